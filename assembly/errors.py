@@ -1,0 +1,100 @@
+"""What is raised on purpose, and the checks of arguments that raise it.
+
+Bad input raises `InputError` at once. Its text names the argument, what came and what was expected.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["AssemblyError", "InputError", "integer", "number", "positive", "real_array", "vector"]
+
+
+class AssemblyError(Exception):
+    """Base of everything this library raises on purpose."""
+
+
+class InputError(AssemblyError, ValueError):
+    """An argument that cannot be used; the text says which, what came and what was expected."""
+
+
+def _shown(value: Any) -> str:
+    """A short form of any value for a message."""
+    if isinstance(value, np.ndarray) and value.size > 8:
+        return f"an array of shape {value.shape}"
+    text = repr(value)
+    return text if len(text) <= 80 else text[:77] + "..."
+
+
+def real_array(name: str, value: ArrayLike, shape: Sequence[int | str]) -> NDArray[np.float64]:
+    """A new array of finite doubles of the given shape.
+
+    Parameters
+    ----------
+    name
+        The argument's name, for the message.
+    value
+        What came.
+    shape
+        The expected shape; a string stands for any extent of at least one.
+
+    Raises
+    ------
+    InputError
+        Not numeric, another shape, or not finite.
+    """
+    wanted = "(" + ", ".join(str(extent) for extent in shape) + ("," if len(shape) == 1 else "") + ")"
+    try:
+        array = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{name} is {_shown(value)}; expected real numbers of shape {wanted}") from None
+    fits = array.ndim == len(shape) and all(
+        (has >= 1 if isinstance(want, str) else has == want) for has, want in zip(array.shape, shape, strict=True)
+    )
+    if not fits:
+        raise InputError(f"{name} has shape {array.shape}; expected {wanted}")
+    finite = np.isfinite(array)
+    if not finite.all():
+        where = tuple(int(k) for k in np.argwhere(~finite)[0])
+        raise InputError(f"{name}[{', '.join(map(str, where))}] is {array[where]}; expected finite numbers")
+    return array
+
+
+def vector(name: str, value: ArrayLike, length: int = 3) -> NDArray[np.float64]:
+    """A finite vector of the given length."""
+    return real_array(name, value, (length,))
+
+
+def number(name: str, value: Any) -> float:
+    """A finite real number."""
+    try:
+        result = float(value)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"{name} is {_shown(value)}; expected a finite real number") from None
+    if not np.isfinite(result):
+        raise InputError(f"{name} is {result}; expected a finite real number")
+    return result
+
+
+def positive(name: str, value: Any) -> float:
+    """A finite number above zero."""
+    result = number(name, value)
+    if result <= 0.0:
+        raise InputError(f"{name} is {result:g}; expected a positive number")
+    return result
+
+
+def integer(name: str, value: Any, low: int, high: int) -> int:
+    """An integer from low to high, both included."""
+    try:
+        result = operator.index(value)
+    except TypeError:
+        raise InputError(f"{name} is {_shown(value)}; expected an integer from {low} to {high}") from None
+    if not low <= result <= high:
+        raise InputError(f"{name} is {result}; expected an integer from {low} to {high}")
+    return result

@@ -1,0 +1,1 @@
+"""Shapes in body coordinates: curves, surfaces, faces and makers of common shapes."""

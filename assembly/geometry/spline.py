@@ -1,0 +1,234 @@
+"""Rational spline points and derivatives inside kernels.
+
+A surface is packed as one power table per span: with s = u - (middle of the span) and t likewise,
+
+    (w x, w y, w z, w)(u, v) = sum_kl  c[k, l] s^k t^l,
+
+four lanes a coefficient, evaluated by Horner's rule with both derivatives at once. Degrees up to
+three share one unrolled bicubic path (missing powers are zero); higher degrees run in loops.
+
+A surface is a record of `SURFACE_RECORD` integers in the table, a curve one of `CURVE_RECORD`:
+offsets point into the pool of doubles.
+"""
+
+from __future__ import annotations
+
+from assembly._kernel import kernel, lane, load_lanes, store_xyz
+
+SURFACE_RECORD = 12
+# Fields of a surface record.
+DEGREE_U, DEGREE_V, SPANS_U, SPANS_V, BREAKS_U, BREAKS_V, COEFFICIENTS = 0, 1, 2, 3, 4, 5, 6
+CLOSED_U, CLOSED_V, SIGN, CELLS, CELL_COUNT = 7, 8, 9, 10, 11
+CURVE_RECORD = 5
+# Fields of a curve record.
+CURVE_DEGREE, CURVE_SPANS, CURVE_BREAKS, CURVE_COEFFICIENTS, CURVE_CLOSED = 0, 1, 2, 3, 4
+
+
+@kernel(inline=True)
+def find_span(pool, breaks, count, u):
+    """Index of the span that holds u; the first or last one beyond the ends."""
+    lo = 0
+    hi = count
+    while hi - lo > 1:
+        mid = (lo + hi) >> 1
+        if u >= pool[breaks + mid]:
+            lo = mid
+        else:
+            hi = mid
+    return lo
+
+
+@kernel(inline=True)
+def _row3(pool, o, t):
+    """Cubic in t: value, first and second derivative, four lanes each."""
+    a = load_lanes(pool, o)
+    b = load_lanes(pool, o + 4)
+    c = load_lanes(pool, o + 8)
+    d = load_lanes(pool, o + 12)
+    return a + t * (b + t * (c + t * d)), b + t * (2.0 * c + t * (3.0 * d)), 2.0 * c + (6.0 * t) * d
+
+
+@kernel(inline=True)
+def _bicubic(pool, o, s, t):
+    """Homogeneous value and derivatives (A, Au, Av, Auu, Auv, Avv) of a bicubic piece."""
+    a, av, avv = _row3(pool, o, t)
+    b, bv, bvv = _row3(pool, o + 16, t)
+    c, cv, cvv = _row3(pool, o + 32, t)
+    d, dv, dvv = _row3(pool, o + 48, t)
+    return (
+        a + s * (b + s * (c + s * d)),
+        b + s * (2.0 * c + s * (3.0 * d)),
+        av + s * (bv + s * (cv + s * dv)),
+        2.0 * c + (6.0 * s) * d,
+        bv + s * (2.0 * cv + s * (3.0 * dv)),
+        avv + s * (bvv + s * (cvv + s * dvv)),
+    )
+
+
+@kernel(inline=True)
+def _row(pool, o, degree, t):
+    """The same as `_row3` for any degree; the second derivative comes halved."""
+    p = load_lanes(pool, o + 4 * degree)
+    d = 0.0 * p
+    h = 0.0 * p
+    for k in range(degree - 1, -1, -1):
+        h = d + t * h
+        d = p + t * d
+        p = load_lanes(pool, o + 4 * k) + t * p
+    return p, d, h
+
+
+@kernel(inline=True)
+def _any_degree(pool, o, degree_u, degree_v, s, t):
+    """Homogeneous value and derivatives for any degree, Horner in u over Horner in v."""
+    stride = 4 * (degree_v + 1)
+    p, pv, pvv = _row(pool, o + stride * degree_u, degree_v, t)
+    d = 0.0 * p
+    dv = 0.0 * p
+    h = 0.0 * p
+    for k in range(degree_u - 1, -1, -1):
+        h = d + s * h
+        d = p + s * d
+        dv = pv + s * dv
+        a, av, avv = _row(pool, o + stride * k, degree_v, t)
+        p = a + s * p
+        pv = av + s * pv
+        pvv = avv + s * pvv
+    return p, d, pv, 2.0 * h, dv, 2.0 * pvv
+
+
+@kernel(inline=True)
+def _quotient(a, au, av, auu, auv, avv):
+    """Divide by the weight: rational derivatives from homogeneous ones."""
+    i = 1.0 / lane(a, 3)
+    wu = lane(au, 3)
+    wv = lane(av, 3)
+    p = i * a
+    pu = i * (au - wu * p)
+    pv = i * (av - wv * p)
+    return (
+        p,
+        pu,
+        pv,
+        i * (auu - (2.0 * wu) * pu - lane(auu, 3) * p),
+        i * (auv - wu * pv - wv * pu - lane(auv, 3) * p),
+        i * (avv - (2.0 * wv) * pv - lane(avv, 3) * p),
+    )
+
+
+@kernel(inline=True)
+def surface_lanes(table, pool, r, u, v):
+    """S, Su, Sv, Suu, Suv, Svv of the surface whose record starts at r, as four-lane values."""
+    iu = find_span(pool, table[r + BREAKS_U], table[r + SPANS_U], u)
+    iv = find_span(pool, table[r + BREAKS_V], table[r + SPANS_V], v)
+    ou = table[r + BREAKS_U] + iu
+    ov = table[r + BREAKS_V] + iv
+    s = u - 0.5 * (pool[ou] + pool[ou + 1])
+    t = v - 0.5 * (pool[ov] + pool[ov + 1])
+    p = table[r + DEGREE_U]
+    q = table[r + DEGREE_V]
+    o = table[r + COEFFICIENTS] + 4 * (p + 1) * (q + 1) * (iu * table[r + SPANS_V] + iv)
+    if p == 3 and q == 3:
+        a, au, av, auu, auv, avv = _bicubic(pool, o, s, t)
+    else:
+        a, au, av, auu, auv, avv = _any_degree(pool, o, p, q, s, t)
+    return _quotient(a, au, av, auu, auv, avv)
+
+
+@kernel(inline=True)
+def xyz(a):
+    return (lane(a, 0), lane(a, 1), lane(a, 2))
+
+
+@kernel
+def surface_point(table, pool, r, u, v):
+    """S, Su, Sv, Suu, Suv, Svv as 3-tuples."""
+    a, au, av, auu, auv, avv = surface_lanes(table, pool, r, u, v)
+    return xyz(a), xyz(au), xyz(av), xyz(auu), xyz(auv), xyz(avv)
+
+
+@kernel(inline=True)
+def into_domain(pool, breaks, count, closed, u):
+    """u itself, wrapped where the direction is closed; beyond the ends by rounding alone, the end.
+
+    The second value is False where u is outside or not finite.
+    """
+    low = pool[breaks]
+    high = pool[breaks + count]
+    if low <= u <= high:
+        return u, True
+    if not -1e300 < u < 1e300:
+        return low, False
+    if closed != 0:
+        # The remainder of a tiny negative number rounds to the whole period.
+        return min(max(low + (u - low) % (high - low), low), high), True
+    slack = 1e-14 * (high - low)
+    return min(max(u, low), high), low - slack <= u <= high + slack
+
+
+@kernel
+def evaluate_surface(table, pool, u, v, order, out):
+    """Points and derivatives to `order` at flat parameters into flat `out`, quantity by quantity.
+
+    Returns -1, or 2 i for a parameter u[i] that is not in the domain, or 2 i + 1 for v[i].
+    """
+    count = u.size
+    block = 3 * count
+    for i in range(count):
+        x, fits = into_domain(pool, table[BREAKS_U], table[SPANS_U], table[CLOSED_U], u[i])
+        if not fits:
+            return 2 * i
+        y, fits = into_domain(pool, table[BREAKS_V], table[SPANS_V], table[CLOSED_V], v[i])
+        if not fits:
+            return 2 * i + 1
+        a, au, av, auu, auv, avv = surface_lanes(table, pool, 0, x, y)
+        o = 3 * i
+        store_xyz(a, out, o)
+        if order >= 1:
+            store_xyz(au, out, o + block)
+            store_xyz(av, out, o + 2 * block)
+        if order >= 2:
+            store_xyz(auu, out, o + 3 * block)
+            store_xyz(auv, out, o + 4 * block)
+            store_xyz(avv, out, o + 5 * block)
+    return -1
+
+
+@kernel(inline=True)
+def curve_lanes(table, pool, r, t):
+    """C, Ct, Ctt of the curve whose record starts at r, as four-lane values."""
+    span = find_span(pool, table[r + CURVE_BREAKS], table[r + CURVE_SPANS], t)
+    at = table[r + CURVE_BREAKS] + span
+    s = t - 0.5 * (pool[at] + pool[at + 1])
+    degree = table[r + CURVE_DEGREE]
+    a, d, h = _row(pool, table[r + CURVE_COEFFICIENTS] + 4 * (degree + 1) * span, degree, s)
+    i = 1.0 / lane(a, 3)
+    p = i * a
+    pt = i * (d - lane(d, 3) * p)
+    return p, pt, i * (2.0 * h - (2.0 * lane(d, 3)) * pt - (2.0 * lane(h, 3)) * p)
+
+
+@kernel
+def curve_point(table, pool, r, t):
+    """C, Ct, Ctt as 3-tuples (z is zero for plane curves)."""
+    a, d, h = curve_lanes(table, pool, r, t)
+    return xyz(a), xyz(d), xyz(h)
+
+
+@kernel
+def evaluate_curve(table, pool, t, order, out):
+    """Points and derivatives to `order` at flat parameters into flat `out`; -1, or the index of a bad parameter."""
+    count = t.size
+    block = 3 * count
+    for i in range(count):
+        x, fits = into_domain(pool, table[CURVE_BREAKS], table[CURVE_SPANS], table[CURVE_CLOSED], t[i])
+        if not fits:
+            return i
+        a, d, h = curve_lanes(table, pool, 0, x)
+        o = 3 * i
+        store_xyz(a, out, o)
+        if order >= 1:
+            store_xyz(d, out, o + block)
+        if order >= 2:
+            store_xyz(h, out, o + 2 * block)
+    return -1
