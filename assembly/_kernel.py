@@ -1,0 +1,321 @@
+"""The one door to Numba: `@kernel`, a cache that cannot be stale, and values of four lanes.
+
+A kernel is a compiled function. Kernels that other kernels call in their inner loops are marked
+``@kernel(inline=True)``; the rest are cached on disk, in a folder named by a hash of all kernel
+sources, because Numba's own cache does not notice an edit in another file. An entry is one file
+with its own checksum, so that no reader can meet a half-written or damaged one.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import operator
+import os
+import pickle
+import shutil
+import stat
+import sys
+import tempfile
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import llvmlite
+import numba
+import numpy as np
+from llvmlite import ir
+from numba import njit, types
+from numba.core import caching, config, serialize
+from numba.core.compiler import CompileResult
+from numba.core.datamodel import models
+from numba.extending import intrinsic, overload, register_model
+
+__all__ = ["kernel", "lane", "load_lanes", "store_xyz"]
+
+_PACKAGE = Path(__file__).resolve().parent
+_LOG = logging.getLogger("assembly")
+_STAMP_LENGTH = 24
+_FOLDERS_KEPT = 4
+
+
+def _source_stamp(package: Path) -> str | None:
+    """Hash of every kernel source and of what compiles it; None where the sources cannot be read.
+
+    A kernel source is a file of the package that names this module. Settings that change the
+    machine code, and versions whose entries cannot be exchanged, are part of the hash.
+    """
+    toolchain = (sys.implementation.cache_tag, numba.__version__, llvmlite.__version__, np.__version__)
+    settings = (config.OPT, config.BOUNDSCHECK, config.LOOP_VECTORIZE, config.SLP_VECTORIZE)
+    digest = hashlib.sha256(repr((toolchain, settings)).encode())
+    found = False
+    for path in sorted(package.rglob("*.py")):
+        text = path.read_bytes()
+        if b"_kernel" in text:
+            found = True
+            digest.update(path.relative_to(package).as_posix().encode() + b"\0" + text + b"\0")
+    return digest.hexdigest()[:_STAMP_LENGTH] if found else None
+
+
+def _user_folder() -> Path:
+    """The user's cache."""
+    base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA")
+    return Path(base or os.path.expanduser("~/.cache")) / "assembly"
+
+
+def _temporary_folder() -> Path:
+    """The same among the temporary files, and private: entries are unpickled, so nobody else may write them."""
+    user = os.getuid() if hasattr(os, "getuid") else 0
+    folder = Path(tempfile.gettempdir()) / f"assembly-{user}"
+    folder.mkdir(mode=0o700, exist_ok=True)
+    status = folder.lstat()
+    if os.name != "nt" and (not stat.S_ISDIR(status.st_mode) or status.st_uid != user or status.st_mode & 0o022):
+        raise PermissionError(f"{folder} can be written by somebody else")
+    return folder
+
+
+def _cache_folder(stamp: str | None) -> Path | None:
+    """A writable folder for this stamp, or None: then kernels are compiled in every process."""
+    if stamp is None:
+        return None
+    for root in (_user_folder, _temporary_folder):
+        try:
+            folder = root() / stamp
+            is_new = not folder.exists()
+            folder.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=folder):
+                os.utime(folder)  # the time of last use, by which old folders are dropped
+        except OSError as error:
+            _LOG.info("no kernel cache there: %s", error)
+            continue
+        if is_new:
+            _drop_old_folders(folder.parent)
+        return folder
+    return None
+
+
+def _drop_old_folders(root: Path) -> None:
+    """Keep the few stamps used last. A process that still uses a dropped one compiles again."""
+    used: list[tuple[float, Path]] = []
+    for folder in root.iterdir():
+        try:
+            if len(folder.name) == _STAMP_LENGTH and folder.is_dir():
+                used.append((folder.stat().st_mtime, folder))
+        except OSError:  # another process dropped it first
+            continue
+    for _, folder in sorted(used, reverse=True)[_FOLDERS_KEPT:]:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+_FOLDER = _cache_folder(_source_stamp(_PACKAGE))
+
+
+class _Cache(caching._Cache):  # type: ignore[misc]
+    """The compiled forms of one kernel on disk: a checksum, then what Numba needs to load it.
+
+    One file a signature, found by name and replaced as a whole: processes that run at the same
+    time can at worst write the same entry twice. Whatever is wrong with an entry, the answer is to
+    compile again.
+    """
+
+    _announced = False
+
+    def __init__(self, function: Callable[..., Any], folder: Path) -> None:
+        self._function = function
+        self._folder = folder
+
+    @property
+    def cache_path(self) -> str:
+        return str(self._folder)
+
+    def enable(self) -> None:
+        """Nothing to do: whether a kernel is cached is decided when it is made."""
+
+    def disable(self) -> None:
+        """Nothing to do, as in `enable`."""
+
+    def flush(self) -> None:
+        for path in self._folder.glob(f"{self._title()}-*"):
+            path.unlink(missing_ok=True)
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        target_context.refresh()
+        path = self._path(sig, target_context.codegen())
+        try:
+            entry = path.read_bytes()
+            payload = entry[32:]
+            if hashlib.sha256(payload).digest() != entry[:32]:
+                raise ValueError("the checksum does not fit")
+            return CompileResult._rebuild(target_context, *pickle.loads(payload))
+        except FileNotFoundError:
+            if not _Cache._announced:
+                _Cache._announced = True
+                _LOG.warning("compiling kernels for the first time (some seconds; kept in %s)", self._folder)
+        except Exception as error:  # loading is a shortcut: nothing that goes wrong in it may stop a solve
+            _LOG.warning("compiling %s again: its cache entry %s is damaged (%s)", self._title(), path, error)
+        return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        if data.library.has_dynamic_globals:
+            warnings.warn(f"{self._title()} uses an address or a large global array and is not cached", stacklevel=2)
+            return
+        payload = serialize.dumps(data._reduce())
+        path = self._path(sig, data.codegen)
+        try:
+            self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            handle, unfinished = tempfile.mkstemp(dir=self._folder)
+            try:
+                with os.fdopen(handle, "wb") as file:
+                    file.write(hashlib.sha256(payload).digest() + payload)
+                os.replace(unfinished, path)
+            except OSError:
+                os.unlink(unfinished)
+                raise
+        except OSError as error:
+            _LOG.info("%s is not cached: %s", self._title(), error)
+
+    def _title(self) -> str:
+        name = f"{self._function.__module__}.{self._function.__qualname__}"
+        return f"{name.replace('<', '').replace('>', '')}-{self._function.__code__.co_firstlineno}"
+
+    def _path(self, sig: Any, codegen: Any) -> Path:
+        """The entry of a signature; a kernel made by a factory also depends on what it closes over."""
+        closed_over = [cell.cell_contents for cell in self._function.__closure__ or ()]
+        key = repr((sig, codegen.magic_tuple())).encode() + self._function.__code__.co_code + serialize.dumps(closed_over)
+        return self._folder / f"{self._title()}-{hashlib.sha256(key).hexdigest()[:32]}"
+
+
+def kernel(function: Callable[..., Any] | None = None, *, inline: bool = False, exact: bool = False) -> Any:
+    """Compile a function with the project's settings.
+
+    Parameters
+    ----------
+    inline
+        Copied into its callers by LLVM and never cached alone: for small helpers.
+    exact
+        No fused multiply-add: for code whose rounding is part of a proof.
+
+    Notes
+    -----
+    A kernel outside this package (a test's, a user's) is compiled in every process: the stamp of
+    the cache knows nothing of its source.
+    """
+    if function is None:
+        return lambda f: kernel(f, inline=inline, exact=exact)
+    fastmath: Any = False if exact else {"contract"}
+    settings: dict[str, Any] = {"fastmath": fastmath, "error_model": "numpy", "nogil": True}
+    if inline:
+        settings["forceinline"] = True
+    compiled = njit(**settings)(function)
+    stamped = _PACKAGE in Path(function.__code__.co_filename).resolve().parents
+    if not config.DISABLE_JIT and not inline and stamped and _FOLDER is not None:
+        compiled._cache = _Cache(function, _FOLDER)
+    return compiled
+
+
+# ------------------------------------------------------------------------------------------------
+# Four lanes: (x, y, z, w) as one vector value. Without JIT the same names work on numpy 4-vectors.
+
+
+class _LanesType(types.Type):  # type: ignore[misc]
+    def __init__(self) -> None:
+        super().__init__(name="Lanes4")
+
+
+_lanes = _LanesType()
+_VECTOR = ir.VectorType(ir.DoubleType(), 4)
+_I32 = ir.IntType(32)
+
+
+@register_model(_LanesType)
+class _LanesModel(models.PrimitiveModel):  # type: ignore[misc]
+    def __init__(self, dmm: Any, fe_type: Any) -> None:
+        super().__init__(dmm, fe_type, _VECTOR)
+
+
+if config.DISABLE_JIT:
+
+    def load_lanes(array: np.ndarray, offset: int) -> Any:
+        """Four consecutive doubles of a flat array."""
+        return array[offset : offset + 4].copy()
+
+    def lane(value: Any, index: int) -> float:
+        """One component of a four-lane value."""
+        return float(value[index])
+
+    def store_xyz(value: Any, array: np.ndarray, offset: int) -> None:
+        """Write lanes 0 to 2 to a flat array."""
+        array[offset : offset + 3] = value[:3]
+
+else:
+
+    @intrinsic  # type: ignore[misc]
+    def load_lanes(_typing: Any, array: Any, offset: Any) -> Any:
+        """Four consecutive doubles of a flat array."""
+
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
+            pointer = builder.bitcast(builder.gep(data, [arguments[1]]), _VECTOR.as_pointer())
+            return builder.load(pointer, align=8)
+
+        return _lanes(array, offset), generate
+
+    @intrinsic  # type: ignore[misc]
+    def lane(_typing: Any, value: Any, index: Any) -> Any:
+        """One component of a four-lane value; the index is a literal."""
+        if not isinstance(index, types.IntegerLiteral):
+            return None
+
+        def generate(_context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            return builder.extract_element(arguments[0], _I32(signature.args[1].literal_value))
+
+        return types.float64(value, index), generate
+
+    @intrinsic  # type: ignore[misc]
+    def store_xyz(_typing: Any, value: Any, array: Any, offset: Any) -> Any:
+        """Write lanes 0 to 2 to a flat array."""
+
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            data = context.make_array(signature.args[1])(context, builder, arguments[1]).data
+            for k in range(3):
+                place = builder.gep(data, [builder.add(arguments[2], arguments[2].type(k))])
+                builder.store(builder.extract_element(arguments[0], _I32(k)), place)
+            return context.get_dummy_value()
+
+        return types.none(value, array, offset), generate
+
+    def _spread(builder: Any, scalar: Any) -> Any:
+        first = builder.insert_element(ir.Constant(_VECTOR, ir.Undefined), scalar, _I32(0))
+        return builder.shuffle_vector(
+            first, ir.Constant(_VECTOR, ir.Undefined), ir.Constant(ir.VectorType(_I32, 4), [0, 0, 0, 0])
+        )
+
+    def _register(symbol: Any, instruction: str) -> None:
+        flags = ("contract",)
+
+        @intrinsic  # type: ignore[misc]
+        def vector_vector(_typing: Any, x: Any, y: Any) -> Any:
+            def generate(_c: Any, builder: Any, _s: Any, a: Any) -> Any:
+                return getattr(builder, instruction)(a[0], a[1], flags=flags)
+
+            return _lanes(x, y), generate
+
+        @intrinsic  # type: ignore[misc]
+        def scalar_vector(_typing: Any, x: Any, y: Any) -> Any:
+            def generate(_c: Any, builder: Any, _s: Any, a: Any) -> Any:
+                return getattr(builder, instruction)(_spread(builder, a[0]), a[1], flags=flags)
+
+            return _lanes(types.float64, y), generate
+
+        @overload(symbol)
+        def _operator(x, y):  # type: ignore[no-untyped-def]  # Numba compares the two signatures
+            if isinstance(x, _LanesType) and isinstance(y, _LanesType):
+                return lambda x, y: vector_vector(x, y)
+            if isinstance(x, types.Float) and isinstance(y, _LanesType):
+                return lambda x, y: scalar_vector(x, y)
+            return None
+
+    _register(operator.add, "fadd")
+    _register(operator.sub, "fsub")
+    _register(operator.mul, "fmul")

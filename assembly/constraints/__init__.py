@@ -1,0 +1,1 @@
+"""What must hold between bodies, and what is wished for."""

@@ -1,0 +1,183 @@
+"""A scene packed into one table of integers and one pool of doubles, and its rows evaluated.
+
+All lengths in a program are divided by the scene's length scale. Table: a header, the slot of
+every body (-1: fixed), then a record a row and a record an objective term. The loop works on
+
+    configuration  (n, 7)   poses, scaled, positions relative to a reference
+    contacts       (k, 4)   parameters of every tracked pair
+    records        (k, R)   what the gap's derivatives need (see `track_contact`)
+    residual       (m,)     rows; jacobian (m, 12) in the twists of the row's two bodies
+"""
+
+from __future__ import annotations
+
+from assembly._kernel import kernel
+from assembly.geometry.vec import add, cross, dot, matvec, quaternion_product, sub
+from assembly.kinematics.motion import position, relative_pose, rotation
+from assembly.proximity.extremal import CONVERGED, SINGULAR, solve_pair
+from assembly.proximity.velocity import add_gap_hessian, gradient_row, store_rates, tangent_rates, z_rows
+
+# Header of the table.
+BODIES, MOVING, CONTACTS, ROWS, TERMS, SLOTS, ROW_TABLE, TERM_TABLE, HEADER = 0, 1, 2, 3, 4, 5, 6, 7, 8
+# A row: kind, its two bodies, their surface records, its contact, and whether it is one-sided (residual >= 0).
+ROW = 8
+KIND, BODY_F, BODY_G, SURFACE_F, SURFACE_G, CONTACT, ONE_SIDED = 0, 1, 2, 3, 4, 5, 6
+CONTACT_ROW = 0
+# A term: kind, body, offset of its parameters.
+TERM = 4
+TERM_KIND, TERM_BODY, TERM_PARAMETERS = 0, 1, 2
+POINT_DISTANCE, POSTURE = 0, 1
+# Header of the pool.
+SCALE, POOL_HEADER = 0, 4
+# A contact's record.
+GAP, NORMAL, ARM_F, ARM_G, RATES, FORM, PROPER, RECORD = 0, 1, 4, 7, 10, 26, 42, 44
+
+
+@kernel(inline=True)
+def load(array, o):
+    return (array[o], array[o + 1], array[o + 2])
+
+
+@kernel(inline=True)
+def save(array, o, a):
+    array[o] = a[0]
+    array[o + 1] = a[1]
+    array[o + 2] = a[2]
+
+
+@kernel
+def track_contact(table, pool, row, q, start, limit, record, z):
+    """Newton on the pair of one contact row; fills its record and z rows. Returns status, parameters, iterations."""
+    i = table[row + BODY_F]
+    j = table[row + BODY_G]
+    turn_f = rotation(q, i)
+    turn, shift = relative_pose(q, i, turn_f, j, rotation(q, j))
+    status, x, count, frame = solve_pair(
+        table, pool, table[row + SURFACE_F], table[row + SURFACE_G], turn, shift, start, 1.0, limit
+    )
+    if status == CONVERGED or status == SINGULAR:
+        n, tx, ty, _pf, pg, e, t, a, c, _r, beta, _regular = frame
+        m, k, regular = tangent_rates(a, c, beta, 1e-9)
+        normal = matvec(turn_f, n)
+        arm_f = matvec(turn_f, pg)
+        arm_g = matvec(turn_f, sub(pg, shift))
+        record[GAP] = beta
+        save(record, NORMAL, normal)
+        save(record, ARM_F, arm_f)
+        save(record, ARM_G, arm_g)
+        store_rates(m, k, a, e, t, record[RATES:FORM], record[FORM:PROPER])
+        # Relative curvature -H (I + beta A)^-1: indefinite means the surfaces cross beside the point.
+        h11 = a[0] - c[0]
+        h12 = a[1] - c[1]
+        h22 = a[2] - c[2]
+        record[PROPER] = 1.0 if h11 * h22 - h12 * h12 > -1e-9 * (h11 * h11 + h22 * h22) and h11 + h22 >= 0.0 else 0.0
+        z_rows(matvec(turn_f, tx), matvec(turn_f, ty), arm_f, arm_g, z)
+    return status, x, count
+
+
+@kernel
+def add_term(table, pool, term, q, gradient, hessian, second):
+    """Value of one objective term; adds its gradient and, when `second`, its Hessian."""
+    body = table[term + TERM_BODY]
+    slot = table[table[SLOTS] + body]
+    o = table[term + TERM_PARAMETERS]
+    weight = pool[o]
+    s = 6 * slot
+    if table[term + TERM_KIND] == POINT_DISTANCE:
+        p = matvec(rotation(q, body), load(pool, o + 1))
+        e = add(sub(position(q, body), load(pool, o + 4)), p)
+        value = weight * dot(e, e)
+        if slot < 0:
+            return value
+        turn = cross(p, e)
+        for k in range(3):
+            gradient[s + k] += 2.0 * weight * e[k]
+            gradient[s + 3 + k] += 2.0 * weight * turn[k]
+        if second:
+            pp = dot(p, p) - dot(e, p)
+            for k in range(3):
+                hessian[s + k, s + k] += 2.0 * weight
+                hessian[s + 3 + k, s + 3 + k] += 2.0 * weight * pp
+                i = (k + 1) % 3
+                j = (k + 2) % 3
+                # d(turn)/dx = [p]x: -p_j at (k, i), +p_i at (k, j).
+                hessian[s + 3 + k, s + i] -= 2.0 * weight * p[j]
+                hessian[s + 3 + k, s + j] += 2.0 * weight * p[i]
+                hessian[s + i, s + 3 + k] -= 2.0 * weight * p[j]
+                hessian[s + j, s + 3 + k] += 2.0 * weight * p[i]
+                for l in range(3):
+                    hessian[s + 3 + k, s + 3 + l] += weight * (p[k] * e[l] + e[k] * p[l] - 2.0 * p[k] * p[l])
+        return value
+    # Posture: |x - x0|^2 + s^2 4 (1 - (e.e0)^2), with c and u the scalar and vector part of e0 e^*.
+    d = sub(position(q, body), load(pool, o + 1))
+    c, ux, uy, uz = quaternion_product(
+        (pool[o + 4], pool[o + 5], pool[o + 6], pool[o + 7]), (q[body, 3], -q[body, 4], -q[body, 5], -q[body, 6])
+    )
+    u = (ux, uy, uz)
+    lever = weight * pool[o + 8] * pool[o + 8]
+    value = weight * dot(d, d) + 4.0 * lever * dot(u, u)
+    if slot < 0:
+        return value
+    for k in range(3):
+        gradient[s + k] += 2.0 * weight * d[k]
+        gradient[s + 3 + k] -= 4.0 * lever * c * u[k]
+    if second:
+        for k in range(3):
+            hessian[s + k, s + k] += 2.0 * weight
+            hessian[s + 3 + k, s + 3 + k] += 2.0 * lever * c * c
+            for l in range(3):
+                hessian[s + 3 + k, s + 3 + l] -= 2.0 * lever * u[k] * u[l]
+    return value
+
+
+@kernel
+def evaluate(table, pool, q, start, limit, contacts, records, z, residual, jacobian):
+    """Track every contact from `start` and evaluate all rows. Returns the worst status and the contact it belongs to."""
+    for r in range(table[ROWS]):
+        row = table[ROW_TABLE] + ROW * r
+        k = table[row + CONTACT]
+        x = (start[k, 0], start[k, 1], start[k, 2], start[k, 3])
+        status, x, _count = track_contact(table, pool, row, q, x, limit, records[k], z[k])
+        contacts[k, 0], contacts[k, 1], contacts[k, 2], contacts[k, 3] = x
+        if status != CONVERGED and status != SINGULAR:
+            return status, k
+        record = records[k]
+        residual[r] = record[GAP]
+        gradient_row(load(record, NORMAL), load(record, ARM_F), load(record, ARM_G), jacobian[r])
+    return CONVERGED, -1
+
+
+@kernel
+def objective(table, pool, q, gradient, hessian, second):
+    """Value, gradient and (when `second`) Hessian of the objective; both arrays are overwritten."""
+    n = 6 * table[MOVING]
+    for i in range(n):
+        gradient[i] = 0.0
+        if second:
+            for j in range(n):
+                hessian[i, j] = 0.0
+    value = 0.0
+    for t in range(table[TERMS]):
+        value += add_term(table, pool, table[TERM_TABLE] + TERM * t, q, gradient, hessian, second)
+    return value
+
+
+@kernel
+def add_row_hessian(table, r, records, z, factor, hessian):
+    """Add factor times the second derivative of row r."""
+    row = table[ROW_TABLE] + ROW * r
+    f = 6 * table[table[SLOTS] + table[row + BODY_F]]
+    g = 6 * table[table[SLOTS] + table[row + BODY_G]]
+    k = table[row + CONTACT]
+    record = records[k]
+    add_gap_hessian(
+        load(record, NORMAL),
+        load(record, ARM_F),
+        load(record, ARM_G),
+        record[FORM:PROPER],
+        z[k],
+        factor,
+        hessian,
+        f,
+        g,
+    )

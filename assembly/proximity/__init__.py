@@ -1,0 +1,27 @@
+"""Where two shapes are closest, how sure we are, and how that moves."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from assembly._lazy import lazy_names
+
+if TYPE_CHECKING:
+    from assembly.proximity.pairs import ContactPair as ContactPair
+    from assembly.proximity.pairs import PairStatus as PairStatus
+    from assembly.proximity.pairs import contact_jacobian as contact_jacobian
+    from assembly.proximity.pairs import extremal_pair as extremal_pair
+    from assembly.proximity.pairs import gap_gradient as gap_gradient
+    from assembly.proximity.pairs import gap_hessian as gap_hessian
+else:
+    __getattr__, __dir__, __all__ = lazy_names(
+        __name__,
+        {
+            "ContactPair": "assembly.proximity.pairs",
+            "PairStatus": "assembly.proximity.pairs",
+            "contact_jacobian": "assembly.proximity.pairs",
+            "extremal_pair": "assembly.proximity.pairs",
+            "gap_gradient": "assembly.proximity.pairs",
+            "gap_hessian": "assembly.proximity.pairs",
+        },
+    )

@@ -1,0 +1,85 @@
+"""A global start for an extremal pair: the nearest cells of two surfaces, then Newton.
+
+Every surface carries cells: small pieces with a sample point and a bounding sphere. The nearest sample of g
+is found for every cell of f; from the nearest such pairs, far enough from one another to
+belong to different minima, Newton runs, and the pair with the smallest |gap| wins. A pair of cells whose spheres are
+farther apart than the best pair found is never tried.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from assembly._kernel import kernel
+from assembly.geometry.spline import CELL_COUNT, CELLS
+from assembly.geometry.vec import add, matvec
+from assembly.proximity.extremal import CONVERGED, LEFT_PATCH, NOT_CONVERGED, SINGULAR, solve_pair
+
+CELL = 9  # doubles a cell: u, v, point, sphere's center, radius
+CANDIDATES = 8
+
+
+@kernel
+def global_start(table, pool, f, g, rotation, shift, size, limit):
+    """Status, parameters and gap of the extremal pair with the smallest |gap| among those found."""
+    of = table[f + CELLS]
+    og = table[g + CELLS]
+    nf = table[f + CELL_COUNT]
+    ng = table[g + CELL_COUNT]
+    px = np.empty(ng)
+    py = np.empty(ng)
+    pz = np.empty(ng)
+    for j in range(ng):
+        o = og + CELL * j
+        px[j], py[j], pz[j] = add(matvec(rotation, (pool[o + 2], pool[o + 3], pool[o + 4])), shift)
+    nearest = np.empty(nf, np.int64)
+    distance = np.empty(nf)
+    for i in range(nf):
+        o = of + CELL * i
+        x = pool[o + 2]
+        y = pool[o + 3]
+        z = pool[o + 4]
+        best = 1e300
+        where = 0
+        for j in range(ng):
+            d = (px[j] - x) * (px[j] - x) + (py[j] - y) * (py[j] - y) + (pz[j] - z) * (pz[j] - z)
+            if d < best:
+                best = d
+                where = j
+        nearest[i] = where
+        distance[i] = math.sqrt(best)
+    best_status = NOT_CONVERGED
+    best_gap = 1e300
+    best_x = (0.0, 0.0, 0.0, 0.0)
+    for _ in range(CANDIDATES):
+        i = np.argmin(distance)
+        if distance[i] >= 1e300:
+            break
+        a = of + CELL * i
+        b = og + CELL * nearest[i]
+        reach = pool[a + 8] + pool[b + 8]
+        if best_status != NOT_CONVERGED and distance[i] - 2.0 * reach > abs(best_gap):
+            break
+        start = (pool[a], pool[a + 1], pool[b], pool[b + 1])
+        status, x, _count, frame = solve_pair(table, pool, f, g, rotation, shift, start, size, limit)
+        if status != NOT_CONVERGED:
+            gap = frame[10]
+            # A true extremum beats a point held at the end of a patch.
+            better = abs(gap) < abs(best_gap)
+            if best_status == LEFT_PATCH and status != LEFT_PATCH:
+                better = True
+            if status == LEFT_PATCH and (best_status == CONVERGED or best_status == SINGULAR):
+                better = False
+            if better:
+                best_status = status
+                best_gap = gap
+                best_x = x
+        # Neighbors of this cell would lead to the same minimum.
+        for k in range(nf):
+            o = of + CELL * k
+            d = (pool[o + 2] - pool[a + 2]) ** 2 + (pool[o + 3] - pool[a + 3]) ** 2 + (pool[o + 4] - pool[a + 4]) ** 2
+            if math.sqrt(d) <= 2.0 * (pool[a + 8] + pool[o + 8]):
+                distance[k] = 1e300
+    return best_status, best_x, best_gap

@@ -1,0 +1,1 @@
+"""From constraints to poses: the loop, its options, and what it hands back."""

@@ -1,0 +1,44 @@
+"""The dense step: Cholesky factorization that says whether the matrix is positive definite."""
+
+from __future__ import annotations
+
+import math
+
+from assembly._kernel import kernel
+
+
+@kernel
+def factorize(m, n):
+    """Cholesky in the upper triangle of m, m = U^T U, diagonal stored inverted; False where not positive definite.
+
+    Right-looking: rows are updated along memory, which vectorizes.
+    """
+    for k in range(n):
+        pivot = m[k, k]
+        if not pivot > 0.0:
+            return False
+        inverse = 1.0 / math.sqrt(pivot)
+        m[k, k] = inverse
+        for j in range(k + 1, n):
+            m[k, j] *= inverse
+        for i in range(k + 1, n):
+            f = m[k, i]
+            if f != 0.0:
+                for j in range(i, n):
+                    m[i, j] -= f * m[k, j]
+    return True
+
+
+@kernel
+def substitute(m, n, b):
+    """Solve U^T U x = b in place, for the factor that `factorize` left."""
+    for k in range(n):
+        s = b[k] * m[k, k]
+        b[k] = s
+        for i in range(k + 1, n):
+            b[i] -= m[k, i] * s
+    for k in range(n - 1, -1, -1):
+        s = b[k]
+        for i in range(k + 1, n):
+            s -= m[k, i] * b[i]
+        b[k] = s * m[k, k]
