@@ -76,7 +76,8 @@ def surface_cells(surface: NurbsSurface, count: int = COUNT) -> Array:
         large = order[radius[order] >= _ROUND * radius[order[0]]][: count - len(points)]
         kept = np.ones(len(points), dtype=bool)
         kept[large] = False
-        new_points, new_box = [], []
+        new_points: list[Array] = []
+        new_box: list[Array] = []
         for axis, chosen in ((1, large[along_u[large]]), (2, large[~along_u[large]])):
             new_points += _halves(points[chosen], axis)
             lower, upper = box[chosen].copy(), box[chosen].copy()
