@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from assembly.geometry.surface import NurbsSurface
 
-__all__ = ["COUNT", "surface_cells"]
+__all__ = ["COUNT", "split", "surface_cells"]
 
 Array = NDArray[np.float64]
 COUNT = 128
@@ -48,8 +48,8 @@ def _measures(points: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
     return center, radius, long_u >= long_v
 
 
-def surface_cells(surface: NurbsSurface, count: int = COUNT) -> Array:
-    """Cells that cover a surface.
+def split(surface: NurbsSurface, count: int = COUNT) -> tuple[Array, Array, Array]:
+    """Boxes in (u, v) that tile the domain, with spheres around the surface over them.
 
     Parameters
     ----------
@@ -60,13 +60,14 @@ def surface_cells(surface: NurbsSurface, count: int = COUNT) -> Array:
 
     Returns
     -------
-    (cells, 9) array
-        u and v of the middle, the surface point there (3), sphere center (3), sphere radius.
+    boxes : (cells, 4)
+        u_low, u_high, v_low, v_high.
+    centers : (cells, 3)
+    radii : (cells,)
     """
     pieces = surface.bezier_pieces()
     points = pieces.reshape((-1,) + pieces.shape[2:])
     at_u, at_v = surface.breaks()
-    # Parameter boxes (cells, 4): u_low, u_high, v_low, v_high.
     low = np.meshgrid(at_u[:-1], at_v[:-1], indexing="ij")
     high = np.meshgrid(at_u[1:], at_v[1:], indexing="ij")
     box = np.stack([low[0].ravel(), high[0].ravel(), low[1].ravel(), high[1].ravel()], axis=1)
@@ -93,7 +94,14 @@ def surface_cells(surface: NurbsSurface, count: int = COUNT) -> Array:
         center = np.concatenate([center[kept], measured[0]])
         radius = np.concatenate([radius[kept], measured[1]])
         along_u = np.concatenate([along_u[kept], measured[2]])
-    middle_u = 0.5 * (box[:, 0] + box[:, 1])
-    middle_v = 0.5 * (box[:, 2] + box[:, 3])
-    at = surface.evaluate(middle_u, middle_v)
-    return np.column_stack([middle_u, middle_v, at, center, radius])
+    return box, center, radius
+
+
+def surface_cells(surface: NurbsSurface, count: int = COUNT) -> Array:
+    """The cells of `split` as kernels read them: (cells, 9).
+
+    A row is u and v of the middle of a cell, the surface point there, the center of its sphere, its radius.
+    """
+    box, center, radius = split(surface, count)
+    u, v = 0.5 * (box[:, 0] + box[:, 1]), 0.5 * (box[:, 2] + box[:, 3])
+    return np.column_stack([u, v, surface.evaluate(u, v), center, radius])

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly.errors import InputError, integer, number, real_array
 from assembly.geometry import bezier
+from assembly.geometry.cells import surface_cells
 from assembly.geometry.curve import COINCIDENT, checked_name, checked_weights, flat, parameters, similarity
 from assembly.geometry.spline import CELL_COUNT, CELLS, SURFACE_RECORD, evaluate_surface
 
@@ -237,8 +238,6 @@ class NurbsSurface:
 
     @cached_property
     def _packed(self) -> tuple[NDArray[np.int64], Array]:
-        from assembly.geometry.cells import surface_cells
-
         record, pool = self._tables
         cells = surface_cells(self)
         record = record.copy()
@@ -282,11 +281,12 @@ class NurbsSurface:
         at_u, at_v = parameters("u", u), parameters("v", v)
         if at_u.shape != at_v.shape:
             try:
-                at_u, at_v = np.broadcast_arrays(at_u, at_v)
+                shape = np.broadcast_shapes(at_u.shape, at_v.shape)
             except ValueError:
                 raise InputError(
                     f"u and v have shapes {at_u.shape} and {at_v.shape}; expected shapes that broadcast"
                 ) from None
+            at_u, at_v = np.broadcast_to(at_u, shape), np.broadcast_to(at_v, shape)
         record, pool = self._tables
         row_u, row_v = flat(at_u), flat(at_v)
         out = np.empty(3 * _QUANTITIES[order] * row_u.size)
@@ -318,12 +318,12 @@ class NurbsSurface:
         normal = np.cross(su, sv)
         inward = inward_u * (np.cross(suu, sv) + np.cross(su, suv)) + inward_v * (np.cross(suv, sv) + np.cross(su, svv))
         length = np.linalg.norm(normal, axis=-1, keepdims=True)
-        pole = length <= _POLE * np.linalg.norm(inward, axis=-1, keepdims=True)
+        # Below rounding of the products Su x Sv is noise without a direction.
+        noise = 1e-14 * np.linalg.norm(su, axis=-1, keepdims=True) * np.linalg.norm(sv, axis=-1, keepdims=True)
+        pole = length <= np.maximum(_POLE * np.linalg.norm(inward, axis=-1, keepdims=True), noise)
         normal = np.where(pole, inward, normal)
         length = np.linalg.norm(normal, axis=-1, keepdims=True)
-        # Anything below rounding of the products is noise without a direction.
-        area = (u1 - u0) * (v1 - v0)
-        floor = 1e-14 * self.size**2 / area
-        if (length <= np.where(pole, floor, 0.0)).any():
+        floor = 1e-14 * self.size**2 / ((u1 - u0) * (v1 - v0))
+        if (pole & (length <= floor)).any():
             raise InputError("u, v hit a point without a normal: Su x Sv and its derivative into the domain vanish")
         return np.asarray(normal / length)
