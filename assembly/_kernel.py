@@ -111,7 +111,7 @@ def _drop_old_folders(root: Path) -> None:
 _FOLDER = _cache_folder(_source_stamp(_PACKAGE))
 
 
-class _Cache(caching._Cache):  # type: ignore[misc]
+class _Cache(caching._Cache):
     """The compiled forms of one kernel on disk: a checksum, then what Numba needs to load it.
 
     One file a signature, found by name and replaced as a whole: processes that run at the same
@@ -182,7 +182,8 @@ class _Cache(caching._Cache):  # type: ignore[misc]
     def _path(self, sig: Any, codegen: Any) -> Path:
         """The entry of a signature; a kernel made by a factory also depends on what it closes over."""
         closed_over = [cell.cell_contents for cell in self._function.__closure__ or ()]
-        key = repr((sig, codegen.magic_tuple())).encode() + self._function.__code__.co_code + serialize.dumps(closed_over)
+        key = repr((sig, codegen.magic_tuple())).encode() + self._function.__code__.co_code
+        key += serialize.dumps(closed_over)
         return self._folder / f"{self._title()}-{hashlib.sha256(key).hexdigest()[:32]}"
 
 
@@ -218,7 +219,7 @@ def kernel(function: Callable[..., Any] | None = None, *, inline: bool = False, 
 # Four lanes: (x, y, z, w) as one vector value. Without JIT the same names work on numpy 4-vectors.
 
 
-class _LanesType(types.Type):  # type: ignore[misc]
+class _LanesType(types.Type):
     def __init__(self) -> None:
         super().__init__(name="Lanes4")
 
@@ -229,7 +230,7 @@ _I32 = ir.IntType(32)
 
 
 @register_model(_LanesType)
-class _LanesModel(models.PrimitiveModel):  # type: ignore[misc]
+class _LanesModel(models.PrimitiveModel):
     def __init__(self, dmm: Any, fe_type: Any) -> None:
         super().__init__(dmm, fe_type, _VECTOR)
 
@@ -250,7 +251,7 @@ if config.DISABLE_JIT:
 
 else:
 
-    @intrinsic  # type: ignore[misc]
+    @intrinsic
     def load_lanes(_typing: Any, array: Any, offset: Any) -> Any:
         """Four consecutive doubles of a flat array."""
 
@@ -261,7 +262,7 @@ else:
 
         return _lanes(array, offset), generate
 
-    @intrinsic  # type: ignore[misc]
+    @intrinsic
     def lane(_typing: Any, value: Any, index: Any) -> Any:
         """One component of a four-lane value; the index is a literal."""
         if not isinstance(index, types.IntegerLiteral):
@@ -272,7 +273,7 @@ else:
 
         return types.float64(value, index), generate
 
-    @intrinsic  # type: ignore[misc]
+    @intrinsic
     def store_xyz(_typing: Any, value: Any, array: Any, offset: Any) -> Any:
         """Write lanes 0 to 2 to a flat array."""
 
@@ -294,14 +295,14 @@ else:
     def _register(symbol: Any, instruction: str) -> None:
         flags = ("contract",)
 
-        @intrinsic  # type: ignore[misc]
+        @intrinsic
         def vector_vector(_typing: Any, x: Any, y: Any) -> Any:
             def generate(_c: Any, builder: Any, _s: Any, a: Any) -> Any:
                 return getattr(builder, instruction)(a[0], a[1], flags=flags)
 
             return _lanes(x, y), generate
 
-        @intrinsic  # type: ignore[misc]
+        @intrinsic
         def scalar_vector(_typing: Any, x: Any, y: Any) -> Any:
             def generate(_c: Any, builder: Any, _s: Any, a: Any) -> Any:
                 return getattr(builder, instruction)(_spread(builder, a[0]), a[1], flags=flags)

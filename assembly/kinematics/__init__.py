@@ -1,0 +1,1 @@
+"""Bodies in the world: poses, and how they move."""

@@ -1,0 +1,19 @@
+"""Scenes and solutions to look at, in a browser or in a file; nothing else imports this package."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from assembly._lazy import lazy_names
+
+if TYPE_CHECKING:
+    from assembly.view.browser import save_html as save_html
+    from assembly.view.browser import show as show
+else:
+    __getattr__, __dir__, __all__ = lazy_names(
+        __name__,
+        {
+            "save_html": "assembly.view.browser",
+            "show": "assembly.view.browser",
+        },
+    )

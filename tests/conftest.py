@@ -1,0 +1,36 @@
+"""What every test may use."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import hypothesis
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+
+# The first example of a test may compile kernels, so no deadline; the same examples in every run,
+# so that a failure is one for everybody.
+hypothesis.settings.register_profile("assembly", deadline=None, derandomize=True, max_examples=50)
+hypothesis.settings.load_profile("assembly")
+
+
+@pytest.fixture
+def run_python() -> Callable[..., str]:
+    """Run code in a fresh interpreter with changed environment variables; what it printed.
+
+    A variable given as None is removed. The code sees the modules of this tree, or of `path`.
+    """
+
+    def run(code: str, path: Path = ROOT, **variables: str | None) -> str:
+        wanted = {**os.environ, "PYTHONPATH": str(path), "PYTHONDONTWRITEBYTECODE": "1", **variables}
+        environment = {name: value for name, value in wanted.items() if value is not None}
+        done = subprocess.run([sys.executable, "-c", code], env=environment, cwd=path, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        return done.stdout + done.stderr
+
+    return run

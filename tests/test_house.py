@@ -1,0 +1,130 @@
+"""The rules of the house: what an import costs, which names are public, what kernels may use."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import assembly
+import assembly.proximity
+import assembly.view
+
+ROOT = Path(__file__).resolve().parent.parent
+PACKAGE = ROOT / "assembly"
+HEAVY = ("casadi", "matplotlib", "meshcat", "numba", "numpy", "scipy")
+LAZY = [assembly, assembly.proximity, assembly.view]
+
+
+def imported_modules(path: Path) -> set[str]:
+    """Full names of everything a file imports from this package: modules, and names in them."""
+    names: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            names.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            assert node.level == 0, f"{path}: relative import"
+            names.update((node.module, *(f"{node.module}.{alias.name}" for alias in node.names)))
+    return {name for name in names if name.partition(".")[0] == "assembly"}
+
+
+def source_of(module: str) -> Path | None:
+    """The file of a module of this package, if there is one; packages are not meant."""
+    path = ROOT.joinpath(*module.split(".")).with_suffix(".py")
+    return path if path.is_file() else None
+
+
+KERNEL_FILES = [p for p in sorted(PACKAGE.rglob("*.py")) if "assembly._kernel" in imported_modules(p)]
+
+
+def test_import_is_light(run_python):
+    loaded = run_python(f"import assembly, sys; print([m for m in {HEAVY} if m in sys.modules])")
+    assert loaded.strip() == "[]"
+
+
+def test_scripting_loads_neither_casadi_nor_meshcat(run_python):
+    code = f"""
+import assembly, sys
+for name in assembly.__all__:
+    if name not in ("reference", "view"):
+        getattr(assembly, name)
+print([m for m in {HEAVY} if m in sys.modules and m in ("casadi", "matplotlib", "meshcat")])
+"""
+    assert run_python(code).strip() == "[]"
+
+
+@pytest.mark.parametrize(("package", "name"), [(p, n) for p in LAZY for n in p.__all__], ids=lambda x: str(x))
+def test_public_names_resolve(package, name):
+    value = getattr(package, name)
+    assert name in dir(package)
+    assert value.__name__.rpartition(".")[2] == name
+    assert value.__doc__
+
+
+@pytest.mark.parametrize("package", LAZY, ids=lambda p: p.__name__)
+def test_type_checkers_see_the_same_names(package):
+    tree = ast.parse(Path(package.__file__).read_text())
+    block = next(node for node in tree.body if isinstance(node, ast.If))
+    table = ast.literal_eval(block.orelse[0].value.args[1])
+    seen = {}
+    for node in block.body:
+        assert isinstance(node, ast.ImportFrom)
+        for alias in node.names:
+            assert alias.asname == alias.name, "only `import name as name` is a public name to a type checker"
+            module = f"{node.module}.{alias.name}"
+            seen[alias.name] = module if table.get(alias.name) == module else node.module
+    assert seen == table
+
+
+@pytest.mark.parametrize("package", LAZY, ids=lambda p: p.__name__)
+def test_unknown_names_are_attribute_errors(package):
+    with pytest.raises(AttributeError, match=f"module '{package.__name__}' has no attribute 'NurbsSurfce'") as caught:
+        _ = package.NurbsSurfce
+    assert (caught.value.name, caught.value.obj) == ("NurbsSurfce", package)  # what "Did you mean" is made of
+    with pytest.raises(ImportError):
+        importlib.import_module(f"{package.__name__}.NurbsSurfce")
+
+
+def test_a_name_is_imported_once(monkeypatch):
+    value = assembly.errors
+    monkeypatch.setattr("assembly._lazy.import_module", None)
+    assert assembly.errors is value
+
+
+def test_there_are_kernel_files():
+    assert {"geometry/vec.py", "geometry/spline.py"} <= {p.relative_to(PACKAGE).as_posix() for p in KERNEL_FILES}
+
+
+@pytest.mark.parametrize("path", KERNEL_FILES, ids=lambda p: p.relative_to(PACKAGE).as_posix())
+def test_kernels_use_only_what_the_cache_is_stamped_with(path):
+    # The stamp covers the files that name _kernel. A constant from any other file could change
+    # while the machine code it went into is still found on disk.
+    sources = {source_of(module) for module in imported_modules(path)} - {None}
+    assert PACKAGE / "_kernel.py" in sources
+    assert [s.name for s in sources if b"_kernel" not in s.read_bytes()] == []
+
+
+@pytest.mark.parametrize("path", KERNEL_FILES, ids=lambda p: p.relative_to(PACKAGE).as_posix())
+def test_a_file_holds_kernels_or_objects(path):
+    top = ast.parse(path.read_text()).body
+    assert [node.name for node in top if isinstance(node, ast.ClassDef)] == []
+    for node in top:
+        if isinstance(node, ast.FunctionDef):
+            assert any(ast.unparse(d).startswith("kernel") for d in node.decorator_list), f"{node.name} is no kernel"
+
+
+def test_type_checking_leaves_out_the_kernel_files_only():
+    configuration = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["mypy"]["overrides"]
+    left_out = next(o["module"] for o in configuration if o.get("ignore_errors"))
+    kernels = {".".join(p.relative_to(ROOT).with_suffix("").parts) for p in KERNEL_FILES}
+    assert set(left_out) == kernels
+
+
+def test_readme_commands_are_what_ci_runs():
+    readme = (ROOT / "README.md").read_text()
+    commands = [line for line in readme.splitlines() if line.startswith("pip install")]
+    assert commands == ["pip install . && python examples/paper_clips.py", 'pip install ".[test]" && python -m tests']
+    assert "^pip install" in (ROOT / ".ci/run").read_text()

@@ -1,0 +1,291 @@
+"""The kernel cache, on a small package of its own that holds a copy of assembly/_kernel.py."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import pickle
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import pytest
+
+KERNEL = Path(__file__).resolve().parent.parent / "assembly" / "_kernel.py"
+FILES = {
+    "__init__.py": "",
+    "constants.py": "from small._kernel import kernel\nFACTOR = 2.0\n",
+    "callee.py": """
+from small._kernel import kernel
+@kernel
+def inner(x):
+    return x + 1.0
+@kernel(inline=True)
+def helper(x):
+    return x
+""",
+    "caller.py": """
+from small._kernel import kernel
+from small.callee import helper, inner
+from small.constants import FACTOR
+@kernel
+def outer(x):
+    return FACTOR * helper(inner(x))
+def power(exponent):
+    @kernel
+    def raised(x):
+        return x**exponent
+    return raised
+""",
+}
+# Prints the answer, how often it was found on disk and compiled, and where the cache is.
+CALL = """
+from small.caller import outer
+from small import _kernel
+answer = outer(3.0)
+stats = outer.stats
+print(answer, sum(stats.cache_hits.values()), sum(stats.cache_misses.values()), sep="|", end="|")
+print(_kernel._FOLDER)
+"""
+UNSET = dict.fromkeys(("NUMBA_DISABLE_JIT", "NUMBA_CACHE_LOCATOR_CLASSES", "XDG_CACHE_HOME", "LOCALAPPDATA"))
+
+
+class Package:
+    """A package `small` with kernels, a cache folder, and fresh processes that use both."""
+
+    def __init__(self, folder: Path, run_python) -> None:
+        self.folder = folder / "source" / "small"
+        self.folder.mkdir(parents=True)
+        for name, text in FILES.items():
+            (self.folder / name).write_text(text)
+        shutil.copy(KERNEL, self.folder / "_kernel.py")
+        self.cache = folder / "cache"
+        self._run_python = run_python
+
+    def run(self, code: str = CALL, **variables: str | None) -> str:
+        settings = {**UNSET, "NUMBA_CACHE_DIR": str(self.cache), **variables}
+        return self._run_python(code, path=self.folder.parent, **settings)
+
+    def call(self, **variables: str | None) -> tuple[float, int, int, Path | None]:
+        """Answer, cache hits, compilations, cache folder, of a process that calls `outer(3.0)`."""
+        answer, hits, misses, folder = self.run(**variables).strip().splitlines()[0].split("|")
+        return float(answer), int(hits), int(misses), None if folder == "None" else Path(folder)
+
+    def edit(self, name: str, old: str, new: str) -> None:
+        text = (self.folder / name).read_text()
+        assert text.count(old) == 1
+        (self.folder / name).write_text(text.replace(old, new))
+
+    def entries(self, folder: Path) -> list[Path]:
+        return sorted(folder.iterdir())
+
+
+@pytest.fixture
+def package(tmp_path, run_python) -> Package:
+    return Package(tmp_path, run_python)
+
+
+@pytest.fixture
+def cache_module(package, monkeypatch):
+    """The copied _kernel module in this process, with its cache in the package's cache folder."""
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(package.cache))
+    monkeypatch.syspath_prepend(str(package.folder.parent))
+    monkeypatch.setattr(tempfile, "tempdir", str(package.folder.parent.parent / "temporary"))
+    Path(tempfile.gettempdir()).mkdir()
+    import small._kernel as module
+
+    yield module
+    for name in [name for name in sys.modules if name.partition(".")[0] == "small"]:
+        del sys.modules[name]
+
+
+def test_second_process_loads_what_the_first_compiled(package):
+    answer, hits, misses, folder = package.call()
+    assert (answer, hits, misses) == (8.0, 0, 1)
+    assert folder.parent == package.cache / "assembly"
+    # Two kernels, one signature each: the inlined helper has no entry of its own.
+    assert [p.name.split("-")[0] for p in package.entries(folder)] == ["small.callee.inner", "small.caller.outer"]
+    before = [p.stat().st_mtime_ns for p in package.entries(folder)]
+    assert package.call() == (8.0, 1, 0, folder)
+    assert [p.stat().st_mtime_ns for p in package.entries(folder)] == before
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "answer"),
+    [
+        ("callee.py", "x + 1.0", "x + 2.0", 10.0),  # a callee in another file
+        ("callee.py", "    return x\n", "    return -x\n", -8.0),  # an inlined callee in another file
+        ("constants.py", "2.0", "3.0", 12.0),  # a constant in another file
+        ("caller.py", "FACTOR *", "10.0 * FACTOR *", 80.0),
+    ],
+)
+def test_an_edit_in_any_kernel_file_is_seen(package, name, old, new, answer):
+    stale = package.call()
+    package.edit(name, old, new)
+    fresh = package.call()
+    assert fresh[:3] == (answer, 0, 1)
+    assert fresh[3] != stale[3]
+
+
+def test_an_edit_that_is_undone_finds_the_old_entry(package):
+    before = package.call()[3]
+    package.edit("callee.py", "x + 1.0", "x + 2.0")
+    package.call()
+    package.edit("callee.py", "x + 2.0", "x + 1.0")
+    assert package.call() == (8.0, 1, 0, before)
+
+
+def test_settings_that_change_the_code_have_their_own_folder(package):
+    plain = package.call()
+    checked = package.call(NUMBA_BOUNDSCHECK="1")
+    assert checked[:3] == (8.0, 0, 1)
+    assert checked[3] != plain[3]
+
+
+def flip_a_bit(entry: bytes) -> bytes:
+    middle = len(entry) // 2
+    return entry[:middle] + bytes([entry[middle] ^ 1]) + entry[middle + 1 :]
+
+
+@pytest.mark.parametrize(
+    "damages",
+    [(flip_a_bit, lambda entry: entry[: len(entry) // 2]), (lambda entry: b"", lambda entry: b"not a pickle" * 9)],
+    ids=["flipped bit, half of it", "empty, something else"],
+)
+def test_a_damaged_entry_is_compiled_again(package, damages):
+    folder = package.call()[3]
+    for damage, entry in zip(damages, package.entries(folder), strict=True):
+        entry.write_bytes(damage(entry.read_bytes()))
+    output = package.run()
+    assert output.startswith("8.0|0|1|")
+    assert output.count("is damaged (the checksum does not fit)") == 2
+    assert package.call()[:3] == (8.0, 1, 0)  # and mended
+
+
+def test_an_entry_that_numba_cannot_load_is_compiled_again(package):
+    # A sound checksum around something that Numba does not expect.
+    folder = package.call()[3]
+    for entry in package.entries(folder):
+        payload = pickle.dumps((1, 2, 3))
+        entry.write_bytes(hashlib.sha256(payload).digest() + payload)
+    assert package.run().startswith("8.0|0|1|")
+    assert package.call()[:3] == (8.0, 1, 0)
+
+
+def test_unwritable_cache_falls_back_to_a_private_temporary_folder(package, tmp_path):
+    # Below a regular file no folder can be made, not even by root.
+    (tmp_path / "file").write_text("")
+    (tmp_path / "temporary").mkdir()
+    blocked = {"NUMBA_CACHE_DIR": str(tmp_path / "file" / "cache"), "TMPDIR": str(tmp_path / "temporary")}
+    answer, hits, misses, folder = package.call(**blocked)
+    assert (answer, hits, misses) == (8.0, 0, 1)
+    assert folder.parent.parent == tmp_path / "temporary"
+    assert folder.parent.stat().st_mode & 0o077 == 0
+    assert package.call(**blocked) == (8.0, 1, 0, folder)
+    folder.parent.chmod(0o777)  # others could put code there that we would run: not ours any more
+    assert package.call(**blocked) == (8.0, 0, 1, None)
+
+
+def test_no_writable_place_at_all(package, cache_module, monkeypatch):
+    (package.cache.parent / "file").write_text("")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(package.cache.parent / "file" / "cache"))
+    monkeypatch.setattr(tempfile, "tempdir", str(package.cache.parent / "file"))
+    assert cache_module._cache_folder("0" * 24) is None
+
+
+def test_a_package_without_sources_is_not_cached(cache_module, tmp_path):
+    (tmp_path / "empty").mkdir()
+    assert cache_module._source_stamp(tmp_path / "empty") is None
+    assert cache_module._cache_folder(None) is None
+
+
+def test_cache_that_vanishes_or_fills_up_while_in_use(package):
+    code = """
+import shutil
+from small import _kernel
+from small.caller import outer
+shutil.rmtree(_kernel._FOLDER)
+_kernel._FOLDER.write_text("")
+print(outer(3.0), outer.stats.cache_misses.total(), flush=True)
+_kernel._FOLDER.unlink()
+print(outer(3), outer.stats.cache_misses.total(), len(list(_kernel._FOLDER.iterdir())))
+"""
+    lines = [line for line in package.run(code).splitlines() if line[0].isdigit()]
+    # Integer argument: another signature of both kernels, saved into a folder that is made again.
+    assert lines == ["8.0 1", "8.0 2 2"]
+
+
+def test_compiling_is_logged_once_and_loading_is_not(package):
+    line = "compiling kernels for the first time"
+    code = CALL + "outer(3)\n"
+    assert package.run(code).count(line) == 1
+    assert package.run(code).count(line) == 0
+
+
+def test_kernels_of_a_factory_do_not_share_an_entry(package):
+    code = "from small.caller import power\nprint(power(2)(3.0), power(3)(3.0))"
+    for _ in range(2):
+        assert package.run(code).splitlines()[0] == "9.0 27.0"
+
+
+def test_recompile_replaces_the_entry(package):
+    code = CALL + "outer.recompile()\nprint(outer(3.0), outer.stats.cache_misses.total())"
+    package.call()
+    assert package.run(code).splitlines()[1] == "8.0 1"
+    assert package.call()[:3] == (8.0, 1, 0)
+
+
+def test_concurrent_processes(package):
+    environment = {**os.environ, "PYTHONPATH": str(package.folder.parent), "NUMBA_CACHE_DIR": str(package.cache)}
+    code = CALL.replace("answer = outer(3.0)", "outer(3)\nanswer = outer(3.0)")
+    processes = [
+        subprocess.Popen([sys.executable, "-c", code], env=environment, stdout=subprocess.PIPE, text=True)
+        for _ in range(4)
+    ]
+    answers = [process.communicate()[0].split("|")[0] for process in processes]
+    assert answers == ["8.0"] * 4
+    folder = package.call()[3]
+    # Two kernels with two signatures each, and nothing unfinished left behind.
+    assert len(package.entries(folder)) == 4
+    assert package.call()[:3] == (8.0, 1, 0)
+
+
+def test_only_the_folders_used_last_are_kept(cache_module, package):
+    root = package.cache / "assembly"
+    shutil.rmtree(root)
+    stamps = [f"{k:024d}" for k in range(7)]
+    for age, stamp in enumerate(stamps[:6]):
+        cache_module._cache_folder(stamp)
+        os.utime(root / stamp, (1000.0 + age, 1000.0 + age))
+    (root / "notes").mkdir()  # somebody else's
+    cache_module._cache_folder(stamps[2])  # in use again, so the youngest
+    cache_module._cache_folder(stamps[6])
+    assert sorted(p.name for p in root.iterdir()) == [stamps[2], stamps[4], stamps[5], stamps[6], "notes"]
+
+
+def test_dropping_folders_survives_another_process_doing_the_same(cache_module, package, monkeypatch):
+    root = package.cache / "assembly"
+    for k in range(8):
+        (root / f"{k:024d}").mkdir(exist_ok=True)
+    sound = Path.iterdir
+
+    def iterdir(folder):
+        for found in list(sound(folder)):
+            shutil.rmtree(found)  # dropped between being listed and being looked at
+            yield found
+
+    monkeypatch.setattr(Path, "iterdir", iterdir)
+    cache_module._drop_old_folders(root)
+    monkeypatch.undo()
+    assert list(root.iterdir()) == []
+
+
+def test_a_kernel_outside_the_package_is_not_cached(cache_module):
+    @cache_module.kernel
+    def doubled(x):
+        return 2.0 * x
+
+    assert doubled(2.0) == 4.0
+    assert doubled.stats.cache_path is None
