@@ -28,7 +28,8 @@ TERM = 4
 TERM_KIND, TERM_BODY, TERM_PARAMETERS = 0, 1, 2
 POINT_DISTANCE, POSTURE = 0, 1
 # Header of the pool.
-SCALE, POOL_HEADER = 0, 4
+# length scale, reference point (1 to 3), weight by which the objective was divided.
+SCALE, REFERENCE, WEIGHT, POOL_HEADER = 0, 1, 4, 8
 # A contact's record.
 GAP, NORMAL, ARM_F, ARM_G, RATES, FORM, PROPER, RECORD = 0, 1, 4, 7, 10, 26, 42, 44
 
@@ -71,6 +72,7 @@ def track_contact(table, pool, row, q, start, limit, record, z):
         h12 = a[1] - c[1]
         h22 = a[2] - c[2]
         record[PROPER] = 1.0 if h11 * h22 - h12 * h12 > -1e-9 * (h11 * h11 + h22 * h22) and h11 + h22 >= 0.0 else 0.0
+        record[43] = (h11 * h22 - h12 * h12) / (h11 * h11 + h22 * h22 + 2.0 * h12 * h12)
         z_rows(matvec(turn_f, tx), matvec(turn_f, ty), arm_f, arm_g, z)
     return status, x, count
 

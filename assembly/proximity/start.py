@@ -15,7 +15,8 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly.geometry.spline import CELL_COUNT, CELLS
 from assembly.geometry.vec import add, matvec
-from assembly.proximity.extremal import CONVERGED, LEFT_PATCH, NOT_CONVERGED, SINGULAR, solve_pair
+from assembly.kinematics.motion import position, relative_pose, rotation
+from assembly.proximity.extremal import CONVERGED, LEFT_PATCH, NOT_CONVERGED, SINGULAR, pair_frame, solve_pair
 
 CELL = 9  # doubles a cell: u, v, point, sphere's center, radius
 CANDIDATES = 8
@@ -83,3 +84,25 @@ def global_start(table, pool, f, g, rotation, shift, size, limit):
             if math.sqrt(d) <= 2.0 * (pool[a + 8] + pool[o + 8]):
                 distance[k] = 1e300
     return best_status, best_x, best_gap
+
+
+@kernel
+def find_pair(table, pool, f, g, q, x, size, limit, out):
+    """One pair for Python: from x, or a global start where x is NaN.
+
+    out: parameters (4), point of f (3), point of g (3), normal (3), gap; all in world axes. Returns the status.
+    """
+    turn_f = rotation(q, 0)
+    turn, shift = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
+    if math.isnan(x[0]):
+        status, x, _gap = global_start(table, pool, f, g, turn, shift, size, limit)
+        frame = pair_frame(table, pool, f, g, turn, shift, x)
+    else:
+        status, x, _count, frame = solve_pair(table, pool, f, g, turn, shift, x, size, limit)
+    origin = position(q, 0)
+    out[0], out[1], out[2], out[3] = x
+    out[4], out[5], out[6] = add(matvec(turn_f, frame[3]), origin)
+    out[7], out[8], out[9] = add(matvec(turn_f, frame[4]), origin)
+    out[10], out[11], out[12] = matvec(turn_f, frame[0])
+    out[13] = frame[10]
+    return status

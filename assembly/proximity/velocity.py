@@ -15,9 +15,12 @@ only these rates:
 
 from __future__ import annotations
 
+import numpy as np
+
 from assembly._kernel import kernel
-from assembly.geometry.vec import cross, dot
-from assembly.proximity.extremal import pair_inverse, pair_matrix
+from assembly.geometry.vec import cross, dot, matvec, sub
+from assembly.kinematics.motion import quaternion_columns, relative_pose, rotation
+from assembly.proximity.extremal import pair_frame, pair_inverse, pair_matrix
 
 
 @kernel(inline=True)
@@ -164,3 +167,50 @@ def add_gap_hessian(n, arm_f, arm_g, form, z, factor, out, f, g):
                     value += factor * s
                 out[f + 3 + i, g + 3 + j] += value
                 out[g + 3 + j, f + 3 + i] += value
+
+
+@kernel
+def pair_derivatives(table, pool, f, g, q, x, size, jacobian, gradient, hessian):
+    """The public derivatives of one pair, all at once: (4, 14), (14,) and (12, 12), world axes.
+
+    Returns the pair's residual (lengths over `size`, and the tilt) and whether everything is regular.
+    """
+    turn_f = rotation(q, 0)
+    turn, shift = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
+    n, tx, ty, _pf, pg, e, t, a, c, r, beta, regular = pair_frame(table, pool, f, g, turn, shift, x)
+    error = max(abs(r[0]), abs(r[1])) / size + max(abs(r[2]), abs(r[3]))
+    if not regular:
+        return error, False
+    m, k, isolated = tangent_rates(a, c, beta, 1e-9 / size)
+    rates = np.empty(16)
+    form = np.empty(16)
+    z = np.empty((4, 12))
+    row = np.empty(12)
+    store_rates(m, k, a, e, t, rates, form)
+    normal = matvec(turn_f, n)
+    arm_f = matvec(turn_f, pg)
+    arm_g = matvec(turn_f, sub(pg, shift))
+    z_rows(matvec(turn_f, tx), matvec(turn_f, ty), arm_f, arm_g, z)
+    gradient_row(normal, arm_f, arm_g, row)
+    into_quaternions(row, q, gradient)
+    for i in range(4):
+        for j in range(12):
+            row[j] = 0.0
+            for l in range(4):
+                row[j] += rates[4 * i + l] * z[l, j]
+        into_quaternions(row, q, jacobian[i])
+    hessian[:, :] = 0.0
+    add_gap_hessian(normal, arm_f, arm_g, form, z, 1.0, hessian, 0, 6)
+    return error, isolated
+
+
+@kernel(inline=True)
+def into_quaternions(row, q, out):
+    """A row over the twists of two bodies as a row over (q_f, q_g), (14,)."""
+    for b in range(2):
+        for k in range(3):
+            out[7 * b + k] = row[6 * b + k]
+        w = (row[6 * b + 3], row[6 * b + 4], row[6 * b + 5])
+        out[7 * b + 3], out[7 * b + 4], out[7 * b + 5], out[7 * b + 6] = quaternion_columns(
+            w, q[b, 3], q[b, 4], q[b, 5], q[b, 6]
+        )

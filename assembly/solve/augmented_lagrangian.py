@@ -234,6 +234,8 @@ def solve_program(table, pool, settings, state, history):
     gradient = np.empty(n)
     descent = np.empty(n)
     step = np.empty(n)
+    straight = np.empty(n)
+    bent = np.empty(n)
     lagrangian = np.empty((n, n))
     matrix = np.empty((n, n))
     active = np.empty(m)
@@ -287,7 +289,7 @@ def solve_program(table, pool, settings, state, history):
             history[iteration, 3] = mu
             history[iteration, 4] = shift
             history[iteration, 5] = alpha
-            history[iteration, 6] = radius
+            history[iteration, 6] = records[:, 43].min()
         if violation <= settings[FEASIBILITY] and dual <= settings[STATIONARITY] and not restoring:
             status = SOLVED
             break
@@ -353,6 +355,9 @@ def solve_program(table, pool, settings, state, history):
         noise = 1e-14 * (abs(here) + abs(weight * value) + 1e-300)
         alpha = 1.0
         accepted = False
+        corrections = 0
+        for i in range(n):
+            straight[i] = step[i]
         while alpha > 1e-7:
             move(table, q, step, alpha, trial_q)
             predict(table, contacts, records, z, step, alpha, guess)
@@ -365,6 +370,22 @@ def solve_program(table, pool, settings, state, history):
                 if there <= here + 1e-4 * alpha * slope + noise:
                     accepted = True
                     break
+                if corrections < 2:
+                    # The rows' curvature, not the direction, is at fault as a rule: bend the step back onto the rows.
+                    corrections += 1
+                    for i in range(n):
+                        bent[i] = 0.0
+                    for r in range(m):
+                        forces[r] = -(trial_residual[r] - (1.0 - alpha) * residual[r]) * active[r]
+                    add_transposed(table, jacobian, forces, bent)
+                    substitute(matrix, n, bent)
+                    for i in range(n):
+                        step[i] += bent[i] / alpha
+                    continue
+                if corrections == 2:
+                    for i in range(n):
+                        step[i] = straight[i]
+                    corrections = 3
             alpha *= 0.5
         if not accepted:
             status = STALLED
@@ -372,7 +393,7 @@ def solve_program(table, pool, settings, state, history):
         if not restoring:
             for r in range(m):
                 if active[r] > 0.0:
-                    dy = alpha * (times(table, jacobian, r, step) + residual[r]) / mu
+                    dy = alpha * (times(table, jacobian, r, straight) + residual[r]) / mu
                     y[r] += dy
                     if table[table[ROW_TABLE] + ROW * r + ONE_SIDED] == 1:
                         y[r] = min(y[r], 0.0)

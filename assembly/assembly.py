@@ -1,0 +1,246 @@
+"""Assembly: bodies, what must hold between them, what is wished for, and the solve."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from os import PathLike
+from time import perf_counter
+from typing import Any, Union
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.constraints.contact import Contact
+from assembly.constraints.objectives import Objective, PointDistance, Posture
+from assembly.constraints.packing import Packed, pack
+from assembly.errors import InputError, real_array, vector
+from assembly.kinematics.body import Body
+from assembly.solve.augmented_lagrangian import (
+    COUNT,
+    CULPRIT,
+    DUAL,
+    HISTORY,
+    IMPROPER,
+    OBJECTIVE,
+    RESULTS,
+    VIOLATION,
+    solve_program,
+)
+from assembly.solve.options import Options
+from assembly.solve.solution import Scene, Solution, Status
+
+__all__ = ["Assembly"]
+
+Array = NDArray[np.float64]
+_STATUSES = tuple(Status)
+_DEFAULTS = Options()
+_DEFAULT_SETTINGS = _DEFAULTS.settings()
+
+
+class Assembly:
+    """A scene: rigid bodies, constraints between them, an objective.
+
+    Parameters
+    ----------
+    bodies : iterable of Body
+        Names must be distinct.
+
+    Notes
+    -----
+    The scene is packed once, at the first solve after a change of its bodies, constraints or terms. Targets,
+    weights' ratios aside, and starts may change between solves without packing again.
+    """
+
+    def __init__(self, bodies: Iterable[Body] = ()) -> None:
+        self._bodies: list[Body] = []
+        self._constraints: list[Contact] = []
+        self._objectives: list[tuple[float, Objective]] = []
+        self._packed: Packed | None = None
+        self._scene: Scene | None = None
+        for body in bodies:
+            self.add(body)
+
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """Bodies in the order of q's rows."""
+        return tuple(self._bodies)
+
+    @property
+    def constraints(self) -> tuple[Contact, ...]:
+        """Constraints in the order they were given."""
+        return tuple(self._constraints)
+
+    @property
+    def objectives(self) -> tuple[tuple[float, Objective], ...]:
+        """Terms with their signs: 1 minimized, -1 maximized."""
+        return tuple(self._objectives)
+
+    def __repr__(self) -> str:
+        return f"Assembly({len(self._bodies)} bodies, {len(self._constraints)} constraints)"
+
+    def body(self, name: str) -> Body:
+        """The body of that name."""
+        for body in self._bodies:
+            if body.name == name:
+                return body
+        known = ", ".join(repr(body.name) for body in self._bodies)
+        raise InputError(f"name is {name!r}; expected one of {known}")
+
+    def add(self, body: Body) -> Body:
+        """Add a body and return it."""
+        if not isinstance(body, Body):
+            raise TypeError(f"body is {body!r}; expected a Body")
+        if any(other is body for other in self._bodies):
+            raise InputError(f"body {body.name!r} is in the assembly already; expected each body once")
+        if any(other.name == body.name for other in self._bodies):
+            raise InputError(f"body has the name {body.name!r} of another body; expected distinct names")
+        self._bodies.append(body)
+        self._packed = None
+        return body
+
+    def constrain(self, *constraints: Contact) -> None:
+        """Add constraints; their names must be distinct and their bodies in the assembly."""
+        for constraint in constraints:
+            if not isinstance(constraint, Contact):
+                raise TypeError(f"constraint is {constraint!r}; expected a Contact")
+            self._check_bodies(constraint.name, constraint.bodies)
+            if any(other.name == constraint.name for other in self._constraints):
+                raise InputError(f"constraint name {constraint.name!r} is taken; expected distinct names, say name=...")
+            if all(body.fixed for body in constraint.bodies):
+                raise InputError(f"constraint {constraint.name!r} is between two fixed bodies; expected one that moves")
+            self._constraints.append(constraint)
+            self._packed = None
+
+    def minimize(self, *objectives: Objective) -> None:
+        """Add terms to the objective."""
+        self._add_terms(1.0, objectives)
+
+    def maximize(self, *objectives: Objective) -> None:
+        """Subtract terms from the objective."""
+        self._add_terms(-1.0, objectives)
+
+    def _add_terms(self, sign: float, objectives: Iterable[Objective]) -> None:
+        for objective in objectives:
+            if not isinstance(objective, (PointDistance, Posture)):
+                raise TypeError(f"objective is {objective!r}; expected PointDistance or Posture")
+            self._check_bodies(repr(objective), objective.bodies)
+            self._objectives.append((sign, objective))
+            self._packed = None
+
+    def _check_bodies(self, what: str, bodies: Iterable[Body]) -> None:
+        for body in bodies:
+            if not any(other is body for other in self._bodies):
+                known = ", ".join(repr(other.name) for other in self._bodies) or "no bodies yet"
+                raise InputError(f"{what} is on body {body.name!r}; expected a body of this assembly: {known}")
+
+    @property
+    def q(self) -> Array:
+        """Where the bodies stand, (n, 7)."""
+        return np.array([body.q for body in self._bodies]).reshape(-1, 7)
+
+    def packed(self) -> Packed:
+        """The scene as the compiled loop reads it; made at first use."""
+        if self._packed is None:
+            if all(body.fixed for body in self._bodies):
+                raise InputError(f"bodies are {[body.name for body in self._bodies]}, none moving; expected one")
+            terms = self._objectives or [(1.0, Posture())]
+            packed = pack(self._bodies, self._constraints, terms)
+            self._scene = Scene(self.bodies, self.constraints, tuple(packed.faces), packed.scale)
+            self._packed = packed
+        return self._packed
+
+    def solve(
+        self,
+        q0: Union[ArrayLike, Solution, None] = None,
+        *,
+        starts: Mapping[str, ArrayLike] | None = None,
+        **options: Any,
+    ) -> Solution:
+        """Find the pose where every constraint holds and the objective is stationary.
+
+        Parameters
+        ----------
+        q0 : (n, 7) or Solution, optional
+            Where to start: a row a body (rows of fixed bodies too), or an earlier solution of this assembly, whose
+            contacts and multipliers are taken up as well. The bodies' own poses by default.
+        starts : mapping of constraint name -> (4,), optional
+            Parameters near the pair each contact is to track; a global start finds the others.
+        **options
+            See `Options`.
+
+        Returns
+        -------
+        Solution
+            Check `success`; the status and the message say what happened otherwise.
+        """
+        packed = self.packed()
+        settings = Options.of(options).settings() if options else _DEFAULT_SETTINGS
+        state = self._start(packed, q0, starts)
+        history = np.empty((int(settings[2]) + 1, HISTORY))
+        begin = perf_counter()
+        code = solve_program(packed.table, packed.pool, settings, state, history)
+        seconds = perf_counter() - begin
+        return self._solution(packed, state, history, code, seconds)
+
+    def _start(self, packed: Packed, q0: Union[ArrayLike, Solution, None], starts: Mapping[str, ArrayLike] | None) -> Array:
+        """State of the loop: configuration, contact parameters (NaN: to be found), multipliers, room for results."""
+        state = np.empty(packed.results_at + RESULTS)
+        q = state[: packed.contacts_at].reshape(-1, 7)
+        if isinstance(q0, Solution):
+            if q0._scene is not self._scene:
+                raise InputError("q0 is a solution of another assembly, or of this one before a change; expected its own")
+            q[:] = q0.q
+            state[packed.contacts_at : packed.multipliers_at] = q0._parameters.ravel()
+            state[packed.multipliers_at : packed.residuals_at] = q0._multipliers * (
+                1.0 / (packed.scale * packed.weight)
+            )
+        else:
+            q[:] = self.q if q0 is None else self._checked(q0)
+            state[packed.contacts_at : packed.multipliers_at] = np.nan
+            state[packed.multipliers_at : packed.residuals_at] = 0.0
+        if starts:
+            names = [constraint.name for constraint in self._constraints]
+            for name, value in starts.items():
+                if name not in names:
+                    raise InputError(f"starts names {name!r}; expected one of {', '.join(map(repr, names))}")
+                at = packed.contacts_at + 4 * names.index(name)
+                state[at : at + 4] = vector(f"starts[{name!r}]", value, 4)
+        packed.refresh(q)
+        return state
+
+    def _checked(self, q0: ArrayLike) -> Array:
+        q = real_array("q0", q0, (len(self._bodies), 7))
+        norms = np.linalg.norm(q[:, 3:], axis=1)
+        if np.abs(norms - 1.0).max() > 1e-2:
+            raise InputError(f"q0 has quaternions of norms {norms.tolist()}; expected unit quaternions")
+        q[:, 3:] /= norms[:, None]
+        return q
+
+    def _solution(self, packed: Packed, state: Array, history: Array, code: int, seconds: float) -> Solution:
+        assert self._scene is not None
+        results = state[packed.results_at :]
+        force = packed.scale * packed.weight
+        return Solution(
+            self._scene,
+            state[: packed.contacts_at].reshape(-1, 7),
+            state[packed.contacts_at : packed.multipliers_at].reshape(-1, 4),
+            state[packed.multipliers_at : packed.residuals_at] * force,
+            state[packed.residuals_at : packed.results_at],
+            _STATUSES[code],
+            {
+                "iterations": int(results[COUNT]),
+                "seconds": seconds,
+                "objective": float(results[OBJECTIVE]) * packed.scale**2 * packed.weight,
+                "feasibility": float(results[VIOLATION]),
+                "stationarity": float(results[DUAL]),
+                "culprit": int(results[CULPRIT]),
+                "improper": bool(results[IMPROPER]),
+                "history": history[: int(results[COUNT]) + 1],
+            },
+        )
+
+    def save(self, path: Union[str, PathLike[str]]) -> None:
+        """Write the scene as JSON; `asm.load` reads it back."""
+        from assembly.scene_file import save
+
+        save(self, path)

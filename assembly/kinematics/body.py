@@ -1,0 +1,164 @@
+"""Body: a rigid thing with a name, a pose and faces; points and frames on it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Union
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.errors import InputError, vector
+from assembly.geometry.face import Face
+from assembly.geometry.surface import NurbsSurface
+from assembly.kinematics.pose import Pose
+
+__all__ = ["Body", "BodyFace", "Frame", "Point", "Shape"]
+
+Array = NDArray[np.float64]
+Shape = Union[NurbsSurface, Face, Sequence[Union[NurbsSurface, Face]]]
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """A point of a body, in body coordinates (3,)."""
+
+    body: Body
+    coordinates: Array
+
+    def __repr__(self) -> str:
+        x, y, z = self.coordinates
+        return f"{self.body.name}.point({x:g}, {y:g}, {z:g})"
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """A frame on a body: origin (3,) and axes (3, 3), the columns x, y, z, in body coordinates."""
+
+    body: Body
+    origin: Array
+    axes: Array
+
+
+@dataclass(frozen=True, eq=False)
+class BodyFace:
+    """One face of a body."""
+
+    body: Body
+    face: Face
+    name: str
+
+    def __repr__(self) -> str:
+        return f"{self.body.name}.face({self.name!r})"
+
+
+class Body:
+    """A rigid body.
+
+    Parameters
+    ----------
+    name : str
+        Not empty; unique in an assembly.
+    shape : NurbsSurface, Face, or a sequence of them, optional
+        In body coordinates. A surface's outward normal is Su x Sv.
+    position, quaternion
+        Where the body stands, body to world; the quaternion is (w, x, y, z), unit to within a percent.
+    fixed : bool
+        A fixed body does not move in a solve and costs no unknowns.
+
+    Raises
+    ------
+    InputError, TypeError
+        Naming the argument, what came and what was expected.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        shape: Shape | None = None,
+        position: ArrayLike = (0.0, 0.0, 0.0),
+        quaternion: ArrayLike = (1.0, 0.0, 0.0, 0.0),
+        fixed: bool = False,
+    ) -> None:
+        if not isinstance(name, str) or not name.strip():
+            raise InputError(f"name is {name!r}; expected a nonempty string")
+        if not isinstance(fixed, (bool, np.bool_)):
+            raise InputError(f"fixed is {fixed!r}; expected True or False")
+        self.name = name
+        self.fixed = bool(fixed)
+        self.pose = Pose(position, quaternion)  # type: ignore[arg-type]
+        self.faces: tuple[BodyFace, ...] = self._named(shape)
+
+    def _named(self, shape: Shape | None) -> tuple[BodyFace, ...]:
+        if shape is None:
+            return ()
+        parts = [shape] if isinstance(shape, (NurbsSurface, Face)) else list(shape)
+        faces: list[BodyFace] = []
+        for k, part in enumerate(parts):
+            if not isinstance(part, (NurbsSurface, Face)):
+                raise TypeError(f"shape of body {self.name!r} holds {part!r}; expected NurbsSurface or Face")
+            face = part if isinstance(part, Face) else Face(part)
+            name = face.name or ("surface" if len(parts) == 1 else f"face {k + 1}")
+            if any(name == other.name for other in faces):
+                raise InputError(f"shape of body {self.name!r} has two faces named {name!r}; expected distinct names")
+            faces.append(BodyFace(self, face, name))
+        return tuple(faces)
+
+    def __repr__(self) -> str:
+        return f"Body({self.name!r}, {len(self.faces)} faces{', fixed' if self.fixed else ''})"
+
+    @property
+    def q(self) -> Array:
+        """The row x y z qw qx qy qz of the body's pose, (7,)."""
+        return self.pose.q
+
+    @property
+    def size(self) -> float:
+        """Diagonal of the box around the control points of all faces; 0 without a shape."""
+        if not self.faces:
+            return 0.0
+        boxes = [face.face.surface.bounding_box() for face in self.faces]
+        low = np.min([box[0] for box in boxes], axis=0)
+        high = np.max([box[1] for box in boxes], axis=0)
+        return float(np.linalg.norm(high - low))
+
+    def face(self, name: str | None = None) -> BodyFace:
+        """A face by name; the only face when no name is given.
+
+        Raises
+        ------
+        InputError
+            No such face, or no name where there are several; the message lists the names.
+        """
+        if name is None and len(self.faces) == 1:
+            return self.faces[0]
+        for face in self.faces:
+            if face.name == name:
+                return face
+        known = ", ".join(repr(face.name) for face in self.faces) or "none, the body has no shape"
+        raise InputError(f"name is {name!r}; expected a face of body {self.name!r}: {known}")
+
+    def point(self, x: float, y: float, z: float) -> Point:
+        """The point (x, y, z) of the body, in body coordinates."""
+        return Point(self, vector("point", (x, y, z)))
+
+    def frame(
+        self, at: ArrayLike = (0.0, 0.0, 0.0), z: ArrayLike = (0.0, 0.0, 1.0), x: ArrayLike | None = None
+    ) -> Frame:
+        """A frame with origin `at` and axis `z`, both in body coordinates.
+
+        Without `x`, the x axis is the coordinate axis farthest from `z`, made orthogonal to it; a given `x` is made
+        orthogonal to `z` too and must not be parallel to it.
+        """
+        axis = vector("z", z)
+        length = float(np.linalg.norm(axis))
+        if not length > 0.0:
+            raise InputError(f"z is {axis.tolist()}; expected a direction other than zero")
+        axis /= length
+        side = np.eye(3)[np.argmin(np.abs(axis))] if x is None else vector("x", x)
+        across = side - (side @ axis) * axis
+        if not np.linalg.norm(across) > 1e-9 * np.linalg.norm(side):
+            raise InputError(f"x is {side.tolist()}; expected a direction that is not parallel to z {axis.tolist()}")
+        across /= np.linalg.norm(across)
+        return Frame(self, vector("at", at), np.column_stack([across, np.cross(axis, across), axis]))

@@ -1,0 +1,180 @@
+"""Poses and the algebra of their quaternions.
+
+A quaternion e = (w, x, y, z) rotates a vector by the rotation of e / |e|:
+
+    R(e) v = ((w^2 - |u|^2) v + 2 w u x v + 2 u (u.v)) / |e|^2,    u = (x, y, z)
+
+(paper 001, appendix B, normalized). So -e is the same rotation, and derivatives along e itself are zero.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.errors import InputError, number, vector
+
+__all__ = [
+    "Pose",
+    "angular_velocity_map",
+    "multiply",
+    "quaternion_rate_map",
+    "retract",
+    "rotate",
+    "rotate_jacobian",
+    "rotation_matrix",
+]
+
+Array = NDArray[np.float64]
+# A quaternion typed to two digits is off by less; a forgotten normalization is off by more.
+UNIT_TOLERANCE = 1e-2
+
+
+def unit_quaternion(name: str, value: ArrayLike) -> Array:
+    """The normalized quaternion; raises where it is zero or far from unit."""
+    e = vector(name, value, 4)
+    norm = float(np.linalg.norm(e))
+    if not abs(norm - 1.0) <= UNIT_TOLERANCE:
+        raise InputError(f"{name} is {e.tolist()} with norm {norm:.6g}; expected a unit quaternion (w, x, y, z)")
+    return e / norm
+
+
+def nonzero_quaternion(name: str, value: ArrayLike) -> Array:
+    """A quaternion of any length but zero, as it came."""
+    e = vector(name, value, 4)
+    if not np.linalg.norm(e) > 1e-150:
+        raise InputError(f"{name} is {e.tolist()}; expected a quaternion (w, x, y, z) other than zero")
+    return e
+
+
+def skew(a: ArrayLike) -> Array:
+    """The (3, 3) matrix of the cross product: skew(a) b = a x b."""
+    x, y, z = np.asarray(a, dtype=np.float64)
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def multiply(a: ArrayLike, b: ArrayLike) -> Array:
+    """Quaternion product a b, (4,)."""
+    a0, au = (e := vector("a", a, 4))[0], e[1:]
+    b0, bu = (e := vector("b", b, 4))[0], e[1:]
+    return np.concatenate([[a0 * b0 - au @ bu], a0 * bu + b0 * au + np.cross(au, bu)])
+
+
+def rotation_matrix(quaternion: ArrayLike) -> Array:
+    """Rotation (3, 3) of the normalized quaternion."""
+    e = nonzero_quaternion("quaternion", quaternion)
+    e = e / np.linalg.norm(e)
+    w, u = e[0], e[1:]
+    return (w * w - u @ u) * np.eye(3) + 2.0 * (w * skew(u) + np.outer(u, u))
+
+
+def rotate(quaternion: ArrayLike, v: ArrayLike) -> Array:
+    """The vectors v (..., 3) rotated by the normalized quaternion."""
+    rotated: Array = np.asarray(v, dtype=np.float64) @ rotation_matrix(quaternion).T
+    return rotated
+
+
+def angular_velocity_map(quaternion: ArrayLike, body_axes: bool = False) -> Array:
+    """G (3, 4) with omega = G(e) e' / |e|^2, omega in world axes, or in body axes on request.
+
+    Paper 001, eq. 17 (body axes; its third row is misprinted). G G^T = 4 |e|^2 I and G e = 0.
+    """
+    w, x, y, z = nonzero_quaternion("quaternion", quaternion)
+    if body_axes:
+        return 2.0 * np.array([[-x, w, z, -y], [-y, -z, w, x], [-z, y, -x, w]])
+    return 2.0 * np.array([[-x, w, -z, y], [-y, z, w, -x], [-z, -y, x, w]])
+
+
+def quaternion_rate_map(quaternion: ArrayLike, body_axes: bool = False) -> Array:
+    """The inverse (4, 3): e' = G(e)^T omega / 4, the rate that keeps |e|."""
+    return 0.25 * angular_velocity_map(quaternion, body_axes).T
+
+
+def rotate_jacobian(quaternion: ArrayLike, v: ArrayLike) -> Array:
+    """d(R(e) v) / de, (3, 4), of the normalized rotation: -[R v]x G(e) / |e|^2.
+
+    Paper 001, eq. 25, with the factor and the term it lacks; radial derivatives are zero.
+    """
+    e = nonzero_quaternion("quaternion", quaternion)
+    return -skew(rotate(e, vector("v", v))) @ angular_velocity_map(e) / (e @ e)
+
+
+def retract(q: ArrayLike, twist: ArrayLike) -> Array:
+    """Pose row(s) (..., 7) moved by twist(s) (..., 6): x + dx and exp(dw) e, normalized."""
+    row, step = np.array(q, dtype=np.float64), np.asarray(twist, dtype=np.float64)
+    if row.shape[-1:] != (7,) or step.shape[-1:] != (6,) or row.shape[:-1] != step.shape[:-1]:
+        raise InputError(f"q and twist have shapes {row.shape} and {step.shape}; expected (..., 7) and (..., 6)")
+    w = step[..., 3:]
+    angle = np.linalg.norm(w, axis=-1, keepdims=True)
+    c, s = np.cos(0.5 * angle), 0.5 * np.sinc(0.5 * angle / np.pi)
+    e0, u = row[..., 3:4], row[..., 4:]
+    v = s * w
+    turned = np.concatenate([c * e0 - (v * u).sum(-1, keepdims=True), c * u + e0 * v + np.cross(v, u)], axis=-1)
+    turned /= np.linalg.norm(turned, axis=-1, keepdims=True)
+    return np.concatenate([row[..., :3] + step[..., :3], turned], axis=-1)
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """A rigid placement, body to world: p_w = R(quaternion) p_b + position.
+
+    Parameters
+    ----------
+    position : (3,)
+    quaternion : (4,)
+        (w, x, y, z), unit to within a percent; it is normalized.
+
+    Raises
+    ------
+    InputError
+        Not finite, wrong shapes, or a quaternion far from unit.
+    """
+
+    position: Array = (0.0, 0.0, 0.0)  # type: ignore[assignment]  # checked and converted below
+    quaternion: Array = (1.0, 0.0, 0.0, 0.0)  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        position = vector("position", self.position)
+        quaternion = unit_quaternion("quaternion", self.quaternion)
+        position.flags.writeable = quaternion.flags.writeable = False
+        object.__setattr__(self, "position", position)
+        object.__setattr__(self, "quaternion", quaternion)
+
+    @classmethod
+    def from_axis_angle(cls, axis: ArrayLike, angle: float, position: ArrayLike = (0.0, 0.0, 0.0)) -> Pose:
+        """Rotation by an angle [rad] about an axis, then the position."""
+        direction = vector("axis", axis)
+        length = float(np.linalg.norm(direction))
+        if not length > 0.0:
+            raise InputError(f"axis is {direction.tolist()}; expected a direction other than zero")
+        half = 0.5 * number("angle", angle)
+        e = np.concatenate([[np.cos(half)], np.sin(half) * direction / length])
+        return cls(np.asarray(position, dtype=np.float64), e)
+
+    @property
+    def q(self) -> Array:
+        """The row x y z qw qx qy qz, (7,)."""
+        return np.concatenate([self.position, self.quaternion])
+
+    @property
+    def matrix(self) -> Array:
+        """Homogeneous (4, 4) matrix."""
+        m = np.eye(4)
+        m[:3, :3] = rotation_matrix(self.quaternion)
+        m[:3, 3] = self.position
+        return m
+
+    def apply(self, points: ArrayLike) -> Array:
+        """World coordinates of body points (..., 3)."""
+        return rotate(self.quaternion, points) + self.position
+
+    def inverse(self) -> Pose:
+        """World to body."""
+        conjugate = self.quaternion * np.array([1.0, -1.0, -1.0, -1.0])
+        return Pose(-rotate(conjugate, self.position), conjugate)
+
+    def __matmul__(self, other: Pose) -> Pose:
+        """First the other pose, then this one."""
+        return Pose(self.apply(other.position), multiply(self.quaternion, other.quaternion))

@@ -1,0 +1,208 @@
+"""Extremal pairs of two surfaces and how they move, from Python.
+
+A configuration row q is [x y z qw qx qy qz], body to world; a quaternion of any length but zero
+stands for the rotation of its unit. Everything returned is in world axes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+from functools import lru_cache
+from typing import Union
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.errors import InputError, real_array, vector
+from assembly.geometry.face import Face
+from assembly.geometry.spline import BREAKS_U, BREAKS_V, CELLS, COEFFICIENTS, SURFACE_RECORD
+from assembly.geometry.surface import NurbsSurface
+from assembly.kinematics.body import BodyFace
+from assembly.kinematics.pose import nonzero_quaternion
+from assembly.proximity.start import find_pair
+from assembly.proximity.velocity import pair_derivatives
+
+__all__ = ["ContactPair", "PairStatus", "contact_jacobian", "extremal_pair", "gap_gradient", "gap_hessian"]
+
+Array = NDArray[np.float64]
+Table = NDArray[np.int64]
+Side = Union[NurbsSurface, Face, BodyFace]
+# Fields of a surface record that are offsets into the pool.
+OFFSETS = (BREAKS_U, BREAKS_V, COEFFICIENTS, CELLS)
+# How far from extremal a pair may be where its derivatives are asked for.
+EXTREMAL = 1e-6
+
+
+class PairStatus(Enum):
+    """What became of a pair; the value says what to do."""
+
+    CONVERGED = "the pair is extremal and isolated"
+    SINGULAR = "extremal, but one of a continuum or at a pole; the current one is kept"
+    LEFT_PATCH = "no extremum inside: the pair is held at the end of a patch; extend it or start elsewhere"
+    NOT_CONVERGED = "Newton did not converge; give a nearer start, or none for a global one"
+
+
+_STATUSES = tuple(PairStatus)
+
+
+@dataclass(frozen=True, eq=False)
+class ContactPair:
+    """An extremal pair of points of two surfaces f and g.
+
+    Attributes
+    ----------
+    parameters : (4,)
+        u_f, v_f, u_g, v_g.
+    points : (2, 3)
+        The point of f and the point of g, world coordinates.
+    normal : (3,)
+        Outward unit normal of f at its point.
+    gap : float
+        normal . (g - f): positive apart, negative interpenetrating.
+    status : PairStatus
+    """
+
+    parameters: Array = field(repr=False)
+    points: Array
+    normal: Array
+    gap: float
+    status: PairStatus
+
+
+def as_face(name: str, side: Side) -> Face:
+    """The face meant by a surface, a face, or a face of a body."""
+    if isinstance(side, BodyFace):
+        return side.face
+    if isinstance(side, Face):
+        return side
+    if isinstance(side, NurbsSurface):
+        return Face(side)
+    raise TypeError(f"{name} is {side!r}; expected a NurbsSurface or a Face")
+
+
+def _key(face: Face) -> tuple[NurbsSurface, bool]:
+    return face.surface, face.reversed
+
+
+@lru_cache(maxsize=64)
+def _packed(f: tuple[NurbsSurface, bool], g: tuple[NurbsSurface, bool]) -> tuple[Table, Array, float]:
+    """Two surfaces as one table and one pool, and the smaller size."""
+    record_f, pool_f = Face(f[0], reversed=f[1]).packed()
+    record_g, pool_g = Face(g[0], reversed=g[1]).packed()
+    record_g = record_g.copy()
+    record_g[list(OFFSETS)] += pool_f.size
+    return np.concatenate([record_f, record_g]), np.concatenate([pool_f, pool_g]), min(f[0].size, g[0].size)
+
+
+def _configuration(q_f: ArrayLike, q_g: ArrayLike) -> Array:
+    q = np.empty((2, 7))
+    for k, (name, value) in enumerate((("q_f", q_f), ("q_g", q_g))):
+        q[k] = vector(name, value, 7)
+        nonzero_quaternion(f"{name}[3:]", q[k, 3:])
+    return q
+
+
+def _inside(name: str, parameters: Array, surfaces: tuple[NurbsSurface, NurbsSurface]) -> tuple[float, ...]:
+    """Parameters as a tuple; raises where one lies beyond the end of an open direction."""
+    limits = [(s.domain[k], s.closed[k]) for s in surfaces for k in range(2)]
+    for k, ((low, high), closed) in enumerate(limits):
+        if not closed and not low <= parameters[k] <= high:
+            raise InputError(f"{name}[{k}] is {parameters[k]:g}; expected a parameter in [{low:g}, {high:g}]")
+    wrapped = [
+        low + (value - low) % (high - low) if closed and not low <= value <= high else value
+        for value, ((low, high), closed) in zip(parameters, limits, strict=True)
+    ]
+    return tuple(float(value) for value in wrapped)
+
+
+def extremal_pair(
+    surface_f: Side, q_f: ArrayLike, surface_g: Side, q_g: ArrayLike, start: ArrayLike | None = None
+) -> ContactPair:
+    """The extremal pair of two surfaces: closest when apart, through touching and interpenetration.
+
+    Parameters
+    ----------
+    surface_f, surface_g : NurbsSurface, Face or BodyFace
+    q_f, q_g : (7,)
+        Their bodies' poses.
+    start : (4,), optional
+        Parameters near the pair: Newton's method goes to the extremum near them. Without a start, bounding cells of
+        both surfaces are searched and the extremum with the smallest |gap| found is returned; this search is thorough,
+        not certified.
+
+    Returns
+    -------
+    ContactPair
+        With a status that says whether the pair is extremal and isolated.
+
+    Raises
+    ------
+    InputError
+        Wrong shapes, NaN, zero quaternions, a start outside the patch.
+
+    Notes
+    -----
+    (g - f).f_u = (g - f).f_v = n_f.g_u = n_f.g_v = 0 (paper 001, section 3.2, in the form that stays regular at contact).
+    """
+    f, g = as_face("surface_f", surface_f), as_face("surface_g", surface_g)
+    q = _configuration(q_f, q_g)
+    table, pool, size = _packed(_key(f), _key(g))
+    if start is None:
+        x: tuple[float, ...] = (np.nan, np.nan, np.nan, np.nan)
+    else:
+        x = _inside("start", vector("start", start, 4), (f.surface, g.surface))
+    out = np.empty(14)
+    status = find_pair(table, pool, 0, SURFACE_RECORD, q, x, size, 60, out)
+    return ContactPair(out[:4], out[4:10].reshape(2, 3), out[10:13], float(out[13]), _STATUSES[status])
+
+
+def _derivatives(
+    surface_f: Side, q_f: ArrayLike, surface_g: Side, q_g: ArrayLike, parameters: ArrayLike
+) -> tuple[Array, Array, Array]:
+    f, g = as_face("surface_f", surface_f), as_face("surface_g", surface_g)
+    q = _configuration(q_f, q_g)
+    table, pool, size = _packed(_key(f), _key(g))
+    x = _inside("parameters", real_array("parameters", parameters, (4,)), (f.surface, g.surface))
+    jacobian, gradient, hessian = np.full((4, 14), np.nan), np.full(14, np.nan), np.full((12, 12), np.nan)
+    error, regular = pair_derivatives(table, pool, 0, SURFACE_RECORD, q, x, size, jacobian, gradient, hessian)
+    if not error <= EXTREMAL:
+        raise InputError(
+            f"parameters are {list(x)}, off an extremal pair by {error:.1e}; expected those of extremal_pair"
+        )
+    if not regular and not np.isfinite(jacobian).all():
+        raise InputError(f"parameters are {list(x)}, at a pole; expected a point where both surfaces are regular")
+    return jacobian, gradient, hessian
+
+
+def contact_jacobian(
+    surface_f: Side, q_f: ArrayLike, surface_g: Side, q_g: ArrayLike, parameters: ArrayLike
+) -> Array:
+    """d(u_f, v_f, u_g, v_g) / d(q_f, q_g), (4, 14), by the contact velocity formulation.
+
+    For any regular parameterization; at an extremum that is not isolated, the damped least-norm rates.
+
+    Source: paper 001, appendix A, eqs. 10 to 21, with corrected signs (docs/derivations.md).
+
+    Raises
+    ------
+    InputError
+        Also where the parameters are not those of an extremal pair.
+    """
+    return _derivatives(surface_f, q_f, surface_g, q_g, parameters)[0]
+
+
+def gap_gradient(surface_f: Side, q_f: ArrayLike, surface_g: Side, q_g: ArrayLike, parameters: ArrayLike) -> Array:
+    """d gap / d(q_f, q_g), (14,): the contact wrench, in quaternion coordinates.
+
+    In twists it is [-n, -(f - x_f) x n, n, (g - x_g) x n]: no parameter rates enter (envelope theorem).
+    """
+    return _derivatives(surface_f, q_f, surface_g, q_g, parameters)[1]
+
+
+def gap_hessian(surface_f: Side, q_f: ArrayLike, surface_g: Side, q_g: ArrayLike, parameters: ArrayLike) -> Array:
+    """Second derivative of the gap, (12, 12), in the twists of f, then g.
+
+    Symmetric; along x + t dx, exp(t dw) e with constant twists the gap's second derivative is twist^T hessian twist.
+    """
+    return _derivatives(surface_f, q_f, surface_g, q_g, parameters)[2]

@@ -1,0 +1,81 @@
+"""What a solve can be told."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.errors import InputError, integer, number
+from assembly.solve.augmented_lagrangian import (
+    FEASIBILITY,
+    ITERATIONS,
+    PENALTY,
+    PENALTY_FLOOR,
+    RADIUS,
+    SETTINGS,
+    STATIONARITY,
+)
+
+__all__ = ["Options"]
+
+
+@dataclass(frozen=True)
+class Options:
+    """Options of `Assembly.solve`. Lengths are relative to the scene's size, the largest body's diagonal.
+
+    Attributes
+    ----------
+    tolerance : float
+        Largest violation of a constraint that counts as held.
+    stationarity : float
+        Largest component of the Lagrangian's gradient that counts as zero, for an objective whose
+        largest weight is scaled to one.
+    max_iterations : int
+        Steps of the loop.
+    penalty : float
+        First mu of the augmented Lagrangian; a smaller one holds constraints harder from the start.
+    penalty_floor : float
+        Smallest mu.
+    radius : float
+        First bound of a step: lengths relative to the scene's size, and radians.
+    """
+
+    tolerance: float = 1e-12
+    stationarity: float = 1e-10
+    max_iterations: int = 300
+    penalty: float = 1e-2
+    penalty_floor: float = 1e-6
+    radius: float = 0.5
+
+    def __post_init__(self) -> None:
+        integer("max_iterations", self.max_iterations, 0, 10**9)
+        for name, high in (("tolerance", 1e-2), ("stationarity", 1e-2), ("penalty", 1e3), ("radius", 1.0)):
+            value = number(name, getattr(self, name))
+            if not 0.0 < value <= high:
+                raise InputError(f"{name} is {value:g}; expected a number above 0 and at most {high:g}")
+        floor = number("penalty_floor", self.penalty_floor)
+        if not 1e-12 <= floor <= self.penalty:
+            raise InputError(f"penalty_floor is {floor:g}; expected a number from 1e-12 to penalty {self.penalty:g}")
+
+    @classmethod
+    def of(cls, options: dict[str, Any]) -> Options:
+        """Options from keyword arguments; an unknown name raises and lists the known ones."""
+        known = [field.name for field in fields(cls)]
+        for name in options:
+            if name not in known:
+                raise InputError(f"option {name!r} is unknown; expected one of {', '.join(known)}")
+        return cls(**options)
+
+    def settings(self) -> NDArray[np.float64]:
+        """The array that the compiled loop reads."""
+        out = np.zeros(SETTINGS)
+        out[FEASIBILITY] = self.tolerance
+        out[STATIONARITY] = self.stationarity
+        out[ITERATIONS] = self.max_iterations
+        out[PENALTY] = self.penalty
+        out[PENALTY_FLOOR] = self.penalty_floor
+        out[RADIUS] = self.radius
+        return out
