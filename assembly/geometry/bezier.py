@@ -42,8 +42,9 @@ def checked_knots(name: str, value: ArrayLike, degree: int, count: int) -> Array
     steps = np.diff(knots)
     if (steps < 0.0).any():
         k = int(np.argmax(steps < 0.0))
-        raise InputError(f"{name} decreases from {knots[k]:g} to {knots[k + 1]:g} at index {k + 1}; "
-                         "expected nondecreasing knots")  # fmt: skip
+        raise InputError(
+            f"{name} decreases from {knots[k]:g} to {knots[k + 1]:g} at index {k + 1}; expected nondecreasing knots"
+        )
     low, high = knots[degree], knots[count]
     if not high > low:
         raise InputError(

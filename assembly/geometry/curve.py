@@ -172,9 +172,12 @@ class NurbsCurve:
         """The same curve run backwards over the same domain."""
         low, high = self.domain
         return NurbsCurve(
-            self.control_points[::-1], bezier.mirrored(self.knots, low, high), self.degree, self.weights[::-1],
+            self.control_points[::-1],
+            bezier.mirrored(self.knots, low, high),
+            self.degree,
+            self.weights[::-1],
             name=self.name,
-        )  # fmt: skip
+        )
 
     def transformed(
         self, rotation: ArrayLike | None = None, translation: ArrayLike = (0.0, 0.0, 0.0), scale: float = 1.0

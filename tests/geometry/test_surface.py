@@ -124,9 +124,7 @@ def test_closed_directions_wrap_and_open_ones_do_not():
 
 
 @settings(max_examples=50, deadline=None)
-@given(
-    st.integers(0, 500), st.sampled_from(DEGREES), st.sampled_from(KINDS), st.integers(0, 1), st.floats(0.02, 0.98)
-)  # fmt: skip
+@given(st.integers(0, 500), st.sampled_from(DEGREES), st.sampled_from(KINDS), st.integers(0, 1), st.floats(0.02, 0.98))
 def test_knot_insertion_keeps_the_surface(seed, degree, kind, direction, part):
     surface = random_surface(seed, degree, (kind, kind))
     low, high = surface.domain[direction]
@@ -207,8 +205,9 @@ def test_closed_looks_at_the_whole_edge():
     weights[-1] *= 1.5
     assert NurbsSurface(torus.control_points, torus.knots, torus.degree, weights).closed == (True, True)
     # Both ends of v are the same point, which is not an edge to cross.
-    petal = NurbsSurface([[[0, 0, 0], [1, 0, 0], [0, 0, 0]], [[0, 0, 0], [0, 1, 0], [0, 0, 0]]],
-                         ([0, 0, 1, 1], [0, 0, 1, 2, 2]), (1, 1))  # fmt: skip
+    petal = NurbsSurface(
+        [[[0, 0, 0], [1, 0, 0], [0, 0, 0]], [[0, 0, 0], [0, 1, 0], [0, 0, 0]]], ([0, 0, 1, 1], [0, 0, 1, 2, 2]), (1, 1)
+    )
     assert petal.closed == (False, False)
 
 
