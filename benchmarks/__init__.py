@@ -1,0 +1,1 @@
+"""Measured figures: ``python -m benchmarks`` writes all that README and docs quote."""

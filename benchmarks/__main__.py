@@ -1,0 +1,108 @@
+"""Run the benchmarks: ``python -m benchmarks [--quick] [--only NAME] [--output FOLDER]``."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import sys
+from collections.abc import Sequence
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from benchmarks.running import run_apart
+from benchmarks.timing import calibration
+
+# Modules with `run(quick: bool) -> dict`. The dict goes to the JSON as it is; its "rows", a list of
+# flat dicts, are printed as a table.
+BENCHMARKS = ("start",)
+LIBRARIES = ("assembly", "casadi", "meshcat", "numba", "numpy", "scipy", "cadquery-ocp", "coal", "python-fcl")
+RESULTS = Path(__file__).resolve().parent / "results"
+
+
+def machine() -> dict[str, Any]:
+    """What the figures depend on: the machine, what is installed, and the time of a fixed loop."""
+    versions = {}
+    for library in LIBRARIES:
+        try:
+            versions[library] = metadata.version(library)
+        except metadata.PackageNotFoundError:
+            versions[library] = "absent"
+    return {
+        "system": platform.platform(),
+        "processor": processor_name(),
+        "cores": os.cpu_count(),
+        "python": platform.python_version(),
+        "versions": versions,
+        "calibration_seconds": calibration(),
+    }
+
+
+def processor_name() -> str:
+    """Model of the processor, where the system tells."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        return platform.processor()
+    return next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), "unknown")
+
+
+def pin_to_one_core() -> None:
+    """Keep this process and its children on one core, and their libraries to one thread."""
+    for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
+        os.environ[variable] = "1"
+    if hasattr(os, "sched_setaffinity"):
+        # The last one: the first serves most interrupts.
+        os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
+
+
+def shown(key: str, value: object) -> str:
+    """A cell of the table; times in a unit that suits them."""
+    if isinstance(value, float):
+        if key in ("low", "high") or key.endswith("seconds"):
+            for unit, size in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)):
+                if abs(value) >= size:
+                    return f"{value / size:.3g} {unit}"
+            return f"{value / 1e-9:.3g} ns"
+        return f"{value:.4g}"
+    return str(value)
+
+
+def table(result: dict[str, Any]) -> str:
+    """The rows of a result as text; columns are the keys in order of appearance."""
+    if "error" in result:
+        return f"failed\n{result['error']}"
+    rows = result.get("rows", [])
+    keys = list(dict.fromkeys(key for row in rows for key in row))
+    cells = [keys, *([shown(key, row.get(key, "")) for key in keys] for row in rows)]
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in cells]
+    return "\n".join(lines)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run, print and write; the number of benchmarks that failed."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="fewer repeats and cases: does everything still run?")
+    parser.add_argument("--only", choices=BENCHMARKS, metavar="NAME", help=f"one of {', '.join(BENCHMARKS)}")
+    parser.add_argument("--output", type=Path, default=RESULTS, metavar="FOLDER", help="where the JSON goes")
+    options = parser.parse_args(arguments)
+
+    pin_to_one_core()
+    report: dict[str, Any] = {"quick": options.quick, "machine": machine(), "benchmarks": {}}
+    for name in [options.only] if options.only else BENCHMARKS:
+        result = run_apart(f"benchmarks.{name}", options.quick)
+        report["benchmarks"][name] = result
+        print(f"\n{name}\n{table(result)}", flush=True)
+    title = (options.only or "all") + ("-quick" if options.quick else "")
+    options.output.mkdir(parents=True, exist_ok=True)
+    path = options.output / f"{title}.json"
+    path.write_text(json.dumps(report, indent=1) + "\n")
+    print(f"\nwritten to {path}")
+    return sum("error" in result for result in report["benchmarks"].values())
+
+
+if __name__ == "__main__":
+    sys.exit(main())
