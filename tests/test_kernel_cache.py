@@ -217,6 +217,25 @@ print(outer(3), outer.stats.cache_misses.total(), len(list(_kernel._FOLDER.iterd
     assert lines == ["8.0 1", "8.0 2 2"]
 
 
+def test_an_entry_that_cannot_be_replaced(package):
+    folder = package.call()[3]
+    for entry in package.entries(folder):
+        entry.unlink()
+        entry.mkdir()  # neither readable as a file nor replaced by one
+    assert package.call()[:3] == (8.0, 0, 1)
+    assert len(package.entries(folder)) == 2  # nothing unfinished beside them
+
+
+def test_a_kernel_tied_to_this_process_is_not_cached(package):
+    # Numba passes an array of more than a megabyte by its address.
+    package.edit("caller.py", "@kernel\ndef outer", "import numpy as np\nTABLE = np.ones(200_000)\n@kernel\ndef outer")
+    package.edit("caller.py", "FACTOR *", "FACTOR * TABLE[int(x)] *")
+    for _ in range(2):
+        output = package.run()
+        assert output.startswith("8.0|0|1|")
+        assert "outer-7 uses an address or a large global array and is not cached" in output
+
+
 def test_compiling_is_logged_once_and_loading_is_not(package):
     line = "compiling kernels for the first time"
     code = CALL + "outer(3)\n"
