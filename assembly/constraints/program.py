@@ -14,7 +14,8 @@ from __future__ import annotations
 from assembly._kernel import kernel
 from assembly.geometry.vec import add, cross, dot, matvec, quaternion_product, sub
 from assembly.kinematics.motion import position, relative_pose, rotation
-from assembly.proximity.extremal import CONVERGED, SINGULAR, solve_pair
+from assembly.proximity.extremal import CONVERGED, SINGULAR, pair_matrix, solve_pair
+from assembly.proximity.free_pair import VARIABLES, VECTORS, free_hessian, free_rows
 from assembly.proximity.velocity import add_gap_hessian, gradient_row, store_rates, tangent_rates, z_rows
 
 # Header of the table.
@@ -30,8 +31,11 @@ POINT_DISTANCE, POSTURE = 0, 1
 # Header of the pool.
 # length scale, reference point (1 to 3), weight by which the objective was divided.
 SCALE, REFERENCE, WEIGHT, POOL_HEADER = 0, 1, 4, 8
+# Scratch for one free pair: five rows with their values, the variations, a Hessian.
+FIVE = 5 * (VARIABLES + 1)
+SCRATCH = FIVE + VECTORS * 3 * VARIABLES + VARIABLES * VARIABLES
 # A contact's record.
-GAP, NORMAL, ARM_F, ARM_G, RATES, FORM, PROPER, RECORD = 0, 1, 4, 7, 10, 26, 42, 44
+GAP, NORMAL, ARM_F, ARM_G, RATES, FORM, PROPER, FOLD, RECORD = 0, 1, 4, 7, 10, 26, 42, 43, 44
 
 
 @kernel(inline=True)
@@ -68,11 +72,11 @@ def track_contact(table, pool, row, q, start, limit, record, z):
         save(record, ARM_G, arm_g)
         store_rates(m, k, a, e, t, record[RATES:FORM], record[FORM:PROPER])
         # Relative curvature -H (I + beta A)^-1: indefinite means the surfaces cross beside the point.
-        h11 = a[0] - c[0]
-        h12 = a[1] - c[1]
-        h22 = a[2] - c[2]
-        record[PROPER] = 1.0 if h11 * h22 - h12 * h12 > -1e-9 * (h11 * h11 + h22 * h22) and h11 + h22 >= 0.0 else 0.0
-        record[43] = (h11 * h22 - h12 * h12) / (h11 * h11 + h22 * h22 + 2.0 * h12 * h12)
+        _k, h, _size = pair_matrix(a, c, beta)
+        det = h[0] * h[3] - h[1] * h[2]
+        norm2 = h[0] * h[0] + h[1] * h[1] + h[2] * h[2] + h[3] * h[3]
+        record[PROPER] = 1.0 if det > -1e-9 * norm2 and h[0] + h[3] <= 0.0 else 0.0
+        record[FOLD] = det / norm2 if norm2 > 1e-18 else 0.0
         z_rows(matvec(turn_f, tx), matvec(turn_f, ty), arm_f, arm_g, z)
     return status, x, count
 
@@ -133,26 +137,55 @@ def add_term(table, pool, term, q, gradient, hessian, second):
 
 
 @kernel
-def evaluate(table, pool, q, start, limit, contacts, records, z, residual, jacobian):
-    """Track every contact from `start` and evaluate all rows. Returns the worst status and the contact it belongs to."""
+def evaluate(table, pool, q, start, limit, free, lengths, work, contacts, records, z, residual, jacobian):
+    """Evaluate all rows at q. Returns the contact whose pair was lost, or -1.
+
+    A tracked contact is carried from `start` to its extremal pair. A free one (free[k] >= 0, its place among the
+    free ones) is evaluated at `start` itself, and its four rows of tangency follow the rows of the program.
+    """
     for r in range(table[ROWS]):
         row = table[ROW_TABLE] + ROW * r
         k = table[row + CONTACT]
-        x = (start[k, 0], start[k, 1], start[k, 2], start[k, 3])
-        status, x, _count = track_contact(table, pool, row, q, x, limit, records[k], z[k])
-        contacts[k, 0], contacts[k, 1], contacts[k, 2], contacts[k, 3] = x
-        if status != CONVERGED and status != SINGULAR:
-            return status, k
         record = records[k]
-        residual[r] = record[GAP]
-        gradient_row(load(record, NORMAL), load(record, ARM_F), load(record, ARM_G), jacobian[r])
-    return CONVERGED, -1
+        x = (start[k, 0], start[k, 1], start[k, 2], start[k, 3])
+        if free[k] < 0:
+            status, x, _count = track_contact(table, pool, row, q, x, limit, record, z[k])
+            if status != CONVERGED and status != SINGULAR:
+                return k
+            residual[r] = record[GAP]
+            gradient_row(load(record, NORMAL), load(record, ARM_F), load(record, ARM_G), jacobian[r])
+        else:
+            e = table[ROWS] + 4 * free[k]
+            five = work[: 5 * (VARIABLES + 1)]
+            values = five[:5]
+            rows = five[5:].reshape(5, VARIABLES)
+            record[GAP] = free_rows(
+                table,
+                pool,
+                table[row + SURFACE_F],
+                table[row + SURFACE_G],
+                table[row + BODY_F],
+                table[row + BODY_G],
+                q,
+                x,
+                lengths[k],
+                work[FIVE : FIVE + VECTORS * 3 * VARIABLES].reshape(VECTORS, 3, VARIABLES),
+                values,
+                rows,
+            )
+            residual[r] = values[0]
+            jacobian[r] = rows[0]
+            for i in range(4):
+                residual[e + i] = values[1 + i]
+                jacobian[e + i] = rows[1 + i]
+        contacts[k, 0], contacts[k, 1], contacts[k, 2], contacts[k, 3] = x
+    return -1
 
 
 @kernel
 def objective(table, pool, q, gradient, hessian, second):
     """Value, gradient and (when `second`) Hessian of the objective; both arrays are overwritten."""
-    n = 6 * table[MOVING]
+    n = gradient.size
     for i in range(n):
         gradient[i] = 0.0
         if second:
@@ -165,21 +198,54 @@ def objective(table, pool, q, gradient, hessian, second):
 
 
 @kernel
-def add_row_hessian(table, r, records, z, factor, hessian):
-    """Add factor times the second derivative of row r."""
+def add_hessian(table, pool, r, q, contacts, free, lengths, work, records, z, y, hessian):
+    """Add the second derivative of y . (row r, and the rows of tangency that go with it)."""
     row = table[ROW_TABLE] + ROW * r
     f = 6 * table[table[SLOTS] + table[row + BODY_F]]
     g = 6 * table[table[SLOTS] + table[row + BODY_G]]
     k = table[row + CONTACT]
-    record = records[k]
-    add_gap_hessian(
-        load(record, NORMAL),
-        load(record, ARM_F),
-        load(record, ARM_G),
-        record[FORM:PROPER],
-        z[k],
-        factor,
-        hessian,
-        f,
-        g,
+    if free[k] < 0:
+        record = records[k]
+        if y[r] != 0.0:
+            add_gap_hessian(
+                load(record, NORMAL),
+                load(record, ARM_F),
+                load(record, ARM_G),
+                record[FORM:PROPER],
+                z[k],
+                y[r],
+                hessian,
+                f,
+                g,
+            )
+        return
+    e = table[ROWS] + 4 * free[k]
+    u = 6 * table[MOVING] + 4 * free[k]
+    five = work[:5]
+    five[0] = y[r]
+    for i in range(4):
+        five[1 + i] = y[e + i]
+    out = work[FIVE + VECTORS * 3 * VARIABLES :].reshape(VARIABLES, VARIABLES)
+    free_hessian(
+        table,
+        pool,
+        table[row + SURFACE_F],
+        table[row + SURFACE_G],
+        table[row + BODY_F],
+        table[row + BODY_G],
+        q,
+        (contacts[k, 0], contacts[k, 1], contacts[k, 2], contacts[k, 3]),
+        lengths[k],
+        five,
+        work[FIVE : FIVE + VECTORS * 3 * VARIABLES].reshape(VECTORS, 3, VARIABLES),
+        out,
     )
+    for i in range(VARIABLES):
+        base = f if i < 6 else (g - 6 if i < 12 else u - 12)
+        if i < 12 and (f if i < 6 else g) < 0:
+            continue
+        for j in range(VARIABLES):
+            other = f if j < 6 else (g - 6 if j < 12 else u - 12)
+            if j < 12 and (f if j < 6 else g) < 0:
+                continue
+            hessian[base + i, other + j] += out[i, j]

@@ -232,3 +232,71 @@ def evaluate_curve(table, pool, t, order, out):
         if order >= 2:
             store_xyz(h, out, o + 2 * block)
     return -1
+
+
+@kernel(inline=True)
+def _row_third(pool, o, degree, t):
+    """As `_row` with one derivative more: value, first, half the second, a sixth of the third derivative."""
+    p = load_lanes(pool, o + 4 * degree)
+    d = 0.0 * p
+    h = 0.0 * p
+    w = 0.0 * p
+    for k in range(degree - 1, -1, -1):
+        w = h + t * w
+        h = d + t * h
+        d = p + t * d
+        p = load_lanes(pool, o + 4 * k) + t * p
+    return p, d, h, w
+
+
+@kernel
+def third_derivatives(table, pool, r, u, v):
+    """Suuu, Suuv, Suvv, Svvv as 3-tuples: what a pair at a fold needs and nothing else does."""
+    iu = find_span(pool, table[r + BREAKS_U], table[r + SPANS_U], u)
+    iv = find_span(pool, table[r + BREAKS_V], table[r + SPANS_V], v)
+    ou = table[r + BREAKS_U] + iu
+    ov = table[r + BREAKS_V] + iv
+    s = u - 0.5 * (pool[ou] + pool[ou + 1])
+    t = v - 0.5 * (pool[ov] + pool[ov + 1])
+    p = table[r + DEGREE_U]
+    q = table[r + DEGREE_V]
+    stride = 4 * (q + 1)
+    o = table[r + COEFFICIENTS] + stride * (p + 1) * (iu * table[r + SPANS_V] + iv)
+    a, b, c, d = _row_third(pool, o + stride * p, q, t)
+    # Names: derivatives in u by letter, in v by number; Taylor coefficients (halves and sixths) until the end.
+    a1 = 0.0 * a
+    a2 = 0.0 * a
+    a3 = 0.0 * a
+    b1 = 0.0 * a
+    b2 = 0.0 * a
+    c1 = 0.0 * a
+    for k in range(p - 1, -1, -1):
+        a3 = a2 + s * a3
+        a2 = a1 + s * a2
+        a1 = a + s * a1
+        b2 = b1 + s * b2
+        b1 = b + s * b1
+        c1 = c + s * c1
+        e, f, g, h = _row_third(pool, o + stride * k, q, t)
+        a = e + s * a
+        b = f + s * b
+        c = g + s * c
+        d = h + s * d
+    i = 1.0 / lane(a, 3)
+    wu = lane(a1, 3)
+    wv = lane(b, 3)
+    wuu = lane(a2, 3)
+    wuv = lane(b1, 3)
+    wvv = lane(c, 3)
+    # Taylor coefficients of the quotient, order by order.
+    x = i * a
+    xu = i * (a1 - wu * x)
+    xv = i * (b - wv * x)
+    xuu = i * (a2 - wu * xu - wuu * x)
+    xuv = i * (b1 - wu * xv - wv * xu - wuv * x)
+    xvv = i * (c - wv * xv - wvv * x)
+    xuuu = i * (a3 - wu * xuu - wuu * xu - lane(a3, 3) * x)
+    xuuv = i * (b2 - wu * xuv - wv * xuu - wuu * xv - wuv * xu - lane(b2, 3) * x)
+    xuvv = i * (c1 - wv * xuv - wu * xvv - wvv * xu - wuv * xv - lane(c1, 3) * x)
+    xvvv = i * (d - wv * xvv - wvv * xv - lane(d, 3) * x)
+    return xyz(6.0 * xuuu), xyz(2.0 * xuuv), xyz(2.0 * xuvv), xyz(6.0 * xvvv)

@@ -8,8 +8,11 @@ Minimize f subject to c = 0 (or c >= 0), multipliers y of L = f + y.c (y <= 0 fo
 with H the Hessian of L, by eliminating dy: (H + d I + J^T J / mu) dx = -(grad f + J^T (y + c / mu)). The Cholesky
 factorization of that matrix tells its inertia; d is raised until it exists. dx descends on the augmented Lagrangian,
 along which a line search runs; multipliers follow every step. -mu I makes redundant rows harmless.
-Where rows cannot all hold, the same step with f = 0, y = 0, mu = 1 minimizes |c|^2 / 2 and the loop says
-INFEASIBLE at its stationary point.
+A step that the rows' curvature spoils is bent back onto the rows with the same factorization before it is shortened.
+
+A contact whose pair comes to a fold gets its coordinates as unknowns (`proximity/free_pair.py`), for the rest of the solve.
+Where rows cannot all hold, the same step with f = 0, y = 0, mu = 1 minimizes |c|^2 / 2, and the loop says INFEASIBLE
+at its stationary point.
 """
 
 from __future__ import annotations
@@ -25,154 +28,52 @@ from assembly.constraints.program import (
     BODY_G,
     CONTACT,
     CONTACTS,
+    FOLD,
     MOVING,
     ONE_SIDED,
     PROPER,
-    RATES,
     RECORD,
+    REFERENCE,
     ROW,
     ROW_TABLE,
     ROWS,
     SCALE,
+    SCRATCH,
     SLOTS,
-    add_row_hessian,
+    SURFACE_F,
+    SURFACE_G,
+    add_hessian,
     evaluate,
     objective,
 )
-from assembly.kinematics.motion import relative_pose, retract, rotation
+from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.extremal import CONVERGED, SINGULAR
+from assembly.proximity.free_pair import VARIABLES, coordinate_lengths
 from assembly.proximity.start import global_start
 from assembly.solve.linear import factorize, substitute
+from assembly.solve.rows import (
+    add_row,
+    add_squares,
+    add_transposed,
+    carry,
+    merit,
+    move,
+    place_rows,
+    times,
+    violation_of,
+)
 
-# Outcomes; `solution.Status` gives each a sentence.
-SOLVED, INFEASIBLE, STALLED, ITERATION_LIMIT, CONTACT_LOST = 0, 1, 2, 3, 4
+# Outcomes; `solution.Status` gives each a sentence. RUNNING is none of them.
+SOLVED, INFEASIBLE, STALLED, ITERATION_LIMIT, CONTACT_LOST, RUNNING = 0, 1, 2, 3, 4, 5
 # Settings, in scaled lengths.
-FEASIBILITY, STATIONARITY, ITERATIONS, PENALTY, PENALTY_FLOOR, RADIUS, WARM, SETTINGS = 0, 1, 2, 3, 4, 5, 6, 8
+FEASIBILITY, STATIONARITY, ITERATIONS, PENALTY, PENALTY_FLOOR, RADIUS, SETTINGS = 0, 1, 2, 3, 4, 5, 8
 # Results at the end of the state.
 STATUS, COUNT, OBJECTIVE, VIOLATION, DUAL, CULPRIT, IMPROPER, RESULTS = 0, 1, 2, 3, 4, 5, 6, 8
 HISTORY = 7  # figures an iteration: objective, feasibility, stationarity, mu, regularization, step length, radius
-
-
-@kernel
-def violation_of(table, residual):
-    """Largest violation and its row."""
-    worst = 0.0
-    where = -1
-    for r in range(table[ROWS]):
-        c = residual[r]
-        if table[table[ROW_TABLE] + ROW * r + ONE_SIDED] == 1:
-            c = min(c, 0.0)
-        if abs(c) > worst:
-            worst = abs(c)
-            where = r
-    return worst, where
-
-
-@kernel
-def merit(table, f, residual, y, mu):
-    """Augmented Lagrangian; a one-sided row counts only while y + c / mu is negative."""
-    value = f
-    for r in range(table[ROWS]):
-        c = residual[r]
-        if table[table[ROW_TABLE] + ROW * r + ONE_SIDED] == 1 and y[r] + c / mu >= 0.0:
-            value -= 0.5 * mu * y[r] * y[r]
-        else:
-            value += y[r] * c + 0.5 * c * c / mu
-    return value
-
-
-@kernel
-def add_transposed(table, jacobian, weights, out):
-    """out += J^T weights."""
-    for r in range(table[ROWS]):
-        w = weights[r]
-        if w == 0.0:
-            continue
-        row = table[ROW_TABLE] + ROW * r
-        f = 6 * table[table[SLOTS] + table[row + BODY_F]]
-        g = 6 * table[table[SLOTS] + table[row + BODY_G]]
-        for k in range(6):
-            if f >= 0:
-                out[f + k] += w * jacobian[r, k]
-            if g >= 0:
-                out[g + k] += w * jacobian[r, 6 + k]
-
-
-@kernel
-def add_squares(table, jacobian, weights, out):
-    """out += J^T diag(weights) J (upper triangle and more)."""
-    for r in range(table[ROWS]):
-        w = weights[r]
-        if w == 0.0:
-            continue
-        row = table[ROW_TABLE] + ROW * r
-        f = 6 * table[table[SLOTS] + table[row + BODY_F]]
-        g = 6 * table[table[SLOTS] + table[row + BODY_G]]
-        for i in range(12):
-            base = f if i < 6 else g
-            if base < 0:
-                continue
-            s = w * jacobian[r, i]
-            o = base + i % 6
-            if f >= 0:
-                for j in range(6):
-                    out[o, f + j] += s * jacobian[r, j]
-            if g >= 0:
-                for j in range(6):
-                    out[o, g + j] += s * jacobian[r, 6 + j]
-
-
-@kernel
-def times(table, jacobian, r, d):
-    """Row r of J d."""
-    row = table[ROW_TABLE] + ROW * r
-    f = 6 * table[table[SLOTS] + table[row + BODY_F]]
-    g = 6 * table[table[SLOTS] + table[row + BODY_G]]
-    s = 0.0
-    for k in range(6):
-        if f >= 0:
-            s += jacobian[r, k] * d[f + k]
-        if g >= 0:
-            s += jacobian[r, 6 + k] * d[g + k]
-    return s
-
-
-@kernel
-def move(table, q, d, alpha, out):
-    """Every moving body retracted by alpha d."""
-    for b in range(table[BODIES]):
-        s = 6 * table[table[SLOTS] + b]
-        if s >= 0:
-            retract(
-                q,
-                b,
-                (alpha * d[s], alpha * d[s + 1], alpha * d[s + 2]),
-                (alpha * d[s + 3], alpha * d[s + 4], alpha * d[s + 5]),
-                out,
-            )
-
-
-@kernel
-def predict(table, contacts, records, z, d, alpha, out):
-    """Contact coordinates carried by the contact velocity along alpha d."""
-    for r in range(table[ROWS]):
-        row = table[ROW_TABLE] + ROW * r
-        f = 6 * table[table[SLOTS] + table[row + BODY_F]]
-        g = 6 * table[table[SLOTS] + table[row + BODY_G]]
-        k = table[row + CONTACT]
-        rates = records[k, RATES : RATES + 16]
-        for i in range(4):
-            out[k, i] = contacts[k, i]
-        for j in range(4):
-            s = 0.0
-            for i in range(6):
-                if f >= 0:
-                    s += z[k, j, i] * d[f + i]
-                if g >= 0:
-                    s += z[k, j, 6 + i] * d[g + i]
-            s *= alpha
-            for i in range(4):
-                out[k, i] += rates[4 * i + j] * s
+# A pair this near to a fold (det H over |H|^2) gets its coordinates as unknowns.
+FREE_BELOW = 0.02
+# A step shorter than this decides nothing.
+SHORTEST = 1e-6
 
 
 @kernel
@@ -187,7 +88,7 @@ def start_contacts(table, pool, q, contacts):
         j = table[row + BODY_G]
         turn, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
         status, x, _gap = global_start(
-            table, pool, table[row + 3], table[row + 4], turn, shift, 1.0, 40
+            table, pool, table[row + SURFACE_F], table[row + SURFACE_G], turn, shift, 1.0, 40
         )
         if status != CONVERGED and status != SINGULAR:
             return k
@@ -196,30 +97,112 @@ def start_contacts(table, pool, q, contacts):
 
 
 @kernel
+def free_folds(table, pool, records, contacts, forces, free, lengths, below, lost):
+    """Mark the pairs near a fold, and the lost one, as free. Returns how many are free now.
+
+    An idle one-sided row asks nothing of its pair.
+    """
+    count = 0
+    for r in range(table[ROWS]):
+        row = table[ROW_TABLE] + ROW * r
+        k = table[row + CONTACT]
+        idle = table[row + ONE_SIDED] == 1 and forces[r] == 0.0
+        if free[k] < 0 and not idle and (abs(records[k, FOLD]) < below or k == lost):
+            x = (contacts[k, 0], contacts[k, 1], contacts[k, 2], contacts[k, 3])
+            coordinate_lengths(table, pool, table[row + SURFACE_F], table[row + SURFACE_G], x, lengths[k])
+            free[k] = 0
+        if free[k] >= 0:
+            free[k] = count
+            count += 1
+    return count
+
+
+@kernel
+def dual_residual(bases, jacobian, rows, one_sided, residual, gradient, y, scratch):
+    """Largest component of grad f + J^T y, and of complementarity."""
+    for i in range(gradient.size):
+        scratch[i] = gradient[i]
+    add_transposed(bases, jacobian, rows, y, scratch)
+    worst = 0.0
+    for i in range(gradient.size):
+        if not abs(scratch[i]) <= worst:
+            worst = abs(scratch[i])
+    for r in range(rows):
+        if one_sided[r] == 1:
+            worst = max(worst, min(abs(y[r]), abs(residual[r])))
+    return worst
+
+
+@kernel
+def least_squares_multipliers(bases, jacobian, rows, one_sided, active, gradient, scratch, gram, y):
+    """The multipliers of the active rows that leave the smallest grad f + J^T y."""
+    n = gradient.size
+    for r in range(rows):
+        for i in range(n):
+            scratch[i] = 0.0
+        if active[r] > 0.0:
+            add_row(bases, jacobian, r, 1.0, scratch)
+        for s in range(r, rows):
+            gram[r, s] = times(bases, jacobian, s, scratch) if active[s] > 0.0 else 0.0
+        gram[r, r] += 1e-10 if active[r] > 0.0 else 1.0
+        y[r] = -times(bases, jacobian, r, gradient) if active[r] > 0.0 else 0.0
+    if factorize(gram, rows):
+        substitute(gram, rows, y)
+    for r in range(rows):
+        if one_sided[r] == 1:
+            y[r] = min(y[r], 0.0)
+
+
+@kernel
+def factorize_shifted(lagrangian, n, shift, matrix):
+    """Factorize lagrangian + d I with the smallest d tried, from `shift` up, that makes it positive definite; -1: none."""
+    scale = 1.0
+    for i in range(n):
+        scale = max(scale, abs(lagrangian[i, i]))
+    while shift <= 1e8 * scale:
+        for i in range(n):
+            for j in range(i, n):
+                matrix[i, j] = lagrangian[i, j]
+            matrix[i, i] += shift
+        if factorize(matrix, n):
+            return shift
+        shift = max(4.0 * shift, 1e-4)
+    return -1.0
+
+
+@kernel
 def solve_program(table, pool, settings, state, history):
     """Solve in place. State: q (n, 7) | contacts (k, 4) | multipliers (m) | residuals (m) | results."""
     bodies = table[BODIES]
     pairs = table[CONTACTS]
     m = table[ROWS]
-    n = 6 * table[MOVING]
     size = pool[SCALE]
     o_contacts = 7 * bodies
     o_y = o_contacts + 4 * pairs
     o_residual = o_y + m
-    o_results = o_residual + m
+    results = state[o_residual + m :]
     q = np.empty((bodies, 7))
-    contacts = np.empty((pairs, 4))
-    y = np.empty(m)
+    reach = 0.0
     for b in range(bodies):
         for k in range(3):
-            q[b, k] = (state[7 * b + k] - pool[1 + k]) / size
+            q[b, k] = (state[7 * b + k] - pool[REFERENCE + k]) / size
+            reach = max(reach, abs(state[7 * b + k]) / size)
         for k in range(3, 7):
             q[b, k] = state[7 * b + k]
-    for k in range(pairs):
-        for i in range(4):
-            contacts[k, i] = state[o_contacts + 4 * k + i]
-    for r in range(m):
-        y[r] = state[o_y + r]
+    contacts = state[o_contacts:o_y].copy().reshape(pairs, 4)
+    # Rows and variables grow by four for every free pair.
+    rows = m
+    most = m + 4 * pairs
+    n = 6 * table[MOVING]
+    free = np.full(pairs, -1)
+    bases = np.empty((most, 3), np.int64)
+    one_sided = np.empty(most, np.int64)
+    place_rows(table, free, bases, one_sided)
+    lengths = np.empty((pairs, 4))
+    work = np.empty(SCRATCH)
+    y = np.zeros(most)
+    y[:m] = state[o_y:o_residual]
+    better_y = y.copy()
     trial_q = q.copy()
     guess = np.empty((pairs, 4))
     trial_contacts = np.empty((pairs, 4))
@@ -227,24 +210,23 @@ def solve_program(table, pool, settings, state, history):
     trial_records = np.empty((pairs, RECORD))
     z = np.empty((pairs, 4, 12))
     trial_z = np.empty((pairs, 4, 12))
-    residual = np.empty(m)
-    trial_residual = np.empty(m)
-    jacobian = np.empty((m, 12))
-    trial_jacobian = np.empty((m, 12))
+    residual = np.empty(most)
+    trial_residual = np.empty(most)
+    jacobian = np.empty((most, VARIABLES))
+    trial_jacobian = np.empty((most, VARIABLES))
+    active = np.empty(most)
+    gram = np.empty((most, most))
+    forces = np.zeros(most)
     gradient = np.empty(n)
     descent = np.empty(n)
     step = np.empty(n)
     straight = np.empty(n)
-    bent = np.empty(n)
     lagrangian = np.empty((n, n))
     matrix = np.empty((n, n))
-    active = np.empty(m)
-    forces = np.empty(m)
 
-    results = state[o_results:]
-    results[CULPRIT] = -1.0
-    status = ITERATION_LIMIT
-    iteration = 0
+    # What rounding of the user's coordinates alone can violate.
+    feasible = max(settings[FEASIBILITY], 4e-16 * reach)
+    limit = int(settings[ITERATIONS])
     mu = settings[PENALTY]
     shift = 0.0
     radius = settings[RADIUS]
@@ -252,36 +234,57 @@ def solve_program(table, pool, settings, state, history):
     dual = math.inf
     value = math.inf
     restoring = False
-    best = math.inf
-    stuck = 0
+    entered = math.inf
+    restorations = 0
+    iteration = 0
+    alpha = 0.0
+    status = RUNNING
+    results[CULPRIT] = -1.0
 
     lost = start_contacts(table, pool, q, contacts)
     if lost < 0:
-        code, lost = evaluate(table, pool, q, contacts, 40, contacts, records, z, residual, jacobian)
+        lost = evaluate(table, pool, q, contacts, 40, free, lengths, work, contacts, records, z, residual, jacobian)
     if lost >= 0:
         status = CONTACT_LOST
         results[CULPRIT] = float(lost)
-    limit = int(settings[ITERATIONS])
-    alpha = 0.0
-    while status == ITERATION_LIMIT:
+    lost = -1
+    below = FREE_BELOW
+    while status == RUNNING:
+        for r in range(rows):
+            forces[r] = 0.0 if one_sided[r] == 1 and y[r] + residual[r] / mu >= 0.0 else 1.0
+        count = free_folds(table, pool, records, contacts, forces, free, lengths, below, lost)
+        if m + 4 * count != rows:
+            for r in range(rows, most):
+                y[r] = 0.0
+                better_y[r] = 0.0
+            rows = m + 4 * count
+            n = 6 * table[MOVING] + 4 * count
+            place_rows(table, free, bases, one_sided)
+            gradient = np.empty(n)
+            descent = np.empty(n)
+            step = np.empty(n)
+            straight = np.empty(n)
+            lagrangian = np.empty((n, n))
+            matrix = np.empty((n, n))
+            lost = evaluate(table, pool, q, contacts, 40, free, lengths, work, contacts, records, z, residual, jacobian)
+        below = FREE_BELOW
+        lost = -1
         value = objective(table, pool, q, gradient, lagrangian, True)
-        violation, _worst = violation_of(table, residual)
-        weight = 0.0 if restoring else 1.0
-        if restoring:
-            for i in range(n):
-                gradient[i] = 0.0
-                for j in range(n):
-                    lagrangian[i, j] = 0.0
-        # Stationarity of the Lagrangian.
-        for i in range(n):
-            step[i] = gradient[i]
-        add_transposed(table, jacobian, y, step)
-        dual = 0.0
-        for i in range(n):
-            dual = max(dual, abs(step[i]))
-        for r in range(m):
-            if table[table[ROW_TABLE] + ROW * r + ONE_SIDED] == 1:
-                dual = max(dual, min(abs(y[r]), abs(residual[r])))
+        violation = violation_of(residual, one_sided, rows)
+        dual = dual_residual(bases, jacobian, rows, one_sided, residual, gradient, better_y, descent)
+        other = dual_residual(bases, jacobian, rows, one_sided, residual, gradient, y, descent)
+        if dual <= other:
+            for r in range(rows):
+                y[r] = better_y[r]
+        else:
+            dual = other
+        if iteration > 0 and alpha < 1.0:
+            least_squares_multipliers(bases, jacobian, rows, one_sided, forces, gradient, descent, gram, better_y)
+            other = dual_residual(bases, jacobian, rows, one_sided, residual, gradient, better_y, descent)
+            if other < dual:
+                dual = other
+                for r in range(rows):
+                    y[r] = better_y[r]
         if iteration < history.shape[0]:
             history[iteration, 0] = value
             history[iteration, 1] = violation
@@ -289,116 +292,132 @@ def solve_program(table, pool, settings, state, history):
             history[iteration, 3] = mu
             history[iteration, 4] = shift
             history[iteration, 5] = alpha
-            history[iteration, 6] = records[:, 43].min()
-        if violation <= settings[FEASIBILITY] and dual <= settings[STATIONARITY] and not restoring:
+            history[iteration, 6] = radius
+        if violation <= feasible and dual <= settings[STATIONARITY]:
             status = SOLVED
             break
         if iteration >= limit:
+            status = ITERATION_LIMIT
             break
+        if restoring and violation <= max(0.1 * entered, feasible):
+            restoring = False
+            mu = settings[PENALTY]
+        if restoring:
+            mu = 1.0
+            for r in range(rows):
+                y[r] = 0.0
+            for i in range(n):
+                gradient[i] = 0.0
+                for j in range(n):
+                    lagrangian[i, j] = 0.0
         # The right side and the matrix.
-        for r in range(m):
+        for r in range(rows):
             t = y[r] + residual[r] / mu
-            one_sided = table[table[ROW_TABLE] + ROW * r + ONE_SIDED] == 1
-            if one_sided and t >= 0.0:
-                forces[r] = 0.0
-                active[r] = 0.0
-            else:
-                forces[r] = t
-                active[r] = 1.0 / mu
+            idle = one_sided[r] == 1 and t >= 0.0
+            forces[r] = 0.0 if idle else -t
+            active[r] = 0.0 if idle else 1.0 / mu
         for i in range(n):
             descent[i] = -gradient[i]
+        add_transposed(bases, jacobian, rows, forces, descent)
+        for r in range(rows):
+            # Far from feasible, c / mu would drown the curvature of the objective; y is what it tends to.
+            forces[r] = (residual[r] if active[r] > 0.0 else 0.0) if restoring else y[r]
         for r in range(m):
-            forces[r] = -forces[r]
-        add_transposed(table, jacobian, forces, descent)
-        for r in range(m):
-            curvature = y[r]
-            if restoring:
-                curvature = residual[r] if active[r] > 0.0 else 0.0
-            if curvature != 0.0:
-                add_row_hessian(table, r, records, z, curvature, lagrangian)
-        add_squares(table, jacobian, active, lagrangian)
-        scale = 0.0
-        for i in range(n):
-            scale = max(scale, abs(lagrangian[i, i]))
-        attempt = max(0.25 * shift, 1e-8)
-        while True:
-            for i in range(n):
-                for j in range(n):
-                    matrix[i, j] = lagrangian[i, j]
-                matrix[i, i] += attempt
-            if factorize(matrix, n):
-                break
-            attempt = max(4.0 * attempt, 1e-4)
-            if attempt > 1e12 * (1.0 + scale):
-                status = STALLED
-                break
-        if status == STALLED:
+            add_hessian(table, pool, r, q, contacts, free, lengths, work, records, z, forces, lagrangian)
+        add_squares(bases, jacobian, rows, active, lagrangian)
+        shift = factorize_shifted(lagrangian, n, max(0.25 * shift, 1e-8), matrix)
+        if shift < 0.0:
+            status = STALLED
             break
-        shift = attempt
         for i in range(n):
             step[i] = descent[i]
         substitute(matrix, n, step)
         longest = 0.0
         for i in range(n):
             longest = max(longest, abs(step[i]))
-        if longest > radius:
-            for i in range(n):
-                step[i] *= radius / longest
+        cut = min(1.0, radius / longest) if longest > 0.0 else 1.0
         slope = 0.0
         for i in range(n):
+            step[i] *= cut
+            straight[i] = step[i]
             slope -= descent[i] * step[i]
-        if restoring and longest < 1e-9:
-            status = INFEASIBLE
+        if restoring and (longest < 1e-10 or abs(slope) < 1e-24):
+            status = INFEASIBLE if violation > feasible else STALLED
             break
         # Line search on the augmented Lagrangian.
-        here = merit(table, weight * value, residual, y, mu)
-        noise = 1e-14 * (abs(here) + abs(weight * value) + 1e-300)
+        here = merit(residual, one_sided, rows, y, mu)
+        if not restoring:
+            here += value
+        noise = 1e-14 * (abs(here) + abs(value) + 1e-300)
         alpha = 1.0
         accepted = False
-        corrections = 0
-        for i in range(n):
-            straight[i] = step[i]
-        while alpha > 1e-7:
+        bends = 0
+        while alpha * longest * cut > 1e-9 * SHORTEST or alpha == 1.0:
             move(table, q, step, alpha, trial_q)
-            predict(table, contacts, records, z, step, alpha, guess)
-            code, lost = evaluate(
-                table, pool, trial_q, guess, 12, trial_contacts, trial_records, trial_z, trial_residual, trial_jacobian
+            carry(table, pool, bases, free, lengths, contacts, records, z, step, alpha, guess)
+            lost = evaluate(
+                table,
+                pool,
+                trial_q,
+                guess,
+                12,
+                free,
+                lengths,
+                work,
+                trial_contacts,
+                trial_records,
+                trial_z,
+                trial_residual,
+                trial_jacobian,
             )
             if lost < 0:
-                there = weight * objective(table, pool, trial_q, gradient, lagrangian, False)
-                there = merit(table, there, trial_residual, y, mu)
+                there = merit(trial_residual, one_sided, rows, y, mu)
+                if not restoring:
+                    there += objective(table, pool, trial_q, gradient, lagrangian, False)
                 if there <= here + 1e-4 * alpha * slope + noise:
                     accepted = True
                     break
-                if corrections < 2:
-                    # The rows' curvature, not the direction, is at fault as a rule: bend the step back onto the rows.
-                    corrections += 1
+                if bends < 2:
+                    bends += 1
                     for i in range(n):
-                        bent[i] = 0.0
-                    for r in range(m):
+                        descent[i] = 0.0
+                    for r in range(rows):
                         forces[r] = -(trial_residual[r] - (1.0 - alpha) * residual[r]) * active[r]
-                    add_transposed(table, jacobian, forces, bent)
-                    substitute(matrix, n, bent)
+                    add_transposed(bases, jacobian, rows, forces, descent)
+                    substitute(matrix, n, descent)
                     for i in range(n):
-                        step[i] += bent[i] / alpha
+                        step[i] += descent[i] / alpha
                     continue
-                if corrections == 2:
+                if bends == 2:
+                    bends = 3
                     for i in range(n):
                         step[i] = straight[i]
-                    corrections = 3
             alpha *= 0.5
+            if alpha < 0.1 and lost >= 0:
+                break
         if not accepted:
-            status = STALLED
+            if lost < 0:
+                # Perhaps a fold is near enough to matter; else nothing moves any more.
+                below = 0.3
+                for k in range(pairs):
+                    if free[k] < 0 and abs(records[k, FOLD]) < below:
+                        lost = k
+            if lost >= 0 and free[lost] < 0:
+                continue
+            lost = -1
+            if not restoring and violation > feasible and restorations < 3:
+                restoring = True
+                restorations += 1
+                entered = violation
+                continue
+            status = INFEASIBLE if restoring and violation > feasible else STALLED
             break
-        if not restoring:
-            for r in range(m):
-                if active[r] > 0.0:
-                    dy = alpha * (times(table, jacobian, r, straight) + residual[r]) / mu
-                    y[r] += dy
-                    if table[table[ROW_TABLE] + ROW * r + ONE_SIDED] == 1:
-                        y[r] = min(y[r], 0.0)
-                else:
-                    y[r] = 0.0
+        for r in range(rows):
+            better_y[r] = 0.0
+            if active[r] > 0.0:
+                better_y[r] = y[r] + alpha * (times(bases, jacobian, r, straight) + residual[r]) / mu
+                if one_sided[r] == 1:
+                    better_y[r] = min(better_y[r], 0.0)
         q, trial_q = trial_q, q
         contacts, trial_contacts = trial_contacts, contacts
         records, trial_records = trial_records, records
@@ -406,16 +425,17 @@ def solve_program(table, pool, settings, state, history):
         residual, trial_residual = trial_residual, residual
         jacobian, trial_jacobian = trial_jacobian, jacobian
         if alpha == 1.0:
-            if longest <= radius:
+            if cut == 1.0:
                 mu = max(0.1 * mu, settings[PENALTY_FLOOR])
             radius = min(2.0 * radius, 1.0)
         else:
-            radius = max(alpha * radius, 1e-6)
+            radius = max(2.0 * alpha * longest * cut, SHORTEST)
         iteration += 1
+
     for b in range(bodies):
         if table[table[SLOTS] + b] >= 0:
             for k in range(3):
-                state[7 * b + k] = q[b, k] * size + pool[1 + k]
+                state[7 * b + k] = q[b, k] * size + pool[REFERENCE + k]
             for k in range(3, 7):
                 state[7 * b + k] = q[b, k]
     for k in range(pairs):
@@ -431,6 +451,6 @@ def solve_program(table, pool, settings, state, history):
     results[DUAL] = dual
     results[IMPROPER] = 0.0
     for k in range(pairs):
-        if records[k, PROPER] == 0.0:
+        if free[k] < 0 and records[k, PROPER] == 0.0:
             results[IMPROPER] += 1.0
     return status
