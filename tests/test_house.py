@@ -19,6 +19,10 @@ HEAVY = ("casadi", "matplotlib", "meshcat", "numba", "numpy", "scipy")
 LAZY = [assembly, assembly.proximity, assembly.view]
 
 
+def label(value: object) -> str:
+    return getattr(value, "__name__", str(value))
+
+
 def imported_modules(path: Path) -> set[str]:
     """Full names of everything a file imports from this package: modules, and names in them."""
     names: set[str] = set()
@@ -56,7 +60,7 @@ print([m for m in {HEAVY} if m in sys.modules and m in ("casadi", "matplotlib", 
     assert run_python(code).strip() == "[]"
 
 
-@pytest.mark.parametrize(("package", "name"), [(p, n) for p in LAZY for n in p.__all__], ids=lambda x: str(x))
+@pytest.mark.parametrize(("package", "name"), [(p, n) for p in LAZY for n in p.__all__], ids=label)
 def test_public_names_resolve(package, name):
     value = getattr(package, name)
     assert name in dir(package)
