@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Union
+import numpy as np
 
 from assembly.errors import InputError
 from assembly.kinematics.body import Body, BodyFace
@@ -33,8 +33,8 @@ class Contact:
 
     def __init__(
         self,
-        a: Union[Body, BodyFace],
-        b: Union[Body, BodyFace],
+        a: Body | BodyFace,
+        b: Body | BodyFace,
         name: str | None = None,
         unilateral: bool = False,
     ) -> None:
@@ -43,16 +43,36 @@ class Contact:
                 raise TypeError(f"{label} is {side!r}; expected a Body or one of its faces")
             if isinstance(side, Body) and not side.faces:
                 raise InputError(f"{label} is body {side.name!r} without a shape; expected a body with a face")
-        self.a = a
-        self.b = b
+        self._a = a
+        self._b = b
         if self.body_a is self.body_b:
             raise InputError(f"a and b are both on body {self.body_a.name!r}; expected two bodies")
         if name is not None and (not isinstance(name, str) or not name.strip()):
             raise InputError(f"name is {name!r}; expected a nonempty string")
-        if not isinstance(unilateral, bool):
+        if not isinstance(unilateral, (bool, np.bool_)):
             raise InputError(f"unilateral is {unilateral!r}; expected True or False")
-        self.name = f"{self.body_a.name}-{self.body_b.name}" if name is None else name
-        self.unilateral = unilateral
+        self._name = f"{self.body_a.name}-{self.body_b.name}" if name is None else name
+        self._unilateral = bool(unilateral)
+
+    @property
+    def a(self) -> Body | BodyFace:
+        """One side, as it was given."""
+        return self._a
+
+    @property
+    def b(self) -> Body | BodyFace:
+        """The other side, as it was given."""
+        return self._b
+
+    @property
+    def name(self) -> str:
+        """Name of the constraint."""
+        return self._name
+
+    @property
+    def unilateral(self) -> bool:
+        """Whether the gap may be positive."""
+        return self._unilateral
 
     @property
     def body_a(self) -> Body:

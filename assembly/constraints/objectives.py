@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.errors import InputError, positive, real_array, vector
+from assembly.errors import positive, vector
 from assembly.kinematics.body import Body, Point
+from assembly.kinematics.pose import pose_rows
 
 __all__ = ["Objective", "PointDistance", "Posture"]
 
@@ -16,8 +17,19 @@ Array = NDArray[np.float64]
 class Objective:
     """A term of the objective; see its subclasses."""
 
-    weight: float
-    bodies: tuple[Body, ...] = ()
+    def __init__(self, bodies: tuple[Body, ...], weight: float) -> None:
+        self._bodies = bodies
+        self._weight = positive("weight", weight)
+
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """Bodies that the term names."""
+        return self._bodies
+
+    @property
+    def weight(self) -> float:
+        """Factor of the term, positive."""
+        return self._weight
 
 
 class PointDistance(Objective):
@@ -38,10 +50,14 @@ class PointDistance(Objective):
     def __init__(self, point: Point, target: ArrayLike, weight: float = 1.0) -> None:
         if not isinstance(point, Point):
             raise TypeError(f"point is {point!r}; expected a point of a body, body.point(x, y, z)")
-        self.point = point
-        self.bodies = (point.body,)
-        self.weight = positive("weight", weight)
+        super().__init__((point.body,), weight)
+        self._point = point
         self.target = target
+
+    @property
+    def point(self) -> Point:
+        """The point that is drawn."""
+        return self._point
 
     @property
     def target(self) -> Array:
@@ -71,15 +87,15 @@ class Posture(Objective):
     """
 
     def __init__(self, reference: ArrayLike | None = None, weight: float = 1.0) -> None:
-        self.weight = positive("weight", weight)
-        self.reference: Array | None = None
-        if reference is not None:
-            rows = real_array("reference", reference, ("n", 7))
-            norms = np.linalg.norm(rows[:, 3:], axis=1)
-            if np.abs(norms - 1.0).max() > 1e-2:
-                raise InputError(f"reference has quaternions of norms {norms.tolist()}; expected unit quaternions")
-            rows[:, 3:] /= norms[:, None]
-            self.reference = rows
+        super().__init__((), weight)
+        self._reference = None if reference is None else pose_rows("reference", reference)
+        if self._reference is not None:
+            self._reference.flags.writeable = False
+
+    @property
+    def reference(self) -> Array | None:
+        """Poses to stay close to, (n, 7), read-only; None where each solve starts."""
+        return self._reference
 
     def __repr__(self) -> str:
         return f"Posture(weight={self.weight:g})"

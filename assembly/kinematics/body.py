@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,12 +11,17 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.errors import InputError, vector
 from assembly.geometry.face import Face
 from assembly.geometry.surface import NurbsSurface
-from assembly.kinematics.pose import Pose
+from assembly.kinematics.pose import Pose, direction
 
 __all__ = ["Body", "BodyFace", "Frame", "Point", "Shape"]
 
 Array = NDArray[np.float64]
-Shape = Union[NurbsSurface, Face, Sequence[Union[NurbsSurface, Face]]]
+Shape = NurbsSurface | Face | Iterable[NurbsSurface | Face]
+
+
+def _frozen(array: Array) -> Array:
+    array.flags.writeable = False
+    return array
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,13 +58,13 @@ class BodyFace:
 
 
 class Body:
-    """A rigid body.
+    """A rigid body. Its pose may be set anew; its name, its faces and whether it is fixed are for life.
 
     Parameters
     ----------
     name : str
         Not empty; unique in an assembly.
-    shape : NurbsSurface, Face, or a sequence of them, optional
+    shape : NurbsSurface, Face, or several of them, optional
         In body coordinates. A surface's outward normal is Su x Sv.
     position, quaternion
         Where the body stands, body to world; the quaternion is (w, x, y, z), unit to within a percent.
@@ -85,15 +89,45 @@ class Body:
             raise InputError(f"name is {name!r}; expected a nonempty string")
         if not isinstance(fixed, (bool, np.bool_)):
             raise InputError(f"fixed is {fixed!r}; expected True or False")
-        self.name = name
-        self.fixed = bool(fixed)
-        self.pose = Pose(position, quaternion)  # type: ignore[arg-type]
-        self.faces: tuple[BodyFace, ...] = self._named(shape)
+        self._name = name
+        self._fixed = bool(fixed)
+        self._pose = Pose(position, quaternion)  # type: ignore[arg-type]  # checked and converted there
+        self._faces = self._named(shape)
+
+    @property
+    def name(self) -> str:
+        """Name of the body."""
+        return self._name
+
+    @property
+    def fixed(self) -> bool:
+        """Whether the body stays where it is in a solve."""
+        return self._fixed
+
+    @property
+    def faces(self) -> tuple[BodyFace, ...]:
+        """Faces in the order they were given."""
+        return self._faces
+
+    @property
+    def pose(self) -> Pose:
+        """Where the body stands; settable. A solve starts here and does not change it."""
+        return self._pose
+
+    @pose.setter
+    def pose(self, value: Pose) -> None:
+        if not isinstance(value, Pose):
+            raise TypeError(f"pose is {value!r}; expected a Pose")
+        self._pose = value
 
     def _named(self, shape: Shape | None) -> tuple[BodyFace, ...]:
         if shape is None:
             return ()
+        if not isinstance(shape, (NurbsSurface, Face, Iterable)):
+            raise TypeError(f"shape of body {self.name!r} is {shape!r}; expected NurbsSurface, Face or several")
         parts = [shape] if isinstance(shape, (NurbsSurface, Face)) else list(shape)
+        if not parts:
+            raise InputError(f"shape of body {self.name!r} is empty; expected a surface, or None for a body without")
         faces: list[BodyFace] = []
         for k, part in enumerate(parts):
             if not isinstance(part, (NurbsSurface, Face)):
@@ -141,7 +175,7 @@ class Body:
 
     def point(self, x: float, y: float, z: float) -> Point:
         """The point (x, y, z) of the body, in body coordinates."""
-        return Point(self, vector("point", (x, y, z)))
+        return Point(self, _frozen(vector("point", (x, y, z))))
 
     def frame(
         self, at: ArrayLike = (0.0, 0.0, 0.0), z: ArrayLike = (0.0, 0.0, 1.0), x: ArrayLike | None = None
@@ -151,14 +185,13 @@ class Body:
         Without `x`, the x axis is the coordinate axis farthest from `z`, made orthogonal to it; a given `x` is made
         orthogonal to `z` too and must not be parallel to it.
         """
-        axis = vector("z", z)
-        length = float(np.linalg.norm(axis))
-        if not length > 0.0:
-            raise InputError(f"z is {axis.tolist()}; expected a direction other than zero")
-        axis /= length
-        side = np.eye(3)[np.argmin(np.abs(axis))] if x is None else vector("x", x)
+        origin, axis = vector("at", at), direction("z", z)
+        side = np.eye(3)[np.argmin(np.abs(axis))] if x is None else direction("x", x)
         across = side - (side @ axis) * axis
-        if not np.linalg.norm(across) > 1e-9 * np.linalg.norm(side):
+        if not np.linalg.norm(across) > 1e-9:
             raise InputError(f"x is {side.tolist()}; expected a direction that is not parallel to z {axis.tolist()}")
-        across /= np.linalg.norm(across)
-        return Frame(self, vector("at", at), np.column_stack([across, np.cross(axis, across), axis]))
+        # Once more: of a side almost along z little is left, and its rounding is along z.
+        across = direction("x", across)
+        across = direction("x", across - (across @ axis) * axis)
+        axes = np.column_stack([across, np.cross(axis, across), axis])
+        return Frame(self, _frozen(origin), _frozen(axes))

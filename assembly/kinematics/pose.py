@@ -10,16 +10,19 @@ A quaternion e = (w, x, y, z) rotates a vector by the rotation of e / |e|:
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import hypot
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.errors import InputError, number, vector
+from assembly.errors import InputError, number, real_array, vector
 
 __all__ = [
     "Pose",
     "angular_velocity_map",
+    "direction",
     "multiply",
+    "pose_rows",
     "quaternion_rate_map",
     "retract",
     "rotate",
@@ -30,28 +33,59 @@ __all__ = [
 Array = NDArray[np.float64]
 # A quaternion typed to two digits is off by less; a forgotten normalization is off by more.
 UNIT_TOLERANCE = 1e-2
+# Rounding of a normalization: within it a quaternion is left as it is, so that normalizing twice changes no bit.
+UNIT_ROUNDING = 1e-15
 
 
 def unit_quaternion(name: str, value: ArrayLike) -> Array:
     """The normalized quaternion; raises where it is zero or far from unit."""
     e = vector(name, value, 4)
-    norm = float(np.linalg.norm(e))
+    norm = hypot(*e)  # np.linalg.norm overflows
     if not abs(norm - 1.0) <= UNIT_TOLERANCE:
         raise InputError(f"{name} is {e.tolist()} with norm {norm:.6g}; expected a unit quaternion (w, x, y, z)")
-    return e / norm
+    return e if abs(norm - 1.0) <= UNIT_ROUNDING else e / norm
 
 
 def nonzero_quaternion(name: str, value: ArrayLike) -> Array:
     """A quaternion of any length but zero, as it came."""
     e = vector(name, value, 4)
-    if not np.linalg.norm(e) > 1e-150:
-        raise InputError(f"{name} is {e.tolist()}; expected a quaternion (w, x, y, z) other than zero")
+    # Between these lengths |e|^2 neither vanishes nor overflows.
+    if not 1e-150 < hypot(*e) < 1e150:
+        raise InputError(f"{name} is {e.tolist()}; expected a quaternion (w, x, y, z) of a length other than zero")
     return e
+
+
+def pose_rows(name: str, value: ArrayLike, count: int | str = "n") -> Array:
+    """Pose rows x y z qw qx qy qz, (count, 7), their quaternions normalized as in `unit_quaternion`."""
+    rows = real_array(name, value, (count, 7))
+    for k, row in enumerate(rows):
+        row[3:] = unit_quaternion(f"{name}[{k}, 3:]", row[3:])
+    return rows
+
+
+def direction(name: str, value: ArrayLike) -> Array:
+    """The unit vector along a vector (3,) of any length but zero."""
+    v = vector(name, value)
+    largest = float(np.abs(v).max())
+    if not largest > 0.0:
+        raise InputError(f"{name} is {v.tolist()}; expected a direction other than zero")
+    v /= largest  # squares of very short and very long vectors have no doubles
+    unit: Array = v / np.linalg.norm(v)
+    return unit
+
+
+def _vectors(name: str, value: ArrayLike, length: int = 3) -> Array:
+    """Finite vectors (..., length)."""
+    try:
+        shape = np.shape(value)[:-1]
+    except ValueError:  # rows of different lengths, which real_array reports
+        shape = ()
+    return real_array(name, value, (*shape, length))
 
 
 def skew(a: ArrayLike) -> Array:
     """The (3, 3) matrix of the cross product: skew(a) b = a x b."""
-    x, y, z = np.asarray(a, dtype=np.float64)
+    x, y, z = vector("a", a)
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
@@ -67,12 +101,13 @@ def rotation_matrix(quaternion: ArrayLike) -> Array:
     e = nonzero_quaternion("quaternion", quaternion)
     e = e / np.linalg.norm(e)
     w, u = e[0], e[1:]
-    return (w * w - u @ u) * np.eye(3) + 2.0 * (w * skew(u) + np.outer(u, u))
+    rotation: Array = (w * w - u @ u) * np.eye(3) + 2.0 * (w * skew(u) + np.outer(u, u))
+    return rotation
 
 
 def rotate(quaternion: ArrayLike, v: ArrayLike) -> Array:
     """The vectors v (..., 3) rotated by the normalized quaternion."""
-    rotated: Array = np.asarray(v, dtype=np.float64) @ rotation_matrix(quaternion).T
+    rotated: Array = _vectors("v", v) @ rotation_matrix(quaternion).T
     return rotated
 
 
@@ -98,14 +133,16 @@ def rotate_jacobian(quaternion: ArrayLike, v: ArrayLike) -> Array:
     Paper 001, eq. 25, with the factor and the term it lacks; radial derivatives are zero.
     """
     e = nonzero_quaternion("quaternion", quaternion)
-    return -skew(rotate(e, vector("v", v))) @ angular_velocity_map(e) / (e @ e)
+    jacobian: Array = -skew(rotate(e, vector("v", v))) @ angular_velocity_map(e) / (e @ e)
+    return jacobian
 
 
 def retract(q: ArrayLike, twist: ArrayLike) -> Array:
     """Pose row(s) (..., 7) moved by twist(s) (..., 6): x + dx and exp(dw) e, normalized."""
-    row, step = np.array(q, dtype=np.float64), np.asarray(twist, dtype=np.float64)
-    if row.shape[-1:] != (7,) or step.shape[-1:] != (6,) or row.shape[:-1] != step.shape[:-1]:
-        raise InputError(f"q and twist have shapes {row.shape} and {step.shape}; expected (..., 7) and (..., 6)")
+    row = _vectors("q", q, 7)
+    step = real_array("twist", twist, (*row.shape[:-1], 6))
+    for e in row[..., 3:].reshape(-1, 4):
+        nonzero_quaternion("q[..., 3:]", e)
     w = step[..., 3:]
     angle = np.linalg.norm(w, axis=-1, keepdims=True)
     c, s = np.cos(0.5 * angle), 0.5 * np.sinc(0.5 * angle / np.pi)
@@ -145,13 +182,9 @@ class Pose:
     @classmethod
     def from_axis_angle(cls, axis: ArrayLike, angle: float, position: ArrayLike = (0.0, 0.0, 0.0)) -> Pose:
         """Rotation by an angle [rad] about an axis, then the position."""
-        direction = vector("axis", axis)
-        length = float(np.linalg.norm(direction))
-        if not length > 0.0:
-            raise InputError(f"axis is {direction.tolist()}; expected a direction other than zero")
+        along = direction("axis", axis)
         half = 0.5 * number("angle", angle)
-        e = np.concatenate([[np.cos(half)], np.sin(half) * direction / length])
-        return cls(np.asarray(position, dtype=np.float64), e)
+        return cls(position, np.concatenate([[np.cos(half)], np.sin(half) * along]))  # type: ignore[arg-type]
 
     @property
     def q(self) -> Array:
@@ -168,7 +201,7 @@ class Pose:
 
     def apply(self, points: ArrayLike) -> Array:
         """World coordinates of body points (..., 3)."""
-        return rotate(self.quaternion, points) + self.position
+        return rotate(self.quaternion, _vectors("points", points)) + self.position
 
     def inverse(self) -> Pose:
         """World to body."""
