@@ -46,7 +46,7 @@ class Contact:
         self._a = a
         self._b = b
         if self.body_a is self.body_b:
-            raise InputError(f"a and b are both on body {self.body_a.name!r}; expected two bodies")
+            raise InputError(f"sides a and b are both on body {self.body_a.name!r}; expected two bodies")
         if name is not None and (not isinstance(name, str) or not name.strip()):
             raise InputError(f"name is {name!r}; expected a nonempty string")
         if not isinstance(unilateral, (bool, np.bool_)):

@@ -117,7 +117,7 @@ motion.retract(q, 0, (0.1, 0.2, 0.3), (0.4, -0.5, 0.6), out)
 motion.retract(q, 1, (0.1, 0.2, 0.3), (4e-5, -5e-5, 6e-5), out)
 turn, shift = motion.relative_pose(q, 0, motion.rotation(q, 0), 1, motion.rotation(q, 1))
 columns = motion.quaternion_columns((0.3, 0.2, -0.9), *q[0, 3:])
-print([*out.ravel().tolist(), *turn, *shift, *columns])
+print(np.array([*out.ravel(), *turn, *shift, *columns]).tolist())
 """
     plain, compiled = (literal_eval(run_python(code, NUMBA_DISABLE_JIT=switch)) for switch in ("1", None))
     # Fused multiply-adds round once where Python rounds twice.
