@@ -30,7 +30,7 @@ from numba import njit, types
 from numba.core import caching, config, serialize
 from numba.core.compiler import CompileResult
 from numba.core.datamodel import models
-from numba.extending import intrinsic, overload, register_model
+from numba.extending import intrinsic, overload, register_jitable, register_model
 
 __all__ = ["kernel", "lane", "load_lanes", "store_xyz"]
 
@@ -187,13 +187,18 @@ class _Cache(caching._Cache):
         return self._folder / f"{self._title()}-{hashlib.sha256(key).hexdigest()[:32]}"
 
 
-def kernel(function: Callable[..., Any] | None = None, *, inline: bool = False, exact: bool = False) -> Any:
+def kernel(
+    function: Callable[..., Any] | None = None, *, inline: bool = False, inner: bool = False, exact: bool = False
+) -> Any:
     """Compile a function with the project's settings.
 
     Parameters
     ----------
     inline
-        Copied into its callers by LLVM and never cached alone: for small helpers.
+        Copied into its callers by LLVM: for small helpers. From Python it runs as plain Python.
+    inner
+        Called by kernels alone, and not copied: no entry from Python and no cache entry, which saves a quarter
+        of its compile time. From Python it runs as plain Python.
     exact
         No fused multiply-add: for code whose rounding is part of a proof.
 
@@ -203,14 +208,14 @@ def kernel(function: Callable[..., Any] | None = None, *, inline: bool = False, 
     the cache knows nothing of its source.
     """
     if function is None:
-        return lambda f: kernel(f, inline=inline, exact=exact)
+        return lambda f: kernel(f, inline=inline, inner=inner, exact=exact)
     fastmath: Any = False if exact else {"contract"}
     settings: dict[str, Any] = {"fastmath": fastmath, "error_model": "numpy", "nogil": True}
-    if inline:
-        settings["forceinline"] = True
+    if inline or inner:
+        return register_jitable(**settings, forceinline=inline)(function)
     compiled = njit(**settings)(function)
     stamped = _PACKAGE in Path(function.__code__.co_filename).resolve().parents
-    if not config.DISABLE_JIT and not inline and stamped and _FOLDER is not None:
+    if not config.DISABLE_JIT and stamped and _FOLDER is not None:
         compiled._cache = _Cache(function, _FOLDER)
     return compiled
 

@@ -14,9 +14,9 @@ from __future__ import annotations
 from assembly._kernel import kernel
 from assembly.geometry.vec import add, cross, dot, matvec, quaternion_product, sub
 from assembly.kinematics.motion import position, relative_pose, rotation
-from assembly.proximity.extremal import CONVERGED, SINGULAR, pair_matrix, solve_pair
-from assembly.proximity.free_pair import VARIABLES, VECTORS, free_hessian, free_rows
-from assembly.proximity.velocity import add_gap_hessian, gradient_row, store_rates, tangent_rates, z_rows
+from assembly.proximity.extremal import CLOSE, CONVERGED, SINGULAR, solve_pair
+from assembly.proximity.free_pair import VARIABLES, free_hessian, free_rows
+from assembly.proximity.velocity import GAP, RECORD, add_gap_terms, gradient_row, store_record
 
 # Header of the table.
 BODIES, MOVING, CONTACTS, ROWS, TERMS, SLOTS, ROW_TABLE, TERM_TABLE, HEADER = 0, 1, 2, 3, 4, 5, 6, 7, 8
@@ -28,62 +28,40 @@ CONTACT_ROW = 0
 TERM = 4
 TERM_KIND, TERM_BODY, TERM_PARAMETERS = 0, 1, 2
 POINT_DISTANCE, POSTURE = 0, 1
+# Behind a contact's record: whether the surfaces do not cross at it, and how far it is from a fold (det H / |H|^2).
+PROPER, FOLD, CONTACT_RECORD = RECORD, RECORD + 1, RECORD + 2
 # Header of the pool.
 # length scale, reference point (1 to 3), weight by which the objective was divided.
 SCALE, REFERENCE, WEIGHT, POOL_HEADER = 0, 1, 4, 8
-# Scratch for one free pair: five rows with their values, the variations, a Hessian.
-FIVE = 5 * (VARIABLES + 1)
-SCRATCH = FIVE + VECTORS * 3 * VARIABLES + VARIABLES * VARIABLES
-# A contact's record.
-GAP, NORMAL, ARM_F, ARM_G, RATES, FORM, PROPER, FOLD, RECORD = 0, 1, 4, 7, 10, 26, 42, 43, 44
-
-
 @kernel(inline=True)
 def load(array, o):
     return (array[o], array[o + 1], array[o + 2])
 
 
 @kernel(inline=True)
-def save(array, o, a):
-    array[o] = a[0]
-    array[o + 1] = a[1]
-    array[o + 2] = a[2]
-
-
-@kernel
-def track_contact(table, pool, row, q, start, limit, record, z):
-    """Newton on the pair of one contact row; fills its record and z rows. Returns status, parameters, iterations."""
+def track_contact(table, pool, row, q, start, patience, records, k):
+    """Newton on the pair of one contact row; fills its record. Returns status and parameters."""
     i = table[row + BODY_F]
     j = table[row + BODY_G]
-    turn_f = rotation(q, i)
-    turn, shift = relative_pose(q, i, turn_f, j, rotation(q, j))
-    status, x, count, frame = solve_pair(
-        table, pool, table[row + SURFACE_F], table[row + SURFACE_G], turn, shift, start, 1.0, limit
+    turn = rotation(q, i)
+    relative, shift = relative_pose(q, i, turn, j, rotation(q, j))
+    status, x, _count, frame, curvature = solve_pair(
+        table, pool, table[row + SURFACE_F], table[row + SURFACE_G], relative, shift, start, 1.0, patience, CLOSE
     )
     if status == CONVERGED or status == SINGULAR:
-        n, tx, ty, _pf, pg, e, t, a, c, _r, beta, _regular = frame
-        m, k, regular = tangent_rates(a, c, beta, 1e-9)
-        normal = matvec(turn_f, n)
-        arm_f = matvec(turn_f, pg)
-        arm_g = matvec(turn_f, sub(pg, shift))
-        record[GAP] = beta
-        save(record, NORMAL, normal)
-        save(record, ARM_F, arm_f)
-        save(record, ARM_G, arm_g)
-        store_rates(m, k, a, e, t, record[RATES:FORM], record[FORM:PROPER])
+        store_record(turn, shift, frame, curvature, records, k)
         # Relative curvature -H (I + beta A)^-1: indefinite means the surfaces cross beside the point.
-        _k, h, _size = pair_matrix(a, c, beta)
+        h = curvature[1]
         det = h[0] * h[3] - h[1] * h[2]
         norm2 = h[0] * h[0] + h[1] * h[1] + h[2] * h[2] + h[3] * h[3]
-        record[PROPER] = 1.0 if det > -1e-9 * norm2 and h[0] + h[3] <= 0.0 else 0.0
-        record[FOLD] = det / norm2 if norm2 > 1e-18 else 0.0
-        z_rows(matvec(turn_f, tx), matvec(turn_f, ty), arm_f, arm_g, z)
-    return status, x, count
+        records[k, PROPER] = 1.0 if det > -1e-9 * norm2 and h[0] + h[3] <= 0.0 else 0.0
+        records[k, FOLD] = det / norm2 if norm2 > 1e-18 else 0.0
+    return status, x
 
 
-@kernel
-def add_term(table, pool, term, q, gradient, hessian, second):
-    """Value of one objective term; adds its gradient and, when `second`, its Hessian."""
+@kernel(inner=True)
+def add_term(table, pool, term, q, gradient, hessian):
+    """Value of one objective term; adds its gradient and its Hessian."""
     body = table[term + TERM_BODY]
     slot = table[table[SLOTS] + body]
     o = table[term + TERM_PARAMETERS]
@@ -99,20 +77,19 @@ def add_term(table, pool, term, q, gradient, hessian, second):
         for k in range(3):
             gradient[s + k] += 2.0 * weight * e[k]
             gradient[s + 3 + k] += 2.0 * weight * turn[k]
-        if second:
-            pp = dot(p, p) - dot(e, p)
-            for k in range(3):
-                hessian[s + k, s + k] += 2.0 * weight
-                hessian[s + 3 + k, s + 3 + k] += 2.0 * weight * pp
-                i = (k + 1) % 3
-                j = (k + 2) % 3
-                # d(turn)/dx = [p]x: -p_j at (k, i), +p_i at (k, j).
-                hessian[s + 3 + k, s + i] -= 2.0 * weight * p[j]
-                hessian[s + 3 + k, s + j] += 2.0 * weight * p[i]
-                hessian[s + i, s + 3 + k] -= 2.0 * weight * p[j]
-                hessian[s + j, s + 3 + k] += 2.0 * weight * p[i]
-                for l in range(3):
-                    hessian[s + 3 + k, s + 3 + l] += weight * (p[k] * e[l] + e[k] * p[l] - 2.0 * p[k] * p[l])
+        pp = dot(p, p) - dot(e, p)
+        for k in range(3):
+            hessian[s + k, s + k] += 2.0 * weight
+            hessian[s + 3 + k, s + 3 + k] += 2.0 * weight * pp
+            i = (k + 1) % 3
+            j = (k + 2) % 3
+            # d(turn)/dx = [p]x: -p_j at (k, i), +p_i at (k, j).
+            hessian[s + 3 + k, s + i] -= 2.0 * weight * p[j]
+            hessian[s + 3 + k, s + j] += 2.0 * weight * p[i]
+            hessian[s + i, s + 3 + k] -= 2.0 * weight * p[j]
+            hessian[s + j, s + 3 + k] += 2.0 * weight * p[i]
+            for l in range(3):
+                hessian[s + 3 + k, s + 3 + l] += weight * (p[k] * e[l] + e[k] * p[l] - 2.0 * p[k] * p[l])
         return value
     # Posture: |x - x0|^2 + s^2 4 (1 - (e.e0)^2), with c and u the scalar and vector part of e0 e^*.
     d = sub(position(q, body), load(pool, o + 1))
@@ -127,39 +104,34 @@ def add_term(table, pool, term, q, gradient, hessian, second):
     for k in range(3):
         gradient[s + k] += 2.0 * weight * d[k]
         gradient[s + 3 + k] -= 4.0 * lever * c * u[k]
-    if second:
-        for k in range(3):
-            hessian[s + k, s + k] += 2.0 * weight
-            hessian[s + 3 + k, s + 3 + k] += 2.0 * lever * c * c
-            for l in range(3):
-                hessian[s + 3 + k, s + 3 + l] -= 2.0 * lever * u[k] * u[l]
+    for k in range(3):
+        hessian[s + k, s + k] += 2.0 * weight
+        hessian[s + 3 + k, s + 3 + k] += 2.0 * lever * c * c
+        for l in range(3):
+            hessian[s + 3 + k, s + 3 + l] -= 2.0 * lever * u[k] * u[l]
     return value
 
 
-@kernel
-def evaluate(table, pool, q, start, limit, free, lengths, work, contacts, records, z, residual, jacobian):
+@kernel(inner=True)
+def evaluate(table, pool, q, start, patience, free, lengths, vectors, contacts, records, residual, jacobian):
     """Evaluate all rows at q. Returns the contact whose pair was lost, or -1.
 
-    A tracked contact is carried from `start` to its extremal pair. A free one (free[k] >= 0, its place among the
+    A tracked contact is carried from `start` to its extremal pair by steps that turn no normal by more than `patience`. A free one (free[k] >= 0, its place among the
     free ones) is evaluated at `start` itself, and its four rows of tangency follow the rows of the program.
     """
     for r in range(table[ROWS]):
         row = table[ROW_TABLE] + ROW * r
         k = table[row + CONTACT]
-        record = records[k]
         x = (start[k, 0], start[k, 1], start[k, 2], start[k, 3])
         if free[k] < 0:
-            status, x, _count = track_contact(table, pool, row, q, x, limit, record, z[k])
+            status, x = track_contact(table, pool, row, q, x, patience, records, k)
             if status != CONVERGED and status != SINGULAR:
                 return k
-            residual[r] = record[GAP]
-            gradient_row(load(record, NORMAL), load(record, ARM_F), load(record, ARM_G), jacobian[r])
+            residual[r] = records[k, GAP]
+            gradient_row(records, k, jacobian, r)
         else:
             e = table[ROWS] + 4 * free[k]
-            five = work[: 5 * (VARIABLES + 1)]
-            values = five[:5]
-            rows = five[5:].reshape(5, VARIABLES)
-            record[GAP] = free_rows(
+            free_rows(
                 table,
                 pool,
                 table[row + SURFACE_F],
@@ -168,64 +140,49 @@ def evaluate(table, pool, q, start, limit, free, lengths, work, contacts, record
                 table[row + BODY_G],
                 q,
                 x,
-                lengths[k],
-                work[FIVE : FIVE + VECTORS * 3 * VARIABLES].reshape(VECTORS, 3, VARIABLES),
-                values,
-                rows,
+                (lengths[k, 0], lengths[k, 1], lengths[k, 2], lengths[k, 3]),
+                vectors,
+                residual,
+                jacobian,
+                r,
+                e,
             )
-            residual[r] = values[0]
-            jacobian[r] = rows[0]
-            for i in range(4):
-                residual[e + i] = values[1 + i]
-                jacobian[e + i] = rows[1 + i]
         contacts[k, 0], contacts[k, 1], contacts[k, 2], contacts[k, 3] = x
     return -1
 
 
-@kernel
-def objective(table, pool, q, gradient, hessian, second):
-    """Value, gradient and (when `second`) Hessian of the objective; both arrays are overwritten."""
+@kernel(inner=True)
+def objective(table, pool, q, gradient, hessian):
+    """Value, gradient and Hessian of the objective; both arrays are overwritten."""
     n = gradient.size
     for i in range(n):
         gradient[i] = 0.0
-        if second:
-            for j in range(n):
-                hessian[i, j] = 0.0
+        for j in range(n):
+            hessian[i, j] = 0.0
     value = 0.0
     for t in range(table[TERMS]):
-        value += add_term(table, pool, table[TERM_TABLE] + TERM * t, q, gradient, hessian, second)
+        value += add_term(table, pool, table[TERM_TABLE] + TERM * t, q, gradient, hessian)
     return value
 
 
-@kernel
-def add_hessian(table, pool, r, q, contacts, free, lengths, work, records, z, y, hessian):
-    """Add the second derivative of y . (row r, and the rows of tangency that go with it)."""
+@kernel(inner=True)
+def add_row_terms(
+    table, pool, r, q, contacts, free, lengths, vectors, block, records, jacobian, y, weights, hessian
+):
+    """Upper triangle of hessian += second derivative of y . rows + J^T diag(weights) J, for row r.
+
+    The rows of tangency of a free pair go with its row.
+    """
     row = table[ROW_TABLE] + ROW * r
     f = 6 * table[table[SLOTS] + table[row + BODY_F]]
     g = 6 * table[table[SLOTS] + table[row + BODY_G]]
     k = table[row + CONTACT]
     if free[k] < 0:
-        record = records[k]
-        if y[r] != 0.0:
-            add_gap_hessian(
-                load(record, NORMAL),
-                load(record, ARM_F),
-                load(record, ARM_G),
-                record[FORM:PROPER],
-                z[k],
-                y[r],
-                hessian,
-                f,
-                g,
-            )
+        if y[r] != 0.0 or weights[r] != 0.0:
+            add_gap_terms(records, k, jacobian, r, y[r], weights[r], hessian, f, g)
         return
     e = table[ROWS] + 4 * free[k]
     u = 6 * table[MOVING] + 4 * free[k]
-    five = work[:5]
-    five[0] = y[r]
-    for i in range(4):
-        five[1 + i] = y[e + i]
-    out = work[FIVE + VECTORS * 3 * VARIABLES :].reshape(VARIABLES, VARIABLES)
     free_hessian(
         table,
         pool,
@@ -235,10 +192,10 @@ def add_hessian(table, pool, r, q, contacts, free, lengths, work, records, z, y,
         table[row + BODY_G],
         q,
         (contacts[k, 0], contacts[k, 1], contacts[k, 2], contacts[k, 3]),
-        lengths[k],
-        five,
-        work[FIVE : FIVE + VECTORS * 3 * VARIABLES].reshape(VECTORS, 3, VARIABLES),
-        out,
+        (lengths[k, 0], lengths[k, 1], lengths[k, 2], lengths[k, 3]),
+        (y[r], y[e], y[e + 1], y[e + 2], y[e + 3]),
+        vectors,
+        block,
     )
     for i in range(VARIABLES):
         base = f if i < 6 else (g - 6 if i < 12 else u - 12)
@@ -248,4 +205,7 @@ def add_hessian(table, pool, r, q, contacts, free, lengths, work, records, z, y,
             other = f if j < 6 else (g - 6 if j < 12 else u - 12)
             if j < 12 and (f if j < 6 else g) < 0:
                 continue
-            hessian[base + i, other + j] += out[i, j]
+            value = block[i, j] + weights[r] * jacobian[r, i] * jacobian[r, j]
+            for l in range(4):
+                value += weights[e + l] * jacobian[e + l, i] * jacobian[e + l, j]
+            hessian[base + i, other + j] += value

@@ -38,41 +38,23 @@ CONVERGED, SINGULAR, LEFT_PATCH, NOT_CONVERGED = 0, 1, 2, 3
 POLE = 1e-9
 # H counts as singular below this ratio of its smallest singular value to its scale.
 RANK = 1e-7
+# Newton's steps: four or five near a solution, more while steps are cut.
+LIMIT = 40
+# The most, in radians, that a step may turn a normal.
+BEND = 0.5
+# A step that turns the normals by less leaves an error below rounding when a solve carries the frame along it.
+CLOSE = 1e-6
 
 
 @kernel(inline=True)
-def tangent_frame(fu, fv, fuu, fuv, fvv, sign):
-    """Unit normal n, tangents x, y with [fu fv] = [x y] E (E upper triangular), and whether regular.
-
-    At a pole the normal is the limit along the other parameter, by second derivatives.
-    """
-    normal = cross(fu, fv)
-    uu = dot(fu, fu)
-    vv = dot(fv, fv)
-    size = math.sqrt(dot(normal, normal))
-    regular = size > POLE * math.sqrt(uu * vv) and size > 1e-290
-    if not regular:
-        along = cross(fuv, fv) if uu <= vv else cross(fu, fuv)
-        length = math.sqrt(dot(along, along))
-        if length > 0.0:
-            normal = along
-            size = length
-    n = scale(sign / size if size > 0.0 else 0.0, normal)
-    if uu >= vv or uu > 1e-16 * vv:
-        x = scale(1.0 / math.sqrt(uu) if uu > 0.0 else 0.0, fu)
-    else:
-        x = scale(1.0 / math.sqrt(vv), cross(fv, n))
-    return n, x, cross(n, x), regular
+def pole_normal(fu, fv, fuv):
+    """The limit of fu x fv where one of them vanishes, along the other parameter."""
+    return cross(fuv, fv) if dot(fu, fu) <= dot(fv, fv) else cross(fu, fuv)
 
 
 @kernel(inline=True)
-def shape_operator(t11, t12, t21, t22, luu, luv, lvv):
-    """-T^-T L T^-1 for tangent coordinates T and L_ij = S_ij.n: symmetric, +1/r on a ball."""
-    i = 1.0 / (t11 * t22 - t12 * t21)
-    p = i * t22
-    q = -i * t12
-    r = -i * t21
-    s = i * t11
+def shape_operator(p, q, r, s, luu, luv, lvv):
+    """-J^T L J for J = [[p, q], [r, s]], the inverse of tangent coordinates, and L_ij = S_ij.n: symmetric, +1/r on a ball."""
     a = luu * p + luv * r
     b = luv * p + lvv * r
     return (
@@ -82,29 +64,47 @@ def shape_operator(t11, t12, t21, t22, luu, luv, lvv):
     )
 
 
-@kernel
+@kernel(inline=True)
 def pair_frame(table, pool, f, g, rotation, shift, x):
     """Everything about a pair at parameters x = (u_f, v_f, u_g, v_g), in the axes of body f.
 
     Returns
     -------
-    n, tx, ty : normal of f and its tangent frame
+    n, tx, ty : normal of f and its tangent frame, [f_u f_v] = [tx ty] E
     pf, pg : the two points
-    e : (e11, e12, e22), tangent coordinates of f
-    t : (t11, t12, t21, t22), tangent coordinates of g
+    e : (11, 12, 22) of E^-1, which is upper triangular
+    t : (11, 12, 21, 22) of T^-1
     a, c : shape operators (11, 12, 22) of f and g with respect to n
     r : (r1x, r1y, r2x, r2y), residual
     beta : n.(pg - pf)
-    regular : whether both parameterizations are regular here
+    regular : whether both parameterizations are regular here; where not, e, t, a, c and r2 are zero
     """
     pf, fu, fv, fuu, fuv, fvv = surface_point(table, pool, f, x[0], x[1])
     qg, gu, gv, guu, guv, gvv = surface_point(table, pool, g, x[2], x[3])
-    n, tx, ty, regular = tangent_frame(fu, fv, fuu, fuv, fvv, float(table[f + SIGN]))
+    sign = float(table[f + SIGN])
     pg = add(matvec(rotation, qg), shift)
     d = sub(pg, pf)
-    e11 = dot(tx, fu)
-    e12 = dot(tx, fv)
-    e22 = dot(ty, fv)
+    normal = cross(fu, fv)
+    uu = dot(fu, fu)
+    nn = dot(normal, normal)
+    regular = nn > POLE * POLE * uu * dot(fv, fv) and nn > 1e-290
+    if not regular:
+        normal = pole_normal(fu, fv, fuv)
+        nn = dot(normal, normal)
+        if not nn > 0.0:
+            nn = 1.0
+    length = math.sqrt(nn)
+    n = scale(sign / length, normal)
+    if uu > 1e-290:
+        i11 = 1.0 / math.sqrt(uu)
+        tx = scale(i11, fu)
+    else:
+        i11 = 0.0
+        tx = scale(1.0 / math.sqrt(dot(fv, fv)), cross(fv, n))
+    ty = cross(n, tx)
+    # |fu x fv| = e11 e22.
+    i22 = sign * uu * i11 / length
+    i12 = -dot(tx, fv) * i11 * i22
     # The normal and the frame go to the axes of g, rather than six derivatives to those of f.
     ng = matvec_t(rotation, n)
     xg = matvec_t(rotation, tx)
@@ -114,23 +114,36 @@ def pair_frame(table, pool, f, g, rotation, shift, x):
     t21 = dot(yg, gu)
     t22 = dot(yg, gv)
     det = t11 * t22 - t12 * t21
-    regular = regular and abs(det) > POLE * math.sqrt(dot(gu, gu) * dot(gv, gv))
-    if not regular or e11 * e22 == 0.0 or det == 0.0:
-        zero = (0.0, 0.0, 0.0)
-        return n, tx, ty, pf, pg, (e11, e12, e22), (t11, t12, t21, t22), zero, zero, (dot(tx, d), dot(ty, d), 0.0, 0.0), dot(n, d), False
-    a = shape_operator(e11, e12, 0.0, e22, dot(fuu, n), dot(fuv, n), dot(fvv, n))
-    c = shape_operator(t11, t12, t21, t22, dot(guu, ng), dot(guv, ng), dot(gvv, ng))
+    regular = regular and det * det > POLE * POLE * dot(gu, gu) * dot(gv, gv) and abs(det) > 1e-145
+    i = 1.0 / det if regular else 0.0
+    if not regular:
+        i11 = 0.0
+        i12 = 0.0
+        i22 = 0.0
+    e = (i11, i12, i22)
+    t = (i * t22, -i * t12, -i * t21, i * t11)
+    a = shape_operator(i11, i12, 0.0, i22, dot(fuu, n), dot(fuv, n), dot(fvv, n))
+    c = shape_operator(t[0], t[1], t[2], t[3], dot(guu, ng), dot(guv, ng), dot(gvv, ng))
     # m = n + P r2 is orthogonal to gu and gv: T^T r2 = -(n.gu, n.gv).
     nu = dot(ng, gu)
     nv = dot(ng, gv)
-    i = 1.0 / det
-    r = (dot(tx, d), dot(ty, d), i * (t21 * nv - t22 * nu), i * (t12 * nu - t11 * nv))
-    return n, tx, ty, pf, pg, (e11, e12, e22), (t11, t12, t21, t22), a, c, r, dot(n, d), True
+    r = (dot(tx, d), dot(ty, d), -(t[0] * nu + t[2] * nv), -(t[1] * nu + t[3] * nv))
+    return n, tx, ty, pf, pg, e, t, a, c, r, dot(n, d), regular
 
 
 @kernel(inline=True)
-def pair_matrix(a, c, beta):
-    """I + beta A (symmetric), H = C (I + beta A) - A, and the scale of H's terms."""
+def curvature_bound(a):
+    """A bound of the largest principal curvature."""
+    return abs(a[0]) + 2.0 * abs(a[1]) + abs(a[2])
+
+
+@kernel(inline=True)
+def pair_matrix(a, c, beta, flat):
+    """I + beta A, H = C (I + beta A) - A, the inverse of H, and whether H is regular.
+
+    Where H is (nearly) singular the inverse is damped: the least step, so that the current pair of a continuum is kept.
+    `flat` is the curvature below which a scene counts as flat.
+    """
     k11 = 1.0 + beta * a[0]
     k12 = beta * a[1]
     k22 = 1.0 + beta * a[2]
@@ -138,50 +151,29 @@ def pair_matrix(a, c, beta):
     h12 = c[0] * k12 + c[1] * k22 - a[1]
     h21 = c[1] * k11 + c[2] * k12 - a[1]
     h22 = c[1] * k12 + c[2] * k22 - a[2]
-    fa = math.sqrt(a[0] * a[0] + 2.0 * a[1] * a[1] + a[2] * a[2])
-    fc = math.sqrt(c[0] * c[0] + 2.0 * c[1] * c[1] + c[2] * c[2])
-    fk = math.sqrt(k11 * k11 + 2.0 * k12 * k12 + k22 * k22)
-    return (k11, k12, k22), (h11, h12, h21, h22), fc * fk + fa
-
-
-@kernel(inline=True)
-def pair_inverse(h, size, flat):
-    """Inverse of H, or its damped least-norm inverse where H is (nearly) singular.
-
-    `flat` is the curvature below which a scene counts as flat. Returns the inverse and whether regular.
-    """
-    det = h[0] * h[3] - h[1] * h[2]
-    norm2 = h[0] * h[0] + h[1] * h[1] + h[2] * h[2] + h[3] * h[3]
-    # The smallest singular value is at least |det| / |H|_F.
-    if abs(det) > 100.0 * RANK * size * math.sqrt(norm2) and size > flat:
+    size = curvature_bound(c) * (abs(k11) + 2.0 * abs(k12) + abs(k22)) + curvature_bound(a)
+    det = h11 * h22 - h12 * h21
+    norm = abs(h11) + abs(h12) + abs(h21) + abs(h22)
+    # The smallest singular value is at least |det| / norm.
+    regular = abs(det) > RANK * size * norm and size > flat
+    if abs(det) > 100.0 * RANK * size * norm and size > flat:
         i = 1.0 / det
-        return (i * h[3], -i * h[1], -i * h[2], i * h[0]), True
-    damping = max(RANK * size, flat)
-    damping *= damping
-    # (H^T H + damping I)^-1 H^T
-    m11 = h[0] * h[0] + h[2] * h[2] + damping
-    m12 = h[0] * h[1] + h[2] * h[3]
-    m22 = h[1] * h[1] + h[3] * h[3] + damping
-    i = 1.0 / (m11 * m22 - m12 * m12)
-    inverse = (
-        i * (m22 * h[0] - m12 * h[1]),
-        i * (m22 * h[2] - m12 * h[3]),
-        i * (m11 * h[1] - m12 * h[0]),
-        i * (m11 * h[3] - m12 * h[2]),
-    )
-    return inverse, abs(det) > RANK * size * math.sqrt(norm2) and size > flat
-
-
-@kernel(inline=True)
-def pair_step(a, c, r, beta, flat):
-    """Newton's step in tangent lengths: (ax, ay, bx, by) and whether H is regular."""
-    k, h, size = pair_matrix(a, c, beta)
-    i, regular = pair_inverse(h, size, flat)
-    s = c[0] * r[0] + c[1] * r[1] - r[2]
-    t = c[1] * r[0] + c[2] * r[1] - r[3]
-    ax = i[0] * s + i[1] * t
-    ay = i[2] * s + i[3] * t
-    return ax, ay, k[0] * ax + k[1] * ay - r[0], k[1] * ax + k[2] * ay - r[1], regular
+        inverse = (i * h22, -i * h12, -i * h21, i * h11)
+    else:
+        damping = max(RANK * size, flat)
+        damping *= damping
+        # (H^T H + damping I)^-1 H^T
+        m11 = h11 * h11 + h21 * h21 + damping
+        m12 = h11 * h12 + h21 * h22
+        m22 = h12 * h12 + h22 * h22 + damping
+        i = 1.0 / (m11 * m22 - m12 * m12)
+        inverse = (
+            i * (m22 * h11 - m12 * h12),
+            i * (m22 * h21 - m12 * h22),
+            i * (m11 * h12 - m12 * h11),
+            i * (m11 * h22 - m12 * h21),
+        )
+    return (k11, k12, k22), (h11, h12, h21, h22), inverse, regular
 
 
 @kernel(inline=True)
@@ -211,52 +203,51 @@ def into_domain(table, pool, r, u, v):
     return u, v, clamped
 
 
-@kernel(inline=True)
-def largest_curvature(a):
-    """A bound of the largest principal curvature."""
-    return math.sqrt(a[0] * a[0] + 2.0 * a[1] * a[1] + a[2] * a[2])
+@kernel(inner=True)
+def solve_pair(table, pool, f, g, rotation, shift, x, size, turn, close):
+    """Newton from x to the extremal pair; returns status, parameters, iterations, frame, and H as `pair_matrix` gives it.
 
-
-@kernel
-def solve_pair(table, pool, f, g, rotation, shift, x, size, limit):
-    """Newton from x to the extremal pair; returns status, parameters, iterations and the frame there.
-
-    `size` is the length against which steps are measured. A step turns neither normal by more than about half a
-    radian, so that the iteration follows the surface instead of jumping to another root.
+    `size` is the length against which steps are measured. A step that would turn a normal by more than `BEND` is
+    shortened, so that the iteration follows the surface; one that would turn it by more than `turn` says that x was not
+    near a pair at all. After a step that turns it by less than `close` the frame is carried along, not evaluated again:
+    what is left is of the order of close^2, and of close^3 in the gap.
     """
     tolerance = 4e-14 * size
     flat = 1e-9 / size
     previous = 1e300
     status = NOT_CONVERGED
     iteration = 0
-    frame = pair_frame(table, pool, f, g, rotation, shift, x)
-    while iteration < limit:
-        n, tx, ty, pf, pg, e, t, a, c, r, beta, regular = frame
+    while True:
+        n, tx, ty, pf, pg, e, t, a, c, r, beta, regular = pair_frame(table, pool, f, g, rotation, shift, x)
+        k, h, inverse, isolated = pair_matrix(a, c, beta, flat)
         if not regular:
             # A pole: nothing better than the point itself when d is already normal there.
-            done = r[0] * r[0] + r[1] * r[1] <= tolerance * tolerance
-            return (SINGULAR if done else NOT_CONVERGED), x, iteration, frame
-        ax, ay, bx, by, isolated = pair_step(a, c, r, beta, flat)
-        step_f = math.sqrt(ax * ax + ay * ay)
-        step_g = math.sqrt(bx * bx + by * by)
+            status = SINGULAR if r[0] * r[0] + r[1] * r[1] <= tolerance * tolerance else NOT_CONVERGED
+            break
+        s0 = c[0] * r[0] + c[1] * r[1] - r[2]
+        s1 = c[1] * r[0] + c[2] * r[1] - r[3]
+        ax = inverse[0] * s0 + inverse[1] * s1
+        ay = inverse[2] * s0 + inverse[3] * s1
+        bx = k[0] * ax + k[1] * ay - r[0]
+        by = k[1] * ax + k[2] * ay - r[1]
+        step_f = abs(ax) + abs(ay)
+        step_g = abs(bx) + abs(by)
         step = max(step_f, step_g)
+        bend = max(max(step_f * curvature_bound(a), step_g * curvature_bound(c)), 2.0 * step / size)
+        small = bend < close and isolated
         if step <= tolerance or (step < 1e-9 * size and step > 0.25 * previous):
             # In a singular system a vanishing step is a solution only if the residual vanishes too.
-            turned = r[2] * r[2] + r[3] * r[3]
-            if isolated:
-                return CONVERGED, x, iteration, frame
-            done = turned < 1e-18 and r[0] * r[0] + r[1] * r[1] < 1e-18 * size * size
-            return (SINGULAR if done else NOT_CONVERGED), x, iteration, frame
-        if not step < 1e300:
-            return NOT_CONVERGED, x, iteration, frame
+            done = abs(r[2]) + abs(r[3]) < 1e-9 and abs(r[0]) + abs(r[1]) < 1e-9 * size
+            status = CONVERGED if isolated else (SINGULAR if done else NOT_CONVERGED)
+            break
+        if iteration == LIMIT or not step < 1e300 or bend > turn:
+            break
         previous = step
-        bend = max(step_f * largest_curvature(a), step_g * largest_curvature(c), 2.0 * step / size)
-        factor = 1.0 if bend <= 0.5 else 0.5 / bend
-        du = factor * (ax * e[2] - ay * e[1]) / (e[0] * e[2])
-        dv = factor * ay / e[2]
-        det = t[0] * t[3] - t[1] * t[2]
-        ds = factor * (bx * t[3] - by * t[1]) / det
-        dt = factor * (by * t[0] - bx * t[2]) / det
+        factor = 1.0 if bend <= BEND else BEND / bend
+        du = factor * (e[0] * ax + e[1] * ay)
+        dv = factor * e[2] * ay
+        ds = factor * (t[0] * bx + t[1] * by)
+        dt = factor * (t[2] * bx + t[3] * by)
         uf, vf, clamped_f = into_domain(table, pool, f, x[0] + du, x[1] + dv)
         ug, vg, clamped_g = into_domain(table, pool, g, x[2] + ds, x[3] + dt)
         status = NOT_CONVERGED
@@ -265,8 +256,21 @@ def solve_pair(table, pool, f, g, rotation, shift, x, size, limit):
             # Held at the end of the patch and nothing else moves: the pair has left.
             still = abs(uf - x[0]) + abs(vf - x[1]) + abs(ug - x[2]) + abs(vg - x[3])
             if still <= 1e-12 * (abs(du) + abs(dv) + abs(ds) + abs(dt)):
-                return LEFT_PATCH, x, iteration, frame
+                break
+        elif small:
+            wx = a[0] * ax + a[1] * ay
+            wy = a[1] * ax + a[2] * ay
+            beta += 0.5 * (r[0] * wx + r[1] * wy - r[2] * bx - r[3] * by)
+            pf = add(pf, blend(ax, tx, ay, ty))
+            pg = add(pg, blend(bx, tx, by, ty))
+            lean = blend(wx, tx, wy, ty)
+            tx = sub(tx, scale(wx, n))
+            ty = sub(ty, scale(wy, n))
+            n = add(n, lean)
+            x = (uf, vf, ug, vg)
+            status = CONVERGED
+            iteration += 1
+            break
         x = (uf, vf, ug, vg)
-        frame = pair_frame(table, pool, f, g, rotation, shift, x)
         iteration += 1
-    return status, x, iteration, frame
+    return status, x, iteration, (n, tx, ty, pf, pg, e, t, a, c, r, beta, regular), (k, h, inverse, isolated)

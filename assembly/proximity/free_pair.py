@@ -43,7 +43,7 @@ def put_column(out, k, a):
     out[2, k] = a[2]
 
 
-@kernel(inline=True)
+@kernel(inner=True)
 def put_turn(out, k, a):
     """Columns k to k+2: the rates e_j x a under a unit rotation about each axis."""
     put_column(out, k, (0.0, -a[2], a[1]))
@@ -56,18 +56,18 @@ def column(a, k):
     return (a[0, k], a[1, k], a[2, k])
 
 
-@kernel
-def coordinate_lengths(table, pool, f, g, x, s):
-    """The lengths s_i: |f_u|, |f_v|, |g_u|, |g_v|."""
+@kernel(inner=True)
+def coordinate_lengths(table, pool, f, g, x, lengths, k):
+    """The lengths s_i into lengths[k]: |f_u|, |f_v|, |g_u|, |g_v|."""
     a = surface_point(table, pool, f, x[0], x[1])
     b = surface_point(table, pool, g, x[2], x[3])
-    s[0] = math.sqrt(dot(a[1], a[1]))
-    s[1] = math.sqrt(dot(a[2], a[2]))
-    s[2] = math.sqrt(dot(b[1], b[1]))
-    s[3] = math.sqrt(dot(b[2], b[2]))
+    lengths[k, 0] = math.sqrt(dot(a[1], a[1]))
+    lengths[k, 1] = math.sqrt(dot(a[2], a[2]))
+    lengths[k, 2] = math.sqrt(dot(b[1], b[1]))
+    lengths[k, 3] = math.sqrt(dot(b[2], b[2]))
 
 
-@kernel
+@kernel(inner=True)
 def variations(table, pool, f, g, i, j, q, x, s, out):
     """First variations of d, f_u, f_v, g_u, g_v, N and n over the 16 variables, and the vectors themselves."""
     turn_f = rotation(q, i)
@@ -80,7 +80,10 @@ def variations(table, pool, f, g, i, j, q, x, s, out):
     normal = scale(float(table[f + SIGN]), cross(fu, fv))
     length = math.sqrt(dot(normal, normal))
     n = scale(1.0 / length, normal)
-    out[:, :, :] = 0.0
+    for m in range(VECTORS):
+        for k in range(3):
+            for l in range(VARIABLES):
+                out[m, k, l] = 0.0
     for k in range(3):
         out[D, k, k] = -1.0
         out[D, k, 6 + k] = 1.0
@@ -110,28 +113,27 @@ def variations(table, pool, f, g, i, j, q, x, s, out):
     return d, n, length, pf, fu, fv, pg, gu, gv
 
 
-@kernel
-def free_rows(table, pool, f, g, i, j, q, x, s, work, residual, jacobian):
-    """The five rows and their gradients (5, 16). Returns the gap."""
+@kernel(inner=True)
+def free_rows(table, pool, f, g, i, j, q, x, s, work, residual, jacobian, r, e):
+    """The gap into row r, the rows of tangency into rows e to e + 3, with their gradients."""
     d, n, _length, _pf, fu, fv, _pg, gu, gv = variations(table, pool, f, g, i, j, q, x, s, work)
     beta = dot(n, d)
-    residual[0] = beta
-    residual[1] = dot(d, fu) / s[0]
-    residual[2] = dot(d, fv) / s[1]
-    residual[3] = dot(n, gu) / s[2]
-    residual[4] = dot(n, gv) / s[3]
+    residual[r] = beta
+    residual[e] = dot(d, fu) / s[0]
+    residual[e + 1] = dot(d, fv) / s[1]
+    residual[e + 2] = dot(n, gu) / s[2]
+    residual[e + 3] = dot(n, gv) / s[3]
     for k in range(VARIABLES):
         dd = column(work[D], k)
         dn = column(work[N1], k)
-        jacobian[0, k] = dot(n, dd) + dot(d, dn)
-        jacobian[1, k] = (dot(dd, fu) + dot(d, column(work[FU], k))) / s[0]
-        jacobian[2, k] = (dot(dd, fv) + dot(d, column(work[FV], k))) / s[1]
-        jacobian[3, k] = (dot(dn, gu) + dot(n, column(work[GU], k))) / s[2]
-        jacobian[4, k] = (dot(dn, gv) + dot(n, column(work[GV], k))) / s[3]
-    return beta
+        jacobian[r, k] = dot(n, dd) + dot(d, dn)
+        jacobian[e, k] = (dot(dd, fu) + dot(d, column(work[FU], k))) / s[0]
+        jacobian[e + 1, k] = (dot(dd, fv) + dot(d, column(work[FV], k))) / s[1]
+        jacobian[e + 2, k] = (dot(dn, gu) + dot(n, column(work[GU], k))) / s[2]
+        jacobian[e + 3, k] = (dot(dn, gv) + dot(n, column(work[GV], k))) / s[3]
 
 
-@kernel(inline=True)
+@kernel(inner=True)
 def add_second(y, a, a1, a2, a11, a12, a22, w, u, s1, s2, out):
     """out += y . (second variation of a), a vector of a body whose rotation stands at w and coordinates at u."""
     ya = dot(y, a)
@@ -152,14 +154,13 @@ def add_second(y, a, a1, a2, a11, a12, a22, w, u, s1, s2, out):
     out[u + 1, u + 1] += dot(y, a22) / (s2 * s2)
 
 
-@kernel
+@kernel(inner=True)
 def free_hessian(table, pool, f, g, i, j, q, x, s, y, work, out):
     """Second derivative (16, 16) of y . rows, overwriting out."""
     d, n, length, pf, fu, fv, pg, gu, gv = variations(table, pool, f, g, i, j, q, x, s, work)
     sign = float(table[f + SIGN])
     turn_f = rotation(q, i)
     turn_g = rotation(q, j)
-    out[:, :] = 0.0
     beta = dot(n, d)
     l1 = y[1] / s[0]
     l2 = y[2] / s[1]

@@ -153,7 +153,7 @@ def extremal_pair(
     else:
         x = _inside("start", vector("start", start, 4), (f.surface, g.surface))
     out = np.empty(14)
-    status = find_pair(table, pool, 0, SURFACE_RECORD, q, x, size, 60, out)
+    status = find_pair(table, pool, 0, SURFACE_RECORD, q, x, size, out)
     return ContactPair(out[:4], out[4:10].reshape(2, 3), out[10:13], float(out[13]), _STATUSES[status])
 
 
@@ -164,15 +164,15 @@ def _derivatives(
     q = _configuration(q_f, q_g)
     table, pool, size = _packed(_key(f), _key(g))
     x = _inside("parameters", real_array("parameters", parameters, (4,)), (f.surface, g.surface))
-    jacobian, gradient, hessian = np.full((4, 14), np.nan), np.full(14, np.nan), np.full((12, 12), np.nan)
-    error, regular = pair_derivatives(table, pool, 0, SURFACE_RECORD, q, x, size, jacobian, gradient, hessian)
+    first, hessian = np.full((5, 14), np.nan), np.full((12, 12), np.nan)
+    error, regular = pair_derivatives(table, pool, 0, SURFACE_RECORD, q, x, size, first, hessian)
     if not error <= EXTREMAL:
         raise InputError(
             f"parameters are {list(x)}, off an extremal pair by {error:.1e}; expected those of extremal_pair"
         )
-    if not regular and not np.isfinite(jacobian).all():
+    if not regular and not np.isfinite(first).all():
         raise InputError(f"parameters are {list(x)}, at a pole; expected a point where both surfaces are regular")
-    return jacobian, gradient, hessian
+    return first[:4], first[4], hessian
 
 
 def contact_jacobian(

@@ -22,8 +22,8 @@ CELL = 9  # doubles a cell: u, v, point, sphere's center, radius
 CANDIDATES = 8
 
 
-@kernel
-def global_start(table, pool, f, g, rotation, shift, size, limit):
+@kernel(inner=True)
+def global_start(table, pool, f, g, rotation, shift, size):
     """Status, parameters and gap of the extremal pair with the smallest |gap| among those found."""
     of = table[f + CELLS]
     og = table[g + CELLS]
@@ -55,7 +55,10 @@ def global_start(table, pool, f, g, rotation, shift, size, limit):
     best_gap = 1e300
     best_x = (0.0, 0.0, 0.0, 0.0)
     for _ in range(CANDIDATES):
-        i = np.argmin(distance)
+        i = 0
+        for k in range(nf):
+            if distance[k] < distance[i]:
+                i = k
         if distance[i] >= 1e300:
             break
         a = of + CELL * i
@@ -64,7 +67,7 @@ def global_start(table, pool, f, g, rotation, shift, size, limit):
         if best_status != NOT_CONVERGED and distance[i] - 2.0 * reach > abs(best_gap):
             break
         start = (pool[a], pool[a + 1], pool[b], pool[b + 1])
-        status, x, _count, frame = solve_pair(table, pool, f, g, rotation, shift, start, size, limit)
+        status, x, _count, frame, _h = solve_pair(table, pool, f, g, rotation, shift, start, size, math.inf, 0.0)
         if status != NOT_CONVERGED:
             gap = frame[10]
             # A true extremum beats a point held at the end of a patch.
@@ -87,7 +90,7 @@ def global_start(table, pool, f, g, rotation, shift, size, limit):
 
 
 @kernel
-def find_pair(table, pool, f, g, q, x, size, limit, out):
+def find_pair(table, pool, f, g, q, x, size, out):
     """One pair for Python: from x, or a global start where x is NaN.
 
     out: parameters (4), point of f (3), point of g (3), normal (3), gap; all in world axes. Returns the status.
@@ -95,10 +98,10 @@ def find_pair(table, pool, f, g, q, x, size, limit, out):
     turn_f = rotation(q, 0)
     turn, shift = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
     if math.isnan(x[0]):
-        status, x, _gap = global_start(table, pool, f, g, turn, shift, size, limit)
+        status, x, _gap = global_start(table, pool, f, g, turn, shift, size)
         frame = pair_frame(table, pool, f, g, turn, shift, x)
     else:
-        status, x, _count, frame = solve_pair(table, pool, f, g, turn, shift, x, size, limit)
+        status, x, _count, frame, _h = solve_pair(table, pool, f, g, turn, shift, x, size, math.inf, 0.0)
     origin = position(q, 0)
     out[0], out[1], out[2], out[3] = x
     out[4], out[5], out[6] = add(matvec(turn_f, frame[3]), origin)

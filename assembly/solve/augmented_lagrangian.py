@@ -27,33 +27,31 @@ from assembly.constraints.program import (
     BODY_F,
     BODY_G,
     CONTACT,
+    CONTACT_RECORD,
     CONTACTS,
     FOLD,
     MOVING,
     ONE_SIDED,
     PROPER,
-    RECORD,
     REFERENCE,
     ROW,
     ROW_TABLE,
     ROWS,
     SCALE,
-    SCRATCH,
     SLOTS,
     SURFACE_F,
     SURFACE_G,
-    add_hessian,
+    add_row_terms,
     evaluate,
     objective,
 )
 from assembly.kinematics.motion import relative_pose, rotation
-from assembly.proximity.extremal import CONVERGED, SINGULAR
-from assembly.proximity.free_pair import VARIABLES, coordinate_lengths
+from assembly.proximity.extremal import BEND, CONVERGED, SINGULAR
+from assembly.proximity.free_pair import VARIABLES, VECTORS, coordinate_lengths
 from assembly.proximity.start import global_start
 from assembly.solve.linear import factorize, substitute
 from assembly.solve.rows import (
     add_row,
-    add_squares,
     add_transposed,
     carry,
     merit,
@@ -76,7 +74,7 @@ FREE_BELOW = 0.02
 SHORTEST = 1e-6
 
 
-@kernel
+@kernel(inner=True)
 def start_contacts(table, pool, q, contacts):
     """Global starts for the contacts whose parameters are NaN. Returns the contact that found none, or -1."""
     for r in range(table[ROWS]):
@@ -88,7 +86,7 @@ def start_contacts(table, pool, q, contacts):
         j = table[row + BODY_G]
         turn, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
         status, x, _gap = global_start(
-            table, pool, table[row + SURFACE_F], table[row + SURFACE_G], turn, shift, 1.0, 40
+            table, pool, table[row + SURFACE_F], table[row + SURFACE_G], turn, shift, 1.0
         )
         if status != CONVERGED and status != SINGULAR:
             return k
@@ -96,7 +94,7 @@ def start_contacts(table, pool, q, contacts):
     return -1
 
 
-@kernel
+@kernel(inner=True)
 def free_folds(table, pool, records, contacts, forces, free, lengths, below, lost):
     """Mark the pairs near a fold, and the lost one, as free. Returns how many are free now.
 
@@ -109,7 +107,7 @@ def free_folds(table, pool, records, contacts, forces, free, lengths, below, los
         idle = table[row + ONE_SIDED] == 1 and forces[r] == 0.0
         if free[k] < 0 and not idle and (abs(records[k, FOLD]) < below or k == lost):
             x = (contacts[k, 0], contacts[k, 1], contacts[k, 2], contacts[k, 3])
-            coordinate_lengths(table, pool, table[row + SURFACE_F], table[row + SURFACE_G], x, lengths[k])
+            coordinate_lengths(table, pool, table[row + SURFACE_F], table[row + SURFACE_G], x, lengths, k)
             free[k] = 0
         if free[k] >= 0:
             free[k] = count
@@ -117,7 +115,7 @@ def free_folds(table, pool, records, contacts, forces, free, lengths, below, los
     return count
 
 
-@kernel
+@kernel(inner=True)
 def dual_residual(bases, jacobian, rows, one_sided, residual, gradient, y, scratch):
     """Largest component of grad f + J^T y, and of complementarity."""
     for i in range(gradient.size):
@@ -133,7 +131,7 @@ def dual_residual(bases, jacobian, rows, one_sided, residual, gradient, y, scrat
     return worst
 
 
-@kernel
+@kernel(inner=True)
 def least_squares_multipliers(bases, jacobian, rows, one_sided, active, gradient, scratch, gram, y):
     """The multipliers of the active rows that leave the smallest grad f + J^T y."""
     n = gradient.size
@@ -153,7 +151,7 @@ def least_squares_multipliers(bases, jacobian, rows, one_sided, active, gradient
             y[r] = min(y[r], 0.0)
 
 
-@kernel
+@kernel(inner=True)
 def factorize_shifted(lagrangian, n, shift, matrix):
     """Factorize lagrangian + d I with the smallest d tried, from `shift` up, that makes it positive definite; -1: none."""
     scale = 1.0
@@ -189,27 +187,36 @@ def solve_program(table, pool, settings, state, history):
             reach = max(reach, abs(state[7 * b + k]) / size)
         for k in range(3, 7):
             q[b, k] = state[7 * b + k]
-    contacts = state[o_contacts:o_y].copy().reshape(pairs, 4)
+    contacts = np.empty((pairs, 4))
+    for k in range(pairs):
+        for i in range(4):
+            contacts[k, i] = state[o_contacts + 4 * k + i]
     # Rows and variables grow by four for every free pair.
     rows = m
     most = m + 4 * pairs
     n = 6 * table[MOVING]
-    free = np.full(pairs, -1)
+    free = np.empty(pairs, np.int64)
+    for k in range(pairs):
+        free[k] = -1
     bases = np.empty((most, 3), np.int64)
     one_sided = np.empty(most, np.int64)
     place_rows(table, free, bases, one_sided)
     lengths = np.empty((pairs, 4))
-    work = np.empty(SCRATCH)
+    vectors = np.empty((VECTORS, 3, VARIABLES))
+    block = np.empty((VARIABLES, VARIABLES))
     y = np.zeros(most)
-    y[:m] = state[o_y:o_residual]
-    better_y = y.copy()
-    trial_q = q.copy()
+    better_y = np.zeros(most)
+    for r in range(m):
+        y[r] = state[o_y + r]
+        better_y[r] = y[r]
+    trial_q = np.empty((bodies, 7))
+    for b in range(bodies):
+        for k in range(7):
+            trial_q[b, k] = q[b, k]
     guess = np.empty((pairs, 4))
     trial_contacts = np.empty((pairs, 4))
-    records = np.empty((pairs, RECORD))
-    trial_records = np.empty((pairs, RECORD))
-    z = np.empty((pairs, 4, 12))
-    trial_z = np.empty((pairs, 4, 12))
+    records = np.empty((pairs, CONTACT_RECORD))
+    trial_records = np.empty((pairs, CONTACT_RECORD))
     residual = np.empty(most)
     trial_residual = np.empty(most)
     jacobian = np.empty((most, VARIABLES))
@@ -243,11 +250,11 @@ def solve_program(table, pool, settings, state, history):
 
     lost = start_contacts(table, pool, q, contacts)
     if lost < 0:
-        lost = evaluate(table, pool, q, contacts, 40, free, lengths, work, contacts, records, z, residual, jacobian)
+        lost = evaluate(table, pool, q, contacts, math.inf, free, lengths, vectors, contacts, records, residual, jacobian)
     if lost >= 0:
         status = CONTACT_LOST
         results[CULPRIT] = float(lost)
-    lost = -1
+    lost = np.int64(-1)
     below = FREE_BELOW
     while status == RUNNING:
         for r in range(rows):
@@ -266,10 +273,10 @@ def solve_program(table, pool, settings, state, history):
             straight = np.empty(n)
             lagrangian = np.empty((n, n))
             matrix = np.empty((n, n))
-            lost = evaluate(table, pool, q, contacts, 40, free, lengths, work, contacts, records, z, residual, jacobian)
+            lost = evaluate(table, pool, q, contacts, math.inf, free, lengths, vectors, contacts, records, residual, jacobian)
         below = FREE_BELOW
         lost = -1
-        value = objective(table, pool, q, gradient, lagrangian, True)
+        value = objective(table, pool, q, gradient, lagrangian)
         violation = violation_of(residual, one_sided, rows)
         dual = dual_residual(bases, jacobian, rows, one_sided, residual, gradient, better_y, descent)
         other = dual_residual(bases, jacobian, rows, one_sided, residual, gradient, y, descent)
@@ -323,8 +330,22 @@ def solve_program(table, pool, settings, state, history):
             # Far from feasible, c / mu would drown the curvature of the objective; y is what it tends to.
             forces[r] = (residual[r] if active[r] > 0.0 else 0.0) if restoring else y[r]
         for r in range(m):
-            add_hessian(table, pool, r, q, contacts, free, lengths, work, records, z, forces, lagrangian)
-        add_squares(bases, jacobian, rows, active, lagrangian)
+            add_row_terms(
+                table,
+                pool,
+                r,
+                q,
+                contacts,
+                free,
+                lengths,
+                vectors,
+                block,
+                records,
+                jacobian,
+                forces,
+                active,
+                lagrangian,
+            )
         shift = factorize_shifted(lagrangian, n, max(0.25 * shift, 1e-8), matrix)
         if shift < 0.0:
             status = STALLED
@@ -354,26 +375,25 @@ def solve_program(table, pool, settings, state, history):
         bends = 0
         while alpha * longest * cut > 1e-9 * SHORTEST or alpha == 1.0:
             move(table, q, step, alpha, trial_q)
-            carry(table, pool, bases, free, lengths, contacts, records, z, step, alpha, guess)
+            carry(table, pool, bases, free, lengths, contacts, records, step, alpha, guess)
             lost = evaluate(
                 table,
                 pool,
                 trial_q,
                 guess,
-                12,
+                BEND,
                 free,
                 lengths,
-                work,
+                vectors,
                 trial_contacts,
                 trial_records,
-                trial_z,
                 trial_residual,
                 trial_jacobian,
             )
             if lost < 0:
                 there = merit(trial_residual, one_sided, rows, y, mu)
                 if not restoring:
-                    there += objective(table, pool, trial_q, gradient, lagrangian, False)
+                    there += objective(table, pool, trial_q, gradient, lagrangian)
                 if there <= here + 1e-4 * alpha * slope + noise:
                     accepted = True
                     break
@@ -393,7 +413,7 @@ def solve_program(table, pool, settings, state, history):
                     for i in range(n):
                         step[i] = straight[i]
             alpha *= 0.5
-            if alpha < 0.1 and lost >= 0:
+            if lost >= 0 and alpha * longest * cut < 0.01:
                 break
         if not accepted:
             if lost < 0:
@@ -421,7 +441,6 @@ def solve_program(table, pool, settings, state, history):
         q, trial_q = trial_q, q
         contacts, trial_contacts = trial_contacts, contacts
         records, trial_records = trial_records, records
-        z, trial_z = trial_z, z
         residual, trial_residual = trial_residual, residual
         jacobian, trial_jacobian = trial_jacobian, jacobian
         if alpha == 1.0:

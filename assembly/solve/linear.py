@@ -7,7 +7,7 @@ import math
 from assembly._kernel import kernel
 
 
-@kernel
+@kernel(inner=True)
 def factorize(m, n):
     """Cholesky in the upper triangle of m, m = U^T U, diagonal stored inverted; False where not positive definite.
 
@@ -29,7 +29,7 @@ def factorize(m, n):
     return True
 
 
-@kernel
+@kernel(inner=True)
 def substitute(m, n, b):
     """Solve U^T U x = b in place, for the factor that `factorize` left."""
     for k in range(n):

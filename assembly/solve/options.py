@@ -48,7 +48,7 @@ class Options:
     max_iterations: int = 300
     penalty: float = 1e-2
     penalty_floor: float = 1e-6
-    radius: float = 0.5
+    radius: float = 0.2
 
     def __post_init__(self) -> None:
         integer("max_iterations", self.max_iterations, 0, 10**9)

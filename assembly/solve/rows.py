@@ -10,7 +10,6 @@ from assembly.constraints.program import (
     CONTACT,
     MOVING,
     ONE_SIDED,
-    RATES,
     ROW,
     ROW_TABLE,
     ROWS,
@@ -18,9 +17,10 @@ from assembly.constraints.program import (
 )
 from assembly.kinematics.motion import retract
 from assembly.proximity.extremal import into_domain
+from assembly.proximity.velocity import RATES, ZED
 
 
-@kernel
+@kernel(inner=True)
 def place_rows(table, free, bases, one_sided):
     """Where each row's variables stand (twist of f, twist of g, free coordinates; negative: none), and its side."""
     for r in range(table[ROWS]):
@@ -38,7 +38,7 @@ def place_rows(table, free, bases, one_sided):
                     bases[e, j] = bases[r, j]
 
 
-@kernel
+@kernel(inner=True)
 def times(bases, jacobian, r, d):
     """Row r of J d."""
     s = 0.0
@@ -57,7 +57,7 @@ def times(bases, jacobian, r, d):
     return s
 
 
-@kernel
+@kernel(inner=True)
 def add_row(bases, jacobian, r, factor, out):
     """out += factor times row r of J."""
     f = bases[r, 0]
@@ -74,7 +74,7 @@ def add_row(bases, jacobian, r, factor, out):
             out[u + k] += factor * jacobian[r, 12 + k]
 
 
-@kernel
+@kernel(inner=True)
 def add_transposed(bases, jacobian, rows, weights, out):
     """out += J^T weights."""
     for r in range(rows):
@@ -82,19 +82,7 @@ def add_transposed(bases, jacobian, rows, weights, out):
             add_row(bases, jacobian, r, weights[r], out)
 
 
-@kernel
-def add_squares(bases, jacobian, rows, weights, out):
-    """out += J^T diag(weights) J."""
-    for r in range(rows):
-        if weights[r] == 0.0:
-            continue
-        for i in range(16 if bases[r, 2] >= 0 else 12):
-            part = 0 if i < 6 else (1 if i < 12 else 2)
-            if bases[r, part] >= 0:
-                add_row(bases, jacobian, r, weights[r] * jacobian[r, i], out[bases[r, part] + i - 6 * part])
-
-
-@kernel
+@kernel(inner=True)
 def violation_of(residual, one_sided, rows):
     """Largest violation."""
     worst = 0.0
@@ -107,7 +95,7 @@ def violation_of(residual, one_sided, rows):
     return worst
 
 
-@kernel
+@kernel(inner=True)
 def merit(residual, one_sided, rows, y, mu):
     """What the rows add to the augmented Lagrangian; a one-sided row counts only while y + c / mu is negative."""
     value = 0.0
@@ -120,7 +108,7 @@ def merit(residual, one_sided, rows, y, mu):
     return value
 
 
-@kernel
+@kernel(inner=True)
 def move(table, q, d, alpha, out):
     """Every moving body retracted by alpha d."""
     for b in range(table[BODIES]):
@@ -135,8 +123,8 @@ def move(table, q, d, alpha, out):
             )
 
 
-@kernel
-def carry(table, pool, bases, free, lengths, contacts, records, z, d, alpha, out):
+@kernel(inner=True)
+def carry(table, pool, bases, free, lengths, contacts, records, d, alpha, out):
     """Contact coordinates along alpha d: by the contact velocity, or, for a free pair, by its own unknowns."""
     for r in range(table[ROWS]):
         row = table[ROW_TABLE] + ROW * r
@@ -145,35 +133,33 @@ def carry(table, pool, bases, free, lengths, contacts, records, z, d, alpha, out
         g = bases[r, 1]
         u = bases[r, 2]
         if u >= 0:
-            s = lengths[k]
             out[k, 0], out[k, 1], _clamped = into_domain(
                 table,
                 pool,
                 table[row + 3],
-                contacts[k, 0] + alpha * d[u] / s[0],
-                contacts[k, 1] + alpha * d[u + 1] / s[1],
+                contacts[k, 0] + alpha * d[u] / lengths[k, 0],
+                contacts[k, 1] + alpha * d[u + 1] / lengths[k, 1],
             )
             out[k, 2], out[k, 3], _clamped = into_domain(
                 table,
                 pool,
                 table[row + 4],
-                contacts[k, 2] + alpha * d[u + 2] / s[2],
-                contacts[k, 3] + alpha * d[u + 3] / s[3],
+                contacts[k, 2] + alpha * d[u + 2] / lengths[k, 2],
+                contacts[k, 3] + alpha * d[u + 3] / lengths[k, 3],
             )
             continue
-        rates = records[k, RATES : RATES + 16]
         for i in range(4):
             out[k, i] = contacts[k, i]
         for j in range(4):
             s = 0.0
             for i in range(6):
                 if f >= 0:
-                    s += z[k, j, i] * d[f + i]
+                    s += records[k, ZED + 12 * j + i] * d[f + i]
                 if g >= 0:
-                    s += z[k, j, 6 + i] * d[g + i]
+                    s += records[k, ZED + 12 * j + 6 + i] * d[g + i]
             s *= alpha
             for i in range(4):
-                out[k, i] += rates[4 * i + j] * s
+                out[k, i] += records[k, RATES + 4 * i + j] * s
         # The prediction may run over the end of a patch; Newton starts inside.
         out[k, 0], out[k, 1], _clamped = into_domain(table, pool, table[row + 3], out[k, 0], out[k, 1])
         out[k, 2], out[k, 3], _clamped = into_domain(table, pool, table[row + 4], out[k, 2], out[k, 3])

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 from assembly._lazy import lazy_names
 
 if TYPE_CHECKING:
-    from assembly.view.browser import save_html as save_html
     from assembly.view.browser import show as show
+    from assembly.view.page import save_html as save_html
 else:
     __getattr__, __dir__, __all__ = lazy_names(
         __name__,
         {
-            "save_html": "assembly.view.browser",
+            "save_html": "assembly.view.page",
             "show": "assembly.view.browser",
         },
     )
