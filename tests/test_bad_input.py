@@ -219,6 +219,10 @@ CASES = {
     "starts unknown": (lambda: solve(starts={"b-a": [0] * 4}), "starts names 'b-a'; expected one of 'a-b'"),
     "starts shape": (lambda: solve(starts={"a-b": [0] * 3}), r"starts\['a-b'\] has shape \(3,\); expected \(4,\)"),
     "starts nan": (lambda: solve(starts={"a-b": [0, 0, 0, NAN]}), r"starts\['a-b'\]\[3\] is nan; expected finite"),
+    "starts outside": (
+        lambda: solve(starts={"a-b": [0, 1e9, 0, 0]}),
+        r"starts\['a-b'\]\[1\] is 1e\+09; expected a parameter in",
+    ),
     "option": (lambda: solve(tolerence=1e-9), "option 'tolerence' is unknown; expected one of tolerance, stationarity"),
     "option value": (lambda: solve(tolerance=0.0), "tolerance is 0; expected a number above 0"),
     "option nan": (lambda: solve(stationarity=NAN), "stationarity is nan; expected a finite real number"),
