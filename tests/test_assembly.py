@@ -501,11 +501,14 @@ def test_out_of_iterations_is_said():
 
 
 def test_an_unsolved_result_holds_no_garbage(monkeypatch):
-    # Fresh memory holds anything; here it holds something to be found.
-    monkeypatch.setattr(np, "empty", lambda shape, dtype=float: np.full(shape, 0.125, dtype))
     # A plate beside the ball: no normal of the one meets the other.
     plate = asm.Body("plate", PLANE, (100.0, 0.0, 0.0), fixed=True)
-    solution = scene_of([plate, ball("ball", 0.5, (0.0, 0.0, 3.0))], ("plate", "ball")).solve()
+    scene = scene_of([plate, ball("ball", 0.5, (0.0, 0.0, 3.0))], ("plate", "ball"))
+    scene.packed()
+    with monkeypatch.context() as patch:
+        # Fresh memory holds anything; here it holds something to be found.
+        patch.setattr(np, "empty", lambda shape, *arguments, **options: np.full(shape, 0.125, *arguments, **options))
+        solution = scene.solve()
     assert not solution.success
     np.testing.assert_array_equal(solution.q[0], plate.q)
     assert np.isfinite(solution.q).all()
