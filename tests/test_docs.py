@@ -1,0 +1,95 @@
+"""What the documents say: their code runs, their links lead somewhere, their tables are those of the code."""
+
+from __future__ import annotations
+
+import ast
+import re
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+
+import assembly as asm
+from assembly.proximity.pairs import PairStatus
+from assembly.solve.options import Options
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+CONCEPTS = (ROOT / "docs" / "concepts.md").read_text()
+README = (ROOT / "README.md").read_text()
+
+
+def blocks(path):
+    """The Python blocks of a page, each after as many empty lines as stand above it, so that errors point there."""
+    text = path.read_text()
+    found = re.finditer(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    return ["\n" * text.count("\n", 0, match.start(1)) + match[1] for match in found]
+
+
+def rows(text, *heads):
+    """The rows of the table whose first cells are these, as lists of cells without backquotes."""
+    lines = iter(text.splitlines())
+    for line in lines:
+        if line.startswith("|") and [c.strip(" `") for c in line.strip("|").split("|")][: len(heads)] == list(heads):
+            break
+    else:
+        raise AssertionError(f"no table {heads}")
+    next(lines)
+    found = []
+    for line in lines:
+        if not line.startswith("|"):
+            break
+        found.append([cell.strip(" `") for cell in line.strip("|").split("|")])
+    return found
+
+
+def test_there_is_code_to_run():
+    assert len(blocks(ROOT / "docs" / "concepts.md")) > 5 and blocks(ROOT / "README.md")
+
+
+@pytest.mark.parametrize("path", [p for p in PAGES if blocks(p)], ids=lambda p: p.name)
+def test_code_runs_as_it_stands(path, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)  # pages write files
+    namespace = {"__name__": "__main__"}
+    for block in blocks(path):
+        exec(compile(block, path, "exec"), namespace)
+    assert capsys.readouterr().out
+
+
+@pytest.mark.parametrize("path", PAGES, ids=lambda p: p.name)
+def test_links_lead_somewhere(path):
+    targets = re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", path.read_text())
+    missing = [t for t in targets if "://" not in t and not (path.parent / t).exists()]
+    assert missing == []
+
+
+@pytest.mark.parametrize("path", PAGES, ids=lambda p: p.name)
+def test_files_that_pages_name_exist(path):
+    named = re.findall(r"`((?:assembly|tests|docs|examples|benchmarks)/[\w/.]+\.(?:py|md|png))`", path.read_text())
+    written_by_benchmarks = {"docs/performance.md"}
+    assert [name for name in named if not (ROOT / name).exists() and name not in written_by_benchmarks] == []
+
+
+def test_statuses_and_their_remedies():
+    assert [row[:2] for row in rows(CONCEPTS, "Status")] == [[s.name, s.value] for s in asm.Status]
+    assert [row[0] for row in rows(CONCEPTS, "PairStatus")] == [s.name for s in PairStatus]
+    derivations = (ROOT / "docs" / "derivations.md").read_text()
+    assert [row[0] for row in rows(derivations, "status", "when")] == [s.name for s in asm.Status]
+
+
+def test_options_and_their_defaults():
+    table = [(name, float(default)) for name, default, _ in rows(CONCEPTS, "option", "default")]
+    assert table == [(option.name, option.default) for option in fields(Options)]
+
+
+def test_readme_shows_the_example():
+    """Statement by statement, in its order; the example has a function around them."""
+    shown = [ast.unparse(node) for node in ast.parse(blocks(ROOT / "README.md")[0]).body]
+    example = (ROOT / "examples" / "paper_clips.py").read_text()
+    body = [ast.unparse(node) for node in ast.walk(ast.parse(example)) if isinstance(node, ast.stmt)]
+    places = [body.index(statement) for statement in shown]
+    assert places == sorted(places)
+
+
+def test_readme_has_the_place_of_the_figures():
+    assert README.count("<!-- figures -->") == README.count("<!-- /figures -->") == 1
