@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from os import PathLike
 from time import perf_counter
-from typing import Any, Union
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -151,7 +151,7 @@ class Assembly:
 
     def solve(
         self,
-        q0: Union[ArrayLike, Solution, None] = None,
+        q0: ArrayLike | Solution | None = None,
         *,
         starts: Mapping[str, ArrayLike] | None = None,
         **options: Any,
@@ -182,7 +182,7 @@ class Assembly:
         seconds = perf_counter() - begin
         return self._solution(packed, state, history, code, seconds)
 
-    def _start(self, packed: Packed, q0: Union[ArrayLike, Solution, None], starts: Mapping[str, ArrayLike] | None) -> Array:
+    def _start(self, packed: Packed, q0: ArrayLike | Solution | None, starts: Mapping[str, ArrayLike] | None) -> Array:
         """State of the loop: configuration, contact parameters (NaN: to be found), multipliers, room for results."""
         state = np.empty(packed.results_at + RESULTS)
         q = state[: packed.contacts_at].reshape(-1, 7)
@@ -239,7 +239,7 @@ class Assembly:
             },
         )
 
-    def save(self, path: Union[str, PathLike[str]]) -> None:
+    def save(self, path: str | PathLike[str]) -> None:
         """Write the scene as JSON; `asm.load` reads it back."""
         from assembly.scene_file import save
 
