@@ -13,19 +13,11 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.constraints.contact import Contact
 from assembly.constraints.objectives import Objective, PointDistance, Posture
 from assembly.constraints.packing import Packed, pack
-from assembly.errors import InputError, real_array, vector
+from assembly.errors import InputError, vector
 from assembly.kinematics.body import Body
-from assembly.solve.augmented_lagrangian import (
-    COUNT,
-    CULPRIT,
-    DUAL,
-    HISTORY,
-    IMPROPER,
-    OBJECTIVE,
-    RESULTS,
-    VIOLATION,
-    solve_program,
-)
+from assembly.kinematics.pose import pose_rows
+from assembly.proximity.pairs import inside
+from assembly.solve.augmented_lagrangian import HISTORY, ITERATIONS, RESULTS, solve_program
 from assembly.solve.options import Options
 from assembly.solve.solution import Scene, Solution, Status
 
@@ -33,8 +25,10 @@ __all__ = ["Assembly"]
 
 Array = NDArray[np.float64]
 _STATUSES = tuple(Status)
-_DEFAULTS = Options()
-_DEFAULT_SETTINGS = _DEFAULTS.settings()
+_SETTINGS = Options().settings()
+_WARM_SETTINGS = Options().settings(warm=True)
+# Rows of history that are kept.
+MOST_HISTORY = 1000
 
 
 class Assembly:
@@ -83,8 +77,8 @@ class Assembly:
         for body in self._bodies:
             if body.name == name:
                 return body
-        known = ", ".join(repr(body.name) for body in self._bodies)
-        raise InputError(f"name is {name!r}; expected one of {known}")
+        known = ", ".join(repr(body.name) for body in self._bodies) or "none yet: the assembly is empty"
+        raise InputError(f"name is {name!r}; expected a body of this assembly: {known}")
 
     def add(self, body: Body) -> Body:
         """Add a body and return it."""
@@ -174,70 +168,45 @@ class Assembly:
             Check `success`; the status and the message say what happened otherwise.
         """
         packed = self.packed()
-        settings = Options.of(options).settings() if options else _DEFAULT_SETTINGS
+        assert self._scene is not None
+        warm = isinstance(q0, Solution)
+        if options:
+            settings = Options.of(options).settings(warm)
+        else:
+            settings = _WARM_SETTINGS if warm else _SETTINGS
         state = self._start(packed, q0, starts)
-        history = np.empty((int(settings[2]) + 1, HISTORY))
+        history = np.empty((min(int(settings[ITERATIONS]), MOST_HISTORY) + 1, HISTORY))
         begin = perf_counter()
         code = solve_program(packed.table, packed.pool, settings, state, history)
-        seconds = perf_counter() - begin
-        return self._solution(packed, state, history, code, seconds)
+        return Solution(self._scene, packed, state, _STATUSES[code], perf_counter() - begin, history)
 
     def _start(self, packed: Packed, q0: ArrayLike | Solution | None, starts: Mapping[str, ArrayLike] | None) -> Array:
         """State of the loop: configuration, contact parameters (NaN: to be found), multipliers, room for results."""
-        state = np.empty(packed.results_at + RESULTS)
-        q = state[: packed.contacts_at].reshape(-1, 7)
         if isinstance(q0, Solution):
-            if q0._scene is not self._scene:
-                raise InputError("q0 is a solution of another assembly, or of this one before a change; expected its own")
-            q[:] = q0.q
-            state[packed.contacts_at : packed.multipliers_at] = q0._parameters.ravel()
-            state[packed.multipliers_at : packed.residuals_at] = q0._multipliers * (
-                1.0 / (packed.scale * packed.weight)
-            )
+            if q0._packed is not packed:
+                raise InputError("q0 is a solution of another assembly, or from before a change; expected one of this scene")
+            state = q0._state.copy()
+            q = state[: packed.contacts_at].reshape(-1, 7)
         else:
-            q[:] = self.q if q0 is None else self._checked(q0)
+            state = np.zeros(packed.results_at + RESULTS)
+            q = state[: packed.contacts_at].reshape(-1, 7)
+            q[:] = self.q if q0 is None else pose_rows("q0", q0, len(self._bodies))
             state[packed.contacts_at : packed.multipliers_at] = np.nan
-            state[packed.multipliers_at : packed.residuals_at] = 0.0
         if starts:
-            names = [constraint.name for constraint in self._constraints]
-            for name, value in starts.items():
-                if name not in names:
-                    raise InputError(f"starts names {name!r}; expected one of {', '.join(map(repr, names))}")
-                at = packed.contacts_at + 4 * names.index(name)
-                state[at : at + 4] = vector(f"starts[{name!r}]", value, 4)
+            self._place_starts(packed, state, starts)
         packed.refresh(q)
         return state
 
-    def _checked(self, q0: ArrayLike) -> Array:
-        q = real_array("q0", q0, (len(self._bodies), 7))
-        norms = np.linalg.norm(q[:, 3:], axis=1)
-        if np.abs(norms - 1.0).max() > 1e-2:
-            raise InputError(f"q0 has quaternions of norms {norms.tolist()}; expected unit quaternions")
-        q[:, 3:] /= norms[:, None]
-        return q
-
-    def _solution(self, packed: Packed, state: Array, history: Array, code: int, seconds: float) -> Solution:
-        assert self._scene is not None
-        results = state[packed.results_at :]
-        force = packed.scale * packed.weight
-        return Solution(
-            self._scene,
-            state[: packed.contacts_at].reshape(-1, 7),
-            state[packed.contacts_at : packed.multipliers_at].reshape(-1, 4),
-            state[packed.multipliers_at : packed.residuals_at] * force,
-            state[packed.residuals_at : packed.results_at],
-            _STATUSES[code],
-            {
-                "iterations": int(results[COUNT]),
-                "seconds": seconds,
-                "objective": float(results[OBJECTIVE]) * packed.scale**2 * packed.weight,
-                "feasibility": float(results[VIOLATION]),
-                "stationarity": float(results[DUAL]),
-                "culprit": int(results[CULPRIT]),
-                "improper": bool(results[IMPROPER]),
-                "history": history[: int(results[COUNT]) + 1],
-            },
-        )
+    def _place_starts(self, packed: Packed, state: Array, starts: Mapping[str, ArrayLike]) -> None:
+        names = [constraint.name for constraint in self._constraints]
+        for name, value in starts.items():
+            if name not in names:
+                raise InputError(f"starts names {name!r}; expected one of {', '.join(map(repr, names))}")
+            k = names.index(name)
+            surfaces = (packed.faces[k][0].face.surface, packed.faces[k][1].face.surface)
+            at = packed.contacts_at + 4 * k
+            what = f"starts[{name!r}]"
+            state[at : at + 4] = inside(what, vector(what, value, 4), surfaces)
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the scene as JSON; `asm.load` reads it back."""

@@ -15,10 +15,12 @@ from __future__ import annotations
 
 from assembly._kernel import kernel, lane, load_lanes, store_xyz
 
-SURFACE_RECORD = 12
+SURFACE_RECORD = 13
 # Fields of a surface record.
 DEGREE_U, DEGREE_V, SPANS_U, SPANS_V, BREAKS_U, BREAKS_V, COEFFICIENTS = 0, 1, 2, 3, 4, 5, 6
 CLOSED_U, CLOSED_V, SIGN, CELLS, CELL_COUNT = 7, 8, 9, 10, 11
+# Edges of the domain that are one point: 1, 2, 4, 8 for the low and high end of u, then of v.
+POLES = 12
 CURVE_RECORD = 5
 # Fields of a curve record.
 CURVE_DEGREE, CURVE_SPANS, CURVE_BREAKS, CURVE_COEFFICIENTS, CURVE_CLOSED = 0, 1, 2, 3, 4

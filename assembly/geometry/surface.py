@@ -128,6 +128,17 @@ class NurbsSurface:
         is_point = float(np.ptp(a, axis=(0, 1)).max()) <= tolerance
         return not is_point and float(np.linalg.norm(a - b, axis=-1).max()) <= tolerance
 
+    @cached_property
+    def _pole_bits(self) -> int:
+        """Bits 1, 2, 4, 8: whether the edge at the low and high end of u, then of v, is one point."""
+        pieces = self._pieces
+        edges = (pieces[0, :, 0], pieces[-1, :, -1], pieces[:, 0, :, 0], pieces[:, -1, :, -1])
+        points = (edge[..., :3] / edge[..., 3:] for edge in edges)
+        return sum(
+            bit for bit, edge in zip((1, 2, 4, 8), points, strict=True)
+            if float(np.ptp(edge, axis=(0, 1)).max()) <= COINCIDENT * self.size
+        )
+
     @property
     def _homogeneous(self) -> Array:
         return np.concatenate([self.control_points * self.weights[..., None], self.weights[..., None]], axis=2)
@@ -230,7 +241,7 @@ class NurbsSurface:
         coefficients = breaks_v + at_v.size
         closed_u, closed_v = self.closed
         record = np.array(
-            [p, q, at_u.size - 1, at_v.size - 1, 0, breaks_v, coefficients, closed_u, closed_v, 1, pool.size, 0],
+            [p, q, at_u.size - 1, at_v.size - 1, 0, breaks_v, coefficients, closed_u, closed_v, 1, pool.size, 0, self._pole_bits],
             dtype=np.int64,
         )
         assert record.size == SURFACE_RECORD

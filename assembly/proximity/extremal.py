@@ -25,16 +25,20 @@ from assembly.geometry.spline import (
     BREAKS_V,
     CLOSED_U,
     CLOSED_V,
+    POLES,
     SIGN,
     SPANS_U,
     SPANS_V,
     surface_point,
 )
 from assembly.geometry.vec import add, blend, cross, dot, matvec, matvec_t, scale, sub
+from assembly.proximity.pole import CHART, limits, nearest_pole, polar_step, pole_frame
 
+# A step that turns about a pole by more than this part of the domain is taken in the pole's plane.
+TURN = 0.08
 # What became of a pair.
 CONVERGED, SINGULAR, LEFT_PATCH, NOT_CONVERGED = 0, 1, 2, 3
-# A pole is where |Su x Sv| falls below this times |Su| |Sv| (or one of them vanishes).
+# A parameterization counts as regular where |Su x Sv| is above this times |Su| |Sv|.
 POLE = 1e-9
 # H counts as singular below this ratio of its smallest singular value to its scale.
 RANK = 1e-7
@@ -44,12 +48,6 @@ LIMIT = 40
 BEND = 0.5
 # A step that turns the normals by less leaves an error below rounding when a solve carries the frame along it.
 CLOSE = 1e-6
-
-
-@kernel(inline=True)
-def pole_normal(fu, fv, fuv):
-    """The limit of fu x fv where one of them vanishes, along the other parameter."""
-    return cross(fuv, fv) if dot(fu, fu) <= dot(fv, fv) else cross(fu, fuv)
 
 
 @kernel(inline=True)
@@ -65,6 +63,78 @@ def shape_operator(p, q, r, s, luu, luv, lvv):
 
 
 @kernel(inline=True)
+def own_frame(table, pool, r, u, v):
+    """Point, outward normal n, tangents x and y, E^-1 (11, 12, 22) with [S_u S_v] = [x y] E, shape operator, regular?
+
+    At a pole E^-1 is zero: the point moves, its polar coordinates have no rates.
+    """
+    zero = (0.0, 0.0, 0.0)
+    if table[r + POLES] != 0:
+        edge, distance = nearest_pole(table, pool, r, u, v)
+        if distance < CHART:
+            p, n, x, y, a, smooth = pole_frame(table, pool, r, edge, u, v)
+            return p, n, x, y, zero, a, smooth
+    p, su, sv, suu, suv, svv = surface_point(table, pool, r, u, v)
+    sign = float(table[r + SIGN])
+    normal = cross(su, sv)
+    uu = dot(su, su)
+    nn = dot(normal, normal)
+    if not (nn > POLE * POLE * uu * dot(sv, sv) and nn > 1e-290):
+        return p, zero, zero, zero, zero, zero, False
+    length = math.sqrt(nn)
+    n = scale(sign / length, normal)
+    i11 = 1.0 / math.sqrt(uu)
+    x = scale(i11, su)
+    # |Su x Sv| = e11 e22.
+    i22 = sign * uu * i11 / length
+    i12 = -dot(x, sv) * i11 * i22
+    a = shape_operator(i11, i12, 0.0, i22, dot(suu, n), dot(suv, n), dot(svv, n))
+    return p, n, x, cross(n, x), (i11, i12, i22), a, True
+
+
+@kernel(inline=True)
+def other_frame(table, pool, r, u, v, n, x, y):
+    """The same seen with another surface's n, x, y: point, T^-1 (11, 12, 21, 22), shape operator, tilt r2, regular?
+
+    m = n + [x y] r2 is orthogonal to S_u and S_v: T^T r2 = -(n.S_u, n.S_v), with T = [x y]^T [S_u S_v].
+    """
+    zero = (0.0, 0.0, 0.0)
+    none = (0.0, 0.0, 0.0, 0.0)
+    if table[r + POLES] != 0:
+        edge, distance = nearest_pole(table, pool, r, u, v)
+        if distance < CHART:
+            p, m, gx, gy, b, smooth = pole_frame(table, pool, r, edge, u, v)
+            s = dot(m, n)
+            if not smooth or abs(s) < 1e-3:
+                return p, none, zero, (0.0, 0.0), False
+            side = 1.0 if s > 0.0 else -1.0
+            xx = dot(x, gx)
+            xy = dot(x, gy)
+            yx = dot(y, gx)
+            yy = dot(y, gy)
+            c = (
+                side * (xx * (b[0] * xx + b[1] * xy) + xy * (b[1] * xx + b[2] * xy)),
+                side * (xx * (b[0] * yx + b[1] * yy) + xy * (b[1] * yx + b[2] * yy)),
+                side * (yx * (b[0] * yx + b[1] * yy) + yy * (b[1] * yx + b[2] * yy)),
+            )
+            return p, none, c, (dot(x, m) / s, dot(y, m) / s), True
+    p, su, sv, suu, suv, svv = surface_point(table, pool, r, u, v)
+    t11 = dot(x, su)
+    t12 = dot(x, sv)
+    t21 = dot(y, su)
+    t22 = dot(y, sv)
+    det = t11 * t22 - t12 * t21
+    if not (det * det > POLE * POLE * dot(su, su) * dot(sv, sv) and abs(det) > 1e-145):
+        return p, none, zero, (0.0, 0.0), False
+    i = 1.0 / det
+    t = (i * t22, -i * t12, -i * t21, i * t11)
+    c = shape_operator(t[0], t[1], t[2], t[3], dot(suu, n), dot(suv, n), dot(svv, n))
+    nu = dot(n, su)
+    nv = dot(n, sv)
+    return p, t, c, (-(t[0] * nu + t[2] * nv), -(t[1] * nu + t[3] * nv)), True
+
+
+@kernel(inline=True)
 def pair_frame(table, pool, f, g, rotation, shift, x):
     """Everything about a pair at parameters x = (u_f, v_f, u_g, v_g), in the axes of body f.
 
@@ -72,63 +142,22 @@ def pair_frame(table, pool, f, g, rotation, shift, x):
     -------
     n, tx, ty : normal of f and its tangent frame, [f_u f_v] = [tx ty] E
     pf, pg : the two points
-    e : (11, 12, 22) of E^-1, which is upper triangular
-    t : (11, 12, 21, 22) of T^-1
+    e : (11, 12, 22) of E^-1, which is upper triangular; zero at a pole
+    t : (11, 12, 21, 22) of T^-1; zero at a pole
     a, c : shape operators (11, 12, 22) of f and g with respect to n
     r : (r1x, r1y, r2x, r2y), residual
     beta : n.(pg - pf)
-    regular : whether both parameterizations are regular here; where not, e, t, a, c and r2 are zero
+    regular : whether both surfaces have a tangent plane here, and those are not orthogonal
     """
-    pf, fu, fv, fuu, fuv, fvv = surface_point(table, pool, f, x[0], x[1])
-    qg, gu, gv, guu, guv, gvv = surface_point(table, pool, g, x[2], x[3])
-    sign = float(table[f + SIGN])
-    pg = add(matvec(rotation, qg), shift)
-    d = sub(pg, pf)
-    normal = cross(fu, fv)
-    uu = dot(fu, fu)
-    nn = dot(normal, normal)
-    regular = nn > POLE * POLE * uu * dot(fv, fv) and nn > 1e-290
-    if not regular:
-        normal = pole_normal(fu, fv, fuv)
-        nn = dot(normal, normal)
-        if not nn > 0.0:
-            nn = 1.0
-    length = math.sqrt(nn)
-    n = scale(sign / length, normal)
-    if uu > 1e-290:
-        i11 = 1.0 / math.sqrt(uu)
-        tx = scale(i11, fu)
-    else:
-        i11 = 0.0
-        tx = scale(1.0 / math.sqrt(dot(fv, fv)), cross(fv, n))
-    ty = cross(n, tx)
-    # |fu x fv| = e11 e22.
-    i22 = sign * uu * i11 / length
-    i12 = -dot(tx, fv) * i11 * i22
+    pf, n, tx, ty, e, a, regular_f = own_frame(table, pool, f, x[0], x[1])
     # The normal and the frame go to the axes of g, rather than six derivatives to those of f.
     ng = matvec_t(rotation, n)
     xg = matvec_t(rotation, tx)
     yg = matvec_t(rotation, ty)
-    t11 = dot(xg, gu)
-    t12 = dot(xg, gv)
-    t21 = dot(yg, gu)
-    t22 = dot(yg, gv)
-    det = t11 * t22 - t12 * t21
-    regular = regular and det * det > POLE * POLE * dot(gu, gu) * dot(gv, gv) and abs(det) > 1e-145
-    i = 1.0 / det if regular else 0.0
-    if not regular:
-        i11 = 0.0
-        i12 = 0.0
-        i22 = 0.0
-    e = (i11, i12, i22)
-    t = (i * t22, -i * t12, -i * t21, i * t11)
-    a = shape_operator(i11, i12, 0.0, i22, dot(fuu, n), dot(fuv, n), dot(fvv, n))
-    c = shape_operator(t[0], t[1], t[2], t[3], dot(guu, ng), dot(guv, ng), dot(gvv, ng))
-    # m = n + P r2 is orthogonal to gu and gv: T^T r2 = -(n.gu, n.gv).
-    nu = dot(ng, gu)
-    nv = dot(ng, gv)
-    r = (dot(tx, d), dot(ty, d), -(t[0] * nu + t[2] * nv), -(t[1] * nu + t[3] * nv))
-    return n, tx, ty, pf, pg, e, t, a, c, r, dot(n, d), regular
+    qg, t, c, tilt, regular_g = other_frame(table, pool, g, x[2], x[3], ng, xg, yg)
+    pg = add(matvec(rotation, qg), shift)
+    d = sub(pg, pf)
+    return n, tx, ty, pf, pg, e, t, a, c, (dot(tx, d), dot(ty, d), tilt[0], tilt[1]), dot(n, d), regular_f and regular_g
 
 
 @kernel(inline=True)
@@ -203,6 +232,24 @@ def into_domain(table, pool, r, u, v):
     return u, v, clamped
 
 
+@kernel(inline=True)
+def advance(table, pool, r, u, v, du, dv, step):
+    """Parameters moved by (du, dv), or over a pole by the tangential step (body axes); whether an end held them."""
+    if table[r + POLES] != 0:
+        edge, distance = nearest_pole(table, pool, r, u, v)
+        ulo, uhi, _ = limits(table, pool, r, 0)
+        vlo, vhi, _ = limits(table, pool, r, 1)
+        turn = abs(dv) / (vhi - vlo) if edge <= 2 else abs(du) / (uhi - ulo)
+        if edge <= 2:
+            beyond = u + du < ulo if edge == 1 else u + du > uhi
+        else:
+            beyond = v + dv < vlo if edge == 4 else v + dv > vhi
+        if distance < CHART or turn > TURN or beyond:
+            u, v = polar_step(table, pool, r, edge, u, v, step)
+            return u, v, False
+    return into_domain(table, pool, r, u + du, v + dv)
+
+
 @kernel(inner=True)
 def solve_pair(table, pool, f, g, rotation, shift, x, size, turn, close):
     """Newton from x to the extremal pair; returns status, parameters, iterations, frame, and H as `pair_matrix` gives it.
@@ -221,8 +268,7 @@ def solve_pair(table, pool, f, g, rotation, shift, x, size, turn, close):
         n, tx, ty, pf, pg, e, t, a, c, r, beta, regular = pair_frame(table, pool, f, g, rotation, shift, x)
         k, h, inverse, isolated = pair_matrix(a, c, beta, flat)
         if not regular:
-            # A pole: nothing better than the point itself when d is already normal there.
-            status = SINGULAR if r[0] * r[0] + r[1] * r[1] <= tolerance * tolerance else NOT_CONVERGED
+            # An apex or a crease: there is no tangent plane to go on.
             break
         s0 = c[0] * r[0] + c[1] * r[1] - r[2]
         s1 = c[1] * r[0] + c[2] * r[1] - r[3]
@@ -248,8 +294,10 @@ def solve_pair(table, pool, f, g, rotation, shift, x, size, turn, close):
         dv = factor * e[2] * ay
         ds = factor * (t[0] * bx + t[1] * by)
         dt = factor * (t[2] * bx + t[3] * by)
-        uf, vf, clamped_f = into_domain(table, pool, f, x[0] + du, x[1] + dv)
-        ug, vg, clamped_g = into_domain(table, pool, g, x[2] + ds, x[3] + dt)
+        move_f = blend(factor * ax, tx, factor * ay, ty)
+        move_g = matvec_t(rotation, blend(factor * bx, tx, factor * by, ty))
+        uf, vf, clamped_f = advance(table, pool, f, x[0], x[1], du, dv, move_f)
+        ug, vg, clamped_g = advance(table, pool, g, x[2], x[3], ds, dt, move_g)
         status = NOT_CONVERGED
         if clamped_f or clamped_g:
             status = LEFT_PATCH

@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import lru_cache
-from typing import Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,7 +26,7 @@ __all__ = ["ContactPair", "PairStatus", "contact_jacobian", "extremal_pair", "ga
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
-Side = Union[NurbsSurface, Face, BodyFace]
+Side = NurbsSurface | Face | BodyFace
 # Fields of a surface record that are offsets into the pool.
 OFFSETS = (BREAKS_U, BREAKS_V, COEFFICIENTS, CELLS)
 # How far from extremal a pair may be where its derivatives are asked for.
@@ -103,7 +102,7 @@ def _configuration(q_f: ArrayLike, q_g: ArrayLike) -> Array:
     return q
 
 
-def _inside(name: str, parameters: Array, surfaces: tuple[NurbsSurface, NurbsSurface]) -> tuple[float, ...]:
+def inside(name: str, parameters: Array, surfaces: tuple[NurbsSurface, NurbsSurface]) -> tuple[float, ...]:
     """Parameters as a tuple; raises where one lies beyond the end of an open direction."""
     limits = [(s.domain[k], s.closed[k]) for s in surfaces for k in range(2)]
     for k, ((low, high), closed) in enumerate(limits):
@@ -151,7 +150,7 @@ def extremal_pair(
     if start is None:
         x: tuple[float, ...] = (np.nan, np.nan, np.nan, np.nan)
     else:
-        x = _inside("start", vector("start", start, 4), (f.surface, g.surface))
+        x = inside("start", vector("start", start, 4), (f.surface, g.surface))
     out = np.empty(14)
     status = find_pair(table, pool, 0, SURFACE_RECORD, q, x, size, out)
     return ContactPair(out[:4], out[4:10].reshape(2, 3), out[10:13], float(out[13]), _STATUSES[status])
@@ -163,15 +162,15 @@ def _derivatives(
     f, g = as_face("surface_f", surface_f), as_face("surface_g", surface_g)
     q = _configuration(q_f, q_g)
     table, pool, size = _packed(_key(f), _key(g))
-    x = _inside("parameters", real_array("parameters", parameters, (4,)), (f.surface, g.surface))
+    x = inside("parameters", real_array("parameters", parameters, (4,)), (f.surface, g.surface))
     first, hessian = np.full((5, 14), np.nan), np.full((12, 12), np.nan)
-    error, regular = pair_derivatives(table, pool, 0, SURFACE_RECORD, q, x, size, first, hessian)
-    if not error <= EXTREMAL:
+    error, _isolated = pair_derivatives(table, pool, 0, SURFACE_RECORD, q, x, size, first, hessian)
+    if np.isfinite(first[4]).all() and not error <= EXTREMAL:
         raise InputError(
             f"parameters are {list(x)}, off an extremal pair by {error:.1e}; expected those of extremal_pair"
         )
-    if not regular and not np.isfinite(first).all():
-        raise InputError(f"parameters are {list(x)}, at a pole; expected a point where both surfaces are regular")
+    if not np.isfinite(first[4]).all():
+        raise InputError(f"parameters are {list(x)}, where a surface has no tangent plane; expected a regular point")
     return first[:4], first[4], hessian
 
 
@@ -187,9 +186,12 @@ def contact_jacobian(
     Raises
     ------
     InputError
-        Also where the parameters are not those of an extremal pair.
+        Also where the parameters are not those of an extremal pair, or at a pole.
     """
-    return _derivatives(surface_f, q_f, surface_g, q_g, parameters)[0]
+    jacobian = _derivatives(surface_f, q_f, surface_g, q_g, parameters)[0]
+    if not np.isfinite(jacobian).all():
+        raise InputError(f"parameters are {np.asarray(parameters).tolist()}, at a pole, where parameters have no rates")
+    return jacobian
 
 
 def gap_gradient(surface_f: Side, q_f: ArrayLike, surface_g: Side, q_g: ArrayLike, parameters: ArrayLike) -> Array:

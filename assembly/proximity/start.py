@@ -1,13 +1,17 @@
 """A global start for an extremal pair: the nearest cells of two surfaces, then Newton.
 
-Every surface carries cells: small pieces with a sample point and a bounding sphere. The nearest sample of g
-is found for every cell of f; from the nearest such pairs, far enough from one another to
-belong to different minima, Newton runs, and the pair with the smallest |gap| wins. A pair of cells whose spheres are
-farther apart than the best pair found is never tried.
+Every surface carries cells: small pieces with a sample point and a bounding sphere. For every cell of f the nearest
+sample of g is found, which leads to the closest points where the surfaces are apart; where they are not, the best by
 
-Newton's method goes to any extremum, the far side of a ball as well. A pair whose |gap| is larger than the distance
-of the samples it came from is not theirs: then the distance is first made smaller by direct search, which
-knows no curvature and passes poles and edges, and Newton runs from there.
+    |d|^2 + w (1 + n_f.n_g),
+
+which prefers normals that oppose each other and leads to the deepest points where the surfaces overlap. From the best such
+pairs, far enough from one another to belong to different extrema, Newton runs. Of what it finds, extrema with opposed
+outward normals (solids face each other) come first, then the smallest |gap|.
+
+Newton's method goes to any extremum, the far side of a ball as well. A pair farther apart than the samples it came from
+is not theirs: then the distance is first made smaller by direct search, which knows no curvature and passes poles and
+edges, and Newton runs from there.
 """
 
 from __future__ import annotations
@@ -17,8 +21,8 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
-from assembly.geometry.spline import BREAKS_U, BREAKS_V, CELL_COUNT, CELLS, SPANS_U, SPANS_V, surface_point
-from assembly.geometry.vec import add, cross, dot, matvec, scale, sub
+from assembly.geometry.spline import BREAKS_U, BREAKS_V, CELL_COUNT, CELLS, SIGN, SPANS_U, SPANS_V, surface_point
+from assembly.geometry.vec import add, cross, dot, matvec, matvec_t, scale, sub
 from assembly.kinematics.motion import position, relative_pose, rotation
 from assembly.proximity.extremal import (
     CONVERGED,
@@ -26,40 +30,85 @@ from assembly.proximity.extremal import (
     NOT_CONVERGED,
     SINGULAR,
     into_domain,
+    own_frame,
     pair_frame,
     solve_pair,
 )
 
-CELL = 9  # doubles a cell: u, v, point, sphere's center, radius
-CANDIDATES = 16
+CELL_SIZE = 9  # doubles a cell: u, v, point, sphere's center, radius
+# How many of the nearest and of the best aligned samples are tried.
+NEAREST = 16
+ALIGNED = 6
 # Direct search: at most so many rounds, from steps of 1/32 of the domain down to 1e-5 of that.
 LEVELS = 200
 # Surfaces nearer than this part of the samples' distance cross there.
 CROSSING = 1e-3
-
-
-@kernel(inline=True)
-def direction(su, sv):
-    """The unit normal, or zero at a pole."""
-    n = cross(su, sv)
-    square = dot(n, n)
-    return scale(1.0 / math.sqrt(square) if square > 0.0 else 0.0, n)
+# w as a part of the square of the smaller extent.
+ALIGNMENT = 0.1
 
 
 @kernel(inner=True)
-def approach(table, pool, f, g, rotation, shift, x, lever):
-    """Parameters with a smaller distance, and it, by direct search: nine points of each surface around the best.
+def cell_samples(table, pool, r, turn, shift, samples):
+    """Points and outward normals of the cells' samples, moved by a pose, (count, 6). Returns their extent."""
+    lo = (math.inf, math.inf, math.inf)
+    hi = (-math.inf, -math.inf, -math.inf)
+    for i in range(table[r + CELL_COUNT]):
+        o = table[r + CELLS] + CELL_SIZE * i
+        p, su, sv, _uu, _uv, _vv = surface_point(table, pool, r, pool[o], pool[o + 1])
+        normal = cross(su, sv)
+        length = math.sqrt(dot(normal, normal))
+        n = matvec(turn, scale(float(table[r + SIGN]) / length if length > 0.0 else 0.0, normal))
+        p = add(matvec(turn, p), shift)
+        samples[i, 0], samples[i, 1], samples[i, 2] = p
+        samples[i, 3], samples[i, 4], samples[i, 5] = n
+        lo = (min(lo[0], p[0]), min(lo[1], p[1]), min(lo[2], p[2]))
+        hi = (max(hi[0], p[0]), max(hi[1], p[1]), max(hi[2], p[2]))
+    d = (hi[0] - lo[0], hi[1] - lo[1], hi[2] - lo[2])
+    return math.sqrt(dot(d, d))
 
-    A lever adds lever^2 (1 - (n_f.n_g)^2) to the square of the distance. Where surfaces cross, that leads away from
-    their intersection, where every distance vanishes, to where they are parallel.
-    """
+
+@kernel(inner=True)
+def best_samples(a, b, weight, nearest, score):
+    """For every sample of f the best sample of g: the nearest one, or with a weight the best aligned one too."""
+    for i in range(a.shape[0]):
+        x = a[i, 0]
+        y = a[i, 1]
+        z = a[i, 2]
+        u = weight * a[i, 3]
+        v = weight * a[i, 4]
+        w = weight * a[i, 5]
+        best = math.inf
+        where = 0
+        for j in range(b.shape[0]):
+            dx = b[j, 0] - x
+            dy = b[j, 1] - y
+            dz = b[j, 2] - z
+            d = dx * dx + dy * dy + dz * dz
+            if weight > 0.0:
+                d += u * b[j, 3] + v * b[j, 4] + w * b[j, 5]
+            if d < best:
+                best = d
+                where = j
+        nearest[i] = where
+        score[i] = math.sqrt(max(best + weight, 0.0))
+
+
+@kernel(inner=True)
+def opposed(frame, rotation, table, pool, g, x):
+    """Whether the outward normal of g opposes that of f."""
+    normal = own_frame(table, pool, g, x[2], x[3])[1]
+    return dot(normal, matvec_t(rotation, frame[0])) < 0.0
+
+
+@kernel(inner=True)
+def approach(table, pool, f, g, rotation, shift, x):
+    """Parameters with a smaller distance, and it, by direct search: nine points of each surface around the best."""
     fu = 0.03125 * (pool[table[f + BREAKS_U] + table[f + SPANS_U]] - pool[table[f + BREAKS_U]])
     fv = 0.03125 * (pool[table[f + BREAKS_V] + table[f + SPANS_V]] - pool[table[f + BREAKS_V]])
     gu = 0.03125 * (pool[table[g + BREAKS_U] + table[g + SPANS_U]] - pool[table[g + BREAKS_U]])
     gv = 0.03125 * (pool[table[g + BREAKS_V] + table[g + SPANS_V]] - pool[table[g + BREAKS_V]])
     finest = 1e-5 * fu
     points = np.empty((9, 3))
-    normals = np.empty((9, 3))
     at = np.empty((9, 2))
     best = 1e300
     for _ in range(LEVELS):
@@ -68,18 +117,14 @@ def approach(table, pool, f, g, rotation, shift, x, lever):
             u, v, _clamped = into_domain(table, pool, g, cs + (k % 3 - 1) * gu, ct + (k // 3 - 1) * gv)
             at[k, 0] = u
             at[k, 1] = v
-            point, su, sv, _uu, _uv, _vv = surface_point(table, pool, g, u, v)
+            point = surface_point(table, pool, g, u, v)[0]
             points[k, 0], points[k, 1], points[k, 2] = add(matvec(rotation, point), shift)
-            normals[k, 0], normals[k, 1], normals[k, 2] = matvec(rotation, direction(su, sv))
         before = best
         for k in range(9):
             u, v, _clamped = into_domain(table, pool, f, cu + (k % 3 - 1) * fu, cv + (k // 3 - 1) * fv)
-            p, su, sv, _uu, _uv, _vv = surface_point(table, pool, f, u, v)
-            n = direction(su, sv)
+            p = surface_point(table, pool, f, u, v)[0]
             for j in range(9):
                 d = (points[j, 0] - p[0]) ** 2 + (points[j, 1] - p[1]) ** 2 + (points[j, 2] - p[2]) ** 2
-                cosine = normals[j, 0] * n[0] + normals[j, 1] * n[1] + normals[j, 2] * n[2]
-                d += lever * lever * (1.0 - cosine * cosine)
                 if d < best:
                     best = d
                     x = (u, v, at[j, 0], at[j, 1])
@@ -95,105 +140,112 @@ def approach(table, pool, f, g, rotation, shift, x, lever):
 
 
 @kernel(inner=True)
-def own_pair(status, frame, size, distance):
-    """Whether Newton's result is extremal indeed (or the end of a patch), and no farther apart than the distance."""
+def is_near(status, frame, distance):
+    """Whether Newton's result is no farther apart than points that are known; else it is another pair."""
     if status == NOT_CONVERGED:
         return False
     if status == LEFT_PATCH:
         d = sub(frame[4], frame[3])
         return dot(d, d) <= distance * distance
-    r = frame[9]
-    return abs(r[0]) + abs(r[1]) < 1e-9 * size and abs(r[2]) + abs(r[3]) < 1e-9 and abs(frame[10]) <= distance
+    return abs(frame[10]) <= distance
+
+
+@kernel(inner=True)
+def take(table, pool, g, rotation, status, x, frame, best):
+    """The better of a pair and the best one so far; both are (rank, |gap|, status, x).
+
+    A true extremum beats a point held at the end of a patch, and one where solids face each other beats all.
+    """
+    rank = 2.0
+    if status == CONVERGED or status == SINGULAR:
+        rank = 0.0 if opposed(frame, rotation, table, pool, g, x) else 1.0
+    gap = frame[10]
+    if rank < best[0] or (rank == best[0] and abs(gap) < abs(best[1])):
+        return rank, gap, np.int64(status), x
+    return best
+
+
+@kernel(inner=True)
+def next_candidate(table, pool, f, a, nearest, score, i):
+    """The cell with the best score, after the neighbors of cell i, which lead to the same extremum, are struck out."""
+    o = table[f + CELLS] + CELL_SIZE * i
+    for k in range(a.shape[0]):
+        dx = a[k, 0] - a[i, 0]
+        dy = a[k, 1] - a[i, 1]
+        dz = a[k, 2] - a[i, 2]
+        reach = pool[o + 8] + pool[table[f + CELLS] + CELL_SIZE * k + 8]
+        if dx * dx + dy * dy + dz * dz <= reach * reach:
+            score[k] = math.inf
+    return lowest(score)
+
+
+@kernel(inner=True)
+def lowest(score):
+    """Index of the least score."""
+    i = 0
+    for k in range(score.size):
+        if score[k] < score[i]:
+            i = k
+    return i
 
 
 @kernel(inner=True)
 def global_start(table, pool, f, g, rotation, shift, size):
-    """Status, parameters and gap of the extremal pair with the smallest |gap| among those found."""
-    of = table[f + CELLS]
-    og = table[g + CELLS]
+    """Status, parameters and gap of the best extremal pair found; where there is none, the nearest points known."""
     nf = table[f + CELL_COUNT]
-    ng = table[g + CELL_COUNT]
-    px = np.empty(ng)
-    py = np.empty(ng)
-    pz = np.empty(ng)
-    for j in range(ng):
-        o = og + CELL * j
-        px[j], py[j], pz[j] = add(matvec(rotation, (pool[o + 2], pool[o + 3], pool[o + 4])), shift)
+    a = np.empty((nf, 6))
+    b = np.empty((table[g + CELL_COUNT], 6))
+    same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+    extent = cell_samples(table, pool, f, same, (0.0, 0.0, 0.0), a)
+    extent = min(extent, cell_samples(table, pool, g, rotation, shift, b))
     nearest = np.empty(nf, np.int64)
-    distance = np.empty(nf)
-    for i in range(nf):
-        o = of + CELL * i
-        x = pool[o + 2]
-        y = pool[o + 3]
-        z = pool[o + 4]
-        best = 1e300
-        where = 0
-        for j in range(ng):
-            d = (px[j] - x) * (px[j] - x) + (py[j] - y) * (py[j] - y) + (pz[j] - z) * (pz[j] - z)
-            if d < best:
-                best = d
-                where = j
-        nearest[i] = where
-        distance[i] = math.sqrt(best)
-    best_status = NOT_CONVERGED
-    best_gap = 1e300
-    nearest_start = 1e300
-    upper = 1e300
-    best_x = (0.0, 0.0, 0.0, 0.0)
-    for _ in range(CANDIDATES):
-        i = 0
-        for k in range(nf):
-            if distance[k] < distance[i]:
-                i = k
-        if distance[i] >= 1e300:
+    score = np.empty(nf)
+    best_samples(a, b, 0.0, nearest, score)
+    best = (3.0, math.inf, np.int64(NOT_CONVERGED), (0.0, 0.0, 0.0, 0.0))
+    crossing = False
+    upper = math.inf
+    i = lowest(score)
+    for attempt in range(NEAREST):
+        if score[i] == math.inf:
             break
-        a = of + CELL * i
-        b = og + CELL * nearest[i]
-        reach = pool[a + 8] + pool[b + 8]
-        if best_status != NOT_CONVERGED and distance[i] - 2.0 * reach > abs(best_gap):
+        o = table[f + CELLS] + CELL_SIZE * i
+        p = table[g + CELLS] + CELL_SIZE * nearest[i]
+        # Cells whose spheres are farther apart than the best pair hold no nearer one.
+        if score[i] - 1.5 * (pool[o + 8] + pool[p + 8]) > min(abs(best[1]), upper):
             break
-        start = (pool[a], pool[a + 1], pool[b], pool[b + 1])
+        start = (pool[o], pool[o + 1], pool[p], pool[p + 1])
+        if attempt == 0:
+            best = (3.0, math.inf, np.int64(NOT_CONVERGED), start)
         status, x, _count, frame, _h = solve_pair(table, pool, f, g, rotation, shift, start, size, math.inf, 0.0)
-        limit = distance[i]
-        likely = best_gap >= 1e300 or distance[i] - reach <= abs(best_gap)
-        if likely and not own_pair(status, frame, size, min(limit, upper)):
-            start, reached = approach(table, pool, f, g, rotation, shift, start, 0.0)
-            crossing = reached <= CROSSING * limit
-            if not crossing:
-                # Apart here: the minimum is no farther than the points found.
-                upper = min(upper, reached + 1e-12 * size)
-                limit = upper
-            else:
-                # Crossing here: how deep is not known from a distance, but samples are as dense as this.
-                limit += reach
-                start, _merit = approach(table, pool, f, g, rotation, shift, start, reach)
-            if crossing or not own_pair(status, frame, size, limit):
-                status, x, _count, frame, _h = solve_pair(
-                    table, pool, f, g, rotation, shift, start, size, math.inf, 0.0
-                )
-        if own_pair(status, frame, size, limit):
-            gap = frame[10]
-            # A true extremum beats a point held at the end of a patch.
-            better = abs(gap) < abs(best_gap)
-            if best_status == LEFT_PATCH and status != LEFT_PATCH:
-                better = True
-            if status == LEFT_PATCH and (best_status == CONVERGED or best_status == SINGULAR):
-                better = False
-            if better:
-                best_status = status
-                best_gap = gap
-                best_x = x
-        elif best_gap >= 1e300 and distance[i] < nearest_start:
-            # Nothing found yet: at least the nearest points known.
-            nearest_start = distance[i]
-            best_x = start
-        # Neighbors of this cell would lead to the same minimum.
-        for k in range(nf):
-            o = of + CELL * k
-            d = (pool[o + 2] - pool[a + 2]) ** 2 + (pool[o + 3] - pool[a + 3]) ** 2 + (pool[o + 4] - pool[a + 4]) ** 2
-            if d <= (pool[a + 8] + pool[o + 8]) ** 2:
-                distance[k] = 1e300
-    return best_status, best_x, best_gap
+        limit = score[i]
+        if not is_near(status, frame, limit):
+            start, reached = approach(table, pool, f, g, rotation, shift, start)
+            if reached <= CROSSING * score[i]:
+                # Every distance vanishes where the surfaces cross: nearness says nothing there.
+                crossing = True
+                break
+            # The minimum is no farther than the points found.
+            limit = reached + 1e-12 * size
+            upper = min(upper, limit)
+            status, x, _count, frame, _h = solve_pair(table, pool, f, g, rotation, shift, start, size, math.inf, 0.0)
+        if is_near(status, frame, limit):
+            best = take(table, pool, g, rotation, status, x, frame, best)
+        i = next_candidate(table, pool, f, a, nearest, score, i)
+    if crossing or best[0] > 0.0 or best[1] < 0.0:
+        # The surfaces overlap, or do not face each other.
+        best_samples(a, b, ALIGNMENT * extent * extent, nearest, score)
+        i = lowest(score)
+        for _ in range(ALIGNED):
+            if score[i] == math.inf:
+                break
+            o = table[f + CELLS] + CELL_SIZE * i
+            p = table[g + CELLS] + CELL_SIZE * nearest[i]
+            start = (pool[o], pool[o + 1], pool[p], pool[p + 1])
+            status, x, _count, frame, _h = solve_pair(table, pool, f, g, rotation, shift, start, size, math.inf, 0.0)
+            if status != NOT_CONVERGED:
+                best = take(table, pool, g, rotation, status, x, frame, best)
+            i = next_candidate(table, pool, f, a, nearest, score, i)
+    return best[2], best[3], best[1]
 
 
 @kernel

@@ -15,6 +15,8 @@ only these rates:
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from assembly._kernel import kernel
@@ -224,7 +226,9 @@ def pair_derivatives(table, pool, f, g, q, x, size, first, hessian):
     into_quaternions(row, q, first, 4)
     for i in range(4):
         for j in range(12):
-            row[j] = 0.0
+            # At a pole the polar coordinates have no rates.
+            at_pole = frame[5][0] == 0.0 if i < 2 else frame[6][0] == 0.0 and frame[6][1] == 0.0
+            row[j] = math.nan if at_pole else 0.0
             for l in range(4):
                 row[j] += records[0, RATES + 4 * i + l] * records[0, ZED + 12 * l + j]
         into_quaternions(row, q, first, i)

@@ -70,13 +70,21 @@ STATUS, COUNT, OBJECTIVE, VIOLATION, DUAL, CULPRIT, IMPROPER, RESULTS = 0, 1, 2,
 HISTORY = 7  # figures an iteration: objective, feasibility, stationarity, mu, regularization, step length, radius
 # A pair this near to a fold (det H over |H|^2) gets its coordinates as unknowns.
 FREE_BELOW = 0.02
+# Every so many steps the largest violation must have halved, or the loop sees whether the rows can hold; so many times.
+PATIENCE = 25
+RESTORATIONS = 3
+# Multipliers below this count for nothing against the objective's curvature, which is of order one.
+WEAK = 1e-3
 # A step shorter than this decides nothing.
 SHORTEST = 1e-6
 
 
 @kernel(inner=True)
-def start_contacts(table, pool, q, contacts):
-    """Global starts for the contacts whose parameters are NaN. Returns the contact that found none, or -1."""
+def start_contacts(table, pool, q, contacts, free, lengths):
+    """Global starts for the contacts whose parameters are NaN. Returns a contact that found none, or -1.
+
+    Where a pair does not exist yet (a face tilted against another), its coordinates become unknowns at once.
+    """
     for r in range(table[ROWS]):
         row = table[ROW_TABLE] + ROW * r
         k = table[row + CONTACT]
@@ -85,13 +93,22 @@ def start_contacts(table, pool, q, contacts):
         i = table[row + BODY_F]
         j = table[row + BODY_G]
         turn, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
-        status, x, _gap = global_start(
-            table, pool, table[row + SURFACE_F], table[row + SURFACE_G], turn, shift, 1.0
-        )
-        if status != CONVERGED and status != SINGULAR:
-            return k
+        status, x, _gap = global_start(table, pool, table[row + SURFACE_F], table[row + SURFACE_G], turn, shift, 1.0)
         contacts[k, 0], contacts[k, 1], contacts[k, 2], contacts[k, 3] = x
+        if status != CONVERGED and status != SINGULAR and not free_pair(table, pool, row, k, contacts, free, lengths):
+            return k
     return -1
+
+
+@kernel(inner=True)
+def free_pair(table, pool, row, k, contacts, free, lengths):
+    """Make the coordinates of contact k unknowns; False at a pole, where polar coordinates cannot be."""
+    x = (contacts[k, 0], contacts[k, 1], contacts[k, 2], contacts[k, 3])
+    coordinate_lengths(table, pool, table[row + SURFACE_F], table[row + SURFACE_G], x, lengths, k)
+    if min(min(lengths[k, 0], lengths[k, 1]), min(lengths[k, 2], lengths[k, 3])) < 1e-6:
+        return False
+    free[k] = 0
+    return True
 
 
 @kernel(inner=True)
@@ -106,9 +123,7 @@ def free_folds(table, pool, records, contacts, forces, free, lengths, below, los
         k = table[row + CONTACT]
         idle = table[row + ONE_SIDED] == 1 and forces[r] == 0.0
         if free[k] < 0 and not idle and (abs(records[k, FOLD]) < below or k == lost):
-            x = (contacts[k, 0], contacts[k, 1], contacts[k, 2], contacts[k, 3])
-            coordinate_lengths(table, pool, table[row + SURFACE_F], table[row + SURFACE_G], x, lengths, k)
-            free[k] = 0
+            free_pair(table, pool, row, k, contacts, free, lengths)
         if free[k] >= 0:
             free[k] = count
             count += 1
@@ -164,7 +179,7 @@ def factorize_shifted(lagrangian, n, shift, matrix):
             matrix[i, i] += shift
         if factorize(matrix, n):
             return shift
-        shift = max(4.0 * shift, 1e-4)
+        shift = max(8.0 * shift, 1e-6)
     return -1.0
 
 
@@ -218,6 +233,11 @@ def solve_program(table, pool, settings, state, history):
     records = np.empty((pairs, CONTACT_RECORD))
     trial_records = np.empty((pairs, CONTACT_RECORD))
     residual = np.empty(most)
+    for r in range(most):
+        residual[r] = math.inf
+    for k in range(pairs):
+        for i in range(CONTACT_RECORD):
+            records[k, i] = 1.0
     trial_residual = np.empty(most)
     jacobian = np.empty((most, VARIABLES))
     trial_jacobian = np.empty((most, VARIABLES))
@@ -243,17 +263,21 @@ def solve_program(table, pool, settings, state, history):
     restoring = False
     entered = math.inf
     restorations = 0
+    check_at = PATIENCE
+    check_violation = math.inf
     iteration = 0
     alpha = 0.0
     status = RUNNING
     results[CULPRIT] = -1.0
 
-    lost = start_contacts(table, pool, q, contacts)
-    if lost < 0:
+    lost = start_contacts(table, pool, q, contacts, free, lengths)
+    count = free_folds(table, pool, records, contacts, forces, free, lengths, -1.0, -1)
+    if lost < 0 and count == 0:
         lost = evaluate(table, pool, q, contacts, math.inf, free, lengths, vectors, contacts, records, residual, jacobian)
     if lost >= 0:
         status = CONTACT_LOST
         results[CULPRIT] = float(lost)
+        value = objective(table, pool, q, gradient, lagrangian)
     lost = np.int64(-1)
     below = FREE_BELOW
     while status == RUNNING:
@@ -308,7 +332,17 @@ def solve_program(table, pool, settings, state, history):
             break
         if restoring and violation <= max(0.1 * entered, feasible):
             restoring = False
-            mu = settings[PENALTY]
+            mu = 1e-4
+            check_at = iteration + PATIENCE
+            check_violation = violation
+        if not restoring and iteration >= check_at:
+            # The rows gain nothing: see whether they can hold at all.
+            if violation > feasible and violation > 0.5 * check_violation and restorations < RESTORATIONS:
+                restoring = True
+                restorations += 1
+                entered = violation
+            check_at = iteration + PATIENCE
+            check_violation = violation
         if restoring:
             mu = 1.0
             for r in range(rows):
@@ -326,9 +360,15 @@ def solve_program(table, pool, settings, state, history):
         for i in range(n):
             descent[i] = -gradient[i]
         add_transposed(bases, jacobian, rows, forces, descent)
+        strongest = 0.0
         for r in range(rows):
             # Far from feasible, c / mu would drown the curvature of the objective; y is what it tends to.
             forces[r] = (residual[r] if active[r] > 0.0 else 0.0) if restoring else y[r]
+            strongest = max(strongest, abs(forces[r]))
+        if strongest < WEAK:
+            # Forces on their way to zero: their curvature would only spoil the inertia, and cost the fast end.
+            for r in range(rows):
+                forces[r] = 0.0
         for r in range(m):
             add_row_terms(
                 table,
@@ -346,7 +386,8 @@ def solve_program(table, pool, settings, state, history):
                 active,
                 lagrangian,
             )
-        shift = factorize_shifted(lagrangian, n, max(0.25 * shift, 1e-8), matrix)
+        # What the inertia needs falls with the distance to the solution.
+        shift = factorize_shifted(lagrangian, n, max(min(0.25 * shift, dual), 1e-8), matrix)
         if shift < 0.0:
             status = STALLED
             break
@@ -362,9 +403,13 @@ def solve_program(table, pool, settings, state, history):
             step[i] *= cut
             straight[i] = step[i]
             slope -= descent[i] * step[i]
-        if restoring and (longest < 1e-10 or abs(slope) < 1e-24):
-            status = INFEASIBLE if violation > feasible else STALLED
-            break
+        if restoring:
+            steepest = 0.0
+            for i in range(n):
+                steepest = max(steepest, abs(descent[i]))
+            if steepest <= 1e-9 * violation or longest < 1e-12:
+                status = INFEASIBLE
+                break
         # Line search on the augmented Lagrangian.
         here = merit(residual, one_sided, rows, y, mu)
         if not restoring:
@@ -425,12 +470,12 @@ def solve_program(table, pool, settings, state, history):
             if lost >= 0 and free[lost] < 0:
                 continue
             lost = -1
-            if not restoring and violation > feasible and restorations < 3:
+            if not restoring and violation > feasible and restorations < RESTORATIONS:
                 restoring = True
                 restorations += 1
                 entered = violation
                 continue
-            status = INFEASIBLE if restoring and violation > feasible else STALLED
+            status = STALLED
             break
         for r in range(rows):
             better_y[r] = 0.0
@@ -457,6 +502,32 @@ def solve_program(table, pool, settings, state, history):
                 state[7 * b + k] = q[b, k] * size + pool[REFERENCE + k]
             for k in range(3, 7):
                 state[7 * b + k] = q[b, k]
+    if status != CONTACT_LOST:
+        # The pose as it is returned, rounded to the user's coordinates, judged afresh.
+        for b in range(bodies):
+            for k in range(3):
+                trial_q[b, k] = (state[7 * b + k] - pool[REFERENCE + k]) / size
+            for k in range(3, 7):
+                trial_q[b, k] = q[b, k]
+        lost = evaluate(
+            table,
+            pool,
+            trial_q,
+            contacts,
+            BEND,
+            free,
+            lengths,
+            vectors,
+            trial_contacts,
+            trial_records,
+            trial_residual,
+            trial_jacobian,
+        )
+        violation = violation_of(trial_residual, one_sided, rows) if lost < 0 else math.inf
+        if status == SOLVED and not violation <= 2.0 * feasible:
+            status = STALLED
+        if lost < 0:
+            residual, trial_residual = trial_residual, residual
     for k in range(pairs):
         for i in range(4):
             state[o_contacts + 4 * k + i] = contacts[k, i]

@@ -69,13 +69,13 @@ class Options:
                 raise InputError(f"option {name!r} is unknown; expected one of {', '.join(known)}")
         return cls(**options)
 
-    def settings(self) -> NDArray[np.float64]:
-        """The array that the compiled loop reads."""
+    def settings(self, warm: bool = False) -> NDArray[np.float64]:
+        """The array that the compiled loop reads; a warm start knows its multipliers and holds constraints at once."""
         out = np.zeros(SETTINGS)
         out[FEASIBILITY] = self.tolerance
         out[STATIONARITY] = self.stationarity
         out[ITERATIONS] = self.max_iterations
-        out[PENALTY] = self.penalty
+        out[PENALTY] = self.penalty_floor if warm else self.penalty
         out[PENALTY_FLOOR] = self.penalty_floor
         out[RADIUS] = self.radius
         return out

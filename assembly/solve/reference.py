@@ -29,6 +29,7 @@ from assembly.errors import InputError
 from assembly.geometry.surface import NurbsSurface
 from assembly.kinematics.body import BodyFace
 from assembly.solve.check import Sides, audit, is_extremal, twist_gradients
+from assembly.solve.augmented_lagrangian import COUNT, CULPRIT, DUAL, IMPROPER, OBJECTIVE, RESULTS, VIOLATION
 from assembly.solve.solution import Iteration, Solution, Status
 
 if TYPE_CHECKING:
@@ -325,17 +326,20 @@ class ReferenceSolver:
                 status = Status.SOLVED
             elif status is Status.SOLVED or (found.held and status is Status.INFEASIBLE):
                 status = Status.STALLED
-        weight = packed.scale * packed.weight
-        results = {
-            "iterations": 0,
-            "seconds": 0.0,
-            "history": np.empty((0, len(Iteration.COLUMNS))),
-            "objective": float(value[0]) * packed.scale * weight,
-            "feasibility": found.feasibility,
-            "stationarity": found.stationarity,
-            "improper": found.crossing and status is not Status.CONTACT_LOST,
-        }
-        return Solution(scene, q, found.parameters, forces * weight, found.gaps, status, results | figures)
+        state = np.zeros(packed.results_at + RESULTS)
+        state[: packed.contacts_at] = q.ravel()
+        state[packed.contacts_at : packed.multipliers_at] = found.parameters.ravel()
+        state[packed.multipliers_at : packed.residuals_at] = forces
+        state[packed.residuals_at : packed.results_at] = found.gaps
+        results = state[packed.results_at :]
+        results[COUNT] = figures.get("iterations", 0)
+        results[OBJECTIVE] = value[0]
+        results[VIOLATION] = found.feasibility
+        results[DUAL] = found.stationarity
+        results[CULPRIT] = figures.get("culprit", -1)
+        results[IMPROPER] = found.crossing and status is not Status.CONTACT_LOST
+        history = figures.get("history", np.empty((0, len(Iteration.COLUMNS))))
+        return Solution(scene, packed, state, status, figures.get("seconds", 0.0), history)
 
 
 def _history(stats: Mapping[str, Any]) -> Array:

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from enum import Enum
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assembly.constraints.contact import Contact
+from assembly.constraints.packing import Packed
 from assembly.errors import InputError
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import Pose
 from assembly.proximity.pairs import ContactPair, extremal_pair
+from assembly.solve.augmented_lagrangian import COUNT, CULPRIT, DUAL, IMPROPER, OBJECTIVE, VIOLATION
 
 if TYPE_CHECKING:
     from assembly.kinematics.body import BodyFace
@@ -93,29 +94,55 @@ class Solution:
     """
 
     def __init__(
-        self,
-        scene: Scene,
-        q: Array,
-        parameters: Array,
-        multipliers: Array,
-        residuals: Array,
-        status: Status,
-        figures: Mapping[str, Any],
+        self, scene: Scene, packed: Packed, state: Array, status: Status, seconds: float, history: Array
     ) -> None:
         self._scene = scene
-        self.q = q
-        self._parameters = parameters
-        self._multipliers = multipliers
-        self._residuals = residuals
+        self._packed = packed
+        self._state = state
+        self._rows = history
         self.status = status
-        self.iterations: int = figures["iterations"]
-        self.seconds: float = figures["seconds"]
-        self.objective: float = figures["objective"]
-        self.feasibility: float = figures["feasibility"]
-        self.stationarity: float = figures["stationarity"]
-        self.history: Array = figures["history"]
-        self._culprit: int = figures.get("culprit", -1)
-        self._improper: bool = figures.get("improper", False)
+        self.seconds = seconds
+
+    @cached_property
+    def q(self) -> Array:
+        """Configuration, (n, 7)."""
+        return self._state[: self._packed.contacts_at].reshape(-1, 7)
+
+    @property
+    def _parameters(self) -> Array:
+        return self._state[self._packed.contacts_at : self._packed.multipliers_at].reshape(-1, 4)
+
+    @property
+    def _residuals(self) -> Array:
+        return self._state[self._packed.residuals_at : self._packed.results_at]
+
+    def _result(self, place: int) -> float:
+        return float(self._state[self._packed.results_at + place])
+
+    @property
+    def iterations(self) -> int:
+        """Steps of the loop."""
+        return int(self._result(COUNT))
+
+    @property
+    def objective(self) -> float:
+        """Value of the objective, in the user's units."""
+        return self._result(OBJECTIVE) * self._packed.scale**2 * self._packed.weight
+
+    @property
+    def feasibility(self) -> float:
+        """Largest violation of a constraint, in the user's units."""
+        return self._result(VIOLATION)
+
+    @property
+    def stationarity(self) -> float:
+        """Largest component of the Lagrangian's gradient, scaled."""
+        return self._result(DUAL)
+
+    @property
+    def history(self) -> Array:
+        """A row an iteration, columns `Iteration.COLUMNS`."""
+        return self._rows[: self.iterations + 1]
 
     @property
     def success(self) -> bool:
@@ -133,9 +160,9 @@ class Solution:
     @cached_property
     def multipliers(self) -> dict[str, Array]:
         """Multipliers of every constraint, by name: forces when the objective is an energy."""
-        return {
-            contact.name: self._multipliers[k : k + 1].copy() for k, contact in enumerate(self._scene.contacts)
-        }
+        packed = self._packed
+        forces = self._state[packed.multipliers_at : packed.residuals_at] * (packed.scale * packed.weight)
+        return {contact.name: forces[k : k + 1] for k, contact in enumerate(self._scene.contacts)}
 
     @cached_property
     def contacts(self) -> dict[str, ContactPair]:
@@ -157,8 +184,9 @@ class Solution:
     def message(self) -> str:
         """The status in a sentence, with the constraint that is violated most."""
         text = self.status.value
-        if self.status is Status.CONTACT_LOST and self._culprit >= 0:
-            return f"{self._scene.contacts[self._culprit].name!r}: {text}"
+        culprit = int(self._result(CULPRIT))
+        if self.status is Status.CONTACT_LOST and culprit >= 0:
+            return f"{self._scene.contacts[culprit].name!r}: {text}"
         tolerance = 1e-9 * self._scene.scale
         held_off = sorted(
             (name for name, value in self.violations.items() if not value <= tolerance),
@@ -167,7 +195,7 @@ class Solution:
         if held_off and not self.success:
             named = ", ".join(f"{name!r} ({self.violations[name]:.3g})" for name in held_off)
             text += f"; violated: {named}"
-        if self._improper:
+        if self._result(IMPROPER) > 0.0:
             text += "; at a contact the surfaces cross beside the point (indefinite relative curvature)"
         return text
 
