@@ -77,8 +77,8 @@ class Assembly:
         for body in self._bodies:
             if body.name == name:
                 return body
-        known = ", ".join(repr(body.name) for body in self._bodies) or "none yet: the assembly is empty"
-        raise InputError(f"name is {name!r}; expected a body of this assembly: {known}")
+        known = ", ".join(repr(body.name) for body in self._bodies)
+        raise InputError(f"name is {name!r}; expected " + (f"one of {known}" if known else "a body, but there is none"))
 
     def add(self, body: Body) -> Body:
         """Add a body and return it."""
@@ -184,7 +184,7 @@ class Assembly:
         """State of the loop: configuration, contact parameters (NaN: to be found), multipliers, room for results."""
         if isinstance(q0, Solution):
             if q0._packed is not packed:
-                raise InputError("q0 is a solution of another assembly, or from before a change; expected one of this scene")
+                raise InputError("q0 is a solution of another assembly, or of this one before a change; expected its own")
             state = q0._state.copy()
             q = state[: packed.contacts_at].reshape(-1, 7)
         else:

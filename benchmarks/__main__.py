@@ -1,4 +1,7 @@
-"""Run the benchmarks: ``python -m benchmarks [--quick] [--only NAME] [--output FOLDER]``."""
+"""Run the benchmarks: ``python -m benchmarks [--quick] [--only NAME] [--output FOLDER]``.
+
+A whole run, not quick, with its JSON where it belongs, writes ``docs/performance.md`` too.
+"""
 
 from __future__ import annotations
 
@@ -12,12 +15,13 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from benchmarks import report as pages
 from benchmarks.running import run_apart
 from benchmarks.timing import calibration
 
 # Modules with `run(quick: bool) -> dict`. The dict goes to the JSON as it is; its "rows", a list of
-# flat dicts, are printed as a table.
-BENCHMARKS = ("start",)
+# flat dicts, are printed as a table, and so are its "figures" (`figures.figure`), which go to the page as well.
+BENCHMARKS = ("evaluation", "pairs", "wires", "laws", "start")
 LIBRARIES = ("assembly", "casadi", "meshcat", "numba", "numpy", "scipy", "cadquery-ocp", "coal", "python-fcl")
 RESULTS = Path(__file__).resolve().parent / "results"
 
@@ -31,9 +35,10 @@ def machine() -> dict[str, Any]:
         except metadata.PackageNotFoundError:
             versions[library] = "absent"
     return {
-        "system": platform.platform(),
         "processor": processor_name(),
         "cores": os.cpu_count(),
+        # Before this run adds its own.
+        "load": os.getloadavg()[0] if hasattr(os, "getloadavg") else None,
         "python": platform.python_version(),
         "versions": versions,
         "calibration_seconds": calibration(),
@@ -75,6 +80,8 @@ def table(result: dict[str, Any]) -> str:
     if "error" in result:
         return f"failed\n{result['error']}"
     rows = result.get("rows", [])
+    if not rows:
+        return ""
     keys = list(dict.fromkeys(key for row in rows for key in row))
     cells = [keys, *([shown(key, row.get(key, "")) for key in keys] for row in rows)]
     widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
@@ -95,12 +102,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for name in [options.only] if options.only else BENCHMARKS:
         result = run_apart(f"benchmarks.{name}", options.quick)
         report["benchmarks"][name] = result
-        print(f"\n{name}\n{table(result)}", flush=True)
+        print("\n".join(["", name, table(result), *pages.lines(result)]), flush=True)
     title = (options.only or "all") + ("-quick" if options.quick else "")
     options.output.mkdir(parents=True, exist_ok=True)
     path = options.output / f"{title}.json"
     path.write_text(json.dumps(report, indent=1) + "\n")
     print(f"\nwritten to {path}")
+    if title == "all" and options.output == RESULTS:
+        pages.PAGE.write_text(pages.page(report))
+        print(f"and to {pages.PAGE}")
     return sum("error" in result for result in report["benchmarks"].values())
 
 

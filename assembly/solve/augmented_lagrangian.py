@@ -533,7 +533,14 @@ def solve_program(table, pool, settings, state, history):
             state[o_contacts + 4 * k + i] = contacts[k, i]
     for r in range(m):
         state[o_y + r] = y[r]
-        state[o_residual + r] = residual[r] * size
+        worst = residual[r]
+        k = table[table[ROW_TABLE] + ROW * r + CONTACT]
+        if free[k] >= 0:
+            # What a free pair lacks to be extremal is a violation of its contact, too.
+            for i in range(4):
+                if abs(residual[m + 4 * free[k] + i]) > abs(worst):
+                    worst = -abs(residual[m + 4 * free[k] + i])
+        state[o_residual + r] = worst * size
     results[STATUS] = float(status)
     results[COUNT] = float(iteration)
     results[OBJECTIVE] = value

@@ -72,7 +72,8 @@ class Sides:
         for side, body, (u, v) in zip(self.faces, self.bodies, pair.parameters.reshape(2, 2), strict=True):
             derivatives = rotate(q[body, 3:], np.array(side.face.surface.evaluate(u, v, 2)[1:]))
             rates = tangents @ derivatives[:2].T
-            if abs(np.linalg.det(rates)) <= _POLE * np.prod(np.linalg.norm(derivatives[:2], axis=1)):
+            spans = np.linalg.norm(derivatives[:2], axis=1) * np.ptp(side.face.surface.domain, axis=1)
+            if spans.min() <= _POLE * side.face.surface.size:
                 return False
             uu, uv, vv = derivatives[2:] @ pair.normal
             inverse = np.linalg.inv(rates)
