@@ -1,0 +1,48 @@
+"""The kernels as plain Python: the same pairs and the same derivatives."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+
+PROGRAM = """
+import json
+import numpy as np
+from assembly.geometry import shapes
+from assembly.geometry.face import Face
+from assembly.proximity import contact_jacobian, extremal_pair, gap_gradient, gap_hessian
+
+q_f = np.array([0.1, -0.2, 0.3, 0.9, 0.1, -0.3, 0.4])
+torus, egg = shapes.torus(3.0, 1.0), Face(shapes.ellipsoid(1.0, 2.0, 1.5), reversed=True)
+plane, pipe = shapes.plane(9.0, 9.0), shapes.cylinder(1.0, 4.0)
+scenes = [
+    (torus, q_f, egg, [6.0, 1.0, 2.0, 1.0, 0.2, 0.1, 0.4], None),
+    (torus, q_f, torus, [5.0, 1.0, 4.0, 0.5, 0.2, 0.1, -2.4], None),
+    (torus, q_f, egg, [4.2, 1.0, 2.0, 1.0, 0.2, 0.1, 0.4], (0.5, 0.5, 5.0, 3.0)),
+    (plane, [0, 0, 0, 1, 0, 0, 0], pipe, [0.1, 0.2, 1.5, 0.5, 0.0, 0.5, 0.0], (0.5, 0.3, 0.3, 2.0)),
+    (plane, [0, 0, 0, 1, 0, 0, 0], plane, [20.0, 0.2, 1.5, 0.5, 0.0, 0.5, 0.0], (0.5, 0.3, 0.3, 2.0)),
+]
+out = []
+for f, p, g, q, start in scenes:
+    pair = extremal_pair(f, p, g, q, start)
+    row = [pair.status.name, pair.parameters.tolist(), pair.points.tolist(), pair.normal.tolist(), pair.gap]
+    if pair.status.name in ("CONVERGED", "SINGULAR"):
+        derivatives = (contact_jacobian, gap_gradient, gap_hessian)
+        row += [function(f, p, g, q, pair.parameters).tolist() for function in derivatives]
+    out.append(row)
+print(json.dumps(out))
+"""
+
+
+def test_plain_python_gives_the_same_pairs(run_python):
+    compiled, plain = (
+        json.loads(run_python(PROGRAM, NUMBA_DISABLE_JIT=value).strip().splitlines()[-1]) for value in ("0", "1")
+    )
+    statuses = [row[0] for row in plain]
+    assert statuses[:2] == ["CONVERGED", "CONVERGED"] and statuses[3] == "SINGULAR"
+    for a, b in zip(compiled, plain, strict=True):
+        assert a[0] == b[0] and len(a) == len(b)
+        for x, y in zip(a[1:], b[1:], strict=True):
+            # Without fused multiply-add: other roundings, amplified by the solve.
+            np.testing.assert_allclose(y, x, rtol=0.0, atol=1e-12 * (1.0 + np.abs(x).max()))
