@@ -339,6 +339,11 @@ def test_nearly_a_continuum(shift):
     assert np.isfinite(pair.parameters).all() and np.isfinite(pair.points).all() and np.isfinite(pair.gap)
     low, high = np.array([*socket.surface.domain, *ball.domain]).T
     assert ((pair.parameters >= low) & (pair.parameters <= high)).all()
+    if shift >= 1e-5:
+        # Well enough separated to converge, at one end of the line of centers or the other.
+        assert pair.status is PairStatus.CONVERGED
+        ends = shift * (1.0 + np.sqrt(0.14) * np.array([-1.0, 1.0]))
+        close(np.abs(pair.gap - ends).min(), 0.0)
 
 
 # ---- bad input -------------------------------------------------------------------------------------------------
