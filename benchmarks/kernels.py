@@ -1,0 +1,109 @@
+# mypy: ignore-errors
+"""Loops around the library's kernels, so that a time is of the kernel and not of the call from Python.
+
+Every result is added up or stored: what nobody reads the compiler leaves out.
+"""
+
+from __future__ import annotations
+
+import math
+
+from assembly._kernel import kernel, lane, load_lanes
+from assembly.geometry.spline import surface_lanes, surface_point
+from assembly.geometry.vec import add
+from assembly.kinematics.motion import relative_pose, rotation
+from assembly.proximity.extremal import pair_frame, pair_matrix, solve_pair
+from assembly.proximity.velocity import RATES, ZED, into_quaternions, pair_derivatives, store_record
+
+
+@kernel
+def lanes_along(table, pool, u, v):
+    """Point and all second derivatives along a path, as four-lane values."""
+    total = 0.0 * load_lanes(pool, 0)
+    for i in range(u.size):
+        a, au, av, auu, auv, avv = surface_lanes(table, pool, 0, u[i], v[i])
+        total = total + a + au + av + auu + auv + avv
+    return lane(total, 0) + lane(total, 1) + lane(total, 2)
+
+
+@kernel
+def points_along(table, pool, u, v):
+    """The same, as 3-tuples."""
+    total = (0.0, 0.0, 0.0)
+    for i in range(u.size):
+        a, au, av, auu, auv, avv = surface_point(table, pool, 0, u[i], v[i])
+        total = add(total, add(add(a, add(au, av)), add(auu, add(auv, avv))))
+    return total[0] + total[1] + total[2]
+
+
+@kernel
+def solve_pairs(table, pool, records, q, starts, sizes, close, times, parameters, gaps, statuses):
+    """Newton from every start, each `times` over; returns all iterations.
+
+    records (n, 2): the two surfaces; q (n, 2, 7); starts and parameters (n, 4); sizes (n,).
+    `close` is that of `solve_pair`.
+    """
+    total = 0
+    for i in range(records.shape[0]):
+        start = (starts[i, 0], starts[i, 1], starts[i, 2], starts[i, 3])
+        for _ in range(times):
+            turn, shift = relative_pose(q[i], 0, rotation(q[i], 0), 1, rotation(q[i], 1))
+            status, x, count, frame, _curvature = solve_pair(
+                table, pool, records[i, 0], records[i, 1], turn, shift, start, sizes[i], math.inf, close
+            )
+            total += count
+            statuses[i] = status
+            gaps[i] = frame[10]
+            parameters[i, 0], parameters[i, 1], parameters[i, 2], parameters[i, 3] = x
+    return total
+
+
+@kernel
+def evaluate_pairs(table, pool, records, parameters, times):
+    """The two surface evaluations of every pair, each `times` over."""
+    total = (0.0, 0.0, 0.0)
+    for i in range(records.shape[0]):
+        for _ in range(times):
+            for side in range(2):
+                a, au, av, auu, auv, avv = surface_point(
+                    table, pool, records[i, side], parameters[i, 2 * side], parameters[i, 2 * side + 1]
+                )
+                total = add(total, add(add(a, add(au, av)), add(auu, add(auv, avv))))
+    return total[0] + total[1] + total[2]
+
+
+@kernel
+def contact_jacobians(table, pool, records, q, parameters, size, times, record, row, out):
+    """d(u_f, v_f, u_g, v_g) / d(q_f, q_g) of every pair, each `times` over: `pair_derivatives` without the gap's own.
+
+    record (1, RECORD), row (12,) and out (5, 14) are room to work in.
+    """
+    total = 0.0
+    for i in range(records.shape[0]):
+        x = (parameters[i, 0], parameters[i, 1], parameters[i, 2], parameters[i, 3])
+        for _ in range(times):
+            turn = rotation(q[i], 0)
+            relative, shift = relative_pose(q[i], 0, turn, 1, rotation(q[i], 1))
+            frame = pair_frame(table, pool, records[i, 0], records[i, 1], relative, shift, x)
+            curvature = pair_matrix(frame[7], frame[8], frame[10], 1e-9 / size)
+            store_record(turn, shift, frame, curvature, record, 0)
+            for k in range(4):
+                for j in range(12):
+                    row[j] = 0.0
+                    for l in range(4):
+                        row[j] += record[0, RATES + 4 * k + l] * record[0, ZED + 12 * l + j]
+                into_quaternions(row, q[i], out, k)
+            total += out[0, 0]
+    return total
+
+
+@kernel
+def all_derivatives(table, pool, records, q, parameters, size, times, out, hessian):
+    """Jacobian, gradient and Hessian of every pair, each `times` over."""
+    total = 0.0
+    for i in range(records.shape[0]):
+        x = (parameters[i, 0], parameters[i, 1], parameters[i, 2], parameters[i, 3])
+        for _ in range(times):
+            error, _regular = pair_derivatives(table, pool, records[i, 0], records[i, 1], q[i], x, size, out, hessian)
+            total += error + hessian[11, 0]
+    return total

@@ -1,0 +1,105 @@
+"""Peers that may not be installed: each maker returns None where they are not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import NdBSpline
+from scipy.spatial.transform import Rotation
+
+import assembly as asm
+
+__all__ = ["homogeneous_spline", "occt_evaluator", "occt_pairs", "occt_points"]
+
+Array = NDArray[np.float64]
+# Point, Su, Sv, Suu, Suv, Svv.
+ORDERS = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
+
+
+def homogeneous_spline(surface: asm.NurbsSurface) -> Callable[[Array], list[Array]]:
+    """scipy's B-spline of (w x, w y, w z, w): the six arrays (n, 4) at parameters (n, 2), without the quotient rule."""
+    weights = surface.weights[..., None]
+    coefficients = np.concatenate([surface.control_points * weights, weights], axis=2)
+    spline = NdBSpline(surface.knots, coefficients, surface.degree)
+    return lambda parameters: [spline(parameters, nu=order) for order in ORDERS]
+
+
+def _occt() -> Any | None:
+    """Names of OCCT as one namespace."""
+    try:
+        modules = [import_module(f"OCP.{name}") for name in ("gp", "Geom", "GeomAdaptor", "Extrema")]
+    except ImportError:
+        return None
+    names: dict[str, Any] = {}
+    for module in modules:
+        names.update(vars(module))
+    try:
+        arrays = import_module("OCP.collections")
+        kinds = [getattr(arrays, name) for name in ("Array2_gp_Pnt", "Array2_double", "Array1_double", "Array1_int")]
+    except ImportError:  # OCCT 7
+        points, others = import_module("OCP.TColgp"), import_module("OCP.TColStd")
+        kinds = [points.TColgp_Array2OfPnt]
+        kinds += [getattr(others, f"TColStd_{name}") for name in ("Array2OfReal", "Array1OfReal", "Array1OfInteger")]
+    names.update(zip(("Points", "Weights", "Knots", "Counts"), kinds, strict=True))
+    return type("Occt", (), names)
+
+
+def _occt_surface(occt: Any, surface: asm.NurbsSurface) -> Any:
+    """An adaptor of the surface."""
+    n, m, _ = surface.control_points.shape
+    points, weights = occt.Points(1, n, 1, m), occt.Weights(1, n, 1, m)
+    for i in range(n):
+        for j in range(m):
+            points.SetValue(i + 1, j + 1, occt.gp_Pnt(*surface.control_points[i, j].tolist()))
+            weights.SetValue(i + 1, j + 1, float(surface.weights[i, j]))
+    knots, counts = [], []
+    for row in surface.knots:
+        values, times = np.unique(row, return_counts=True)
+        knots.append(occt.Knots(1, values.size))
+        counts.append(occt.Counts(1, values.size))
+        for k, (value, time) in enumerate(zip(values, times, strict=True)):
+            knots[-1].SetValue(k + 1, float(value))
+            counts[-1].SetValue(k + 1, int(time))
+    made = occt.Geom_BSplineSurface(points, weights, *knots, *counts, *surface.degree)
+    return occt.GeomAdaptor_Surface(made)
+
+
+def occt_evaluator(surface: asm.NurbsSurface, u: float, v: float) -> Callable[[], None] | None:
+    """One call of OCCT's D2 at (u, v)."""
+    occt = _occt()
+    if occt is None:
+        return None
+    adaptor = _occt_surface(occt, surface)
+    out = [occt.gp_Pnt(), *(occt.gp_Vec() for _ in range(5))]
+    return lambda: adaptor.D2(u, v, *out)
+
+
+def occt_pairs(
+    surfaces: list[tuple[asm.NurbsSurface, asm.NurbsSurface]], q: Array, starts: Array
+) -> list[Callable[[], Any]] | None:
+    """OCCT's local search, a callable a pair; `occt_points` reads what it returns."""
+    occt = _occt()
+    if occt is None:
+        return None
+    searches: list[Callable[[], Any]] = []
+    for pair, rows, start in zip(surfaces, q, starts.tolist(), strict=True):
+        turns = Rotation.from_quat(rows[:, 3:], scalar_first=True)
+        f, g = (
+            _occt_surface(occt, surface.transformed(turn.as_matrix(), row[:3]))
+            for surface, row, turn in zip(pair, rows, turns, strict=True)
+        )
+        searches.append(partial(occt.Extrema_GenLocateExtSS, f, g, *start, 1e-10, 1e-10))
+    return searches
+
+
+def occt_points(extremum: Any) -> Array | None:
+    """The two points (2, 3), or None where the search gave up."""
+    if not extremum.IsDone():
+        return None
+    pair = (extremum.PointOnS1().Value(), extremum.PointOnS2().Value())
+    return np.array([[p.X(), p.Y(), p.Z()] for p in pair])

@@ -1,0 +1,90 @@
+"""Figures and the page they are printed on."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import pytest
+
+from benchmarks import report
+from benchmarks.figures import figure, met, quantity
+
+
+@pytest.mark.parametrize(
+    ("unit", "measured", "reach", "of", "verdict"),
+    [
+        ("seconds", 39e-9, 40e-9, None, True),
+        ("seconds", 41e-9, 40e-9, None, False),
+        ("error", 1e-8, 1e-8, None, True),
+        ("ratio", 1.1, 1.05, None, False),
+        ("count", 50, 50, 50, True),
+        ("count", 49, 50, 50, False),
+        ("count", 49, None, 50, None),
+        ("error", math.nan, 1e-8, None, False),
+    ],
+)
+def test_what_counts_as_reached(unit, measured, reach, of, verdict):
+    assert met(figure("x", unit, measured, reach=reach, of=of)) is verdict
+
+
+@pytest.mark.parametrize(("unit", "of"), [("count", None), ("seconds", 3)])
+def test_only_counts_are_out_of_a_number(unit, of):
+    with pytest.raises(ValueError, match=f"of is {of} with unit '{unit}', expected"):
+        figure("x", unit, 1.0, of=of)
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "of", "text"),
+    [
+        (3.46e-8, "seconds", None, "34.6 ns"),
+        (1e-6, "seconds", None, "1 us"),
+        (5.5e-3, "seconds", None, "5.5 ms"),
+        (12.0, "seconds", None, "12 s"),
+        (48, "count", 50, "48 of 50"),
+        (1.23e-13, "error", None, "1.2e-13"),
+        (1.034, "ratio", None, "1.03"),
+        (None, "seconds", None, "absent"),
+        (math.nan, "error", None, "none"),
+    ],
+)
+def test_quantities(value, unit, of, text):
+    assert quantity(value, unit, of) == text
+
+
+def test_a_table_has_goals_misses_and_absent_peers():
+    figures = [
+        figure("a | b", "seconds", 5e-8, reach=4e-8, peers={"scipy": 1e-6, "OCCT": None}),
+        figure("cases", "count", 2, of=3),
+    ]
+    assert report.lines({"figures": figures}) == [
+        "| what | reach | measured | peer |",
+        "| --- | --- | --- | --- |",
+        r"| a \| b | 40 ns | 50 ns (not reached) | scipy 1 us; OCCT absent |",
+        "| cases |  | 2 of 3 |  |",
+    ]
+
+
+def test_a_failure_is_said():
+    result = {"error": "Traceback ...\n  File ...\nValueError: no luck\n"}
+    assert report.lines(result) == ["This benchmark failed: `ValueError: no luck`"]
+
+
+def test_the_page_is_written_from_the_json(tmp_path, monkeypatch, capsys):
+    versions = {"numpy": "2.4.6", "coal": "absent"}
+    machine = {"processor": "Abacus 3", "python": "3.11.1", "versions": versions, "cores": 2, "load": 0.1}
+    results = {"start": {"about": "Whole processes.", "figures": [figure("import", "seconds", 1e-2)]}}
+    (tmp_path / "all.json").write_text(json.dumps({"machine": machine, "benchmarks": results}))
+    monkeypatch.setattr(report, "RESULTS", tmp_path / "all.json")
+    monkeypatch.setattr(report, "PAGE", tmp_path / "performance.md")
+    assert report.main() == 0
+    text = (tmp_path / "performance.md").read_text()
+    assert "Machine: Abacus 3. Python 3.11.1, numpy 2.4.6." in text
+    assert text.index("## Start") < text.index("Whole processes.") < text.index("| import |  | 10 ms |  |")
+    assert str(tmp_path) in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("load", "said"), [(0.1, False), (1.7, True), (None, False)])
+def test_a_busy_machine_is_said(load, said):
+    machine = {"processor": "Abacus 3", "python": "3.11.1", "versions": {}, "cores": 2, "load": load}
+    assert ("**Provisional:**" in report.page({"machine": machine, "benchmarks": {}})) is said
