@@ -184,7 +184,9 @@ class Assembly:
         """State of the loop: configuration, contact parameters (NaN: to be found), multipliers, room for results."""
         if isinstance(q0, Solution):
             if q0._packed is not packed:
-                raise InputError("q0 is a solution of another assembly, or of this one before a change; expected its own")
+                raise InputError(
+                    "q0 is a solution of another assembly, or of this one before a change; expected its own"
+                )
             state = q0._state.copy()
             q = state[: packed.contacts_at].reshape(-1, 7)
         else:

@@ -12,8 +12,8 @@ import assembly as asm
 def paper_clips() -> asm.Assembly:
     clip = asm.shapes.paper_clip(length=33.0, width=8.0, wire_radius=0.5)  # [mm]
     red = asm.Body("red", clip, fixed=True)
-    green = asm.Body("green", clip, position=(-7.0, 5.0, -23.0), quaternion=(0.90, 0.27, 0.19, 0.29))
-    blue = asm.Body("blue", clip, position=(4.0, 2.5, -27.5), quaternion=(0.64, -0.10, -0.10, 0.75))
+    green = asm.Body("green", clip, position=(-7.0, 5.0, -23.0), quaternion=(0.904, 0.279, 0.144, 0.289))
+    blue = asm.Body("blue", clip, position=(4.0, 3.0, -28.0), quaternion=(0.649, -0.063, -0.147, 0.744))
     chain = asm.Assembly([red, green, blue])
     chain.constrain(asm.Contact(red, green), asm.Contact(green, blue), asm.Contact(red, blue))
     chain.minimize(asm.PointDistance(blue.point(0, 0, -15), target=(12.0, 4.0, -40.0)))

@@ -213,7 +213,7 @@ CASES = {
     "q0 shape": (lambda: solve(np.zeros(7)), r"q0 has shape \(7,\); expected \(2, 7\)"),
     "q0 nan": (lambda: solve(q_of([0, 0, NAN, 1, 0, 0, 0])), r"q0\[1, 2\] is nan; expected finite numbers"),
     "q0 zero": (lambda: solve(q_of([0] * 7)), "q0.* 0.0.*; expected .*unit quaternion"),
-    "q0 far from unit": (lambda: solve(q_of([3, 0, 0, 2, 0, 0, 0])), r"q0\[1, 3:\] is \[2.0, .* expected a unit quaternion"),
+    "q0 far from unit": (lambda: solve(q_of([3, 0, 0, 2, 0, 0, 0])), r"q0\[1, 3:\] is \[2.0, .* a unit quaternion"),
     "q0 of another": (solve_from_a_stranger, "q0 is a solution of another assembly, or .*; expected its own"),
     "q0 of before": (solve_from_before_a_change, "q0 is a solution of .* this one before a change; expected its own"),
     "starts unknown": (lambda: solve(starts={"b-a": [0] * 4}), "starts names 'b-a'; expected one of 'a-b'"),

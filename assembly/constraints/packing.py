@@ -154,7 +154,9 @@ def _scene_size(bodies: Sequence[Body], objectives: Sequence[tuple[float, Object
     if size > 0.0:
         return size
     points = [body.pose.position for body in bodies]
-    points += [term.point.body.pose.apply(term.point.coordinates) for _, term in objectives if isinstance(term, PointDistance)]
+    points += [
+        term.point.body.pose.apply(term.point.coordinates) for _, term in objectives if isinstance(term, PointDistance)
+    ]
     spread = float(np.linalg.norm(np.ptp(points, axis=0)))
     return spread if spread > 0.0 else 1.0
 
@@ -177,8 +179,6 @@ def _choose_faces(contact: Contact) -> tuple[BodyFace, BodyFace]:
     return best[2], best[3]
 
 
-def pack(
-    bodies: Sequence[Body], contacts: Sequence[Contact], objectives: Sequence[tuple[float, Objective]]
-) -> Packed:
+def pack(bodies: Sequence[Body], contacts: Sequence[Contact], objectives: Sequence[tuple[float, Objective]]) -> Packed:
     """Pack a scene. `objectives` are (sign, term): 1 to minimize, -1 to maximize."""
     return Packed(bodies, contacts, objectives)

@@ -11,12 +11,14 @@ every body (-1: fixed), then a record a row and a record an objective term. The 
 
 from __future__ import annotations
 
+import math
+
 from assembly._kernel import kernel
 from assembly.geometry.vec import add, cross, dot, matvec, quaternion_product, sub
 from assembly.kinematics.motion import position, relative_pose, rotation
-from assembly.proximity.extremal import CLOSE, CONVERGED, SINGULAR, solve_pair
+from assembly.proximity.extremal import CLOSE, CONVERGED, LEFT_PATCH, SINGULAR, solve_pair
 from assembly.proximity.free_pair import VARIABLES, free_hessian, free_rows
-from assembly.proximity.velocity import GAP, RECORD, add_gap_terms, gradient_row, store_record
+from assembly.proximity.velocity import GAP, RATES, RECORD, add_gap_terms, gradient_row, store_record
 
 # Header of the table.
 BODIES, MOVING, CONTACTS, ROWS, TERMS, SLOTS, ROW_TABLE, TERM_TABLE, HEADER = 0, 1, 2, 3, 4, 5, 6, 7, 8
@@ -33,6 +35,8 @@ PROPER, FOLD, CONTACT_RECORD = RECORD, RECORD + 1, RECORD + 2
 # Header of the pool.
 # length scale, reference point (1 to 3), weight by which the objective was divided.
 SCALE, REFERENCE, WEIGHT, POOL_HEADER = 0, 1, 4, 8
+
+
 @kernel(inline=True)
 def load(array, o):
     return (array[o], array[o + 1], array[o + 2])
@@ -40,7 +44,7 @@ def load(array, o):
 
 @kernel(inline=True)
 def track_contact(table, pool, row, q, start, patience, records, k):
-    """Newton on the pair of one contact row; fills its record. Returns status and parameters."""
+    """Newton on the pair of one row; fills its record. Returns status, parameters, the points' signed distance."""
     i = table[row + BODY_F]
     j = table[row + BODY_G]
     turn = rotation(q, i)
@@ -48,6 +52,8 @@ def track_contact(table, pool, row, q, start, patience, records, k):
     status, x, _count, frame, curvature = solve_pair(
         table, pool, table[row + SURFACE_F], table[row + SURFACE_G], relative, shift, start, 1.0, patience, CLOSE
     )
+    apart = sub(frame[4], frame[3])
+    distance = math.sqrt(dot(apart, apart))
     if status == CONVERGED or status == SINGULAR:
         store_record(turn, shift, frame, curvature, records, k)
         # Relative curvature -H (I + beta A)^-1: indefinite means the surfaces cross beside the point.
@@ -56,7 +62,7 @@ def track_contact(table, pool, row, q, start, patience, records, k):
         norm2 = h[0] * h[0] + h[1] * h[1] + h[2] * h[2] + h[3] * h[3]
         records[k, PROPER] = 1.0 if det > -1e-9 * norm2 and h[0] + h[3] <= 0.0 else 0.0
         records[k, FOLD] = det / norm2 if norm2 > 1e-18 else 0.0
-    return status, x
+    return status, x, distance if frame[10] > 0.0 else -distance
 
 
 @kernel(inner=True)
@@ -116,17 +122,23 @@ def add_term(table, pool, term, q, gradient, hessian):
 def evaluate(table, pool, q, start, patience, free, lengths, vectors, contacts, records, residual, jacobian):
     """Evaluate all rows at q. Returns the contact whose pair was lost, or -1.
 
-    A tracked contact is carried from `start` to its extremal pair by steps that turn no normal by more than `patience`. A free one (free[k] >= 0, its place among the
-    free ones) is evaluated at `start` itself, and its four rows of tangency follow the rows of the program.
+    A tracked contact is carried from `start` to its extremal pair, by steps that turn no normal by more than
+    `patience`. A free one (free[k] >= 0, its place among the free ones) is evaluated at `start` itself, and its four
+    rows of tangency follow the rows of the program. A one-sided row whose pair has left its patch, apart, asks nothing.
     """
     for r in range(table[ROWS]):
         row = table[ROW_TABLE] + ROW * r
         k = table[row + CONTACT]
         x = (start[k, 0], start[k, 1], start[k, 2], start[k, 3])
         if free[k] < 0:
-            status, x = track_contact(table, pool, row, q, x, patience, records, k)
+            status, x, distance = track_contact(table, pool, row, q, x, patience, records, k)
             if status != CONVERGED and status != SINGULAR:
-                return k
+                if status != LEFT_PATCH or table[row + ONE_SIDED] == 0 or not distance > 0.0:
+                    return k
+                records[k, GAP] = distance
+                for i in range(4):
+                    for j in range(4):
+                        records[k, RATES + 4 * i + j] = 0.0
             residual[r] = records[k, GAP]
             gradient_row(records, k, jacobian, r)
         else:
@@ -166,9 +178,7 @@ def objective(table, pool, q, gradient, hessian):
 
 
 @kernel(inner=True)
-def add_row_terms(
-    table, pool, r, q, contacts, free, lengths, vectors, block, records, jacobian, y, weights, hessian
-):
+def add_row_terms(table, pool, r, q, contacts, free, lengths, vectors, block, records, jacobian, y, weights, hessian):
     """Upper triangle of hessian += second derivative of y . rows + J^T diag(weights) J, for row r.
 
     The rows of tangency of a free pair go with its row.

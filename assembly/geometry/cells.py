@@ -97,11 +97,12 @@ def split(surface: NurbsSurface, count: int = COUNT) -> tuple[Array, Array, Arra
     return box, center, radius
 
 
-def surface_cells(surface: NurbsSurface, count: int = COUNT) -> Array:
-    """The cells of `split` as kernels read them: (cells, 9).
+def surface_cells(surface: NurbsSurface) -> Array:
+    """The cells of `split` as kernels read them: (cells, 9); more of them for a surface of many spans.
 
     A row is u and v of the middle of a cell, the surface point there, the center of its sphere, its radius.
     """
-    box, center, radius = split(surface, count)
+    spans = surface._pieces.shape[0] * surface._pieces.shape[1]
+    box, center, radius = split(surface, min(max(COUNT, 8 * spans), 3 * COUNT))
     u, v = 0.5 * (box[:, 0] + box[:, 1]), 0.5 * (box[:, 2] + box[:, 3])
     return np.column_stack([u, v, surface.evaluate(u, v), center, radius])

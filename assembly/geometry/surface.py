@@ -135,7 +135,8 @@ class NurbsSurface:
         edges = (pieces[0, :, 0], pieces[-1, :, -1], pieces[:, 0, :, 0], pieces[:, -1, :, -1])
         points = (edge[..., :3] / edge[..., 3:] for edge in edges)
         return sum(
-            bit for bit, edge in zip((1, 2, 4, 8), points, strict=True)
+            bit
+            for bit, edge in zip((1, 2, 4, 8), points, strict=True)
             if float(np.ptp(edge, axis=(0, 1)).max()) <= COINCIDENT * self.size
         )
 
@@ -240,10 +241,9 @@ class NurbsSurface:
         breaks_v = at_u.size
         coefficients = breaks_v + at_v.size
         closed_u, closed_v = self.closed
-        record = np.array(
-            [p, q, at_u.size - 1, at_v.size - 1, 0, breaks_v, coefficients, closed_u, closed_v, 1, pool.size, 0, self._pole_bits],
-            dtype=np.int64,
-        )
+        sizes = [p, q, at_u.size - 1, at_v.size - 1]
+        ends = [closed_u, closed_v, 1, pool.size, 0, self._pole_bits]
+        record = np.array([*sizes, 0, breaks_v, coefficients, *ends], dtype=np.int64)
         assert record.size == SURFACE_RECORD
         return record, pool
 

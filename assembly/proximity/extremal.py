@@ -52,7 +52,7 @@ CLOSE = 1e-6
 
 @kernel(inline=True)
 def shape_operator(p, q, r, s, luu, luv, lvv):
-    """-J^T L J for J = [[p, q], [r, s]], the inverse of tangent coordinates, and L_ij = S_ij.n: symmetric, +1/r on a ball."""
+    """-J^T L J, J = [[p, q], [r, s]] the inverse of tangent coordinates, L_ij = S_ij.n; symmetric, +1/r on a ball."""
     a = luu * p + luv * r
     b = luv * p + lvv * r
     return (
@@ -64,7 +64,9 @@ def shape_operator(p, q, r, s, luu, luv, lvv):
 
 @kernel(inline=True)
 def own_frame(table, pool, r, u, v):
-    """Point, outward normal n, tangents x and y, E^-1 (11, 12, 22) with [S_u S_v] = [x y] E, shape operator, regular?
+    """Point, outward normal n, tangents x and y, E^-1 (11, 12, 22), shape operator, and whether regular.
+
+    [S_u S_v] = [x y] E.
 
     At a pole E^-1 is zero: the point moves, its polar coordinates have no rates.
     """
@@ -94,7 +96,7 @@ def own_frame(table, pool, r, u, v):
 
 @kernel(inline=True)
 def other_frame(table, pool, r, u, v, n, x, y):
-    """The same seen with another surface's n, x, y: point, T^-1 (11, 12, 21, 22), shape operator, tilt r2, regular?
+    """Seen with another surface's n, x, y: point, T^-1 (11, 12, 21, 22), shape operator, tilt r2, whether regular.
 
     m = n + [x y] r2 is orthogonal to S_u and S_v: T^T r2 = -(n.S_u, n.S_v), with T = [x y]^T [S_u S_v].
     """
@@ -252,7 +254,7 @@ def advance(table, pool, r, u, v, du, dv, step):
 
 @kernel(inner=True)
 def solve_pair(table, pool, f, g, rotation, shift, x, size, turn, close):
-    """Newton from x to the extremal pair; returns status, parameters, iterations, frame, and H as `pair_matrix` gives it.
+    """Newton from x to the extremal pair: status, parameters, iterations, frame, and H as `pair_matrix` gives it.
 
     `size` is the length against which steps are measured. A step that would turn a normal by more than `BEND` is
     shortened, so that the iteration follows the surface; one that would turn it by more than `turn` says that x was not

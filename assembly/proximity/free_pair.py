@@ -3,7 +3,9 @@
 As a function of the poses alone an extremal pair has an end: a fold, where it merges with another one and H is
 singular. With (u_f, v_f, u_g, v_g) as unknowns beside the twists, five rows stay smooth through it:
 
-    beta = n.d,   d.f_u / s_1,   d.f_v / s_2,   n.g_u / s_3,   n.g_v / s_4        (d = g - f, n = N / |N|, N = f_u x f_v).
+    beta = n.d,   d.f_u / s_1,   d.f_v / s_2,   n.g_u / s_3,   n.g_v / s_4,
+
+d = g - f, n = N / |N|, N = f_u x f_v.
 
 The s_i are lengths fixed for a solve (|f_u| ... where it began), and the unknowns are s_i u_i, lengths too. Local
 variables, in this order: twist of f (6), twist of g (6), the four coordinates. Second derivatives of the rows

@@ -37,7 +37,7 @@ class PairStatus(Enum):
     """What became of a pair; the value says what to do."""
 
     CONVERGED = "the pair is extremal and isolated"
-    SINGULAR = "extremal, but one of a continuum or at a pole; the current one is kept"
+    SINGULAR = "extremal, but one of a continuum; the current one is kept"
     LEFT_PATCH = "no extremum inside: the pair is held at the end of a patch; extend it or start elsewhere"
     NOT_CONVERGED = "Newton did not converge; give a nearer start, or none for a global one"
 
@@ -127,8 +127,8 @@ def extremal_pair(
         Their bodies' poses.
     start : (4,), optional
         Parameters near the pair: Newton's method goes to the extremum near them. Without a start, bounding cells of
-        both surfaces are searched and the extremum with the smallest |gap| found is returned; this search is thorough,
-        not certified.
+        both surfaces are searched; of the extrema found, those with opposed outward normals come first, then the one
+        with the smallest |gap| is returned. This search is thorough, not certified.
 
     Returns
     -------
@@ -142,7 +142,7 @@ def extremal_pair(
 
     Notes
     -----
-    (g - f).f_u = (g - f).f_v = n_f.g_u = n_f.g_v = 0 (paper 001, section 3.2, in the form that stays regular at contact).
+    (g - f).f_u = (g - f).f_v = n_f.g_u = n_f.g_v = 0: paper 001, section 3.2, in the form that is regular at contact.
     """
     f, g = as_face("surface_f", surface_f), as_face("surface_g", surface_g)
     q = _configuration(q_f, q_g)
@@ -174,9 +174,7 @@ def _derivatives(
     return first[:4], first[4], hessian
 
 
-def contact_jacobian(
-    surface_f: Side, q_f: ArrayLike, surface_g: Side, q_g: ArrayLike, parameters: ArrayLike
-) -> Array:
+def contact_jacobian(surface_f: Side, q_f: ArrayLike, surface_g: Side, q_g: ArrayLike, parameters: ArrayLike) -> Array:
     """d(u_f, v_f, u_g, v_g) / d(q_f, q_g), (4, 14), by the contact velocity formulation.
 
     For any regular parameterization; at an extremum that is not isolated, the damped least-norm rates.

@@ -3,10 +3,11 @@
 The surface itself is smooth there; only its coordinates are polar. With v the parameter that runs into the pole at v0,
 s = +1 or -1 the inward direction, delta the distance of v from v0 and E(u) = s S_v(u, v0),
 
-    w = E(u) delta,    S = p + w - (w.A w / 2) n,    normal = n + A w,    n ~ s S_uv x S_v,
+    w = E(u) delta + (tangential part of S_vv) delta^2 / 2,
+    S = p + w - (w.A w / 2) n,    normal = n + A w,    n ~ s S_uv x S_v,
 
-up to third order in delta, A the shape operator at the pole. It is found from the normal curvatures -S_vv.n / |S_v|^2 in
-three directions. An apex, where n depends on u, has no such frame.
+up to third order in delta, A the shape operator at the pole. It is found from the normal curvatures
+-S_vv.n / |S_v|^2 in three directions. An apex, where n depends on u, has no such frame.
 """
 
 from __future__ import annotations
@@ -14,7 +15,17 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly.geometry.spline import BREAKS_U, BREAKS_V, CLOSED_U, CLOSED_V, POLES, SIGN, SPANS_U, SPANS_V, surface_point
+from assembly.geometry.spline import (
+    BREAKS_U,
+    BREAKS_V,
+    CLOSED_U,
+    CLOSED_V,
+    POLES,
+    SIGN,
+    SPANS_U,
+    SPANS_V,
+    surface_point,
+)
 from assembly.geometry.vec import add, blend, cross, dot, scale, sub
 
 # The polar chart is left for the pole's own within this part of the domain: its error is the third power.
@@ -81,7 +92,7 @@ def spoke_normal(table, r, edge, e, turn):
 
 @kernel(inner=True)
 def pole_frame(table, pool, r, edge, u, v):
-    """Point, normal, tangents x and y, shape operator (11, 12, 22), and whether there is a tangent plane, near a pole."""
+    """Near a pole: point, normal, tangents x and y, shape operator (11, 12, 22), whether there is a tangent plane."""
     across = 0 if edge <= 2 else 1
     lo, hi, _ = limits(table, pool, r, across)
     other_lo, other_hi, _ = limits(table, pool, r, 1 - across)
@@ -130,15 +141,18 @@ def pole_frame(table, pool, r, edge, u, v):
     a12 = (m22 * r1 - m12 * r2) / det
     a22 = (m11 * r2 - m12 * r1) / det
     # From the pole to the point, in the pole's own chart.
-    w = delta * math.sqrt(ee)
-    q = add(p, blend(w, x, -0.5 * a11 * w * w, n))
+    wx = delta * (math.sqrt(ee) + 0.5 * delta * dot(bent, x))
+    wy = 0.5 * delta * delta * dot(bent, y)
+    lean_x = a11 * wx + a12 * wy
+    lean_y = a12 * wx + a22 * wy
+    q = add(p, add(blend(wx, x, wy, y), scale(-0.5 * (wx * lean_x + wy * lean_y), n)))
     # n + A w is longer than one in second order.
-    stretch = 0.5 * w * w * (a11 * a11 + a12 * a12)
+    stretch = 0.5 * (lean_x * lean_x + lean_y * lean_y)
     return (
         q,
-        add(scale(1.0 - stretch, n), blend(a11 * w, x, a12 * w, y)),
-        sub(x, scale(a11 * w, n)),
-        sub(y, scale(a12 * w, n)),
+        add(scale(1.0 - stretch, n), blend(lean_x, x, lean_y, y)),
+        sub(x, scale(lean_x, n)),
+        sub(y, scale(lean_y, n)),
         (a11, a12, a22),
         True,
     )
@@ -146,7 +160,7 @@ def pole_frame(table, pool, r, edge, u, v):
 
 @kernel(inner=True)
 def polar_step(table, pool, r, edge, u, v, step):
-    """Parameters after a tangential step (body axes) from (u, v) near the pole of `edge`, over the pole if it leads there."""
+    """Parameters after a tangential step (body axes) from (u, v) near the pole of `edge`, over it if it leads there."""
     across = 0 if edge <= 2 else 1
     lo, hi, _ = limits(table, pool, r, across)
     other_lo, other_hi, closed = limits(table, pool, r, 1 - across)

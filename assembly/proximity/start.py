@@ -5,9 +5,9 @@ sample of g is found, which leads to the closest points where the surfaces are a
 
     |d|^2 + w (1 + n_f.n_g),
 
-which prefers normals that oppose each other and leads to the deepest points where the surfaces overlap. From the best such
-pairs, far enough from one another to belong to different extrema, Newton runs. Of what it finds, extrema with opposed
-outward normals (solids face each other) come first, then the smallest |gap|.
+which prefers normals that oppose each other and leads to the deepest points where the surfaces overlap. From the best
+such pairs, far enough from one another to belong to different extrema, Newton runs. Of what it finds, extrema with
+opposed outward normals (solids face each other) come first, then the smallest |gap|.
 
 Newton's method goes to any extremum, the far side of a ball as well. A pair farther apart than the samples it came from
 is not theirs: then the distance is first made smaller by direct search, which knows no curvature and passes poles and
@@ -38,7 +38,7 @@ from assembly.proximity.extremal import (
 CELL_SIZE = 9  # doubles a cell: u, v, point, sphere's center, radius
 # How many of the nearest and of the best aligned samples are tried.
 NEAREST = 16
-ALIGNED = 6
+ALIGNED = 12
 # Direct search: at most so many rounds, from steps of 1/32 of the domain down to 1e-5 of that.
 LEVELS = 200
 # Surfaces nearer than this part of the samples' distance cross there.

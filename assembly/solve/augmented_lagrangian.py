@@ -10,7 +10,8 @@ factorization of that matrix tells its inertia; d is raised until it exists. dx 
 along which a line search runs; multipliers follow every step. -mu I makes redundant rows harmless.
 A step that the rows' curvature spoils is bent back onto the rows with the same factorization before it is shortened.
 
-A contact whose pair comes to a fold gets its coordinates as unknowns (`proximity/free_pair.py`), for the rest of the solve.
+A contact whose pair comes to a fold gets its coordinates as unknowns (`proximity/free_pair.py`) for the rest of the
+solve.
 Where rows cannot all hold, the same step with f = 0, y = 0, mu = 1 minimizes |c|^2 / 2, and the loop says INFEASIBLE
 at its stationary point.
 """
@@ -24,14 +25,11 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly.constraints.program import (
     BODIES,
-    BODY_F,
-    BODY_G,
     CONTACT,
     CONTACT_RECORD,
     CONTACTS,
     FOLD,
     MOVING,
-    ONE_SIDED,
     PROPER,
     REFERENCE,
     ROW,
@@ -39,21 +37,19 @@ from assembly.constraints.program import (
     ROWS,
     SCALE,
     SLOTS,
-    SURFACE_F,
-    SURFACE_G,
     add_row_terms,
     evaluate,
     objective,
 )
-from assembly.kinematics.motion import relative_pose, rotation
-from assembly.proximity.extremal import BEND, CONVERGED, SINGULAR
-from assembly.proximity.free_pair import VARIABLES, VECTORS, coordinate_lengths
-from assembly.proximity.start import global_start
-from assembly.solve.linear import factorize, substitute
+from assembly.proximity.extremal import BEND
+from assembly.proximity.free_pair import VARIABLES, VECTORS
+from assembly.solve.contacts import free_folds, start_contacts
+from assembly.solve.linear import factorize_shifted, substitute
 from assembly.solve.rows import (
-    add_row,
     add_transposed,
     carry,
+    dual_residual,
+    least_squares_multipliers,
     merit,
     move,
     place_rows,
@@ -75,112 +71,10 @@ PATIENCE = 25
 RESTORATIONS = 3
 # Multipliers below this count for nothing against the objective's curvature, which is of order one.
 WEAK = 1e-3
+# A gap that counts as touching where crossing surfaces are reported.
+TOUCHING = 1e-9
 # A step shorter than this decides nothing.
 SHORTEST = 1e-6
-
-
-@kernel(inner=True)
-def start_contacts(table, pool, q, contacts, free, lengths):
-    """Global starts for the contacts whose parameters are NaN. Returns a contact that found none, or -1.
-
-    Where a pair does not exist yet (a face tilted against another), its coordinates become unknowns at once.
-    """
-    for r in range(table[ROWS]):
-        row = table[ROW_TABLE] + ROW * r
-        k = table[row + CONTACT]
-        if not math.isnan(contacts[k, 0]):
-            continue
-        i = table[row + BODY_F]
-        j = table[row + BODY_G]
-        turn, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
-        status, x, _gap = global_start(table, pool, table[row + SURFACE_F], table[row + SURFACE_G], turn, shift, 1.0)
-        contacts[k, 0], contacts[k, 1], contacts[k, 2], contacts[k, 3] = x
-        if status != CONVERGED and status != SINGULAR and not free_pair(table, pool, row, k, contacts, free, lengths):
-            return k
-    return -1
-
-
-@kernel(inner=True)
-def free_pair(table, pool, row, k, contacts, free, lengths):
-    """Make the coordinates of contact k unknowns; False at a pole, where polar coordinates cannot be."""
-    x = (contacts[k, 0], contacts[k, 1], contacts[k, 2], contacts[k, 3])
-    coordinate_lengths(table, pool, table[row + SURFACE_F], table[row + SURFACE_G], x, lengths, k)
-    if min(min(lengths[k, 0], lengths[k, 1]), min(lengths[k, 2], lengths[k, 3])) < 1e-6:
-        return False
-    free[k] = 0
-    return True
-
-
-@kernel(inner=True)
-def free_folds(table, pool, records, contacts, forces, free, lengths, below, lost):
-    """Mark the pairs near a fold, and the lost one, as free. Returns how many are free now.
-
-    An idle one-sided row asks nothing of its pair.
-    """
-    count = 0
-    for r in range(table[ROWS]):
-        row = table[ROW_TABLE] + ROW * r
-        k = table[row + CONTACT]
-        idle = table[row + ONE_SIDED] == 1 and forces[r] == 0.0
-        if free[k] < 0 and not idle and (abs(records[k, FOLD]) < below or k == lost):
-            free_pair(table, pool, row, k, contacts, free, lengths)
-        if free[k] >= 0:
-            free[k] = count
-            count += 1
-    return count
-
-
-@kernel(inner=True)
-def dual_residual(bases, jacobian, rows, one_sided, residual, gradient, y, scratch):
-    """Largest component of grad f + J^T y, and of complementarity."""
-    for i in range(gradient.size):
-        scratch[i] = gradient[i]
-    add_transposed(bases, jacobian, rows, y, scratch)
-    worst = 0.0
-    for i in range(gradient.size):
-        if not abs(scratch[i]) <= worst:
-            worst = abs(scratch[i])
-    for r in range(rows):
-        if one_sided[r] == 1:
-            worst = max(worst, min(abs(y[r]), abs(residual[r])))
-    return worst
-
-
-@kernel(inner=True)
-def least_squares_multipliers(bases, jacobian, rows, one_sided, active, gradient, scratch, gram, y):
-    """The multipliers of the active rows that leave the smallest grad f + J^T y."""
-    n = gradient.size
-    for r in range(rows):
-        for i in range(n):
-            scratch[i] = 0.0
-        if active[r] > 0.0:
-            add_row(bases, jacobian, r, 1.0, scratch)
-        for s in range(r, rows):
-            gram[r, s] = times(bases, jacobian, s, scratch) if active[s] > 0.0 else 0.0
-        gram[r, r] += 1e-10 if active[r] > 0.0 else 1.0
-        y[r] = -times(bases, jacobian, r, gradient) if active[r] > 0.0 else 0.0
-    if factorize(gram, rows):
-        substitute(gram, rows, y)
-    for r in range(rows):
-        if one_sided[r] == 1:
-            y[r] = min(y[r], 0.0)
-
-
-@kernel(inner=True)
-def factorize_shifted(lagrangian, n, shift, matrix):
-    """Factorize lagrangian + d I with the smallest d tried, from `shift` up, that makes it positive definite; -1: none."""
-    scale = 1.0
-    for i in range(n):
-        scale = max(scale, abs(lagrangian[i, i]))
-    while shift <= 1e8 * scale:
-        for i in range(n):
-            for j in range(i, n):
-                matrix[i, j] = lagrangian[i, j]
-            matrix[i, i] += shift
-        if factorize(matrix, n):
-            return shift
-        shift = max(8.0 * shift, 1e-6)
-    return -1.0
 
 
 @kernel
@@ -273,7 +167,9 @@ def solve_program(table, pool, settings, state, history):
     lost = start_contacts(table, pool, q, contacts, free, lengths)
     count = free_folds(table, pool, records, contacts, forces, free, lengths, -1.0, -1)
     if lost < 0 and count == 0:
-        lost = evaluate(table, pool, q, contacts, math.inf, free, lengths, vectors, contacts, records, residual, jacobian)
+        lost = evaluate(
+            table, pool, q, contacts, math.inf, free, lengths, vectors, contacts, records, residual, jacobian
+        )
     if lost >= 0:
         status = CONTACT_LOST
         results[CULPRIT] = float(lost)
@@ -297,8 +193,14 @@ def solve_program(table, pool, settings, state, history):
             straight = np.empty(n)
             lagrangian = np.empty((n, n))
             matrix = np.empty((n, n))
-            lost = evaluate(table, pool, q, contacts, math.inf, free, lengths, vectors, contacts, records, residual, jacobian)
+            lost = evaluate(
+                table, pool, q, contacts, math.inf, free, lengths, vectors, contacts, records, residual, jacobian
+            )
         below = FREE_BELOW
+        if lost >= 0 and free[lost] < 0:
+            # A pair that is lost and cannot be freed (an idle row, a pole): nothing moves any more.
+            results[CULPRIT] = float(lost)
+            status = STALLED
         lost = -1
         value = objective(table, pool, q, gradient, lagrangian)
         violation = violation_of(residual, one_sided, rows)
@@ -524,7 +426,7 @@ def solve_program(table, pool, settings, state, history):
             trial_jacobian,
         )
         violation = violation_of(trial_residual, one_sided, rows) if lost < 0 else math.inf
-        if status == SOLVED and not violation <= 2.0 * feasible:
+        if status == SOLVED and not violation <= 1.25 * feasible:
             status = STALLED
         if lost < 0:
             residual, trial_residual = trial_residual, residual
@@ -547,7 +449,8 @@ def solve_program(table, pool, settings, state, history):
     results[VIOLATION] = violation * size
     results[DUAL] = dual
     results[IMPROPER] = 0.0
-    for k in range(pairs):
-        if free[k] < 0 and records[k, PROPER] == 0.0:
+    for r in range(m):
+        k = table[table[ROW_TABLE] + ROW * r + CONTACT]
+        if free[k] < 0 and records[k, PROPER] == 0.0 and abs(residual[r]) <= TOUCHING:
             results[IMPROPER] += 1.0
     return status

@@ -42,3 +42,20 @@ def substitute(m, n, b):
         for i in range(k + 1, n):
             s -= m[k, i] * b[i]
         b[k] = s * m[k, k]
+
+
+@kernel(inner=True)
+def factorize_shifted(lagrangian, n, shift, matrix):
+    """Factorize lagrangian + d I with the first d from `shift` up that makes it positive definite; -1: none."""
+    scale = 1.0
+    for i in range(n):
+        scale = max(scale, abs(lagrangian[i, i]))
+    while shift <= 1e8 * scale:
+        for i in range(n):
+            for j in range(i, n):
+                matrix[i, j] = lagrangian[i, j]
+            matrix[i, i] += shift
+        if factorize(matrix, n):
+            return shift
+        shift = max(8.0 * shift, 1e-6)
+    return -1.0

@@ -43,7 +43,7 @@ class Options:
         First bound of a step: lengths relative to the scene's size, and radians.
     """
 
-    tolerance: float = 1e-12
+    tolerance: float = 2e-13
     stationarity: float = 1e-10
     max_iterations: int = 300
     penalty: float = 1e-2

@@ -28,8 +28,8 @@ from assembly.constraints.packing import Packed
 from assembly.errors import InputError
 from assembly.geometry.surface import NurbsSurface
 from assembly.kinematics.body import BodyFace
-from assembly.solve.check import Sides, audit, is_extremal, twist_gradients
 from assembly.solve.augmented_lagrangian import COUNT, CULPRIT, DUAL, IMPROPER, OBJECTIVE, RESULTS, VIOLATION
+from assembly.solve.check import Sides, audit, is_extremal, twist_gradients
 from assembly.solve.solution import Iteration, Solution, Status
 
 if TYPE_CHECKING:

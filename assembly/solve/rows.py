@@ -18,6 +18,7 @@ from assembly.constraints.program import (
 from assembly.kinematics.motion import retract
 from assembly.proximity.extremal import into_domain
 from assembly.proximity.velocity import RATES, ZED
+from assembly.solve.linear import factorize, substitute
 
 
 @kernel(inner=True)
@@ -163,3 +164,39 @@ def carry(table, pool, bases, free, lengths, contacts, records, d, alpha, out):
         # The prediction may run over the end of a patch; Newton starts inside.
         out[k, 0], out[k, 1], _clamped = into_domain(table, pool, table[row + 3], out[k, 0], out[k, 1])
         out[k, 2], out[k, 3], _clamped = into_domain(table, pool, table[row + 4], out[k, 2], out[k, 3])
+
+
+@kernel(inner=True)
+def dual_residual(bases, jacobian, rows, one_sided, residual, gradient, y, scratch):
+    """Largest component of grad f + J^T y, and of complementarity."""
+    for i in range(gradient.size):
+        scratch[i] = gradient[i]
+    add_transposed(bases, jacobian, rows, y, scratch)
+    worst = 0.0
+    for i in range(gradient.size):
+        if not abs(scratch[i]) <= worst:
+            worst = abs(scratch[i])
+    for r in range(rows):
+        if one_sided[r] == 1:
+            worst = max(worst, min(abs(y[r]), abs(residual[r])))
+    return worst
+
+
+@kernel(inner=True)
+def least_squares_multipliers(bases, jacobian, rows, one_sided, active, gradient, scratch, gram, y):
+    """The multipliers of the active rows that leave the smallest grad f + J^T y."""
+    n = gradient.size
+    for r in range(rows):
+        for i in range(n):
+            scratch[i] = 0.0
+        if active[r] > 0.0:
+            add_row(bases, jacobian, r, 1.0, scratch)
+        for s in range(r, rows):
+            gram[r, s] = times(bases, jacobian, s, scratch) if active[s] > 0.0 else 0.0
+        gram[r, r] += 1e-10 if active[r] > 0.0 else 1.0
+        y[r] = -times(bases, jacobian, r, gradient) if active[r] > 0.0 else 0.0
+    if factorize(gram, rows):
+        substitute(gram, rows, y)
+    for r in range(rows):
+        if one_sided[r] == 1:
+            y[r] = min(y[r], 0.0)

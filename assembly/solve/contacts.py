@@ -1,0 +1,74 @@
+"""The loop's contacts: where their pairs start, and which of them get their coordinates as unknowns."""
+
+from __future__ import annotations
+
+import math
+
+from assembly._kernel import kernel
+from assembly.constraints.program import (
+    BODY_F,
+    BODY_G,
+    CONTACT,
+    FOLD,
+    ONE_SIDED,
+    ROW,
+    ROW_TABLE,
+    ROWS,
+    SURFACE_F,
+    SURFACE_G,
+)
+from assembly.kinematics.motion import relative_pose, rotation
+from assembly.proximity.extremal import CONVERGED, SINGULAR
+from assembly.proximity.free_pair import coordinate_lengths
+from assembly.proximity.start import global_start
+
+
+@kernel(inner=True)
+def free_pair(table, pool, row, k, contacts, free, lengths):
+    """Make the coordinates of contact k unknowns; False at a pole, where polar coordinates cannot be."""
+    x = (contacts[k, 0], contacts[k, 1], contacts[k, 2], contacts[k, 3])
+    coordinate_lengths(table, pool, table[row + SURFACE_F], table[row + SURFACE_G], x, lengths, k)
+    if min(min(lengths[k, 0], lengths[k, 1]), min(lengths[k, 2], lengths[k, 3])) < 1e-6:
+        return False
+    free[k] = 0
+    return True
+
+
+@kernel(inner=True)
+def start_contacts(table, pool, q, contacts, free, lengths):
+    """Global starts for the contacts whose parameters are NaN. Returns a contact that found none, or -1.
+
+    Where a pair does not exist yet (a face tilted against another), its coordinates become unknowns at once.
+    """
+    for r in range(table[ROWS]):
+        row = table[ROW_TABLE] + ROW * r
+        k = table[row + CONTACT]
+        if not math.isnan(contacts[k, 0]):
+            continue
+        i = table[row + BODY_F]
+        j = table[row + BODY_G]
+        turn, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
+        status, x, _gap = global_start(table, pool, table[row + SURFACE_F], table[row + SURFACE_G], turn, shift, 1.0)
+        contacts[k, 0], contacts[k, 1], contacts[k, 2], contacts[k, 3] = x
+        if status != CONVERGED and status != SINGULAR and not free_pair(table, pool, row, k, contacts, free, lengths):
+            return k
+    return -1
+
+
+@kernel(inner=True)
+def free_folds(table, pool, records, contacts, forces, free, lengths, below, lost):
+    """Mark the pairs near a fold, and the lost one, as free. Returns how many are free now.
+
+    An idle one-sided row asks nothing of its pair.
+    """
+    count = 0
+    for r in range(table[ROWS]):
+        row = table[ROW_TABLE] + ROW * r
+        k = table[row + CONTACT]
+        idle = table[row + ONE_SIDED] == 1 and forces[r] == 0.0
+        if free[k] < 0 and not idle and (abs(records[k, FOLD]) < below or k == lost):
+            free_pair(table, pool, row, k, contacts, free, lengths)
+        if free[k] >= 0:
+            free[k] = count
+            count += 1
+    return count
