@@ -42,7 +42,7 @@ def load(array, o):
     return (array[o], array[o + 1], array[o + 2])
 
 
-@kernel(inline=True)
+@kernel(inner=True)
 def track_contact(table, pool, row, q, start, patience, records, k):
     """Newton on the pair of one row; fills its record. Returns status, parameters, the points' signed distance."""
     i = table[row + BODY_F]
