@@ -204,6 +204,8 @@ class Assembly:
         return state
 
     def _place_starts(self, packed: Packed, state: Array, starts: Mapping[str, ArrayLike]) -> None:
+        if not isinstance(starts, Mapping):
+            raise TypeError(f"starts is {starts!r}; expected a mapping of constraint name to parameters")
         names = [constraint.name for constraint in self._constraints]
         for name, value in starts.items():
             if name not in names:

@@ -48,11 +48,16 @@ def real_array(name: str, value: ArrayLike, shape: Sequence[int | str]) -> NDArr
     InputError
         Not numeric, another shape, or not finite.
     """
-    wanted = "(" + ", ".join(str(extent) for extent in shape) + ("," if len(shape) == 1 else "") + ")"
     try:
-        array = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"{name} is {_shown(value)}; expected real numbers of shape {wanted}") from None
+        came = np.asarray(value)
+        array = np.array(came, dtype=np.float64) if came.dtype.kind in "iuf" else None
+    except (TypeError, ValueError, OverflowError):
+        array = None
+    if array is not None and array.shape == tuple(shape) and np.isfinite(array).all():
+        return array
+    wanted = "(" + ", ".join(str(extent) for extent in shape) + ("," if len(shape) == 1 else "") + ")"
+    if array is None:
+        raise InputError(f"{name} is {_shown(value)}; expected real numbers of shape {wanted}")
     fits = array.ndim == len(shape) and all(
         (has >= 1 if isinstance(want, str) else has == want) for has, want in zip(array.shape, shape, strict=True)
     )
@@ -73,6 +78,8 @@ def vector(name: str, value: ArrayLike, length: int = 3) -> NDArray[np.float64]:
 def number(name: str, value: Any) -> float:
     """A finite real number."""
     try:
+        if isinstance(value, (str, bytes, bool, np.bool_)):
+            raise TypeError
         result = float(value)
     except (TypeError, ValueError, OverflowError):
         raise InputError(f"{name} is {_shown(value)}; expected a finite real number") from None
@@ -92,6 +99,8 @@ def positive(name: str, value: Any) -> float:
 def integer(name: str, value: Any, low: int, high: int) -> int:
     """An integer from low to high, both included."""
     try:
+        if isinstance(value, (bool, np.bool_)):
+            raise TypeError
         result = operator.index(value)
     except TypeError:
         raise InputError(f"{name} is {_shown(value)}; expected an integer from {low} to {high}") from None

@@ -18,7 +18,8 @@ from assembly.geometry.vec import add, cross, dot, matvec, quaternion_product, s
 from assembly.kinematics.motion import position, relative_pose, rotation
 from assembly.proximity.extremal import CLOSE, CONVERGED, LEFT_PATCH, SINGULAR, solve_pair
 from assembly.proximity.free_pair import VARIABLES, free_hessian, free_rows
-from assembly.proximity.velocity import GAP, RATES, RECORD, add_gap_terms, gradient_row, store_record
+from assembly.proximity.start import global_start
+from assembly.proximity.velocity import GAP, RECORD, add_gap_terms, gradient_row, store_record
 
 # Header of the table.
 BODIES, MOVING, CONTACTS, ROWS, TERMS, SLOTS, ROW_TABLE, TERM_TABLE, HEADER = 0, 1, 2, 3, 4, 5, 6, 7, 8
@@ -63,6 +64,18 @@ def track_contact(table, pool, row, q, start, patience, records, k):
         records[k, PROPER] = 1.0 if det > -1e-9 * norm2 and h[0] + h[3] <= 0.0 else 0.0
         records[k, FOLD] = det / norm2 if norm2 > 1e-18 else 0.0
     return status, x, distance if frame[10] > 0.0 else -distance
+
+
+@kernel(inner=True)
+def restart_contact(table, pool, row, q, records, k):
+    """As `track_contact`, from a global start."""
+    i = table[row + BODY_F]
+    j = table[row + BODY_G]
+    relative, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
+    status, x, _gap = global_start(table, pool, table[row + SURFACE_F], table[row + SURFACE_G], relative, shift, 1.0)
+    if status == CONVERGED or status == SINGULAR:
+        status, x, _distance = track_contact(table, pool, row, q, x, math.inf, records, k)
+    return status, x
 
 
 @kernel(inner=True)
@@ -124,7 +137,8 @@ def evaluate(table, pool, q, start, patience, free, lengths, vectors, contacts, 
 
     A tracked contact is carried from `start` to its extremal pair, by steps that turn no normal by more than
     `patience`. A free one (free[k] >= 0, its place among the free ones) is evaluated at `start` itself, and its four
-    rows of tangency follow the rows of the program. A one-sided row whose pair has left its patch, apart, asks nothing.
+    rows of tangency follow the rows of the program. A one-sided row that loses its pair takes the
+    nearest one there is.
     """
     for r in range(table[ROWS]):
         row = table[ROW_TABLE] + ROW * r
@@ -133,12 +147,21 @@ def evaluate(table, pool, q, start, patience, free, lengths, vectors, contacts, 
         if free[k] < 0:
             status, x, distance = track_contact(table, pool, row, q, x, patience, records, k)
             if status != CONVERGED and status != SINGULAR:
-                if status != LEFT_PATCH or table[row + ONE_SIDED] == 0 or not distance > 0.0:
+                if table[row + ONE_SIDED] == 0:
                     return k
-                records[k, GAP] = distance
-                for i in range(4):
-                    for j in range(4):
-                        records[k, RATES + 4 * i + j] = 0.0
+                # A one-sided contact is of the nearest pair, whichever that is now.
+                held = status == LEFT_PATCH and distance > 0.0
+                status, x = restart_contact(table, pool, row, q, records, k)
+                if status != CONVERGED and status != SINGULAR:
+                    if not held:
+                        return k
+                    for i in range(CONTACT_RECORD):
+                        records[k, i] = 0.0
+                    records[k, GAP] = distance
+                    records[k, PROPER] = 1.0
+                    records[k, FOLD] = 1.0
+                elif not records[k, GAP] > 0.0:
+                    return k
             residual[r] = records[k, GAP]
             gradient_row(records, k, jacobian, r)
         else:

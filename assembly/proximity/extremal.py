@@ -46,8 +46,10 @@ RANK = 1e-7
 LIMIT = 40
 # The most, in radians, that a step may turn a normal.
 BEND = 0.5
+# Steps below this many radians that do not shrink any more are rounding.
+STAGNANT = 1e-7
 # A step that turns the normals by less leaves an error below rounding when a solve carries the frame along it.
-CLOSE = 1e-6
+CLOSE = 2e-7
 
 
 @kernel(inline=True)
@@ -281,9 +283,12 @@ def solve_pair(table, pool, f, g, rotation, shift, x, size, turn, close):
         step_f = abs(ax) + abs(ay)
         step_g = abs(bx) + abs(by)
         step = max(step_f, step_g)
-        bend = max(max(step_f * curvature_bound(a), step_g * curvature_bound(c)), 2.0 * step / size)
+        bend_f = step_f * max(curvature_bound(a), 2.0 / size)
+        bend_g = step_g * max(curvature_bound(c), 2.0 / size)
+        bend = max(bend_f, bend_g)
         small = bend < close and isolated
-        if step <= tolerance or (step < 1e-9 * size and step > 0.25 * previous):
+        # Small against the scene and against the bodies' own curvature; or as small as rounding lets it become.
+        if (step <= tolerance and bend < 1e-9) or (bend < STAGNANT and step > 0.25 * previous):
             # In a singular system a vanishing step is a solution only if the residual vanishes too.
             done = abs(r[2]) + abs(r[3]) < 1e-9 and abs(r[0]) + abs(r[1]) < 1e-9 * size
             status = CONVERGED if isolated else (SINGULAR if done else NOT_CONVERGED)
@@ -291,13 +296,15 @@ def solve_pair(table, pool, f, g, rotation, shift, x, size, turn, close):
         if iteration == LIMIT or not step < 1e300 or bend > turn:
             break
         previous = step
-        factor = 1.0 if bend <= BEND else BEND / bend
-        du = factor * (e[0] * ax + e[1] * ay)
-        dv = factor * e[2] * ay
-        ds = factor * (t[0] * bx + t[1] * by)
-        dt = factor * (t[2] * bx + t[3] * by)
-        move_f = blend(factor * ax, tx, factor * ay, ty)
-        move_g = matvec_t(rotation, blend(factor * bx, tx, factor * by, ty))
+        # Each surface by its own measure: a pebble turns while the hill beside it is crossed.
+        factor_f = 1.0 if bend_f <= BEND else BEND / bend_f
+        factor_g = 1.0 if bend_g <= BEND else BEND / bend_g
+        du = factor_f * (e[0] * ax + e[1] * ay)
+        dv = factor_f * e[2] * ay
+        ds = factor_g * (t[0] * bx + t[1] * by)
+        dt = factor_g * (t[2] * bx + t[3] * by)
+        move_f = blend(factor_f * ax, tx, factor_f * ay, ty)
+        move_g = matvec_t(rotation, blend(factor_g * bx, tx, factor_g * by, ty))
         uf, vf, clamped_f = advance(table, pool, f, x[0], x[1], du, dv, move_f)
         ug, vg, clamped_g = advance(table, pool, g, x[2], x[3], ds, dt, move_g)
         status = NOT_CONVERGED

@@ -86,12 +86,12 @@ def _key(face: Face) -> tuple[NurbsSurface, bool]:
 
 @lru_cache(maxsize=64)
 def _packed(f: tuple[NurbsSurface, bool], g: tuple[NurbsSurface, bool]) -> tuple[Table, Array, float]:
-    """Two surfaces as one table and one pool, and the smaller size."""
+    """Two surfaces as one table and one pool, and the larger size."""
     record_f, pool_f = Face(f[0], reversed=f[1]).packed()
     record_g, pool_g = Face(g[0], reversed=g[1]).packed()
     record_g = record_g.copy()
     record_g[list(OFFSETS)] += pool_f.size
-    return np.concatenate([record_f, record_g]), np.concatenate([pool_f, pool_g]), min(f[0].size, g[0].size)
+    return np.concatenate([record_f, record_g]), np.concatenate([pool_f, pool_g]), max(f[0].size, g[0].size)
 
 
 def _configuration(q_f: ArrayLike, q_g: ArrayLike) -> Array:

@@ -38,7 +38,7 @@ from assembly.proximity.extremal import (
 CELL_SIZE = 9  # doubles a cell: u, v, point, sphere's center, radius
 # How many of the nearest and of the best aligned samples are tried.
 NEAREST = 16
-ALIGNED = 12
+ALIGNED = 8
 # Direct search: at most so many rounds, from steps of 1/32 of the domain down to 1e-5 of that.
 LEVELS = 200
 # Surfaces nearer than this part of the samples' distance cross there.
@@ -220,7 +220,7 @@ def global_start(table, pool, f, g, rotation, shift, size):
         limit = score[i]
         if not is_near(status, frame, limit):
             start, reached = approach(table, pool, f, g, rotation, shift, start)
-            if reached <= CROSSING * score[i]:
+            if reached <= CROSSING * min(score[i], extent):
                 # Every distance vanishes where the surfaces cross: nearness says nothing there.
                 crossing = True
                 break
@@ -231,9 +231,12 @@ def global_start(table, pool, f, g, rotation, shift, size):
         if is_near(status, frame, limit):
             best = take(table, pool, g, rotation, status, x, frame, best)
         i = next_candidate(table, pool, f, a, nearest, score, i)
-    if crossing or best[0] > 0.0 or best[1] < 0.0:
-        # The surfaces overlap, or do not face each other.
-        best_samples(a, b, ALIGNMENT * extent * extent, nearest, score)
+    weight = ALIGNMENT * extent * extent
+    for _ in range(3):
+        # The surfaces overlap, or do not face each other; the deeper, the more the normals tell.
+        if not crossing and best[0] == 0.0 and best[1] >= 0.0:
+            break
+        best_samples(a, b, weight, nearest, score)
         i = lowest(score)
         for _ in range(ALIGNED):
             if score[i] == math.inf:
@@ -245,6 +248,9 @@ def global_start(table, pool, f, g, rotation, shift, size):
             if status != NOT_CONVERGED:
                 best = take(table, pool, g, rotation, status, x, frame, best)
             i = next_candidate(table, pool, f, a, nearest, score, i)
+        if best[0] == 0.0:
+            break
+        weight *= 5.0
     return best[2], best[3], best[1]
 
 

@@ -43,7 +43,7 @@ from assembly.constraints.program import (
 )
 from assembly.proximity.extremal import BEND
 from assembly.proximity.free_pair import VARIABLES, VECTORS
-from assembly.solve.contacts import free_folds, start_contacts
+from assembly.solve.contacts import free_folds, free_pairs_hold, start_contacts
 from assembly.solve.linear import factorize_shifted, substitute
 from assembly.solve.rows import (
     add_transposed,
@@ -297,9 +297,14 @@ def solve_program(table, pool, settings, state, history):
             step[i] = descent[i]
         substitute(matrix, n, step)
         longest = 0.0
+        turn = 0.0
         for i in range(n):
             longest = max(longest, abs(step[i]))
+            if i % 6 >= 3 and i < 6 * table[MOVING]:
+                turn = max(turn, abs(step[i]))
+        # Turns stay below a radian; moves may grow as long as they succeed.
         cut = min(1.0, radius / longest) if longest > 0.0 else 1.0
+        cut = min(cut, 1.0 / turn) if turn > 0.0 else cut
         slope = 0.0
         for i in range(n):
             step[i] *= cut
@@ -310,8 +315,14 @@ def solve_program(table, pool, settings, state, history):
             for i in range(n):
                 steepest = max(steepest, abs(descent[i]))
             if steepest <= 1e-9 * violation or longest < 1e-12:
-                status = INFEASIBLE
+                status = INFEASIBLE if violation > TOUCHING else STALLED
                 break
+            if iteration >= check_at:
+                if violation > 0.99 * check_violation:
+                    status = STALLED
+                    break
+                check_at = iteration + PATIENCE
+                check_violation = violation
         # Line search on the augmented Lagrangian.
         here = merit(residual, one_sided, rows, y, mu)
         if not restoring:
@@ -393,7 +404,7 @@ def solve_program(table, pool, settings, state, history):
         if alpha == 1.0:
             if cut == 1.0:
                 mu = max(0.1 * mu, settings[PENALTY_FLOOR])
-            radius = min(2.0 * radius, 1.0)
+            radius = min(2.0 * radius, 1e6)
         else:
             radius = max(2.0 * alpha * longest * cut, SHORTEST)
         iteration += 1
@@ -426,7 +437,9 @@ def solve_program(table, pool, settings, state, history):
             trial_jacobian,
         )
         violation = violation_of(trial_residual, one_sided, rows) if lost < 0 else math.inf
-        if status == SOLVED and not violation <= 1.25 * feasible:
+        if status == SOLVED and not (
+            violation <= 1.25 * feasible and free_pairs_hold(table, pool, trial_q, contacts, free, 1e-9)
+        ):
             status = STALLED
         if lost < 0:
             residual, trial_residual = trial_residual, residual

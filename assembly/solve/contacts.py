@@ -18,7 +18,7 @@ from assembly.constraints.program import (
     SURFACE_G,
 )
 from assembly.kinematics.motion import relative_pose, rotation
-from assembly.proximity.extremal import CONVERGED, SINGULAR
+from assembly.proximity.extremal import CONVERGED, SINGULAR, pair_frame
 from assembly.proximity.free_pair import coordinate_lengths
 from assembly.proximity.start import global_start
 
@@ -72,3 +72,26 @@ def free_folds(table, pool, records, contacts, forces, free, lengths, below, los
             free[k] = count
             count += 1
     return count
+
+
+@kernel(inner=True)
+def free_pairs_hold(table, pool, q, contacts, free, tolerance):
+    """Whether every free pair is extremal by the frames of tracked pairs, which know poles.
+
+    Its own rows do not tell at a pole or an apex: there a tangent vanishes, and its row with it.
+    """
+    for r in range(table[ROWS]):
+        row = table[ROW_TABLE] + ROW * r
+        k = table[row + CONTACT]
+        if free[k] < 0:
+            continue
+        i = table[row + BODY_F]
+        j = table[row + BODY_G]
+        turn, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
+        x = (contacts[k, 0], contacts[k, 1], contacts[k, 2], contacts[k, 3])
+        frame = pair_frame(table, pool, table[row + SURFACE_F], table[row + SURFACE_G], turn, shift, x)
+        residual = frame[9]
+        tilt = max(abs(residual[2]), abs(residual[3]))
+        if not frame[11] or not tilt <= 1e-9 or not max(abs(residual[0]), abs(residual[1])) <= tolerance:
+            return False
+    return True
