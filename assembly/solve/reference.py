@@ -48,6 +48,7 @@ _IPOPT: dict[str, Any] = {
     "acceptable_iter": 0,
     "bound_relax_factor": 0.0,
     "jacobian_regularization_value": 1e-10,
+    "perturb_always_cd": "yes",
     "max_iter": 500,
 }
 _STATUSES = {
