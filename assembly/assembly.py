@@ -46,6 +46,8 @@ class Assembly:
     weights' ratios aside, and starts may change between solves without packing again.
     """
 
+    _loaded = False  # whether this process has the kernel
+
     def __init__(self, bodies: Iterable[Body] = ()) -> None:
         self._bodies: list[Body] = []
         self._constraints: list[Contact] = []
@@ -177,9 +179,10 @@ class Assembly:
             settings = _WARM_SETTINGS if warm else _SETTINGS
         state = self._start(packed, q0, starts)
         history = np.empty((min(int(settings[ITERATIONS]), MOST_HISTORY) + 1, HISTORY))
-        if not getattr(solve_program, "signatures", True):
+        if not Assembly._loaded:
             # Loading the kernel, or compiling it, is no part of a solve's time.
             solve_program(packed.table, packed.pool, _LOADING, state.copy(), history)
+            Assembly._loaded = True
         begin = perf_counter()
         code = solve_program(packed.table, packed.pool, settings, state, history)
         return Solution(self._scene, packed, state, _STATUSES[code], perf_counter() - begin, history)

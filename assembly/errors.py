@@ -5,6 +5,7 @@ Bad input raises `InputError` at once. Its text names the argument, what came an
 
 from __future__ import annotations
 
+import math
 import operator
 from collections.abc import Sequence
 from typing import Any
@@ -53,8 +54,8 @@ def real_array(name: str, value: ArrayLike, shape: Sequence[int | str]) -> NDArr
         array = np.array(came, dtype=np.float64) if came.dtype.kind in "iuf" else None
     except (TypeError, ValueError, OverflowError):
         array = None
-    if array is not None and array.shape == tuple(shape) and np.isfinite(array).all():
-        return array
+    if array is not None and array.shape == tuple(shape) and all(map(math.isfinite, array.ravel().tolist())):
+        return array  # what nearly always comes, without numpy's price for small arrays
     wanted = "(" + ", ".join(str(extent) for extent in shape) + ("," if len(shape) == 1 else "") + ")"
     if array is None:
         raise InputError(f"{name} is {_shown(value)}; expected real numbers of shape {wanted}")

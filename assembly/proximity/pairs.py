@@ -98,21 +98,24 @@ def _configuration(q_f: ArrayLike, q_g: ArrayLike) -> Array:
     q = np.empty((2, 7))
     for k, (name, value) in enumerate((("q_f", q_f), ("q_g", q_g))):
         q[k] = vector(name, value, 7)
-        nonzero_quaternion(f"{name}[3:]", q[k, 3:])
+        _, _, _, a, b, c, d = q[k].tolist()
+        if not max(abs(a), abs(b), abs(c), abs(d)) > 1e-100:
+            nonzero_quaternion(f"{name}[3:]", q[k, 3:])
     return q
 
 
 def inside(name: str, parameters: Array, surfaces: tuple[NurbsSurface, NurbsSurface]) -> tuple[float, ...]:
-    """Parameters as a tuple; raises where one lies beyond the end of an open direction."""
-    limits = [(s.domain[k], s.closed[k]) for s in surfaces for k in range(2)]
-    for k, ((low, high), closed) in enumerate(limits):
-        if not closed and not low <= parameters[k] <= high:
-            raise InputError(f"{name}[{k}] is {parameters[k]:g}; expected a parameter in [{low:g}, {high:g}]")
-    wrapped = [
-        low + (value - low) % (high - low) if closed and not low <= value <= high else value
-        for value, ((low, high), closed) in zip(parameters, limits, strict=True)
-    ]
-    return tuple(float(value) for value in wrapped)
+    """Parameters as a tuple, wrapped; raises where one lies beyond the end of an open direction."""
+    result = []
+    for k, value in enumerate(parameters.tolist()):
+        surface, direction = surfaces[k // 2], k % 2
+        low, high = surface.domain[direction]
+        if not low <= value <= high:
+            if not surface.closed[direction]:
+                raise InputError(f"{name}[{k}] is {value:g}; expected a parameter in [{low:g}, {high:g}]")
+            value = low + (value - low) % (high - low)
+        result.append(value)
+    return tuple(result)
 
 
 def extremal_pair(
