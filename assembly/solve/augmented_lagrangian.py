@@ -77,6 +77,38 @@ TOUCHING = 1e-9
 SHORTEST = 1e-6
 
 
+@kernel(inner=True)
+def write_pose(table, pool, q, state):
+    """Poses of the moving bodies into the state, in the user's coordinates."""
+    for b in range(table[BODIES]):
+        if table[table[SLOTS] + b] >= 0:
+            for k in range(3):
+                state[7 * b + k] = q[b, k] * pool[SCALE] + pool[REFERENCE + k]
+            for k in range(3, 7):
+                state[7 * b + k] = q[b, k]
+
+
+@kernel(inner=True)
+def write_rows(table, contacts, y, residual, free, size, state):
+    """Contacts, multipliers and residuals into the state, lengths in the user's unit."""
+    m = table[ROWS]
+    o = 7 * table[BODIES]
+    for k in range(table[CONTACTS]):
+        for i in range(4):
+            state[o + 4 * k + i] = contacts[k, i]
+    o += 4 * table[CONTACTS]
+    for r in range(m):
+        state[o + r] = y[r]
+        worst = residual[r]
+        k = table[table[ROW_TABLE] + ROW * r + CONTACT]
+        if free[k] >= 0:
+            # What a free pair lacks to be extremal is a violation of its contact, too.
+            for i in range(4):
+                if abs(residual[m + 4 * free[k] + i]) > abs(worst):
+                    worst = -abs(residual[m + 4 * free[k] + i])
+        state[o + m + r] = worst * size
+
+
 @kernel
 def solve_program(table, pool, settings, state, history):
     """Solve in place. State: q (n, 7) | contacts (k, 4) | multipliers (m) | residuals (m) | results."""
@@ -409,12 +441,7 @@ def solve_program(table, pool, settings, state, history):
             radius = max(2.0 * alpha * longest * cut, SHORTEST)
         iteration += 1
 
-    for b in range(bodies):
-        if table[table[SLOTS] + b] >= 0:
-            for k in range(3):
-                state[7 * b + k] = q[b, k] * size + pool[REFERENCE + k]
-            for k in range(3, 7):
-                state[7 * b + k] = q[b, k]
+    write_pose(table, pool, q, state)
     if status != CONTACT_LOST:
         # The pose as it is returned, rounded to the user's coordinates, judged afresh.
         for b in range(bodies):
@@ -443,19 +470,7 @@ def solve_program(table, pool, settings, state, history):
             status = STALLED
         if lost < 0:
             residual, trial_residual = trial_residual, residual
-    for k in range(pairs):
-        for i in range(4):
-            state[o_contacts + 4 * k + i] = contacts[k, i]
-    for r in range(m):
-        state[o_y + r] = y[r]
-        worst = residual[r]
-        k = table[table[ROW_TABLE] + ROW * r + CONTACT]
-        if free[k] >= 0:
-            # What a free pair lacks to be extremal is a violation of its contact, too.
-            for i in range(4):
-                if abs(residual[m + 4 * free[k] + i]) > abs(worst):
-                    worst = -abs(residual[m + 4 * free[k] + i])
-        state[o_residual + r] = worst * size
+    write_rows(table, contacts, y, residual, free, size, state)
     results[STATUS] = float(status)
     results[COUNT] = float(iteration)
     results[OBJECTIVE] = value
