@@ -170,7 +170,7 @@ class Pose:
     """
 
     position: Array = (0.0, 0.0, 0.0)  # type: ignore[assignment]  # checked and converted below
-    quaternion: Array = (1.0, 0.0, 0.0, 0.0)  # type: ignore[assignment]
+    quaternion: Array = (1.0, 0.0, 0.0, 0.0)  # type: ignore[assignment]  # likewise
 
     def __post_init__(self) -> None:
         position = vector("position", self.position)
@@ -184,7 +184,7 @@ class Pose:
         """Rotation by an angle [rad] about an axis, then the position."""
         along = direction("axis", axis)
         half = 0.5 * number("angle", angle)
-        return cls(position, np.concatenate([[np.cos(half)], np.sin(half) * along]))  # type: ignore[arg-type]
+        return cls(position, np.concatenate([[np.cos(half)], np.sin(half) * along]))  # type: ignore[arg-type]  # likewise
 
     @property
     def q(self) -> Array:
