@@ -1,8 +1,8 @@
 """The terms of an objective: values, gradients and Hessians in twists.
 
-    point distance   weight |p - target|^2
-    posture          weight |x - x0|^2 + lever 4 sin^2(angle / 2), from a pose (x0, e0)
-    tape             weight times a user's expression
+point distance   weight |p - target|^2
+posture          weight |x - x0|^2 + lever 4 sin^2(angle / 2), from a pose (x0, e0)
+tape             weight times a user's expression
 """
 
 from __future__ import annotations

@@ -44,8 +44,15 @@ from assembly.proximity.free_pair import VARIABLES, VECTORS
 from assembly.solve.contacts import free_folds, start_contacts
 from assembly.solve.linear import factorize_shifted, substitute
 from assembly.solve.report import judge, write_pose, write_rows
-from assembly.solve.rows import add_transposed, dual_residual, envelope, least_squares_multipliers, place_rows, times
-from assembly.solve.rows import violation_of
+from assembly.solve.rows import (
+    add_transposed,
+    dual_residual,
+    envelope,
+    least_squares_multipliers,
+    place_rows,
+    times,
+    violation_of,
+)
 from assembly.solve.search import SHORTEST, search
 
 # Outcomes; `solution.Status` gives each a sentence. RUNNING is none of them.
@@ -83,9 +90,7 @@ def choose_multipliers(shape, rows, here, shortened, active, gradient, scratch, 
     else:
         dual = other
     if shortened:
-        least_squares_multipliers(
-            bases, jacobian, rows, one_sided, active, gradient, scratch, last_row, gram, better_y
-        )
+        least_squares_multipliers(bases, jacobian, rows, one_sided, active, gradient, scratch, last_row, gram, better_y)
         other = dual_residual(bases, jacobian, rows, one_sided, residual, gradient, better_y, scratch)
         if other < dual:
             dual = other
