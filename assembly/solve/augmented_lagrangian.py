@@ -213,7 +213,7 @@ def solve_program(table, pool, settings, state, history):
     envelope(table, bases, rows, n, last, last_row)
     o_room = table[TAPE_ROOM]
     room = (np.empty(table[o_room]), np.empty(table[o_room + 1]), np.empty(table[o_room + 2]))
-    active = np.empty(most)
+    active = np.zeros(most)
     forces = np.zeros(most)
     gram = np.empty((most, most))
     gradient = np.empty(n)
@@ -242,7 +242,7 @@ def solve_program(table, pool, settings, state, history):
     results[CULPRIT] = -1.0
 
     lost = start_contacts(table, pool, here[0], here[1], free, loose[1])
-    count = free_folds(table, pool, here[2], here[1], forces, free, loose[1], -1.0, -1)
+    count = free_folds(table, pool, here[2], here[1], active, free, loose[1], -1.0, -1)
     if lost < 0 and count == 0:
         lost = evaluate(table, pool, here[1], math.inf, loose, room, here)
     if lost >= 0:
@@ -252,14 +252,15 @@ def solve_program(table, pool, settings, state, history):
     lost = np.int64(-1)
     below = FREE_BELOW
     while status == RUNNING:
+        weigh_rows(rows, one_sided, here[3], y, mu, forces, active)
         if pairs > 0:
-            for r in range(pairs):
-                forces[r] = 0.0 if one_sided[r] == 1 and y[r] + here[3][r] / mu >= 0.0 else 1.0
-            count = free_folds(table, pool, here[2], here[1], forces, free, loose[1], below, lost)
+            count = free_folds(table, pool, here[2], here[1], active, free, loose[1], below, lost)
         if m + 4 * count != rows:
             for r in range(rows, most):
+                # New rows of tangency say nothing yet: least squares leave them out.
                 y[r] = 0.0
                 better_y[r] = 0.0
+                active[r] = 0.0
             rows = m + 4 * count
             n = 6 * table[MOVING] + 4 * count
             place_rows(table, free, bases, one_sided)
@@ -281,8 +282,6 @@ def solve_program(table, pool, settings, state, history):
         value = objective(table, pool, here[0], 1, room, last, gradient, lagrangian)
         violation = violation_of(residual, one_sided, rows)
         shortened = iteration > 0 and alpha < 1.0
-        if shortened:
-            weigh_rows(rows, one_sided, residual, y, mu, forces, active)
         dual = choose_multipliers(shape, rows, here, shortened, active, gradient, descent, gram, y, better_y)
         if iteration < history.shape[0]:
             history[iteration, 0] = value

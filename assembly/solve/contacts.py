@@ -54,7 +54,7 @@ def start_contacts(table, pool, q, contacts, free, lengths):
 
 
 @kernel(inner=True)
-def free_folds(table, pool, records, contacts, forces, free, lengths, below, lost):
+def free_folds(table, pool, records, contacts, active, free, lengths, below, lost):
     """Mark the pairs near a fold, and the lost one, as free. Returns how many are free now.
 
     An idle one-sided row asks nothing of its pair.
@@ -62,7 +62,7 @@ def free_folds(table, pool, records, contacts, forces, free, lengths, below, los
     count = 0
     for k in range(table[CONTACTS]):
         row = table[ROW_TABLE] + ROW * k
-        idle = table[row + ONE_SIDED] == 1 and forces[k] == 0.0
+        idle = table[row + ONE_SIDED] == 1 and active[k] == 0.0
         if free[k] < 0 and not idle and (abs(records[k, FOLD]) < below or k == lost):
             free_pair(table, pool, row, k, contacts, free, lengths)
         if free[k] >= 0:
