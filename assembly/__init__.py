@@ -17,8 +17,24 @@ if TYPE_CHECKING:
     from assembly import view as view
     from assembly.assembly import Assembly as Assembly
     from assembly.constraints.contact import Contact as Contact
+    from assembly.constraints.couplings import Gear as Gear
+    from assembly.constraints.couplings import RackPinion as RackPinion
+    from assembly.constraints.joints import Cylindrical as Cylindrical
+    from assembly.constraints.joints import Fixed as Fixed
+    from assembly.constraints.joints import Parallel as Parallel
+    from assembly.constraints.joints import Perpendicular as Perpendicular
+    from assembly.constraints.joints import Planar as Planar
+    from assembly.constraints.joints import Prismatic as Prismatic
+    from assembly.constraints.joints import Revolute as Revolute
+    from assembly.constraints.joints import Screw as Screw
+    from assembly.constraints.joints import Spherical as Spherical
+    from assembly.constraints.joints import Universal as Universal
     from assembly.constraints.objectives import PointDistance as PointDistance
     from assembly.constraints.objectives import Posture as Posture
+    from assembly.constraints.placements import Angle as Angle
+    from assembly.constraints.placements import Distance as Distance
+    from assembly.constraints.placements import PointOnLine as PointOnLine
+    from assembly.constraints.placements import PointOnPlane as PointOnPlane
     from assembly.geometry import shapes as shapes
     from assembly.geometry.curve import NurbsCurve as NurbsCurve
     from assembly.geometry.face import Face as Face
@@ -34,18 +50,34 @@ else:
     __getattr__, __dir__, __all__ = lazy_names(
         __name__,
         {
+            "Angle": "assembly.constraints.placements",
             "Assembly": "assembly.assembly",
             "Body": "assembly.kinematics.body",
             "Contact": "assembly.constraints.contact",
             "ContactPair": "assembly.proximity.pairs",
+            "Cylindrical": "assembly.constraints.joints",
+            "Distance": "assembly.constraints.placements",
             "Face": "assembly.geometry.face",
+            "Fixed": "assembly.constraints.joints",
+            "Gear": "assembly.constraints.couplings",
             "NurbsCurve": "assembly.geometry.curve",
             "NurbsSurface": "assembly.geometry.surface",
+            "Parallel": "assembly.constraints.joints",
+            "Perpendicular": "assembly.constraints.joints",
+            "Planar": "assembly.constraints.joints",
             "PointDistance": "assembly.constraints.objectives",
+            "PointOnLine": "assembly.constraints.placements",
+            "PointOnPlane": "assembly.constraints.placements",
             "Pose": "assembly.kinematics.pose",
             "Posture": "assembly.constraints.objectives",
+            "Prismatic": "assembly.constraints.joints",
+            "RackPinion": "assembly.constraints.couplings",
+            "Revolute": "assembly.constraints.joints",
+            "Screw": "assembly.constraints.joints",
             "Solution": "assembly.solve.solution",
+            "Spherical": "assembly.constraints.joints",
             "Status": "assembly.solve.solution",
+            "Universal": "assembly.constraints.joints",
             "errors": "assembly.errors",
             "load": "assembly.scene_file",
             "proximity": "assembly.proximity",

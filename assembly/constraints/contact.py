@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from assembly.constraints.constraint import Constraint
 from assembly.errors import InputError
 from assembly.kinematics.body import Body, BodyFace
 
 __all__ = ["Contact"]
 
 
-class Contact:
+class Contact(Constraint):
     """The extremal gap of two faces is zero (or, one-sided, not negative).
 
     The gap is that of the pair of points the solve tracks from its start; where it lies on the faces is free.
@@ -47,11 +48,9 @@ class Contact:
         self._b = b
         if self.body_a is self.body_b:
             raise InputError(f"sides a and b are both on body {self.body_a.name!r}; expected two bodies")
-        if name is not None and (not isinstance(name, str) or not name.strip()):
-            raise InputError(f"name is {name!r}; expected a nonempty string")
+        super().__init__((self.body_a, self.body_b), name)
         if not isinstance(unilateral, (bool, np.bool_)):
             raise InputError(f"unilateral is {unilateral!r}; expected True or False")
-        self._name = f"{self.body_a.name}-{self.body_b.name}" if name is None else name
         self._unilateral = bool(unilateral)
 
     @property
@@ -63,11 +62,6 @@ class Contact:
     def b(self) -> Body | BodyFace:
         """The other side, as it was given."""
         return self._b
-
-    @property
-    def name(self) -> str:
-        """Name of the constraint."""
-        return self._name
 
     @property
     def unilateral(self) -> bool:
@@ -83,11 +77,6 @@ class Contact:
     def body_b(self) -> Body:
         """The body of side b."""
         return self.b if isinstance(self.b, Body) else self.b.body
-
-    @property
-    def bodies(self) -> tuple[Body, Body]:
-        """Both bodies."""
-        return self.body_a, self.body_b
 
     def __repr__(self) -> str:
         return f"Contact({self.a!r}, {self.b!r}, name={self.name!r}{', unilateral=True' if self.unilateral else ''})"
