@@ -98,6 +98,9 @@ class FramePair:
     frame_a: Frame
     frame_b: Frame
 
+    def __repr__(self) -> str:
+        return f"FramePair({self.frame_a.body.name!r}, {self.frame_b.body.name!r})"
+
 
 @dataclass(frozen=True, eq=False)
 class Coordinate:
@@ -205,6 +208,12 @@ class Freedom:
 
     @value.setter
     def value(self, value: float | None) -> None:
+        low, high = self._range
+        # What nearly always comes, without the price of every check; NaN and infinities fail the comparisons.
+        if type(value) is float and self._value is not None:
+            if low < value < high and self._lower <= value <= self._upper:
+                self._value = value
+                return
         self._set(value, self._lower, self._upper)
 
     @property

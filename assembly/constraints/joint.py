@@ -177,10 +177,10 @@ class Driven:
     def __get__(self, joint: Joint, owner: type[Joint]) -> float | None: ...
 
     def __get__(self, joint: Joint | None, owner: type[Joint]) -> Self | float | None:
-        return self if joint is None else joint.freedom(self._freedom).value
+        return self if joint is None else joint._freedoms[self._freedom].value
 
     def __set__(self, joint: Joint, value: float | None) -> None:
-        joint.freedom(self._freedom).value = value
+        joint._freedoms[self._freedom].value = value
 
 
 class Limits:
@@ -197,10 +197,10 @@ class Limits:
     def __get__(self, joint: Joint, owner: type[Joint]) -> Bounds | None: ...
 
     def __get__(self, joint: Joint | None, owner: type[Joint]) -> Self | Bounds | None:
-        return self if joint is None else joint.freedom(self._freedom).limits
+        return self if joint is None else joint._freedoms[self._freedom].limits
 
     def __set__(self, joint: Joint, value: Sequence[float | None] | None) -> None:
-        joint.freedom(self._freedom).limits = value
+        joint._freedoms[self._freedom].limits = value
 
 
 class Offset:

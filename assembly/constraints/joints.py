@@ -172,9 +172,7 @@ class Screw(Cylindrical):
     ) -> None:
         self._pitch = number("pitch", pitch)
         if self._pitch == 0.0:
-            raise InputError(
-                "pitch is 0; expected the travel a turn, not zero; a joint that does not slide is Revolute"
-            )
+            raise InputError("pitch is 0; expected the travel a turn, not zero; a nut that cannot slide is Revolute")
         super().__init__(
             frame_a,
             frame_b,
@@ -262,12 +260,14 @@ class Spherical(Joint):
         azimuth_limits: Range = None,
         twist_limits: Range = None,
     ) -> None:
-        settings = {
-            "swing": (swing, swing_limits),
-            "azimuth": (azimuth, azimuth_limits),
-            "twist": (twist, twist_limits),
-        }
-        super().__init__(frame_a, frame_b, name, **settings)
+        super().__init__(
+            frame_a,
+            frame_b,
+            name,
+            swing=(swing, swing_limits),
+            azimuth=(azimuth, azimuth_limits),
+            twist=(twist, twist_limits),
+        )
 
 
 class Universal(Joint):

@@ -89,7 +89,7 @@ def tilt(records, k):
     return c, s, n
 
 
-@kernel(inner=True)
+@kernel(inline=True)
 def swing(component, records, k):
     """The value phi(c) u.z_b of a swing, phi = theta / sin(theta) as a function of c = cos(theta), and its parts.
 
@@ -99,16 +99,17 @@ def swing(component, records, k):
     """
     u = load(records, k, AXES_A + 3 * component)
     v = load(records, k, AXES_B + 6)
-    c, s, n = tilt(records, k)
+    z = load(records, k, AXES_A + 6)
     a = dot(u, v)
     hu = cross(v, u)
-    x = 1.0 - c
+    x = 1.0 - dot(z, v)
     if x < SERIES:
         # phi = sum_n x^n prod_{i <= n} i / (2 i + 1): arcsin(y) / (y sqrt(1 - y^2)) with y^2 = x / 2.
         phi = 1.0 + x * (1 / 3 + x * (2 / 15 + x * (2 / 35 + x * (8 / 315 + x * (8 / 693)))))
         e = -(1 / 3 + x * (4 / 15 + x * (6 / 35 + x * (32 / 315 + x * (40 / 693)))))
         second = 4 / 15 + x * (12 / 35 + x * (96 / 315 + x * (160 / 693)))
-        return phi * a, u, hu, cross(v, load(records, k, AXES_A + 6)), phi, e * a, e * a, e, second * a
+        return phi * a, u, hu, cross(v, z), phi, e * a, e * a, e, second * a
+    c, s, n = tilt(records, k)
     theta = math.atan2(s, c)
     along = 1.0 if component == 0 else 0.0
     if s > UNDEFINED:
@@ -133,45 +134,52 @@ def coordinate(kind, component, records, k, near):
 
     A TURN or an AZIMUTH is the one within pi of `near`.
     """
+    value = near
+    n = ZERO
+    d = ZERO
+    h = ZERO
     if kind == COINCIDENT:
+        value = records[k, APART + component]
         n = world_axis(component, 1.0)
-        return records[k, APART + component], n, load(records, k, ARM_A), load(records, k, ARM_B), ZERO
-    if kind == SLIDE:
+    elif kind == SLIDE:
         n = load(records, k, AXES_A + 3 * component)
         d = load(records, k, APART)
-        return dot(n, d), n, add(load(records, k, ARM_A), d), load(records, k, ARM_B), ZERO
-    if kind == SWING:
+        value = dot(n, d)
+    elif kind == SWING:
         value, _u, hu, p, phi, j, _m, _e, _w = swing(component, records, k)
-        return value, ZERO, ZERO, ZERO, blend(phi, hu, j, p)
-    if kind == TURN:
+        h = blend(phi, hu, j, p)
+    elif kind == TURN:
         x = load(records, k, AXES_A)
         y = load(records, k, AXES_A + 3)
         xb = load(records, k, AXES_B)
         yb = load(records, k, AXES_B + 3)
-        # d/dw of the angle is (z_a + z_b) / (1 + z_a.z_b), and 1 + z_a.z_b = |z_a + z_b|^2 / 2.
+        # h = (z_a + z_b) / (1 + z_a.z_b), and 1 + z_a.z_b = |z_a + z_b|^2 / 2.
         m = add(load(records, k, AXES_A + 6), load(records, k, AXES_B + 6))
         square = dot(m, m)
-        if square < POLE * POLE:
-            return near, ZERO, ZERO, ZERO, ZERO
-        angle = math.atan2(dot(y, xb) - dot(x, yb), dot(x, xb) + dot(y, yb))
-        return unwrap(angle, near), ZERO, ZERO, ZERO, scale(2.0 / square, m)
-    if kind == DOT:
+        if square >= POLE * POLE:
+            value = unwrap(math.atan2(dot(y, xb) - dot(x, yb), dot(x, xb) + dot(y, yb)), near)
+            h = scale(2.0 / square, m)
+    elif kind == DOT:
         u = load(records, k, AXES_A + 3 * (component // 3))
         v = load(records, k, AXES_B + 3 * (component % 3))
-        return dot(u, v), ZERO, ZERO, ZERO, cross(v, u)
-    if kind == AZIMUTH:
+        value = dot(u, v)
+        h = cross(v, u)
+    elif kind == AZIMUTH:
         v = load(records, k, AXES_B + 3 * component)
         across = cross(load(records, k, AXES_A + 6), v)
         square = dot(across, across)
-        if square < POLE * POLE:
-            return near, ZERO, ZERO, ZERO, ZERO
-        angle = math.atan2(dot(load(records, k, AXES_A + 3), v), dot(load(records, k, AXES_A), v))
-        return unwrap(angle, near), ZERO, ZERO, ZERO, scale(1.0 / square, cross(v, across))
-    if kind == ANGLE:
-        c, s, n = tilt(records, k)
-        return math.atan2(s, c), ZERO, ZERO, ZERO, n
-    length, n = distance_direction(records, k)
-    return length, n, load(records, k, ARM_A), load(records, k, ARM_B), ZERO
+        if square >= POLE * POLE:
+            value = unwrap(math.atan2(dot(load(records, k, AXES_A + 3), v), dot(load(records, k, AXES_A), v)), near)
+            h = scale(1.0 / square, cross(v, across))
+    elif kind == ANGLE:
+        c, s, h = tilt(records, k)
+        value = math.atan2(s, c)
+    else:
+        value, n = distance_direction(records, k)
+    # `records` is used last where the branches meet: else Numba counts references to it, which costs half a row.
+    arm_f = add(load(records, k, ARM_A), d)
+    arm_g = load(records, k, ARM_B)
+    return value, n, arm_f, arm_g, h
 
 
 @kernel(inline=True)
@@ -188,10 +196,15 @@ def write_gradient(n, arm_f, arm_g, h, factor, jacobian, r, column):
 @kernel(inline=True)
 def add_block(hessian, r, c, m):
     """hessian[r : r + 3, c : c + 3] += m, nine numbers."""
-    for i in range(3):
-        hessian[r + i, c] += m[3 * i]
-        hessian[r + i, c + 1] += m[3 * i + 1]
-        hessian[r + i, c + 2] += m[3 * i + 2]
+    hessian[r, c] += m[0]
+    hessian[r, c + 1] += m[1]
+    hessian[r, c + 2] += m[2]
+    hessian[r + 1, c] += m[3]
+    hessian[r + 1, c + 1] += m[4]
+    hessian[r + 1, c + 2] += m[5]
+    hessian[r + 2, c] += m[6]
+    hessian[r + 2, c + 1] += m[7]
+    hessian[r + 2, c + 2] += m[8]
 
 
 @kernel(inline=True)
@@ -234,7 +247,7 @@ def add_stretch(hessian, a, b, r, t, n, w):
     add_block(hessian, a + 3, b + 3, general(scale(-w, t), r, scale(-w, rn), tn, ZERO, w * dot(r, t)))
 
 
-@kernel(inner=True)
+@kernel(inline=True)
 def add_point_terms(kind, component, records, k, y, hessian, f, g):
     """`add_coordinate_hessian` of COINCIDENT, SLIDE and DISTANCE."""
     arm_f = load(records, k, ARM_A)
@@ -274,16 +287,15 @@ def add_point_terms(kind, component, records, k, y, hessian, f, g):
         add_block(hessian, g + 3, g + 3, symmetric(n, arm_g, ZERO, ZERO, dot(n, arm_g)))
 
 
-@kernel(inner=True)
-def add_coordinate_hessian(kind, component, records, k, y, hessian, f, g):
-    """Upper triangle of hessian += y (second derivative of a coordinate), twists at f.. and g.., negative: fixed."""
-    if kind == COINCIDENT or kind == SLIDE or kind == DISTANCE:
-        add_point_terms(kind, component, records, k, y, hessian, f, g)
-        return
-    # K = sym(a b^T) + sym(c d^T) - t I.
+@kernel(inline=True)
+def turning_form(kind, component, records, k):
+    """h, and a, b, c, d, t of K = sym(a b^T) + sym(c d^T) - t I, of a coordinate of angles."""
     z = load(records, k, AXES_A + 6)
+    a = ZERO
+    b = ZERO
     c = ZERO
     d = ZERO
+    h = ZERO
     t = 0.0
     if kind == SWING:
         _value, u, hu, c, phi, j, m, e, w = swing(component, records, k)
@@ -293,14 +305,13 @@ def add_coordinate_hessian(kind, component, records, k, y, hessian, f, g):
         d = blend(2.0 * e, hu, w, c)
         h = blend(phi, hu, j, c)
     elif kind == TURN:
-        # h = 2 m / |m|^2 with the rate of |m|^2 / 2 = 1 + z_a.z_b along m x z_a.
+        # h = 2 m / |m|^2, and |m|^2 / 2 = 1 + z_a.z_b changes along m x z_a.
         m = add(z, load(records, k, AXES_B + 6))
         square = dot(m, m)
-        if square < POLE * POLE:
-            return
-        h = scale(2.0 / square, m)
-        a = scale(-2.0 / square, h)
-        b = cross(m, z)
+        if square >= POLE * POLE:
+            h = scale(2.0 / square, m)
+            a = scale(-2.0 / square, h)
+            b = cross(m, z)
     elif kind == DOT:
         a = load(records, k, AXES_A + 3 * (component // 3))
         b = load(records, k, AXES_B + 3 * (component % 3))
@@ -308,14 +319,14 @@ def add_coordinate_hessian(kind, component, records, k, y, hessian, f, g):
         h = cross(b, a)
     elif kind == AZIMUTH:
         v = load(records, k, AXES_B + 3 * component)
-        a = cross(z, v)
-        square = dot(a, a)
-        if square < POLE * POLE:
-            return
-        h = scale(1.0 / square, cross(v, a))
-        b = blend(1.0 / square, v, -2.0 * dot(z, v) / square, h)
+        across = cross(z, v)
+        square = dot(across, across)
+        if square >= POLE * POLE:
+            h = scale(1.0 / square, cross(v, across))
+            a = across
+            b = blend(1.0 / square, v, -2.0 * dot(z, v) / square, h)
     else:
-        # K = (c (I - n n^T) - sym(z_a z_b^T)) / s, n the gradient.
+        # K = (c (I - h h^T) - sym(z_a z_b^T)) / s.
         cosine, s, h = tilt(records, k)
         steep = 1.0 / max(s, CLOSE)
         a = scale(-steep, z)
@@ -323,16 +334,23 @@ def add_coordinate_hessian(kind, component, records, k, y, hessian, f, g):
         t = -steep * cosine
         c = h
         d = scale(t, h)
-    a = scale(y, a)
-    c = scale(y, c)
-    if f >= 0 or g >= 0:
-        block = symmetric(a, b, c, d, y * t)
+    return h, a, b, c, d, t
+
+
+@kernel(inner=True)
+def add_coordinate_hessian(kind, component, records, k, y, hessian, f, g):
+    """Upper triangle of hessian += y (second derivative of a coordinate), twists at f.. and g.., negative: fixed."""
+    if kind == COINCIDENT or kind == SLIDE or kind == DISTANCE:
+        add_point_terms(kind, component, records, k, y, hessian, f, g)
+    elif f >= 0 or g >= 0:
+        h, a, b, c, d, t = turning_form(kind, component, records, k)
+        block = symmetric(scale(y, a), b, scale(y, c), d, y * t)
         if f >= 0:
             add_block(hessian, f + 3, f + 3, block)
         if g >= 0:
             add_block(hessian, g + 3, g + 3, block)
         if f >= 0 and g >= 0:
-            x, y1, z1 = scale(0.5 * y if f < g else -0.5 * y, h)
+            x, y, z = scale(0.5 * y if f < g else -0.5 * y, h)
             xx, xy, xz, _yx, yy, yz, _zx, _zy, zz = block
-            cross_block = (-xx, -xy - z1, -xz + y1, -xy + z1, -yy, -yz - x, -xz - y1, -yz + x, -zz)
-            add_block(hessian, min(f, g) + 3, max(f, g) + 3, cross_block)
+            other = (-xx, -xy - z, -xz + y, -xy + z, -yy, -yz - x, -xz - y, -yz + x, -zz)
+            add_block(hessian, min(f, g) + 3, max(f, g) + 3, other)
