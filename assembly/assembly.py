@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.constraints.constraint import Constraint, structure_changes
-from assembly.constraints.objectives import FrameDistance, Objective, PointDistance, Posture
+from assembly.constraints.expression import Expression
+from assembly.constraints.objectives import Objective, Posture
 from assembly.constraints.packing import Packed, pack
 from assembly.errors import InputError, vector
 from assembly.kinematics.body import Body
@@ -120,8 +121,10 @@ class Assembly:
 
     def _add_terms(self, sign: float, objectives: Iterable[Objective]) -> None:
         for objective in objectives:
-            if not isinstance(objective, (PointDistance, FrameDistance, Posture)):
-                raise TypeError(f"objective is {objective!r}; expected PointDistance, FrameDistance or Posture")
+            if not isinstance(objective, Objective):
+                raise TypeError(f"objective is {objective!r}; expected an objective such as PointDistance or Posture")
+            if isinstance(objective, Expression) and objective.count != 1:
+                raise InputError(f"objective {objective.name!r} has {objective.count} values; expected one")
             self._check_bodies(repr(objective), objective.bodies)
             self._objectives.append((sign, objective))
             self._packed = None

@@ -7,10 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.constraints import program, terms
+from assembly.constraints import program, tape, terms
 from assembly.constraints.constraint import Constraint, Coordinate, Equation, FramePair, structure_changes
 from assembly.constraints.contact import Contact
 from assembly.constraints.couplings import Coupling
+from assembly.constraints.expression import Expression
 from assembly.constraints.joint import Joint
 from assembly.constraints.numbering import number_bodies
 from assembly.constraints.objectives import FrameDistance, Objective, PointDistance, Posture
@@ -71,6 +72,7 @@ class Packed:
         self._postures: list[tuple[Posture, int, int]] = []
         self._values: list[tuple[Equation, int, float]] = []
         self._angles: list[Coordinate] = []
+        self._room = [0, 0, 0]
         self._frames: dict[int, tuple[int, FramePair]] = {}
         self._table: list[Table] = []
         self._pool: list[Array] = []
@@ -127,14 +129,25 @@ class Packed:
         others = [item for item in constraints if isinstance(item, (Joint, Coupling))]
         others.sort(key=lambda item: max(slots[self._places[id(body)]] for body in item.bodies))
         extra = 0
-        for item in others:
-            for equation in item.equations:
+        for joint in others:
+            for equation in joint.equations:
                 rows.append(self._equation(equation))
-                owners.append(numbers[id(item)])
+                owners.append(numbers[id(joint)])
                 extra = max(extra, 2 * (len(equation.terms) - 1))
+        tapes: list[list[int]] = []
         for item in constraints:
-            if item not in others and item not in self.contacts:
-                raise TypeError(f"constraint is {item!r}; expected a Contact, a joint, a coupling or an Expression")
+            if isinstance(item, Expression):
+                side = int(item.unilateral)
+                places = [self._places[id(body)] for body in item.bodies]
+                tapes.append(self._tape(item, len(rows)))
+                rows += [
+                    [program.TAPE_ROW, *[*places, -1][:2], side, 0, 0, len(tapes) - 1, value]
+                    for value in range(item.count)
+                ]
+                owners += [numbers[id(item)]] * item.count
+                extra = max(extra, len(places) - 2)
+        header[program.TAPE_TABLE], _ = self._add([field for tape in tapes for field in tape])
+        header[program.TAPES] = len(tapes)
         header[program.ROW_TABLE], _ = self._add(
             [field for row in rows for field in row + [0] * (program.ROW - len(row))]
         )
@@ -145,7 +158,7 @@ class Packed:
         header[program.TERM_TABLE], _ = self._add(
             [field for term in terms_ for field in term + [0] * (terms.TERM - len(term))]
         )
-        header[program.TAPE_ROOM], _ = self._add([0, 0, 0])
+        header[program.TAPE_ROOM], _ = self._add(self._room)
         header[program.BODIES] = len(bodies)
         header[program.MOVING] = int(slots.max()) + 1
         header[program.CONTACTS] = len(self.contacts)
@@ -164,7 +177,7 @@ class Packed:
 
     def _natural_unit(self, objective: Objective) -> float:
         """What an objective of order one in scaled lengths counts in the user's units."""
-        return self.scale**2
+        return 1.0 if isinstance(objective, Expression) else self.scale**2
 
     def _coordinate(self, coordinate: Coordinate) -> tuple[list[int], list[int]]:
         """The fields of a coordinate in a row, and its bodies."""
@@ -193,6 +206,20 @@ class Packed:
         self._values.append((equation, at + 2, unit))
         flags = [int(equation.one_sided), int(equation.is_drive), int(not first.is_angle)]
         return [program.JOINT_ROW, *bodies, *flags, *fields, at, second]
+
+    def _tape(self, expression: Expression, row: int) -> list[int]:
+        """Pack the instructions of an expression; its record."""
+        places = []
+        for instructions in expression.tapes:
+            table = instructions.table.copy()
+            table[tape.CONSTANTS] += self._pool_size
+            places.append(self._add(table, instructions.constants)[0])
+            self._room[2] = max(self._room[2], int(table[tape.WORK]))
+        bodies, count = len(expression.bodies), expression.count
+        self._room[0] = max(self._room[0], 7 * bodies + count)
+        self._room[1] = max(self._room[1], count + 6 * bodies * count, 36 * bodies**2)
+        listed, at = self._add([self._places[id(body)] for body in expression.bodies], [expression.scale])
+        return [*places, count, bodies, listed, row, at, 0]
 
     def _joints(self) -> int:
         """Pack the frames; where their records begin."""
@@ -226,6 +253,10 @@ class Packed:
             return [[terms.POINT_DISTANCE, self._places[id(objective.point.body)], at]]
         if isinstance(objective, FrameDistance):
             return self._frame_terms(weight, objective)
+        if isinstance(objective, Expression):
+            _, at = self._add(pool=[weight])
+            listed, _ = self._add(self._tape(objective, -1))
+            return [[terms.TAPE_TERM, -1, at, listed]]
         assert isinstance(objective, Posture)
         if objective.reference is not None and len(objective.reference) != len(bodies):
             raise InputError(f"reference has {len(objective.reference)} rows; expected one per body, {len(bodies)}")

@@ -4,10 +4,13 @@ All lengths in a program are divided by the scene's length scale. Table: a heade
 every body (-1: fixed), then a record a row (contacts first), a joint, a tape and an objective term. The loop works on
 
     configuration  (n, 7)       poses, scaled, positions relative to a reference
-    tracked        (k, 4)       parameters of every contact's pair, then the unwrapped angles of joints
-    records        (k + j, R)   what the gaps' derivatives need (see `track_contact`), then the joints' frames in the world
-    residual       (m,)         rows
+    tracked        (k, 4)       parameters of every contact's pair, then (first column) unwrapped angles of joints
+    records        (k + j, R)   what the derivatives of gaps need (see `track_contact`), then frames of joints
+    residual       (m,)         rows: contacts, joints, tapes; behind them four for every free pair
     jacobian       (m, 16 + e)  in the twists of a row's two bodies (12), a free pair's coordinates (4), further bodies
+
+A row of a joint is c_1 coordinate_1 + c_2 coordinate_2 - value (`primitives.py`); rows of a tape are the values of a
+user's expression (`tape.py`).
 """
 
 from __future__ import annotations
@@ -47,7 +50,6 @@ JOINT_RECORD = 3
 # its first row, where the size of one unit is in the pool.
 TAPE_RECORD = 8
 TAPE_FIRST, TAPE_SECOND, TAPE_VALUES, TAPE_BODIES, TAPE_LIST, TAPE_ROW_AT, TAPE_SCALE = 0, 1, 2, 3, 4, 5, 6
-# Room that tapes need: (inputs, outputs, work).
 # Columns of the Jacobian: twists of f and g, a free pair's coordinates, further bodies.
 FREE_COLUMN, EXTRA_COLUMN = 12, 16
 # Behind a contact's record: whether the surfaces do not cross at it, and how far it is from a fold (det H / |H|^2).

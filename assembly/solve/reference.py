@@ -195,14 +195,14 @@ class ReferenceSolver:
         self._fixed = [k for k, body in enumerate(scene.bodies) if body.fixed]
         patches: dict[NurbsSurface, _Patch] = {}
         self._pairs: list[_Pair] = []
-        for contact, faces in zip(scene.constraints, packed.faces, strict=True):
+        for contact, faces in zip(packed.contacts, packed.faces, strict=True):
             for side in faces:
                 if side.face.surface not in patches:
                     patches[side.face.surface] = _Patch(side.face.surface, packed.scale)
             f, g = (patches[side.face.surface] for side in faces)
             i, j = (scene.bodies.index(body) for body in contact.bodies)
             self._pairs.append(_Pair(faces, (i, j), (f, g)))
-        self._one_sided = np.array([contact.unilateral for contact in scene.constraints], dtype=bool)
+        self._one_sided = np.array([contact.unilateral for contact in packed.contacts], dtype=bool)
         self._terms: list[tuple[PointDistance | Posture, int]] = []
         self._build(scene)
 

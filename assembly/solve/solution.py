@@ -154,7 +154,7 @@ class Solution:
 
     @cached_property
     def violations(self) -> dict[str, float]:
-        """Violation of every constraint, by name: the largest of its rows, lengths in the user's unit, angles in radians."""
+        """Violation of every constraint, by name: its largest; lengths in the user's unit, angles in radians."""
         packed = self._packed
         each = np.where(packed.one_sided, np.maximum(-self._residuals, 0.0), np.abs(self._residuals))
         return {
