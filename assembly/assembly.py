@@ -18,7 +18,7 @@ from assembly.errors import InputError, vector
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import pose_rows
 from assembly.proximity.pairs import inside
-from assembly.solve.augmented_lagrangian import HISTORY, ITERATIONS, RESULTS, solve_program
+from assembly.solve.augmented_lagrangian import HISTORY, ITERATIONS, RECENTER, RESULTS, solve_program
 from assembly.solve.options import Options
 from assembly.solve.solution import Scene, Solution, Status
 
@@ -185,6 +185,9 @@ class Assembly:
         else:
             settings = _WARM_SETTINGS if warm else _SETTINGS
         state = self._start(packed, q0, starts)
+        if not self._objectives:
+            settings = settings.copy()
+            settings[RECENTER] = 1.0
         history = np.empty((min(int(settings[ITERATIONS]), MOST_HISTORY) + 1, HISTORY))
         if not Assembly._loaded:
             # Loading the kernel, or compiling it, is no part of a solve's time.

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["number_bodies"]
+__all__ = ["gathering_order", "number_bodies"]
 
 
 def number_bodies(fixed: Sequence[bool], groups: Sequence[Sequence[int]]) -> NDArray[np.int64]:
@@ -33,3 +33,31 @@ def number_bodies(fixed: Sequence[bool], groups: Sequence[Sequence[int]]) -> NDA
     order = reverse_cuthill_mckee(graph, symmetric_mode=True)
     slots[moving[order]] = np.arange(moving.size)
     return slots
+
+
+def gathering_order(fixed: Sequence[bool], rows: Sequence[Sequence[int]]) -> list[tuple[int, list[int]]]:
+    """Bodies one after the other, each with the rows that it shares with bodies before it alone.
+
+    `rows` has the bodies of every row. Fixed bodies stand; where a group of bodies has none of these, the first one
+    of it stands.
+    """
+    meeting: list[set[int]] = [set() for _ in fixed]
+    for row, group in enumerate(rows):
+        for body in group:
+            meeting[body].add(row)
+    stands = [bool(value) for value in fixed]
+    order: list[tuple[int, list[int]]] = []
+    ready = [body for body, value in enumerate(stands) if value]
+    for seed in [*ready, *range(len(stands))]:
+        queue = [seed]
+        stands[seed] = True
+        while queue:
+            placed = queue.pop(0)
+            for row in sorted(meeting[placed]):
+                for body in rows[row]:
+                    if not stands[body]:
+                        stands[body] = True
+                        held = [r for r in sorted(meeting[body]) if all(stands[other] for other in rows[r])]
+                        order.append((body, held))
+                        queue.append(body)
+    return [(body, held) for body, held in order if held]

@@ -13,7 +13,7 @@ from assembly.constraints.contact import Contact
 from assembly.constraints.couplings import Coupling
 from assembly.constraints.expression import Expression
 from assembly.constraints.joint import Joint
-from assembly.constraints.numbering import number_bodies
+from assembly.constraints.numbering import gathering_order, number_bodies
 from assembly.constraints.objectives import FrameDistance, Objective, PointDistance, Posture
 from assembly.constraints.primitives import AZIMUTH, TURN, place_frames
 from assembly.constraints.primitives import RECORD as JOINT_FRAMES
@@ -152,6 +152,7 @@ class Packed:
             [field for row in rows for field in row + [0] * (program.ROW - len(row))]
         )
         header[program.JOINT_TABLE] = self._joints()
+        header[program.GATHER_TABLE] = self._gathering(bodies, rows)
         terms_: list[list[int]] = []
         for sign, objective in objectives:
             terms_.extend(self._terms(sign * objective.weight, objective, bodies))
@@ -174,6 +175,19 @@ class Packed:
         self.drives = table[:, program.DRIVE] == 1
         self.lengths = table[:, program.IS_LENGTH] == 1
         self.spans = [np.flatnonzero(self.owners == k) for k in range(len(constraints))]
+
+    def _gathering(self, bodies: Sequence[Body], rows: list[list[int]]) -> int:
+        """Pack the order in which scattered bodies are put together; where it begins."""
+        groups = []
+        for row in rows:
+            places = row[1:3] if row[0] == program.JOINT_ROW else []
+            if places and row[program.SECOND] >= 0:
+                second = np.concatenate(self._table)[row[program.SECOND] :]
+                places = [*places, *second[program.SECOND_BODY_F : program.SECOND_RECORD].tolist()]
+            groups.append(list(dict.fromkeys(places)))
+        order = gathering_order([body.fixed for body in bodies], groups)
+        fields = [field for body, held in order for field in (body, len(held), *held)]
+        return self._add([len(order), *fields])[0]
 
     def _natural_unit(self, objective: Objective) -> float:
         """What an objective of order one in scaled lengths counts in the user's units."""

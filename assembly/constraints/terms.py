@@ -117,6 +117,17 @@ def tape_term(table, pool, term, q, order, room, gradient, hessian):
 
 
 @kernel(inner=True)
+def recenter(table, pool, q):
+    """Every posture from where its body is now."""
+    for t in range(table[TERMS]):
+        term = table[TERM_TABLE] + TERM * t
+        if table[term + TERM_KIND] == POSTURE:
+            o = table[term + TERM_PARAMETERS] + POSTURE_POSITION
+            for k in range(7):
+                pool[o + k] = q[table[term + TERM_BODY], k]
+
+
+@kernel(inner=True)
 def objective(table, pool, q, order, room, last, gradient, hessian):
     """Value of the objective. From order 1 on the gradient and the upper triangle of the Hessian are overwritten.
 

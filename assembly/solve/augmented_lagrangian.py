@@ -11,6 +11,8 @@ along which a line search runs (`search.py`); multipliers follow every step. -mu
 
 A contact whose pair comes to a fold gets its coordinates as unknowns (`proximity/free_pair.py`) for the rest of the
 solve.
+Scattered bodies are gathered first (`gather.py`). The objective of a solve that is given none, that bodies move little,
+is then measured from where they are gathered.
 Where rows cannot all hold, the same step with f = 0, y = 0, mu = 1 minimizes |c|^2 / 2, and the loop says INFEASIBLE
 at its stationary point.
 """
@@ -29,20 +31,26 @@ from assembly.constraints.program import (
     EXTRA,
     EXTRA_COLUMN,
     FOLD,
+    JOINT_ROW,
     JOINTS,
+    KIND,
     MOVING,
     REFERENCE,
+    ROW,
+    ROW_TABLE,
     ROWS,
     SCALE,
+    SLOTS,
     TAPE_ROOM,
     TRACKED,
     add_row_terms,
     evaluate,
 )
-from assembly.constraints.terms import objective
+from assembly.constraints.terms import objective, recenter
 from assembly.proximity.free_pair import VARIABLES, VECTORS
 from assembly.solve.contacts import free_folds, start_contacts
-from assembly.solve.linear import factorize_shifted, substitute
+from assembly.solve.gather import gather
+from assembly.solve.linear import factorize_shifted, forward, substitute
 from assembly.solve.report import judge, write_pose, write_rows
 from assembly.solve.rows import (
     add_transposed,
@@ -58,7 +66,7 @@ from assembly.solve.search import SHORTEST, search
 # Outcomes; `solution.Status` gives each a sentence. RUNNING is none of them.
 SOLVED, INFEASIBLE, STALLED, ITERATION_LIMIT, CONTACT_LOST, RUNNING = 0, 1, 2, 3, 4, 5
 # Settings, in scaled lengths.
-FEASIBILITY, STATIONARITY, ITERATIONS, PENALTY, PENALTY_FLOOR, RADIUS, SETTINGS = 0, 1, 2, 3, 4, 5, 8
+FEASIBILITY, STATIONARITY, ITERATIONS, PENALTY, PENALTY_FLOOR, RADIUS, RECENTER, SETTINGS = 0, 1, 2, 3, 4, 5, 6, 8
 # Results at the end of the state.
 STATUS, COUNT, OBJECTIVE, VIOLATION, DUAL, CULPRIT, IMPROPER, RESULTS = 0, 1, 2, 3, 4, 5, 6, 8
 HISTORY = 7  # figures an iteration: objective, feasibility, stationarity, mu, regularization, step length, radius
@@ -71,6 +79,11 @@ RESTORATIONS = 3
 WEAK = 1e-3
 # A violation above this, at the stationary point of all violations, tells that the rows cannot hold.
 TOUCHING = 1e-9
+# Bodies are gathered where a start violates a row of a joint by more than this.
+SCATTERED = 0.5
+# A body turns by this much at most in a step, and this often a step is shortened by a larger shift.
+TURN = 1.0
+SHORTENINGS = 4
 
 
 @kernel(inner=True)
@@ -124,17 +137,59 @@ def curve_rows(rows, residual, y, active, restoring, forces):
 
 
 @kernel(inner=True)
-def shorten(table, n, radius, step):
-    """The factor that keeps a step in the radius and turns below a radian, and the largest component before it."""
+def lengths_of(table, n, step):
+    """The largest component of a step, and the largest turn of a body."""
     longest = 0.0
     turn = 0.0
     for i in range(n):
         longest = max(longest, abs(step[i]))
         if i % 6 >= 3 and i < 6 * table[MOVING]:
             turn = max(turn, abs(step[i]))
-    cut = min(1.0, radius / longest) if longest > 0.0 else 1.0
-    cut = min(cut, 1.0 / turn) if turn > 0.0 else cut
-    return cut, longest
+    return longest, turn
+
+
+@kernel(inner=True)
+def newton_step(table, lagrangian, n, last, shift, matrix, descent, step, scratch):
+    """The step of the shifted matrix, shifted further until no body turns by much more than a radian.
+
+    Scaled down instead, a step would lose what its stiff directions gain. Returns the first shift that makes the
+    matrix positive definite (negative: none), that of the step, and the step's largest component and turn.
+    """
+    first = factorize_shifted(lagrangian, n, last, shift, matrix)
+    used = first
+    longest = 0.0
+    turn = 0.0
+    for attempt in range(SHORTENINGS + 1):
+        if used < 0.0:
+            break
+        for i in range(n):
+            step[i] = descent[i]
+        substitute(matrix, n, last, step)
+        longest, turn = lengths_of(table, n, step)
+        if turn <= 1.5 * TURN or attempt == SHORTENINGS:
+            break
+        # Newton's method on 1 / |step|, whose slope is |U^-T step|^2.
+        for i in range(n):
+            scratch[i] = step[i]
+        forward(matrix, n, last, scratch)
+        square = 0.0
+        slope = 0.0
+        for i in range(n):
+            square += step[i] * step[i]
+            slope += scratch[i] * scratch[i]
+        used = factorize_shifted(lagrangian, n, last, used + square / slope * (turn / TURN - 1.0), matrix)
+    return first, used, longest, turn
+
+
+@kernel(inner=True)
+def scattered(table, residual, one_sided):
+    """Whether a row of a joint is far from holding."""
+    for r in range(table[CONTACTS], table[ROWS]):
+        if table[table[ROW_TABLE] + ROW * r + KIND] == JOINT_ROW:
+            c = min(residual[r], 0.0) if one_sided[r] == 1 else residual[r]
+            if abs(c) > SCATTERED:
+                return True
+    return False
 
 
 @kernel
@@ -249,6 +304,17 @@ def solve_program(table, pool, settings, state, history):
         status = CONTACT_LOST
         results[CULPRIT] = float(lost)
         value = objective(table, pool, here[0], 0, room, last, gradient, lagrangian)
+    if status == RUNNING and scattered(table, here[3], one_sided):
+        gather(table, pool, bases, table[SLOTS], here)
+        if settings[RECENTER] == 1.0:
+            recenter(table, pool, here[0])
+        for r in range(m):
+            y[r] = 0.0
+            better_y[r] = 0.0
+        lost = evaluate(table, pool, here[1], math.inf, loose, room, here)
+        if lost >= 0:
+            status = CONTACT_LOST
+            results[CULPRIT] = float(lost)
     lost = np.int64(-1)
     below = FREE_BELOW
     while status == RUNNING:
@@ -279,8 +345,8 @@ def solve_program(table, pool, settings, state, history):
         residual = here[3]
         jacobian = here[4]
         descent, step, straight = lines
-        value = objective(table, pool, here[0], 1, room, last, gradient, lagrangian)
         violation = violation_of(residual, one_sided, rows)
+        value = objective(table, pool, here[0], 1, room, last, gradient, lagrangian)
         shortened = iteration > 0 and alpha < 1.0
         dual = choose_multipliers(shape, rows, here, shortened, active, gradient, descent, gram, y, better_y)
         if iteration < history.shape[0]:
@@ -330,14 +396,14 @@ def solve_program(table, pool, settings, state, history):
         curve_rows(rows, residual, y, active, restoring, forces)
         add_row_terms(table, pool, loose, room, bases, here, forces, active, lagrangian)
         # What the inertia needs falls with the distance to the solution.
-        shift = factorize_shifted(lagrangian, n, last, max(min(0.25 * shift, dual), 1e-8), matrix)
-        if shift < 0.0:
+        shift, used, longest, turn = newton_step(
+            table, lagrangian, n, last, max(min(0.25 * shift, dual), 1e-8), matrix, descent, step, straight
+        )
+        if used < 0.0:
             status = STALLED
             break
-        for i in range(n):
-            step[i] = descent[i]
-        substitute(matrix, n, last, step)
-        cut, longest = shorten(table, n, radius, step)
+        cut = min(1.0, radius / longest) if longest > 0.0 else 1.0
+        cut = min(cut, 1.0 / turn) if turn > 0.0 else cut
         slope = 0.0
         steepest = 0.0
         for i in range(n):
@@ -404,7 +470,7 @@ def solve_program(table, pool, settings, state, history):
                     better_y[r] = min(better_y[r], 0.0)
         here, trial = trial, here
         if alpha == 1.0:
-            if cut == 1.0:
+            if cut == 1.0 and used == shift:
                 mu = max(0.1 * mu, settings[PENALTY_FLOOR])
             radius = min(2.0 * radius, 1e6)
         else:

@@ -35,13 +35,19 @@ def factorize(m, n, last):
 
 
 @kernel(inner=True)
-def substitute(m, n, last, b):
-    """Solve U^T U x = b in place, for the factor that `factorize` left."""
+def forward(m, n, last, b):
+    """Solve U^T x = b in place, for the factor that `factorize` left."""
     for k in range(n):
         s = b[k] * m[k, k]
         b[k] = s
         for i in range(k + 1, last[k] + 1):
             b[i] -= m[k, i] * s
+
+
+@kernel(inner=True)
+def substitute(m, n, last, b):
+    """Solve U^T U x = b in place."""
+    forward(m, n, last, b)
     for k in range(n - 1, -1, -1):
         s = b[k]
         for i in range(k + 1, last[k] + 1):

@@ -1,0 +1,135 @@
+"""Scattered bodies put together one after the other, so that the loop starts near where joints hold.
+
+Bodies are taken in an order (`packing.py`) in which each has joints with bodies that stand already. Each is moved by
+Levenberg and Marquardt's method until the rows it shares with those are as small as they get: exactly zero where the
+joints make a tree. Rows that close a loop are left to the loop of the solve.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from assembly._kernel import kernel
+from assembly.constraints.program import (
+    CONTACTS,
+    EXTRA_COLUMN,
+    GATHER_TABLE,
+    JOINT,
+    JOINT_RECORD,
+    JOINT_TABLE,
+    ONE_SIDED,
+    ROW,
+    ROW_TABLE,
+    SECOND,
+    joint_row,
+)
+from assembly.constraints.primitives import place_frames
+from assembly.kinematics.motion import retract
+from assembly.solve.linear import factorize, substitute
+
+STEPS = 50
+# Half the sum of squares of a body's rows that is as good as zero.
+ENOUGH = 1e-26
+# The damping at first, and where no step is found any more.
+DAMPING, STUCK = 1e-4, 1e6
+
+
+@kernel(inner=True)
+def place_joint(table, pool, k, q, records):
+    """The world frames of joint k."""
+    joint = table[JOINT_TABLE] + JOINT_RECORD * k
+    place_frames(pool, table[joint + 2], q, table[joint], table[joint + 1], records, table[CONTACTS] + k)
+
+
+@kernel(inner=True)
+def body_rows(table, pool, first, count, point):
+    """Evaluate the rows listed in the table; half the sum of squares of those that do not hold."""
+    q, tracked, records, residual, jacobian = point
+    cost = 0.0
+    for l in range(first, first + count):
+        r = table[l]
+        row = table[ROW_TABLE] + ROW * r
+        second = table[row + SECOND]
+        place_joint(table, pool, table[row + JOINT], q, records)
+        if second >= 0:
+            place_joint(table, pool, table[second + 2], q, records)
+        joint_row(table, pool, r, tracked, tracked, records, residual, jacobian)
+        if table[row + ONE_SIDED] == 0 or residual[r] < 0.0:
+            cost += 0.5 * residual[r] * residual[r]
+    return cost
+
+
+@kernel(inner=True)
+def body_row(bases, jacobian, r, s, out):
+    """Row r of the Jacobian in the one body whose twist stands at s."""
+    for i in range(6):
+        out[i] = 0.0
+    for b in range(bases.shape[1]):
+        if bases[r, b] == s and b != 2:
+            column = 6 * b if b < 2 else EXTRA_COLUMN + 6 * (b - 3)
+            for i in range(6):
+                out[i] += jacobian[r, column + i]
+
+
+@kernel(inner=True)
+def gather(table, pool, bases, slots, point):
+    """Move the bodies of the point one by one."""
+    q, tracked, _records, residual, jacobian = point
+    matrix = np.empty((6, 6))
+    damped = np.empty((6, 6))
+    last = np.full(6, 5)
+    row = np.empty(6)
+    slope = np.empty(6)
+    step = np.empty(6)
+    before = np.empty(7)
+    o = table[GATHER_TABLE] + 1
+    for _entry in range(table[table[GATHER_TABLE]]):
+        body = table[o]
+        count = table[o + 1]
+        first = o + 2
+        o = first + count
+        s = 6 * table[slots + body]
+        damping = DAMPING
+        cost = body_rows(table, pool, first, count, point)
+        for _step in range(STEPS):
+            if cost <= ENOUGH or damping > STUCK:
+                break
+            for i in range(6):
+                slope[i] = 0.0
+                for j in range(i, 6):
+                    matrix[i, j] = 0.0
+            for l in range(first, first + count):
+                r = table[l]
+                if table[table[ROW_TABLE] + ROW * r + ONE_SIDED] == 1 and residual[r] >= 0.0:
+                    continue
+                body_row(bases, jacobian, r, s, row)
+                for i in range(6):
+                    slope[i] += row[i] * residual[r]
+                    for j in range(i, 6):
+                        matrix[i, j] += row[i] * row[j]
+            for k in range(7):
+                before[k] = q[body, k]
+            while damping <= STUCK:
+                for i in range(6):
+                    step[i] = -slope[i]
+                    for j in range(i, 6):
+                        damped[i, j] = matrix[i, j]
+                    damped[i, i] += damping
+                if factorize(damped, 6, last):
+                    substitute(damped, 6, last, step)
+                    turn = math.sqrt(step[3] * step[3] + step[4] * step[4] + step[5] * step[5])
+                    cut = 1.0 if turn <= 1.0 else 1.0 / turn
+                    for i in range(6):
+                        step[i] *= cut
+                    retract(q, body, (step[0], step[1], step[2]), (step[3], step[4], step[5]), q)
+                    there = body_rows(table, pool, first, count, point)
+                    if there < cost:
+                        cost = there
+                        damping = max(0.1 * damping, 1e-12)
+                        break
+                for k in range(7):
+                    q[body, k] = before[k]
+                damping *= 10.0
+        body_rows(table, pool, first, count, point)
