@@ -188,7 +188,12 @@ class _Cache(caching._Cache):
 
 
 def kernel(
-    function: Callable[..., Any] | None = None, *, inline: bool = False, inner: bool = False, exact: bool = False
+    function: Callable[..., Any] | None = None,
+    *,
+    inline: bool = False,
+    inner: bool = False,
+    exact: bool = False,
+    allocates: bool = False,
 ) -> Any:
     """Compile a function with the project's settings.
 
@@ -201,6 +206,9 @@ def kernel(
         of its compile time. From Python it runs as plain Python.
     exact
         No fused multiply-add: for code whose rounding is part of a proof.
+    allocates
+        Whether an inline or inner kernel makes arrays. One that does not counts no references to those it is given,
+        which its caller holds: the atomic counts of nested calls cost more than their work.
 
     Notes
     -----
@@ -208,11 +216,11 @@ def kernel(
     the cache knows nothing of its source.
     """
     if function is None:
-        return lambda f: kernel(f, inline=inline, inner=inner, exact=exact)
+        return lambda f: kernel(f, inline=inline, inner=inner, exact=exact, allocates=allocates)
     fastmath: Any = False if exact else {"contract"}
     settings: dict[str, Any] = {"fastmath": fastmath, "error_model": "numpy", "nogil": True}
     if inline or inner:
-        return register_jitable(**settings, forceinline=inline)(function)
+        return register_jitable(**settings, forceinline=inline, _nrt=allocates)(function)
     compiled = njit(**settings)(function)
     stamped = _PACKAGE in Path(function.__code__.co_filename).resolve().parents
     if not config.DISABLE_JIT and stamped and _FOLDER is not None:

@@ -12,13 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly.constraints.constraint import Constraint, structure_changes
 from assembly.constraints.expression import Expression
-from assembly.constraints.objectives import Objective, Posture
+from assembly.constraints.objectives import Objective
 from assembly.constraints.packing import Packed, pack
 from assembly.errors import InputError, vector
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import pose_rows
 from assembly.proximity.pairs import inside
-from assembly.solve.augmented_lagrangian import HISTORY, ITERATIONS, RECENTER, RESULTS, solve_program
+from assembly.solve.augmented_lagrangian import HISTORY, ITERATIONS, RESULTS, solve_program
 from assembly.solve.options import Options
 from assembly.solve.solution import Scene, Solution, Status
 
@@ -145,8 +145,7 @@ class Assembly:
         if self._packed is None or self._packed.stamp != structure_changes():
             if all(body.fixed for body in self._bodies):
                 raise InputError(f"bodies are {[body.name for body in self._bodies]}, none moving; expected one")
-            terms = self._objectives or [(1.0, Posture())]
-            packed = pack(self._bodies, self._constraints, terms)
+            packed = pack(self._bodies, self._constraints, self._objectives)
             self._scene = Scene(
                 self.bodies, self.constraints, tuple(packed.contacts), tuple(packed.faces), packed.scale
             )
@@ -185,9 +184,6 @@ class Assembly:
         else:
             settings = _WARM_SETTINGS if warm else _SETTINGS
         state = self._start(packed, q0, starts)
-        if not self._objectives:
-            settings = settings.copy()
-            settings[RECENTER] = 1.0
         history = np.empty((min(int(settings[ITERATIONS]), MOST_HISTORY) + 1, HISTORY))
         if not Assembly._loaded:
             # Loading the kernel, or compiling it, is no part of a solve's time.
@@ -213,7 +209,7 @@ class Assembly:
             state[packed.contacts_at : packed.angles_at] = np.nan
         if starts:
             self._place_starts(packed, state, starts)
-        packed.refresh(q)
+        packed.refresh()
         packed.start_angles(q, state, isinstance(q0, Solution))
         return state
 

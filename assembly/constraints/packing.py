@@ -69,7 +69,6 @@ class Packed:
         self.faces = [_choose_faces(contact) for contact in self.contacts]
         self._targets: list[tuple[PointDistance | FrameDistance, int]] = []
         self._turns: list[tuple[FrameDistance, int]] = []
-        self._postures: list[tuple[Posture, int, int]] = []
         self._values: list[tuple[Equation, int, float]] = []
         self._angles: list[Coordinate] = []
         self._room = [0, 0, 0]
@@ -78,9 +77,12 @@ class Packed:
         self._pool: list[Array] = []
         self._table_size = self._pool_size = 0
         self._header = np.zeros(program.HEADER, dtype=np.int64)
-        self._build(bodies, constraints, objectives)
+        implicit = not objectives
+        self._build(bodies, constraints, objectives or [(1.0, Posture())])
+        self._header[program.IMPLICIT] = int(implicit)
         self.table = np.concatenate(self._table)
         self.pool = np.concatenate(self._pool)
+        self._sources = [item for item in self._values if item[0].source is not None]
         self._turned = Turns(self._angles, [(equation, at) for equation, at, _ in self._values])
         self.rows = int(self._header[program.ROWS])
         self.tracked = len(self.contacts) + len(self._angles)
@@ -278,9 +280,10 @@ class Packed:
         for k, body in enumerate(bodies):
             if not body.fixed:
                 lever = 0.5 * (body.size or self.scale) / self.scale
-                _, at = self._add(pool=[weight, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, weight * lever**2])
-                self._postures.append((objective, k, at + terms.POSTURE_POSITION))
-                records.append([terms.POSTURE, k, at])
+                row = body.q if objective.reference is None else objective.reference[k]
+                place = (row[:3] - self.reference) / self.scale
+                _, at = self._add(pool=[weight, *place, *row[3:], weight * lever**2])
+                records.append([terms.POSTURE, k, at, 0, int(objective.reference is None)])
         return records
 
     def _frame_terms(self, weight: float, objective: FrameDistance) -> list[list[int]]:
@@ -298,6 +301,10 @@ class Packed:
         """Write the turns that angles start on into a state."""
         if not self._angles:
             return
+        near = state[self.angles_at : self.multipliers_at : 4]
+        if warm and not self._turned.coupled:
+            self._turned.follow_drives(self.pool, near)
+            return
         scaled = q.copy()
         scaled[:, :3] = (q[:, :3] - self.reference) / self.scale
         records = np.empty((1, JOINT_FRAMES))
@@ -309,15 +316,14 @@ class Packed:
             value = float(coordinate_value(coordinate.kind, coordinate.component, records, 0, near)[0])
             return value if coordinate.is_angle else value * self.scale
 
-        self._turned.start(self.pool, state[self.angles_at : self.multipliers_at : 4], warm, evaluate)
+        self._turned.start(self.pool, near, warm, evaluate)
 
-    def refresh(self, q: Array) -> None:
-        """Write what may have changed since the last solve: values, targets, and postures that follow the start q."""
+    def refresh(self) -> None:
+        """Write what may have changed since the last solve: values and targets."""
         pool, scale = self.pool, self.scale
         x, y, z = self.reference.tolist()
-        for equation, at, unit in self._values:
-            if equation.source is not None:
-                pool[at] = equation.current() / unit
+        for equation, at, unit in self._sources:
+            pool[at] = equation.current() / unit
         for distance, at in self._targets:
             target = distance._target
             pool[at] = (target[0] - x) / scale
@@ -325,10 +331,6 @@ class Packed:
             pool[at + 2] = (target[2] - z) / scale
         for frame_distance, at in self._turns:
             pool[at : at + 4] = frame_distance.body_quaternion
-        for posture, body, at in self._postures:
-            row = q[body] if posture.reference is None else posture.reference[body]
-            pool[at : at + 3] = (row[:3] - self.reference) / scale
-            pool[at + 3 : at + 7] = row[3:]
 
 
 def _scene_size(
@@ -379,5 +381,5 @@ def _choose_faces(contact: Contact) -> tuple[BodyFace, BodyFace]:
 def pack(
     bodies: Sequence[Body], constraints: Sequence[Constraint], objectives: Sequence[tuple[float, Objective]]
 ) -> Packed:
-    """Pack a scene. `objectives` are (sign, term): 1 to minimize, -1 to maximize."""
+    """Pack a scene. `objectives` are (sign, term): 1 to minimize, -1 to maximize; a posture where there is none."""
     return Packed(bodies, constraints, objectives)

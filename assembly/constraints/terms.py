@@ -15,9 +15,9 @@ from assembly.constraints.tape import run_tape
 from assembly.geometry.vec import add, cross, dot, matvec, quaternion_product, sub
 from assembly.kinematics.motion import position, rotation
 
-# A term: kind, body, offset of its parameters, and of a tape: instructions for values and Hessian, bodies, their list.
+# A term: kind, body, offset of its parameters, its tape, and whether a posture is that of the start of each solve.
 TERM = 8
-TERM_KIND, TERM_BODY, TERM_PARAMETERS, TERM_TAPE = 0, 1, 2, 3
+TERM_KIND, TERM_BODY, TERM_PARAMETERS, TERM_TAPE, TERM_FOLLOWS = 0, 1, 2, 3, 4
 POINT_DISTANCE, POSTURE, TAPE_TERM, DEXTERITY = 0, 1, 2, 3
 # Parameters of a posture.
 POSTURE_LENGTH, POSTURE_POSITION, POSTURE_QUATERNION, POSTURE_TURN, POSTURE_PARAMETERS = 0, 1, 4, 8, 9
@@ -118,10 +118,10 @@ def tape_term(table, pool, term, q, order, room, gradient, hessian):
 
 @kernel(inner=True)
 def recenter(table, pool, q):
-    """Every posture from where its body is now."""
+    """Postures that have no reference of their own from where their bodies are now."""
     for t in range(table[TERMS]):
         term = table[TERM_TABLE] + TERM * t
-        if table[term + TERM_KIND] == POSTURE:
+        if table[term + TERM_KIND] == POSTURE and table[term + TERM_FOLLOWS] == 1:
             o = table[term + TERM_PARAMETERS] + POSTURE_POSITION
             for k in range(7):
                 pool[o + k] = q[table[term + TERM_BODY], k]

@@ -43,8 +43,19 @@ class Turns:
                 self._limits[k].append(equation)
             else:
                 self._drives[k] = at
+        self._driven = [(k, drive) for k, drive in enumerate(self._drives) if drive is not None]
         coupled = {id(coordinate) for equation in self._couplings for _, coordinate in equation.terms}
         self._coupled = [id(angle) in coupled for angle in angles]
+
+    @property
+    def coupled(self) -> bool:
+        """Whether an angle is on a turn that another one tells."""
+        return bool(self._couplings)
+
+    def follow_drives(self, pool: Array, near: Array) -> None:
+        """Driven angles near their values; all there is to do in a warm start without couplings."""
+        for k, drive in self._driven:
+            near[k] = pool[drive]
 
     def start(self, pool: Array, near: Array, warm: bool, evaluate: Evaluate) -> None:
         """Write where each angle is looked for into `near`, which has the values found last of a warm start.

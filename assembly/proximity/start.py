@@ -100,7 +100,7 @@ def opposed(frame, rotation, table, pool, g, x):
     return dot(normal, matvec_t(rotation, frame[0])) < 0.0
 
 
-@kernel(inner=True)
+@kernel(inner=True, allocates=True)
 def approach(table, pool, f, g, rotation, shift, x):
     """Parameters with a smaller distance, and it, by direct search: nine points of each surface around the best."""
     fu = 0.03125 * (pool[table[f + BREAKS_U] + table[f + SPANS_U]] - pool[table[f + BREAKS_U]])
@@ -189,7 +189,7 @@ def lowest(score):
     return i
 
 
-@kernel(inner=True)
+@kernel(inner=True, allocates=True)
 def global_start(table, pool, f, g, rotation, shift, size):
     """Status, parameters and gap of the best extremal pair found; where there is none, the nearest points known."""
     nf = table[f + CELL_COUNT]

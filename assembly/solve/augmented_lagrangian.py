@@ -31,6 +31,7 @@ from assembly.constraints.program import (
     EXTRA,
     EXTRA_COLUMN,
     FOLD,
+    IMPLICIT,
     JOINT_ROW,
     JOINTS,
     KIND,
@@ -66,7 +67,7 @@ from assembly.solve.search import SHORTEST, search
 # Outcomes; `solution.Status` gives each a sentence. RUNNING is none of them.
 SOLVED, INFEASIBLE, STALLED, ITERATION_LIMIT, CONTACT_LOST, RUNNING = 0, 1, 2, 3, 4, 5
 # Settings, in scaled lengths.
-FEASIBILITY, STATIONARITY, ITERATIONS, PENALTY, PENALTY_FLOOR, RADIUS, RECENTER, SETTINGS = 0, 1, 2, 3, 4, 5, 6, 8
+FEASIBILITY, STATIONARITY, ITERATIONS, PENALTY, PENALTY_FLOOR, RADIUS, SETTINGS = 0, 1, 2, 3, 4, 5, 8
 # Results at the end of the state.
 STATUS, COUNT, OBJECTIVE, VIOLATION, DUAL, CULPRIT, IMPROPER, RESULTS = 0, 1, 2, 3, 4, 5, 6, 8
 HISTORY = 7  # figures an iteration: objective, feasibility, stationarity, mu, regularization, step length, radius
@@ -87,7 +88,7 @@ SHORTENINGS = 4
 
 
 @kernel(inner=True)
-def choose_multipliers(shape, rows, here, shortened, active, gradient, scratch, gram, y, better_y):
+def choose_multipliers(shape, rows, here, shortened, good, active, gradient, scratch, gram, y, better_y):
     """The better of y, of what the last step proposed, and after a shortened step of least squares; into y.
 
     Returns the dual residual.
@@ -96,7 +97,10 @@ def choose_multipliers(shape, rows, here, shortened, active, gradient, scratch, 
     residual = here[3]
     jacobian = here[4]
     dual = dual_residual(bases, jacobian, rows, one_sided, residual, gradient, better_y, scratch)
-    other = dual_residual(bases, jacobian, rows, one_sided, residual, gradient, y, scratch)
+    # Where they are as good as they should be, the old ones need no look.
+    other = math.inf
+    if dual > good:
+        other = dual_residual(bases, jacobian, rows, one_sided, residual, gradient, y, scratch)
     if dual <= other:
         for r in range(rows):
             y[r] = better_y[r]
@@ -137,35 +141,22 @@ def curve_rows(rows, residual, y, active, restoring, forces):
 
 
 @kernel(inner=True)
-def lengths_of(table, n, step):
-    """The largest component of a step, and the largest turn of a body."""
-    longest = 0.0
-    turn = 0.0
-    for i in range(n):
-        longest = max(longest, abs(step[i]))
-        if i % 6 >= 3 and i < 6 * table[MOVING]:
-            turn = max(turn, abs(step[i]))
-    return longest, turn
+def damped_step(table, lagrangian, n, last, shift, matrix, descent, step, scratch):
+    """The step of the factor in `matrix`, its shift raised until no body turns by much more than a radian.
 
-
-@kernel(inner=True)
-def newton_step(table, lagrangian, n, last, shift, matrix, descent, step, scratch):
-    """The step of the shifted matrix, shifted further until no body turns by much more than a radian.
-
-    Scaled down instead, a step would lose what its stiff directions gain. Returns the first shift that makes the
-    matrix positive definite (negative: none), that of the step, and the step's largest component and turn.
+    Scaled down instead, a step would lose what its stiff directions gain. Returns the shift, and the step's largest
+    component and turn.
     """
-    first = factorize_shifted(lagrangian, n, last, shift, matrix)
-    used = first
-    longest = 0.0
-    turn = 0.0
     for attempt in range(SHORTENINGS + 1):
-        if used < 0.0:
-            break
         for i in range(n):
             step[i] = descent[i]
         substitute(matrix, n, last, step)
-        longest, turn = lengths_of(table, n, step)
+        longest = 0.0
+        turn = 0.0
+        for i in range(n):
+            longest = max(longest, abs(step[i]))
+            if i % 6 >= 3 and i < 6 * table[MOVING]:
+                turn = max(turn, abs(step[i]))
         if turn <= 1.5 * TURN or attempt == SHORTENINGS:
             break
         # Newton's method on 1 / |step|, whose slope is |U^-T step|^2.
@@ -177,8 +168,16 @@ def newton_step(table, lagrangian, n, last, shift, matrix, descent, step, scratc
         for i in range(n):
             square += step[i] * step[i]
             slope += scratch[i] * scratch[i]
-        used = factorize_shifted(lagrangian, n, last, used + square / slope * (turn / TURN - 1.0), matrix)
-    return first, used, longest, turn
+        shift = factorize_shifted(lagrangian, n, last, shift + square / slope * (turn / TURN - 1.0), matrix)
+    return shift, longest, turn
+
+
+@kernel(inline=True, allocates=True)
+def unknowns(n):
+    """Room for n unknowns: gradient, (right side or scratch, step, step before it was bent), Hessian, its factor."""
+    vectors = np.empty((4, n))
+    matrices = np.empty((2, n, n))
+    return vectors[0], (vectors[1], vectors[2], vectors[3]), matrices[0], matrices[1]
 
 
 @kernel(inner=True)
@@ -207,22 +206,19 @@ def solve_program(table, pool, settings, state, history):
     rows = m
     most = m + 4 * pairs
     n = 6 * table[MOVING]
-    columns = EXTRA_COLUMN + 6 * table[EXTRA]
-    # A point of the search: poses, tracked values, records, residual, Jacobian.
-    here = (
-        np.empty((bodies, 7)),
-        np.empty((tracks, 4)),
-        np.empty((pairs + table[JOINTS], CONTACT_RECORD)),
-        np.empty(most),
-        np.empty((most, columns)),
-    )
-    trial = (
-        np.empty((bodies, 7)),
-        np.empty((tracks, 4)),
-        np.empty((pairs + table[JOINTS], CONTACT_RECORD)),
-        np.empty(most),
-        np.empty((most, columns)),
-    )
+    # One block of memory a kind, because each costs its allocation. A point of the search: poses, tracked values,
+    # records, residual, Jacobian.
+    poses = np.empty((2, bodies, 7))
+    tracked = np.empty((3, tracks, 4))
+    records = np.empty((2, pairs + table[JOINTS], CONTACT_RECORD))
+    by_row = np.zeros((6, most))
+    jacobians = np.empty((2, most, EXTRA_COLUMN + 6 * table[EXTRA]))
+    here = (poses[0], tracked[0], records[0], by_row[0], jacobians[0])
+    trial = (poses[1], tracked[1], records[1], by_row[1], jacobians[1])
+    y = by_row[2]
+    better_y = by_row[3]
+    active = by_row[4]
+    forces = by_row[5]
     reach = 0.0
     for b in range(bodies):
         for k in range(7):
@@ -232,50 +228,38 @@ def solve_program(table, pool, settings, state, history):
                 value = (value - pool[REFERENCE + k]) / size
             here[0][b, k] = value
             trial[0][b, k] = value
+    recenter(table, pool, here[0])
     for k in range(tracks):
         for i in range(4):
             here[1][k, i] = state[o_tracked + 4 * k + i]
     for k in range(pairs):
         for i in range(CONTACT_RECORD):
             here[2][k, i] = 1.0
-    for r in range(most):
-        here[3][r] = math.inf
-    y = np.zeros(most)
-    better_y = np.zeros(most)
     for r in range(m):
+        here[3][r] = math.inf
         y[r] = state[o_y + r]
         better_y[r] = y[r]
-    free = np.empty(pairs, np.int64)
+    # Where rows stand: variables, sides, and the envelopes of matrices of variables and of rows.
+    integers = np.empty((4, max(most, n + 4 * pairs)), np.int64)
+    shape = (np.empty((most, 3 + table[EXTRA]), np.int64), integers[0], integers[1], integers[2])
+    bases, one_sided, last, last_row = shape
+    # What pairs need: which are free, the lengths of their coordinates, room for their derivatives; a guess of all.
+    free = integers[3]
     for k in range(pairs):
         free[k] = -1
-    # What pairs need: which are free, the lengths of their coordinates, room for their derivatives; a guess of all.
     loose = (
         free,
         np.empty((pairs, 4)),
         np.empty((VECTORS if pairs > 0 else 0, 3, VARIABLES)),
         np.empty((VARIABLES if pairs > 0 else 0, VARIABLES)),
-        np.empty((tracks, 4)),
+        tracked[2],
     )
-    # Where rows stand: variables, sides, and the envelopes of matrices of variables and of rows.
-    shape = (
-        np.empty((most, 3 + table[EXTRA]), np.int64),
-        np.empty(most, np.int64),
-        np.empty(n + 4 * pairs, np.int64),
-        np.empty(most, np.int64),
-    )
-    bases, one_sided, last, last_row = shape
     place_rows(table, free, bases, one_sided)
     envelope(table, bases, rows, n, last, last_row)
     o_room = table[TAPE_ROOM]
     room = (np.empty(table[o_room]), np.empty(table[o_room + 1]), np.empty(table[o_room + 2]))
-    active = np.zeros(most)
-    forces = np.zeros(most)
     gram = np.empty((most, most))
-    gradient = np.empty(n)
-    # Right side or scratch, step, step before it was bent.
-    lines = (np.empty(n), np.empty(n), np.empty(n))
-    lagrangian = np.empty((n, n))
-    matrix = np.empty((n, n))
+    gradient, lines, lagrangian, matrix = unknowns(n)
 
     # What rounding of the user's coordinates alone can violate.
     feasible = max(settings[FEASIBILITY], 4e-16 * reach)
@@ -286,6 +270,9 @@ def solve_program(table, pool, settings, state, history):
     violation = math.inf
     dual = math.inf
     value = math.inf
+    last_violation = math.inf
+    last_dual = math.inf
+    kept = False
     restoring = False
     entered = math.inf
     restorations = 0
@@ -306,7 +293,7 @@ def solve_program(table, pool, settings, state, history):
         value = objective(table, pool, here[0], 0, room, last, gradient, lagrangian)
     if status == RUNNING and scattered(table, here[3], one_sided):
         gather(table, pool, bases, table[SLOTS], here)
-        if settings[RECENTER] == 1.0:
+        if table[IMPLICIT] == 1:
             recenter(table, pool, here[0])
         for r in range(m):
             y[r] = 0.0
@@ -331,10 +318,8 @@ def solve_program(table, pool, settings, state, history):
             n = 6 * table[MOVING] + 4 * count
             place_rows(table, free, bases, one_sided)
             envelope(table, bases, rows, n, last, last_row)
-            gradient = np.empty(n)
-            lines = (np.empty(n), np.empty(n), np.empty(n))
-            lagrangian = np.empty((n, n))
-            matrix = np.empty((n, n))
+            gradient, lines, lagrangian, matrix = unknowns(n)
+            kept = False
             lost = evaluate(table, pool, here[1], math.inf, loose, room, here)
         below = FREE_BELOW
         if lost >= 0 and free[lost] < 0:
@@ -348,7 +333,9 @@ def solve_program(table, pool, settings, state, history):
         violation = violation_of(residual, one_sided, rows)
         value = objective(table, pool, here[0], 1, room, last, gradient, lagrangian)
         shortened = iteration > 0 and alpha < 1.0
-        dual = choose_multipliers(shape, rows, here, shortened, active, gradient, descent, gram, y, better_y)
+        # At the start both are the same; later a tenth of the last residual is good.
+        good = math.inf if iteration == 0 else 0.1 * last_dual
+        dual = choose_multipliers(shape, rows, here, shortened, good, active, gradient, descent, gram, y, better_y)
         if iteration < history.shape[0]:
             history[iteration, 0] = value
             history[iteration, 1] = violation
@@ -393,15 +380,19 @@ def solve_program(table, pool, settings, state, history):
         for i in range(n):
             descent[i] = -gradient[i]
         add_transposed(bases, jacobian, rows, forces, descent)
-        curve_rows(rows, residual, y, active, restoring, forces)
-        add_row_terms(table, pool, loose, room, bases, here, forces, active, lagrangian)
-        # What the inertia needs falls with the distance to the solution.
-        shift, used, longest, turn = newton_step(
-            table, lagrangian, n, last, max(min(0.25 * shift, dual), 1e-8), matrix, descent, step, straight
-        )
-        if used < 0.0:
-            status = STALLED
-            break
+        # Where the last step gained so much that a second one by its factor will do, that is cheaper.
+        gain = 2.0 * max(violation / max(last_violation, feasible), dual / max(last_dual, settings[STATIONARITY]))
+        if not (kept and gain * violation <= feasible and gain * dual <= settings[STATIONARITY]):
+            curve_rows(rows, residual, y, active, restoring, forces)
+            add_row_terms(table, pool, loose, room, bases, here, forces, active, lagrangian)
+            # What the inertia needs falls with the distance to the solution.
+            shift = factorize_shifted(lagrangian, n, last, max(min(0.25 * shift, dual), 1e-8), matrix)
+            if shift < 0.0:
+                status = STALLED
+                break
+        used, longest, turn = damped_step(table, lagrangian, n, last, shift, matrix, descent, step, straight)
+        last_violation = violation
+        last_dual = dual
         cut = min(1.0, radius / longest) if longest > 0.0 else 1.0
         cut = min(cut, 1.0 / turn) if turn > 0.0 else cut
         slope = 0.0
@@ -470,10 +461,12 @@ def solve_program(table, pool, settings, state, history):
                     better_y[r] = min(better_y[r], 0.0)
         here, trial = trial, here
         if alpha == 1.0:
+            kept = cut == 1.0 and used == shift and mu == settings[PENALTY_FLOOR] and not restoring
             if cut == 1.0 and used == shift:
                 mu = max(0.1 * mu, settings[PENALTY_FLOOR])
             radius = min(2.0 * radius, 1e6)
         else:
+            kept = False
             radius = max(2.0 * alpha * longest, SHORTEST)
         iteration += 1
 

@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly.constraints.primitives import place_frames
 from assembly.constraints.program import (
     CONTACTS,
     EXTRA_COLUMN,
@@ -25,7 +26,6 @@ from assembly.constraints.program import (
     SECOND,
     joint_row,
 )
-from assembly.constraints.primitives import place_frames
 from assembly.kinematics.motion import retract
 from assembly.solve.linear import factorize, substitute
 
@@ -73,7 +73,7 @@ def body_row(bases, jacobian, r, s, out):
                 out[i] += jacobian[r, column + i]
 
 
-@kernel(inner=True)
+@kernel(inner=True, allocates=True)
 def gather(table, pool, bases, slots, point):
     """Move the bodies of the point one by one."""
     q, tracked, _records, residual, jacobian = point

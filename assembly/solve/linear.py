@@ -11,26 +11,50 @@ import math
 from assembly._kernel import kernel
 
 
+@kernel(inline=True)
+def pivot_row(m, k, end):
+    """Scale row k by the root of its pivot, kept inverted; False where that is not positive."""
+    pivot = m[k, k]
+    if not pivot > 0.0:
+        return False
+    inverse = 1.0 / math.sqrt(pivot)
+    m[k, k] = inverse
+    for j in range(k + 1, end):
+        m[k, j] *= inverse
+    return True
+
+
 @kernel(inner=True)
 def factorize(m, n, last):
     """Cholesky in the upper triangle of m, m = U^T U, diagonal stored inverted; False where not positive definite.
 
-    Right-looking: rows are updated along memory, which vectorizes.
+    Right-looking, two rows at a time: rows are updated along memory, and each is loaded half as often.
     """
-    for k in range(n):
-        pivot = m[k, k]
-        if not pivot > 0.0:
-            return False
+    k = 0
+    while k < n:
         end = last[k] + 1
-        inverse = 1.0 / math.sqrt(pivot)
-        m[k, k] = inverse
+        if not pivot_row(m, k, end):
+            return False
+        if end < k + 2:
+            k += 1
+            continue
+        f = m[k, k + 1]
         for j in range(k + 1, end):
-            m[k, j] *= inverse
-        for i in range(k + 1, end):
+            m[k + 1, j] -= f * m[k, j]
+        end_next = last[k + 1] + 1
+        if not pivot_row(m, k + 1, end_next):
+            return False
+        for i in range(k + 2, end):
             f = m[k, i]
-            if f != 0.0:
-                for j in range(i, end):
-                    m[i, j] -= f * m[k, j]
+            g = m[k + 1, i]
+            for j in range(i, end):
+                m[i, j] -= f * m[k, j] + g * m[k + 1, j]
+        if end_next > end:
+            for i in range(k + 2, end_next):
+                g = m[k + 1, i]
+                for j in range(max(i, end), end_next):
+                    m[i, j] -= g * m[k + 1, j]
+        k += 2
     return True
 
 

@@ -86,7 +86,7 @@ def width(block):
     return 4 if block == 2 else 6
 
 
-@kernel(inner=True)
+@kernel(inner=True, allocates=True)
 def envelope(table, bases, rows, n, last, last_row):
     """How far the rows of the Lagrangian's Hessian reach, and those of J J^T (see `linear.factorize`)."""
     for i in range(n):

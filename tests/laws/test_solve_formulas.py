@@ -144,7 +144,7 @@ def test_objectives_and_their_derivatives():
             one_body(lambda body, reference=reference: asm.Posture(reference[None])),
         ]
         for scene in scenes:
-            scene.packed().refresh(q)
+            scene.packed().refresh()
         p = rotation_matrix(q[0, 3:]) @ point
         r = q[0, :3] + p - target
         d = q[0, :3] - reference[:3]
