@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from assembly.constraints.contact import Contact as Contact
     from assembly.constraints.couplings import Gear as Gear
     from assembly.constraints.couplings import RackPinion as RackPinion
+    from assembly.constraints.expression import Expression as Expression
     from assembly.constraints.joints import Cylindrical as Cylindrical
     from assembly.constraints.joints import Fixed as Fixed
     from assembly.constraints.joints import Parallel as Parallel
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from assembly.constraints.joints import Screw as Screw
     from assembly.constraints.joints import Spherical as Spherical
     from assembly.constraints.joints import Universal as Universal
+    from assembly.constraints.objectives import FrameDistance as FrameDistance
     from assembly.constraints.objectives import PointDistance as PointDistance
     from assembly.constraints.objectives import Posture as Posture
     from assembly.constraints.placements import Angle as Angle
@@ -57,8 +59,10 @@ else:
             "ContactPair": "assembly.proximity.pairs",
             "Cylindrical": "assembly.constraints.joints",
             "Distance": "assembly.constraints.placements",
+            "Expression": "assembly.constraints.expression",
             "Face": "assembly.geometry.face",
             "Fixed": "assembly.constraints.joints",
+            "FrameDistance": "assembly.constraints.objectives",
             "Gear": "assembly.constraints.couplings",
             "NurbsCurve": "assembly.geometry.curve",
             "NurbsSurface": "assembly.geometry.surface",

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.constraints.contact import Contact
-from assembly.constraints.objectives import Objective, PointDistance, Posture
+from assembly.constraints.constraint import Constraint, structure_changes
+from assembly.constraints.expression import Expression
+from assembly.constraints.objectives import Objective, Posture
 from assembly.constraints.packing import Packed, pack
 from assembly.errors import InputError, vector
 from assembly.kinematics.body import Body
@@ -50,7 +51,7 @@ class Assembly:
 
     def __init__(self, bodies: Iterable[Body] = ()) -> None:
         self._bodies: list[Body] = []
-        self._constraints: list[Contact] = []
+        self._constraints: list[Constraint] = []
         self._objectives: list[tuple[float, Objective]] = []
         self._packed: Packed | None = None
         self._scene: Scene | None = None
@@ -63,7 +64,7 @@ class Assembly:
         return tuple(self._bodies)
 
     @property
-    def constraints(self) -> tuple[Contact, ...]:
+    def constraints(self) -> tuple[Constraint, ...]:
         """Constraints in the order they were given."""
         return tuple(self._constraints)
 
@@ -95,11 +96,13 @@ class Assembly:
         self._packed = None
         return body
 
-    def constrain(self, *constraints: Contact) -> None:
+    def constrain(self, *constraints: Constraint) -> None:
         """Add constraints; their names must be distinct and their bodies in the assembly."""
         for constraint in constraints:
-            if not isinstance(constraint, Contact):
-                raise TypeError(f"constraint is {constraint!r}; expected a Contact")
+            if not isinstance(constraint, Constraint):
+                raise TypeError(
+                    f"constraint is {constraint!r}; expected a Contact, a joint, a coupling or an Expression"
+                )
             self._check_bodies(constraint.name, constraint.bodies)
             if any(other.name == constraint.name for other in self._constraints):
                 raise InputError(f"constraint name {constraint.name!r} is taken; expected distinct names, say name=...")
@@ -118,8 +121,10 @@ class Assembly:
 
     def _add_terms(self, sign: float, objectives: Iterable[Objective]) -> None:
         for objective in objectives:
-            if not isinstance(objective, (PointDistance, Posture)):
-                raise TypeError(f"objective is {objective!r}; expected PointDistance or Posture")
+            if not isinstance(objective, Objective):
+                raise TypeError(f"objective is {objective!r}; expected an objective such as PointDistance or Posture")
+            if isinstance(objective, Expression) and objective.count != 1:
+                raise InputError(f"objective {objective.name!r} has {objective.count} values; expected one")
             self._check_bodies(repr(objective), objective.bodies)
             self._objectives.append((sign, objective))
             self._packed = None
@@ -137,12 +142,14 @@ class Assembly:
 
     def packed(self) -> Packed:
         """The scene as the compiled loop reads it; made at first use."""
-        if self._packed is None:
+        if self._packed is None or self._packed.stamp != structure_changes():
             if all(body.fixed for body in self._bodies):
                 raise InputError(f"bodies are {[body.name for body in self._bodies]}, none moving; expected one")
             terms = self._objectives or [(1.0, Posture())]
             packed = pack(self._bodies, self._constraints, terms)
-            self._scene = Scene(self.bodies, self.constraints, tuple(packed.faces), packed.scale)
+            self._scene = Scene(
+                self.bodies, self.constraints, tuple(packed.contacts), tuple(packed.faces), packed.scale
+            )
             self._packed = packed
         return self._packed
 
@@ -200,19 +207,21 @@ class Assembly:
             state = np.zeros(packed.results_at + RESULTS)
             q = state[: packed.contacts_at].reshape(-1, 7)
             q[:] = self.q if q0 is None else pose_rows("q0", q0, len(self._bodies))
-            state[packed.contacts_at : packed.multipliers_at] = np.nan
+            state[packed.contacts_at : packed.angles_at] = np.nan
         if starts:
             self._place_starts(packed, state, starts)
         packed.refresh(q)
+        packed.start_angles(q, state, isinstance(q0, Solution))
         return state
 
     def _place_starts(self, packed: Packed, state: Array, starts: Mapping[str, ArrayLike]) -> None:
         if not isinstance(starts, Mapping):
             raise TypeError(f"starts is {starts!r}; expected a mapping of constraint name to parameters")
-        names = [constraint.name for constraint in self._constraints]
+        names = [contact.name for contact in packed.contacts]
         for name, value in starts.items():
             if name not in names:
-                raise InputError(f"starts names {name!r}; expected one of {', '.join(map(repr, names))}")
+                known = ", ".join(map(repr, names)) or "none, the assembly has no contacts"
+                raise InputError(f"starts names {name!r}; expected a contact: {known}")
             k = names.index(name)
             surfaces = (packed.faces[k][0].face.surface, packed.faces[k][1].face.surface)
             at = packed.contacts_at + 4 * k

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.errors import positive, vector
-from assembly.kinematics.body import Body, Point
-from assembly.kinematics.pose import pose_rows
+from assembly.kinematics.body import Body, Frame, Point
+from assembly.kinematics.pose import Pose, axes_quaternion, multiply, pose_rows
 
-__all__ = ["Objective", "PointDistance", "Posture"]
+__all__ = ["FrameDistance", "Objective", "PointDistance", "Posture"]
 
 Array = NDArray[np.float64]
 
@@ -99,3 +99,62 @@ class Posture(Objective):
 
     def __repr__(self) -> str:
         return f"Posture(weight={self.weight:g})"
+
+
+class FrameDistance(Objective):
+    """weight (|p - p_t|^2 + length^2 4 sin^2(angle / 2)): a frame of a body is drawn to a pose in the world.
+
+    p is the frame's origin, p_t that of the target; the angle is that of the turn from the frame's axes to the
+    target's. This is the rigid grasp of a hand.
+
+    Parameters
+    ----------
+    frame : Frame or Body
+        `body.frame(...)`; of a body the frame at its origin.
+    target : Pose
+        Where the frame is drawn to. Settable between solves.
+    length : float
+        How much a turn counts: a turn by an angle counts as a point this far from the origin. Half the body's size by
+        default, 1 for a body without shape.
+    weight : float
+        Positive.
+    """
+
+    def __init__(self, frame: Frame | Body, target: Pose, length: float | None = None, weight: float = 1.0) -> None:
+        if isinstance(frame, Body):
+            frame = frame.frame()
+        if not isinstance(frame, Frame):
+            raise TypeError(f"frame is {frame!r}; expected a frame of a body, body.frame(...), or a body")
+        super().__init__((frame.body,), weight)
+        self._frame = frame
+        self._length = 0.5 * frame.body.size or 1.0 if length is None else positive("length", length)
+        # Of the rotation that takes the world's axes to those of the frame on the body, turned back.
+        w, x, y, z = axes_quaternion(frame.axes)
+        self._back = np.array([w, -x, -y, -z])
+        self.target = target
+
+    @property
+    def frame(self) -> Frame:
+        """The frame that is drawn."""
+        return self._frame
+
+    @property
+    def length(self) -> float:
+        """How much a turn counts."""
+        return self._length
+
+    @property
+    def target(self) -> Pose:
+        """Where the frame is drawn to."""
+        return self._pose
+
+    @target.setter
+    def target(self, value: Pose) -> None:
+        if not isinstance(value, Pose):
+            raise TypeError(f"target is {value!r}; expected a Pose")
+        self._pose = value
+        self._target = value.position
+        self.body_quaternion = multiply(value.quaternion, self._back)
+
+    def __repr__(self) -> str:
+        return f"FrameDistance({self._frame!r}, target={self._pose!r}, length={self._length:g}, weight={self.weight:g})"

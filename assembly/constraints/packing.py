@@ -7,9 +7,18 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.constraints import program
+from assembly.constraints import program, tape, terms
+from assembly.constraints.constraint import Constraint, Coordinate, Equation, FramePair, structure_changes
 from assembly.constraints.contact import Contact
-from assembly.constraints.objectives import Objective, PointDistance, Posture
+from assembly.constraints.couplings import Coupling
+from assembly.constraints.expression import Expression
+from assembly.constraints.joint import Joint
+from assembly.constraints.numbering import number_bodies
+from assembly.constraints.objectives import FrameDistance, Objective, PointDistance, Posture
+from assembly.constraints.primitives import AZIMUTH, TURN, place_frames
+from assembly.constraints.primitives import RECORD as JOINT_FRAMES
+from assembly.constraints.primitives import coordinate as coordinate_value
+from assembly.constraints.turns import Turns
 from assembly.errors import InputError
 from assembly.geometry.face import Face
 from assembly.geometry.spline import SURFACE_RECORD
@@ -31,33 +40,54 @@ class Packed:
         See `constraints/program.py`. Lengths in the pool are divided by `scale`.
     scale : float
         The scene's size: the largest diagonal of a body's box.
+    unit : float
+        What one of the loop's objective counts in the user's units.
     faces : list of (BodyFace, BodyFace)
         The faces of every contact.
+    spans : list of slice
+        The rows of every constraint.
+    owners : (m,) int
+        The constraint of every row.
+    drives : (m,) bool
+        Whether a driven value or a limit asks for the row.
+    one_sided, lengths : (m,) bool
+        Whether a row is >= 0; whether it is a length.
     """
 
     def __init__(
         self,
         bodies: Sequence[Body],
-        contacts: Sequence[Contact],
+        constraints: Sequence[Constraint],
         objectives: Sequence[tuple[float, Objective]],
     ) -> None:
         self.count = len(bodies)
-        self.rows = len(contacts)
+        self.stamp = structure_changes()
         self._places = {id(body): k for k, body in enumerate(bodies)}
-        self.scale = _scene_size(bodies, objectives)
+        self.scale = _scene_size(bodies, constraints, objectives)
         self.reference = bodies[0].pose.position.copy()
-        self.faces = [_choose_faces(contact) for contact in contacts]
-        self._targets: list[tuple[PointDistance, int]] = []
+        self.contacts = [constraint for constraint in constraints if isinstance(constraint, Contact)]
+        self.faces = [_choose_faces(contact) for contact in self.contacts]
+        self._targets: list[tuple[PointDistance | FrameDistance, int]] = []
+        self._turns: list[tuple[FrameDistance, int]] = []
         self._postures: list[tuple[Posture, int, int]] = []
+        self._values: list[tuple[Equation, int, float]] = []
+        self._angles: list[Coordinate] = []
+        self._room = [0, 0, 0]
+        self._frames: dict[int, tuple[int, FramePair]] = {}
         self._table: list[Table] = []
         self._pool: list[Array] = []
         self._table_size = self._pool_size = 0
-        self._build(bodies, contacts, objectives)
+        self._header = np.zeros(program.HEADER, dtype=np.int64)
+        self._build(bodies, constraints, objectives)
         self.table = np.concatenate(self._table)
         self.pool = np.concatenate(self._pool)
-        # Where the parts of a state begin: contacts, multipliers, residuals, results.
+        self._turned = Turns(self._angles, [(equation, at) for equation, at, _ in self._values])
+        self.rows = int(self._header[program.ROWS])
+        self.tracked = len(self.contacts) + len(self._angles)
+        # Where the parts of a state begin: tracked values, multipliers, residuals, results.
         self.contacts_at = 7 * self.count
-        self.multipliers_at = self.contacts_at + 4 * self.rows
+        self.angles_at = self.contacts_at + 4 * len(self.contacts)
+        self.multipliers_at = self.contacts_at + 4 * self.tracked
         self.residuals_at = self.multipliers_at + self.rows
         self.results_at = self.residuals_at + self.rows
 
@@ -73,36 +103,135 @@ class Packed:
     def _build(
         self,
         bodies: Sequence[Body],
-        contacts: Sequence[Contact],
+        constraints: Sequence[Constraint],
         objectives: Sequence[tuple[float, Objective]],
     ) -> None:
-        header = np.zeros(program.HEADER, dtype=np.int64)
-        weight = max((term.weight for _, term in objectives), default=1.0)
-        self.weight = weight
+        header = self._header
+        self.unit = max((term.weight * self._natural_unit(term) for _, term in objectives), default=1.0)
         pool = np.zeros(program.POOL_HEADER)
         pool[program.SCALE] = self.scale
         pool[program.REFERENCE : program.REFERENCE + 3] = self.reference
-        pool[program.WEIGHT] = weight
+        pool[program.UNIT] = self.unit
         self._add(header, pool)
-        moving = np.cumsum([not body.fixed for body in bodies]) - 1
-        slots = np.where([body.fixed for body in bodies], -1, moving)
+        groups = [[self._places[id(body)] for body in item.bodies] for item in constraints]
+        slots = number_bodies([body.fixed for body in bodies], groups)
         header[program.SLOTS], _ = self._add(slots)
-        records: dict[tuple[int, bool], int] = {}
         rows: list[list[int]] = []
-        for k, (contact, (face_f, face_g)) in enumerate(zip(contacts, self.faces, strict=True)):
+        owners: list[int] = []
+        numbers = {id(constraint): k for k, constraint in enumerate(constraints)}
+        records: dict[tuple[int, bool], int] = {}
+        for contact, (face_f, face_g) in zip(self.contacts, self.faces, strict=True):
             surfaces = [self._surface(records, side.face) for side in (face_f, face_g)]
             places = [self._places[id(body)] for body in contact.bodies]
-            rows.append([program.CONTACT_ROW, *places, *surfaces, k, int(contact.unilateral), 0])
-        header[program.ROW_TABLE], _ = self._add([field for row in rows for field in row])
-        terms: list[list[int]] = []
+            rows.append([program.CONTACT_ROW, *places, int(contact.unilateral), 0, 1, *surfaces])
+            owners.append(numbers[id(contact)])
+        # Rows in the order of their bodies: then the envelope of J J^T is narrow, too.
+        others = [item for item in constraints if isinstance(item, (Joint, Coupling))]
+        others.sort(key=lambda item: max(slots[self._places[id(body)]] for body in item.bodies))
+        extra = 0
+        for joint in others:
+            for equation in joint.equations:
+                rows.append(self._equation(equation))
+                owners.append(numbers[id(joint)])
+                extra = max(extra, 2 * (len(equation.terms) - 1))
+        tapes: list[list[int]] = []
+        for item in constraints:
+            if isinstance(item, Expression):
+                side = int(item.unilateral)
+                places = [self._places[id(body)] for body in item.bodies]
+                tapes.append(self._tape(item, len(rows)))
+                rows += [
+                    [program.TAPE_ROW, *[*places, -1][:2], side, 0, 0, len(tapes) - 1, value]
+                    for value in range(item.count)
+                ]
+                owners += [numbers[id(item)]] * item.count
+                extra = max(extra, len(places) - 2)
+        header[program.TAPE_TABLE], _ = self._add([field for tape in tapes for field in tape])
+        header[program.TAPES] = len(tapes)
+        header[program.ROW_TABLE], _ = self._add(
+            [field for row in rows for field in row + [0] * (program.ROW - len(row))]
+        )
+        header[program.JOINT_TABLE] = self._joints()
+        terms_: list[list[int]] = []
         for sign, objective in objectives:
-            terms.extend(self._terms(sign * objective.weight / weight, objective, bodies))
-        header[program.TERM_TABLE], _ = self._add([field for term in terms for field in term])
+            terms_.extend(self._terms(sign * objective.weight, objective, bodies))
+        header[program.TERM_TABLE], _ = self._add(
+            [field for term in terms_ for field in term + [0] * (terms.TERM - len(term))]
+        )
+        header[program.TAPE_ROOM], _ = self._add(self._room)
         header[program.BODIES] = len(bodies)
-        header[program.MOVING] = int(moving[-1]) + 1
-        header[program.CONTACTS] = header[program.ROWS] = len(rows)
-        header[program.TERMS] = len(terms)
+        header[program.MOVING] = int(slots.max()) + 1
+        header[program.CONTACTS] = len(self.contacts)
+        header[program.TRACKED] = len(self.contacts) + len(self._angles)
+        header[program.JOINTS] = len(self._frames)
+        header[program.ROWS] = len(rows)
+        header[program.EXTRA] = extra
+        header[program.TERMS] = len(terms_)
         self._table[0] = header
+        table = np.array([row[:6] for row in rows], dtype=np.int64).reshape(-1, 6)
+        self.owners = np.array(owners, dtype=np.int64)
+        self.one_sided = table[:, program.ONE_SIDED] == 1
+        self.drives = table[:, program.DRIVE] == 1
+        self.lengths = table[:, program.IS_LENGTH] == 1
+        self.spans = [np.flatnonzero(self.owners == k) for k in range(len(constraints))]
+
+    def _natural_unit(self, objective: Objective) -> float:
+        """What an objective of order one in scaled lengths counts in the user's units."""
+        return 1.0 if isinstance(objective, Expression) else self.scale**2
+
+    def _coordinate(self, coordinate: Coordinate) -> tuple[list[int], list[int]]:
+        """The fields of a coordinate in a row, and its bodies."""
+        frames = coordinate.frames
+        number, _ = self._frames.setdefault(id(frames), (len(self._frames), frames))
+        angle = -1
+        if coordinate.kind in (TURN, AZIMUTH):
+            if not any(other is coordinate for other in self._angles):
+                self._angles.append(coordinate)
+            angle = len(self.contacts) + next(k for k, other in enumerate(self._angles) if other is coordinate)
+        bodies = [self._places[id(frame.body)] for frame in (frames.frame_a, frames.frame_b)]
+        return [coordinate.kind, coordinate.component, number, angle], bodies
+
+    def _equation(self, equation: Equation) -> list[int]:
+        """The record of a row; its factors are such that it has the unit of its first term, lengths scaled."""
+        (factor, first), *others = equation.terms
+        unit = 1.0 if first.is_angle else self.scale
+        pool = [factor, 0.0, 0.0]
+        fields, bodies = self._coordinate(first)
+        second = -1
+        for other_factor, other in others:
+            other_fields, other_bodies = self._coordinate(other)
+            pool[1] = other_factor * (1.0 if other.is_angle else self.scale) / unit
+            second, _ = self._add([*other_fields, *other_bodies])
+        _, at = self._add(pool=pool)
+        self._values.append((equation, at + 2, unit))
+        flags = [int(equation.one_sided), int(equation.is_drive), int(not first.is_angle)]
+        return [program.JOINT_ROW, *bodies, *flags, *fields, at, second]
+
+    def _tape(self, expression: Expression, row: int) -> list[int]:
+        """Pack the instructions of an expression; its record."""
+        places = []
+        for instructions in expression.tapes:
+            table = instructions.table.copy()
+            table[tape.CONSTANTS] += self._pool_size
+            places.append(self._add(table, instructions.constants)[0])
+            self._room[2] = max(self._room[2], int(table[tape.WORK]))
+        bodies, count = len(expression.bodies), expression.count
+        self._room[0] = max(self._room[0], 7 * bodies + count)
+        self._room[1] = max(self._room[1], count + 6 * bodies * count, 36 * bodies**2)
+        listed, at = self._add([self._places[id(body)] for body in expression.bodies], [expression.scale])
+        return [*places, count, bodies, listed, row, at, 0]
+
+    def _joints(self) -> int:
+        """Pack the frames; where their records begin."""
+        fields: list[int] = []
+        for _, pair in self._frames.values():
+            pool = [
+                np.concatenate([frame.origin / self.scale, frame.axes.T.ravel()])
+                for frame in (pair.frame_a, pair.frame_b)
+            ]
+            _, at = self._add(pool=np.concatenate(pool))
+            fields += [self._places[id(pair.frame_a.body)], self._places[id(pair.frame_b.body)], at]
+        return self._add(fields)[0]
 
     def _surface(self, records: dict[tuple[int, bool], int], face: Face) -> int:
         """Offset of the record of a face; a surface that several bodies share is packed once."""
@@ -116,49 +245,103 @@ class Packed:
         return records[key]
 
     def _terms(self, weight: float, objective: Objective, bodies: Sequence[Body]) -> list[list[int]]:
+        weight *= self._natural_unit(objective) / self.unit
         if isinstance(objective, PointDistance):
             point = objective.point.coordinates / self.scale
             _, at = self._add(pool=[weight, *point, 0.0, 0.0, 0.0])
             self._targets.append((objective, at + 4))
-            return [[program.POINT_DISTANCE, self._places[id(objective.point.body)], at, 0]]
+            return [[terms.POINT_DISTANCE, self._places[id(objective.point.body)], at]]
+        if isinstance(objective, FrameDistance):
+            return self._frame_terms(weight, objective)
+        if isinstance(objective, Expression):
+            _, at = self._add(pool=[weight])
+            listed, _ = self._add(self._tape(objective, -1))
+            return [[terms.TAPE_TERM, -1, at, listed]]
         assert isinstance(objective, Posture)
         if objective.reference is not None and len(objective.reference) != len(bodies):
             raise InputError(f"reference has {len(objective.reference)} rows; expected one per body, {len(bodies)}")
-        terms = []
+        records = []
         for k, body in enumerate(bodies):
             if not body.fixed:
                 lever = 0.5 * (body.size or self.scale) / self.scale
-                _, at = self._add(pool=[weight, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, lever])
-                self._postures.append((objective, k, at + 1))
-                terms.append([program.POSTURE, k, at, 0])
-        return terms
+                _, at = self._add(pool=[weight, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, weight * lever**2])
+                self._postures.append((objective, k, at + terms.POSTURE_POSITION))
+                records.append([terms.POSTURE, k, at])
+        return records
+
+    def _frame_terms(self, weight: float, objective: FrameDistance) -> list[list[int]]:
+        """A frame's origin drawn to a point, and its body turned to a quaternion."""
+        frame = objective.frame
+        place = self._places[id(frame.body)]
+        _, at = self._add(pool=[weight, *(frame.origin / self.scale), 0.0, 0.0, 0.0])
+        self._targets.append((objective, at + 4))
+        lever = objective.length / self.scale
+        _, turn = self._add(pool=[0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, weight * lever**2])
+        self._turns.append((objective, turn + terms.POSTURE_QUATERNION))
+        return [[terms.POINT_DISTANCE, place, at], [terms.POSTURE, place, turn]]
+
+    def start_angles(self, q: Array, state: Array, warm: bool) -> None:
+        """Write the turns that angles start on into a state."""
+        if not self._angles:
+            return
+        scaled = q.copy()
+        scaled[:, :3] = (q[:, :3] - self.reference) / self.scale
+        records = np.empty((1, JOINT_FRAMES))
+
+        def evaluate(coordinate: Coordinate, near: float) -> float:
+            number = self._frames[id(coordinate.frames)][0]
+            i, j, at = self.table[self._header[program.JOINT_TABLE] + program.JOINT_RECORD * number :][:3]
+            place_frames(self.pool, at, scaled, i, j, records, 0)
+            value = float(coordinate_value(coordinate.kind, coordinate.component, records, 0, near)[0])
+            return value if coordinate.is_angle else value * self.scale
+
+        self._turned.start(self.pool, state[self.angles_at : self.multipliers_at : 4], warm, evaluate)
 
     def refresh(self, q: Array) -> None:
-        """Write what may have changed since the last solve: targets, and postures that follow the start q."""
+        """Write what may have changed since the last solve: values, targets, and postures that follow the start q."""
         pool, scale = self.pool, self.scale
         x, y, z = self.reference.tolist()
+        for equation, at, unit in self._values:
+            if equation.source is not None:
+                pool[at] = equation.current() / unit
         for distance, at in self._targets:
             target = distance._target
             pool[at] = (target[0] - x) / scale
             pool[at + 1] = (target[1] - y) / scale
             pool[at + 2] = (target[2] - z) / scale
+        for frame_distance, at in self._turns:
+            pool[at : at + 4] = frame_distance.body_quaternion
         for posture, body, at in self._postures:
             row = q[body] if posture.reference is None else posture.reference[body]
             pool[at : at + 3] = (row[:3] - self.reference) / scale
             pool[at + 3 : at + 7] = row[3:]
 
 
-def _scene_size(bodies: Sequence[Body], objectives: Sequence[tuple[float, Objective]]) -> float:
-    """The largest body; without shapes, the spread of positions and of points on bodies."""
-    size = max(body.size for body in bodies)
-    if size > 0.0:
-        return size
-    points = [body.pose.position for body in bodies]
-    points += [
-        term.point.body.pose.apply(term.point.coordinates) for _, term in objectives if isinstance(term, PointDistance)
-    ]
-    spread = float(np.linalg.norm(np.ptp(points, axis=0)))
-    return spread if spread > 0.0 else 1.0
+def _scene_size(
+    bodies: Sequence[Body], constraints: Sequence[Constraint], objectives: Sequence[tuple[float, Objective]]
+) -> float:
+    """The largest body, by its shape or by the frames and points on it; of points alone, their spread."""
+    marks: dict[int, list[Array]] = {id(body): [] for body in bodies}
+    for item in constraints:
+        for equation in getattr(item, "equations", ()):
+            for _, coordinate in equation.terms:
+                for frame in (coordinate.frames.frame_a, coordinate.frames.frame_b):
+                    marks[id(frame.body)].append(frame.origin)
+    for _, term in objectives:
+        if isinstance(term, PointDistance):
+            marks[id(term.point.body)].append(term.point.coordinates)
+        elif isinstance(term, FrameDistance):
+            marks[id(term.frame.body)].append(term.frame.origin)
+    sizes = [max(body.size, _spread(marks[id(body)])) for body in bodies]
+    size = max(sizes)
+    if not size > 0.0:
+        size = _spread([body.pose.apply(mark) for body in bodies for mark in (np.zeros(3), *marks[id(body)])])
+    return size if size > 0.0 else 1.0
+
+
+def _spread(points: Sequence[Array]) -> float:
+    """Diagonal of the box around points."""
+    return float(np.linalg.norm(np.ptp(points, axis=0))) if points else 0.0
 
 
 def _choose_faces(contact: Contact) -> tuple[BodyFace, BodyFace]:
@@ -179,6 +362,8 @@ def _choose_faces(contact: Contact) -> tuple[BodyFace, BodyFace]:
     return best[2], best[3]
 
 
-def pack(bodies: Sequence[Body], contacts: Sequence[Contact], objectives: Sequence[tuple[float, Objective]]) -> Packed:
+def pack(
+    bodies: Sequence[Body], constraints: Sequence[Constraint], objectives: Sequence[tuple[float, Objective]]
+) -> Packed:
     """Pack a scene. `objectives` are (sign, term): 1 to minimize, -1 to maximize."""
-    return Packed(bodies, contacts, objectives)
+    return Packed(bodies, constraints, objectives)

@@ -1,12 +1,16 @@
 """A scene packed into one table of integers and one pool of doubles, and its rows evaluated.
 
 All lengths in a program are divided by the scene's length scale. Table: a header, the slot of
-every body (-1: fixed), then a record a row and a record an objective term. The loop works on
+every body (-1: fixed), then a record a row (contacts first), a joint, a tape and an objective term. The loop works on
 
-    configuration  (n, 7)   poses, scaled, positions relative to a reference
-    contacts       (k, 4)   parameters of every tracked pair
-    records        (k, R)   what the gap's derivatives need (see `track_contact`)
-    residual       (m,)     rows; jacobian (m, 12) in the twists of the row's two bodies
+    configuration  (n, 7)       poses, scaled, positions relative to a reference
+    tracked        (k, 4)       parameters of every contact's pair, then (first column) unwrapped angles of joints
+    records        (k + j, R)   what the derivatives of gaps need (see `track_contact`), then frames of joints
+    residual       (m,)         rows: contacts, joints, tapes; behind them four for every free pair
+    jacobian       (m, 16 + e)  in the twists of a row's two bodies (12), a free pair's coordinates (4), further bodies
+
+A row of a joint is c_1 coordinate_1 + c_2 coordinate_2 - value (`primitives.py`); rows of a tape are the values of a
+user's expression (`tape.py`).
 """
 
 from __future__ import annotations
@@ -14,33 +18,45 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly.geometry.vec import add, cross, dot, matvec, quaternion_product, sub
-from assembly.kinematics.motion import position, relative_pose, rotation
+from assembly.constraints.primitives import add_coordinate_hessian, coordinate, place_frames, write_gradient
+from assembly.constraints.tape import run_tape
+from assembly.geometry.vec import dot, sub
+from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.extremal import CLOSE, CONVERGED, LEFT_PATCH, SINGULAR, solve_pair
 from assembly.proximity.free_pair import VARIABLES, free_hessian, free_rows
 from assembly.proximity.start import global_start
 from assembly.proximity.velocity import GAP, RECORD, add_gap_terms, gradient_row, store_record
 
-# Header of the table.
-BODIES, MOVING, CONTACTS, ROWS, TERMS, SLOTS, ROW_TABLE, TERM_TABLE, HEADER = 0, 1, 2, 3, 4, 5, 6, 7, 8
-# A row: kind, its two bodies, their surface records, its contact, and whether it is one-sided (residual >= 0).
-ROW = 8
-KIND, BODY_F, BODY_G, SURFACE_F, SURFACE_G, CONTACT, ONE_SIDED = 0, 1, 2, 3, 4, 5, 6
-CONTACT_ROW = 0
-# A term: kind, body, offset of its parameters.
-TERM = 4
-TERM_KIND, TERM_BODY, TERM_PARAMETERS = 0, 1, 2
-POINT_DISTANCE, POSTURE = 0, 1
+# Header of the table: counts, then where its parts begin.
+BODIES, MOVING, CONTACTS, TRACKED, JOINTS, ROWS, TAPES, TERMS, EXTRA = 0, 1, 2, 3, 4, 5, 6, 7, 8
+SLOTS, ROW_TABLE, JOINT_TABLE, TAPE_TABLE, TERM_TABLE, TAPE_ROOM, HEADER = 9, 10, 11, 12, 13, 14, 16
+# A row: kind, its two bodies (-1: none), whether it is one-sided (residual >= 0), whether it prescribes a freedom, and
+# whether its residual is a length. Row k is that of contact k.
+ROW = 14
+KIND, BODY_F, BODY_G, ONE_SIDED, DRIVE, IS_LENGTH = 0, 1, 2, 3, 4, 5
+CONTACT_ROW, JOINT_ROW, TAPE_ROW = 0, 1, 2
+# Of a contact: its surfaces.
+SURFACE_F, SURFACE_G = 6, 7
+# Of a joint: kind and component of the coordinate, the joint that has its frames, where its angle is tracked (-1: it is
+# none), where its factor, the second factor and the value are in the pool, and a second coordinate with its bodies.
+COORDINATE, COMPONENT, JOINT, ANGLE, PARAMETERS, SECOND = 6, 7, 8, 9, 10, 11
+# A second coordinate: kind, component, joint, angle, bodies.
+SECOND_BODY_F, SECOND_BODY_G, SECOND_RECORD = 4, 5, 6
+# Of a tape: which, and which of its values.
+TAPE, TAPE_VALUE = 6, 7
+# A joint: its bodies and where its frames are in the pool.
+JOINT_RECORD = 3
+# A tape: instructions for values and Jacobian, and for the Hessian; its values, its bodies, where the list of these is,
+# its first row, where the size of one unit is in the pool.
+TAPE_RECORD = 8
+TAPE_FIRST, TAPE_SECOND, TAPE_VALUES, TAPE_BODIES, TAPE_LIST, TAPE_ROW_AT, TAPE_SCALE = 0, 1, 2, 3, 4, 5, 6
+# Columns of the Jacobian: twists of f and g, a free pair's coordinates, further bodies.
+FREE_COLUMN, EXTRA_COLUMN = 12, 16
 # Behind a contact's record: whether the surfaces do not cross at it, and how far it is from a fold (det H / |H|^2).
 PROPER, FOLD, CONTACT_RECORD = RECORD, RECORD + 1, RECORD + 2
 # Header of the pool.
-# length scale, reference point (1 to 3), weight by which the objective was divided.
-SCALE, REFERENCE, WEIGHT, POOL_HEADER = 0, 1, 4, 8
-
-
-@kernel(inline=True)
-def load(array, o):
-    return (array[o], array[o + 1], array[o + 2])
+# length scale, reference point (1 to 3), unit of the objective: what its scaled value counts in the user's units.
+SCALE, REFERENCE, UNIT, POOL_HEADER = 0, 1, 4, 8
 
 
 @kernel(inner=True)
@@ -79,143 +95,188 @@ def restart_contact(table, pool, row, q, records, k):
 
 
 @kernel(inner=True)
-def add_term(table, pool, term, q, gradient, hessian):
-    """Value of one objective term; adds its gradient and its Hessian."""
-    body = table[term + TERM_BODY]
-    slot = table[table[SLOTS] + body]
-    o = table[term + TERM_PARAMETERS]
-    weight = pool[o]
-    s = 6 * slot
-    if table[term + TERM_KIND] == POINT_DISTANCE:
-        p = matvec(rotation(q, body), load(pool, o + 1))
-        e = add(sub(position(q, body), load(pool, o + 4)), p)
-        value = weight * dot(e, e)
-        if slot < 0:
-            return value
-        turn = cross(p, e)
-        for k in range(3):
-            gradient[s + k] += 2.0 * weight * e[k]
-            gradient[s + 3 + k] += 2.0 * weight * turn[k]
-        pp = dot(p, p) - dot(e, p)
-        for k in range(3):
-            hessian[s + k, s + k] += 2.0 * weight
-            hessian[s + 3 + k, s + 3 + k] += 2.0 * weight * pp
-            i = (k + 1) % 3
-            j = (k + 2) % 3
-            # d(turn)/dx = [p]x: -p_j at (k, i), +p_i at (k, j).
-            hessian[s + 3 + k, s + i] -= 2.0 * weight * p[j]
-            hessian[s + 3 + k, s + j] += 2.0 * weight * p[i]
-            hessian[s + i, s + 3 + k] -= 2.0 * weight * p[j]
-            hessian[s + j, s + 3 + k] += 2.0 * weight * p[i]
-            for l in range(3):
-                hessian[s + 3 + k, s + 3 + l] += weight * (p[k] * e[l] + e[k] * p[l] - 2.0 * p[k] * p[l])
-        return value
-    # Posture: |x - x0|^2 + s^2 4 (1 - (e.e0)^2), with c and u the scalar and vector part of e0 e^*.
-    d = sub(position(q, body), load(pool, o + 1))
-    c, ux, uy, uz = quaternion_product(
-        (pool[o + 4], pool[o + 5], pool[o + 6], pool[o + 7]), (q[body, 3], -q[body, 4], -q[body, 5], -q[body, 6])
-    )
-    u = (ux, uy, uz)
-    lever = weight * pool[o + 8] * pool[o + 8]
-    value = weight * dot(d, d) + 4.0 * lever * dot(u, u)
-    if slot < 0:
-        return value
-    for k in range(3):
-        gradient[s + k] += 2.0 * weight * d[k]
-        gradient[s + 3 + k] -= 4.0 * lever * c * u[k]
-    for k in range(3):
-        hessian[s + k, s + k] += 2.0 * weight
-        hessian[s + 3 + k, s + 3 + k] += 2.0 * lever * c * c
-        for l in range(3):
-            hessian[s + 3 + k, s + 3 + l] -= 2.0 * lever * u[k] * u[l]
-    return value
-
-
-@kernel(inner=True)
-def evaluate(table, pool, q, start, patience, free, lengths, vectors, contacts, records, residual, jacobian):
-    """Evaluate all rows at q. Returns the contact whose pair was lost, or -1.
+def contact_row(table, pool, r, start, patience, loose, point):
+    """Row r, of contact r. Returns whether its pair was found.
 
     A tracked contact is carried from `start` to its extremal pair, by steps that turn no normal by more than
-    `patience`. A free one (free[k] >= 0, its place among the free ones) is evaluated at `start` itself, and its four
+    `patience`. A free one (free[r] >= 0, its place among the free ones) is evaluated at `start` itself, and its four
     rows of tangency follow the rows of the program. A one-sided row that loses its pair takes the
     nearest one there is.
     """
-    for r in range(table[ROWS]):
-        row = table[ROW_TABLE] + ROW * r
-        k = table[row + CONTACT]
-        x = (start[k, 0], start[k, 1], start[k, 2], start[k, 3])
-        if free[k] < 0:
-            status, x, distance = track_contact(table, pool, row, q, x, patience, records, k)
+    q, tracked, records, residual, jacobian = point
+    free = loose[0]
+    lengths = loose[1]
+    row = table[ROW_TABLE] + ROW * r
+    x = (start[r, 0], start[r, 1], start[r, 2], start[r, 3])
+    if free[r] < 0:
+        status, x, distance = track_contact(table, pool, row, q, x, patience, records, r)
+        if status != CONVERGED and status != SINGULAR:
+            if table[row + ONE_SIDED] == 0:
+                return False
+            # A one-sided contact is of the nearest pair, whichever that is now.
+            held = status == LEFT_PATCH and distance > 0.0
+            status, x = restart_contact(table, pool, row, q, records, r)
             if status != CONVERGED and status != SINGULAR:
-                if table[row + ONE_SIDED] == 0:
-                    return k
-                # A one-sided contact is of the nearest pair, whichever that is now.
-                held = status == LEFT_PATCH and distance > 0.0
-                status, x = restart_contact(table, pool, row, q, records, k)
-                if status != CONVERGED and status != SINGULAR:
-                    if not held:
-                        return k
-                    for i in range(CONTACT_RECORD):
-                        records[k, i] = 0.0
-                    records[k, GAP] = distance
-                    records[k, PROPER] = 1.0
-                    records[k, FOLD] = 1.0
-                elif not records[k, GAP] > 0.0:
-                    return k
-            residual[r] = records[k, GAP]
-            gradient_row(records, k, jacobian, r)
-        else:
-            e = table[ROWS] + 4 * free[k]
-            free_rows(
-                table,
-                pool,
-                table[row + SURFACE_F],
-                table[row + SURFACE_G],
-                table[row + BODY_F],
-                table[row + BODY_G],
-                q,
-                x,
-                (lengths[k, 0], lengths[k, 1], lengths[k, 2], lengths[k, 3]),
-                vectors,
-                residual,
-                jacobian,
-                r,
-                e,
-            )
-        contacts[k, 0], contacts[k, 1], contacts[k, 2], contacts[k, 3] = x
+                if not held:
+                    return False
+                for i in range(CONTACT_RECORD):
+                    records[r, i] = 0.0
+                records[r, GAP] = distance
+                records[r, PROPER] = 1.0
+                records[r, FOLD] = 1.0
+            elif not records[r, GAP] > 0.0:
+                return False
+        residual[r] = records[r, GAP]
+        gradient_row(records, r, jacobian, r)
+    else:
+        e = table[ROWS] + 4 * free[r]
+        free_rows(
+            table,
+            pool,
+            table[row + SURFACE_F],
+            table[row + SURFACE_G],
+            table[row + BODY_F],
+            table[row + BODY_G],
+            q,
+            x,
+            (lengths[r, 0], lengths[r, 1], lengths[r, 2], lengths[r, 3]),
+            loose[2],
+            residual,
+            jacobian,
+            r,
+            e,
+        )
+    tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3] = x
+    return True
+
+
+@kernel(inner=True)
+def coordinate_row(pool, kind, component, k, angle, factor, start, tracked, records, jacobian, r, column):
+    """Factor times a coordinate, its gradient into row r from `column` on; its angle is tracked."""
+    near = start[angle, 0] if angle >= 0 else 0.0
+    value, n, arm_f, arm_g, h = coordinate(kind, component, records, k, near)
+    if angle >= 0:
+        tracked[angle, 0] = value
+    write_gradient(n, arm_f, arm_g, h, factor, jacobian, r, column)
+    return factor * value
+
+
+@kernel(inner=True)
+def joint_row(table, pool, r, start, tracked, records, residual, jacobian):
+    """Row r, of a joint."""
+    row = table[ROW_TABLE] + ROW * r
+    o = table[row + PARAMETERS]
+    pairs = table[CONTACTS]
+    second = table[row + SECOND]
+    value = -pool[o + 2]
+    for part in range(1 if second < 0 else 2):
+        at = row + COORDINATE if part == 0 else second
+        value += coordinate_row(
+            pool,
+            table[at],
+            table[at + 1],
+            pairs + table[at + 2],
+            table[at + 3],
+            pool[o + part],
+            start,
+            tracked,
+            records,
+            jacobian,
+            r,
+            0 if part == 0 else EXTRA_COLUMN,
+        )
+    residual[r] = value
+
+
+@kernel(inner=True)
+def place_tape(table, pool, tape, q, room):
+    """The poses of a tape's bodies, in the user's units, to the front of its room. Returns where its inputs end."""
+    size = pool[SCALE]
+    for b in range(table[tape + TAPE_BODIES]):
+        body = table[table[tape + TAPE_LIST] + b]
+        for i in range(3):
+            room[7 * b + i] = q[body, i] * size + pool[REFERENCE + i]
+        for i in range(3, 7):
+            room[7 * b + i] = q[body, i]
+    return 7 * table[tape + TAPE_BODIES]
+
+
+@kernel(inner=True)
+def tape_rows(table, pool, tape, q, room, residual, jacobian):
+    """All rows of a tape; a value that is not finite is an infinite violation."""
+    inputs, outputs, work = room
+    place_tape(table, pool, tape, q, inputs)
+    run_tape(table, pool, table[tape + TAPE_FIRST], inputs, work, outputs)
+    m = table[tape + TAPE_VALUES]
+    count = table[tape + TAPE_BODIES]
+    each = 1.0 / pool[table[tape + TAPE_SCALE]]
+    size = pool[SCALE]
+    for v in range(m):
+        r = table[tape + TAPE_ROW_AT] + v
+        residual[r] = outputs[v] * each
+        if not math.isfinite(outputs[v]):
+            residual[r] = math.inf
+        for b in range(count):
+            at = m + 6 * (count * v + b)
+            column = 6 * b if b < 2 else EXTRA_COLUMN + 6 * (b - 2)
+            for i in range(3):
+                jacobian[r, column + i] = outputs[at + i] * each * size
+                jacobian[r, column + 3 + i] = outputs[at + 3 + i] * each
+
+
+@kernel(inner=True)
+def evaluate(table, pool, start, patience, loose, room, point):
+    """Evaluate all rows at the point's poses. Returns the contact whose pair was lost, or -1.
+
+    `start` are the tracked values to begin from. `point` is (poses, tracked values, records, residual, Jacobian); all
+    but the poses are written. `loose` is what free pairs need: (places, lengths, room, ...).
+    """
+    q, tracked, records, residual, jacobian = point
+    pairs = table[CONTACTS]
+    for r in range(pairs):
+        if not contact_row(table, pool, r, start, patience, loose, point):
+            return r
+    for k in range(table[JOINTS]):
+        joint = table[JOINT_TABLE] + JOINT_RECORD * k
+        place_frames(pool, table[joint + 2], q, table[joint], table[joint + 1], records, pairs + k)
+    for r in range(pairs, table[ROWS]):
+        if table[table[ROW_TABLE] + ROW * r + KIND] == JOINT_ROW:
+            joint_row(table, pool, r, start, tracked, records, residual, jacobian)
+    for t in range(table[TAPES]):
+        tape_rows(table, pool, table[TAPE_TABLE] + TAPE_RECORD * t, q, room, residual, jacobian)
     return -1
 
 
 @kernel(inner=True)
-def objective(table, pool, q, gradient, hessian):
-    """Value, gradient and Hessian of the objective; both arrays are overwritten."""
-    n = gradient.size
-    for i in range(n):
-        gradient[i] = 0.0
-        for j in range(n):
-            hessian[i, j] = 0.0
-    value = 0.0
-    for t in range(table[TERMS]):
-        value += add_term(table, pool, table[TERM_TABLE] + TERM * t, q, gradient, hessian)
-    return value
+def add_gram(bases, jacobian, r, weight, hessian):
+    """Upper triangle of hessian += weight J_r^T J_r, for row r of two bodies and more."""
+    for b in range(bases.shape[1]):
+        at = bases[r, b]
+        if at < 0 or b == 2:
+            continue
+        column = 6 * b if b < 2 else EXTRA_COLUMN + 6 * (b - 3)
+        for c in range(bases.shape[1]):
+            other = bases[r, c]
+            if other < at or c == 2:
+                continue
+            across = 6 * c if c < 2 else EXTRA_COLUMN + 6 * (c - 3)
+            for i in range(6):
+                s = weight * jacobian[r, column + i]
+                if s != 0.0:
+                    for j in range(6):
+                        hessian[at + i, other + j] += s * jacobian[r, across + j]
 
 
 @kernel(inner=True)
-def add_row_terms(table, pool, r, q, contacts, free, lengths, vectors, block, records, jacobian, y, weights, hessian):
-    """Upper triangle of hessian += second derivative of y . rows + J^T diag(weights) J, for row r.
-
-    The rows of tangency of a free pair go with its row.
-    """
+def add_free_terms(table, pool, r, loose, point, y, weights, hessian):
+    """As `add_row_terms`, for the row of a free pair and its rows of tangency."""
+    q, tracked, _records, _residual, jacobian = point
+    free, lengths, vectors, block, _guess = loose
     row = table[ROW_TABLE] + ROW * r
     f = 6 * table[table[SLOTS] + table[row + BODY_F]]
     g = 6 * table[table[SLOTS] + table[row + BODY_G]]
-    k = table[row + CONTACT]
-    if free[k] < 0:
-        if y[r] != 0.0 or weights[r] != 0.0:
-            add_gap_terms(records, k, jacobian, r, y[r], weights[r], hessian, f, g)
-        return
-    e = table[ROWS] + 4 * free[k]
-    u = 6 * table[MOVING] + 4 * free[k]
+    e = table[ROWS] + 4 * free[r]
+    u = 6 * table[MOVING] + 4 * free[r]
     free_hessian(
         table,
         pool,
@@ -224,8 +285,8 @@ def add_row_terms(table, pool, r, q, contacts, free, lengths, vectors, block, re
         table[row + BODY_F],
         table[row + BODY_G],
         q,
-        (contacts[k, 0], contacts[k, 1], contacts[k, 2], contacts[k, 3]),
-        (lengths[k, 0], lengths[k, 1], lengths[k, 2], lengths[k, 3]),
+        (tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3]),
+        (lengths[r, 0], lengths[r, 1], lengths[r, 2], lengths[r, 3]),
         (y[r], y[e], y[e + 1], y[e + 2], y[e + 3]),
         vectors,
         block,
@@ -242,3 +303,68 @@ def add_row_terms(table, pool, r, q, contacts, free, lengths, vectors, block, re
             for l in range(4):
                 value += weights[e + l] * jacobian[e + l, i] * jacobian[e + l, j]
             hessian[base + i, other + j] += value
+
+
+@kernel(inner=True)
+def add_tape_hessian(table, pool, tape, q, room, y, hessian):
+    """Upper triangle of hessian += second derivative of y . rows, for the rows of a tape."""
+    inputs, outputs, work = room
+    m = table[tape + TAPE_VALUES]
+    count = table[tape + TAPE_BODIES]
+    each = 1.0 / pool[table[tape + TAPE_SCALE]]
+    size = pool[SCALE]
+    end = place_tape(table, pool, tape, q, inputs)
+    for v in range(m):
+        inputs[end + v] = y[table[tape + TAPE_ROW_AT] + v] * each
+    run_tape(table, pool, table[tape + TAPE_SECOND], inputs, work, outputs)
+    for b in range(count):
+        at = 6 * table[table[SLOTS] + table[table[tape + TAPE_LIST] + b]]
+        for c in range(count):
+            other = 6 * table[table[SLOTS] + table[table[tape + TAPE_LIST] + c]]
+            if at < 0 or other < at:
+                continue
+            for i in range(6):
+                for j in range(6):
+                    factor = (size if i < 3 else 1.0) * (size if j < 3 else 1.0)
+                    hessian[at + i, other + j] += factor * outputs[6 * count * (6 * b + i) + 6 * c + j]
+
+
+@kernel(inner=True)
+def add_row_terms(table, pool, loose, room, bases, point, y, weights, hessian):
+    """Upper triangle of hessian += second derivative of y . rows + J^T diag(weights) J.
+
+    The rows of tangency of a free pair go with its row.
+    """
+    q, _tracked, records, _residual, jacobian = point
+    pairs = table[CONTACTS]
+    for r in range(pairs):
+        if loose[0][r] >= 0:
+            add_free_terms(table, pool, r, loose, point, y, weights, hessian)
+        elif y[r] != 0.0 or weights[r] != 0.0:
+            add_gap_terms(records, r, jacobian, r, y[r], weights[r], hessian, bases[r, 0], bases[r, 1])
+    for r in range(pairs, table[ROWS]):
+        if weights[r] != 0.0:
+            add_gram(bases, jacobian, r, weights[r], hessian)
+        row = table[ROW_TABLE] + ROW * r
+        if y[r] == 0.0 or table[row + KIND] != JOINT_ROW:
+            continue
+        second = table[row + SECOND]
+        for part in range(1 if second < 0 else 2):
+            at = row + COORDINATE if part == 0 else second
+            add_coordinate_hessian(
+                table[at],
+                table[at + 1],
+                records,
+                pairs + table[at + 2],
+                y[r] * pool[table[row + PARAMETERS] + part],
+                hessian,
+                bases[r, 0 if part == 0 else 3],
+                bases[r, 1 if part == 0 else 4],
+            )
+    for t in range(table[TAPES]):
+        tape = table[TAPE_TABLE] + TAPE_RECORD * t
+        idle = True
+        for v in range(table[tape + TAPE_VALUES]):
+            idle = idle and y[table[tape + TAPE_ROW_AT] + v] == 0.0
+        if not idle:
+            add_tape_hessian(table, pool, tape, q, room, y, hessian)

@@ -20,6 +20,7 @@ from assembly.errors import InputError, number, real_array, vector
 __all__ = [
     "Pose",
     "angular_velocity_map",
+    "axes_quaternion",
     "direction",
     "multiply",
     "pose_rows",
@@ -109,6 +110,22 @@ def rotate(quaternion: ArrayLike, v: ArrayLike) -> Array:
     """The vectors v (..., 3) rotated by the normalized quaternion."""
     rotated: Array = _vectors("v", v) @ rotation_matrix(quaternion).T
     return rotated
+
+
+def axes_quaternion(axes: ArrayLike) -> Array:
+    """Unit quaternion of a rotation matrix (3, 3), its scalar part not negative.
+
+    The eigenvector of Bar-Itzhack's matrix: exact to rounding for every rotation, halves of a turn too.
+    """
+    m = real_array("axes", axes, (3, 3))
+    if not np.abs(m.T @ m - np.eye(3)).max() <= UNIT_TOLERANCE or not np.linalg.det(m) > 0.0:
+        raise InputError(f"axes is {m.tolist()}; expected a rotation matrix, columns x, y, z")
+    k = np.zeros((4, 4))
+    k[1:, 1:] = m + m.T - np.trace(m) * np.eye(3)
+    k[0, 0] = np.trace(m)
+    k[0, 1:] = k[1:, 0] = (m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1])
+    e: Array = np.linalg.eigh(k)[1][:, -1]
+    return -e if e[0] < 0.0 else e
 
 
 def angular_velocity_map(quaternion: ArrayLike, body_axes: bool = False) -> Array:

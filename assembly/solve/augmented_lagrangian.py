@@ -7,8 +7,7 @@ Minimize f subject to c = 0 (or c >= 0), multipliers y of L = f + y.c (y <= 0 fo
 
 with H the Hessian of L, by eliminating dy: (H + d I + J^T J / mu) dx = -(grad f + J^T (y + c / mu)). The Cholesky
 factorization of that matrix tells its inertia; d is raised until it exists. dx descends on the augmented Lagrangian,
-along which a line search runs; multipliers follow every step. -mu I makes redundant rows harmless.
-A step that the rows' curvature spoils is bent back onto the rows with the same factorization before it is shortened.
+along which a line search runs (`search.py`); multipliers follow every step. -mu I makes redundant rows harmless.
 
 A contact whose pair comes to a fold gets its coordinates as unknowns (`proximity/free_pair.py`) for the rest of the
 solve.
@@ -25,37 +24,36 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly.constraints.program import (
     BODIES,
-    CONTACT,
     CONTACT_RECORD,
     CONTACTS,
+    EXTRA,
+    EXTRA_COLUMN,
     FOLD,
+    JOINTS,
     MOVING,
-    PROPER,
     REFERENCE,
-    ROW,
-    ROW_TABLE,
     ROWS,
     SCALE,
-    SLOTS,
+    TAPE_ROOM,
+    TRACKED,
     add_row_terms,
     evaluate,
-    objective,
 )
-from assembly.proximity.extremal import BEND
+from assembly.constraints.terms import objective
 from assembly.proximity.free_pair import VARIABLES, VECTORS
-from assembly.solve.contacts import free_folds, free_pairs_hold, start_contacts
+from assembly.solve.contacts import free_folds, start_contacts
 from assembly.solve.linear import factorize_shifted, substitute
+from assembly.solve.report import judge, write_pose, write_rows
 from assembly.solve.rows import (
     add_transposed,
-    carry,
     dual_residual,
+    envelope,
     least_squares_multipliers,
-    merit,
-    move,
     place_rows,
     times,
     violation_of,
 )
+from assembly.solve.search import SHORTEST, search
 
 # Outcomes; `solution.Status` gives each a sentence. RUNNING is none of them.
 SOLVED, INFEASIBLE, STALLED, ITERATION_LIMIT, CONTACT_LOST, RUNNING = 0, 1, 2, 3, 4, 5
@@ -71,109 +69,156 @@ PATIENCE = 25
 RESTORATIONS = 3
 # Multipliers below this count for nothing against the objective's curvature, which is of order one.
 WEAK = 1e-3
-# A gap that counts as touching where crossing surfaces are reported.
+# A violation above this, at the stationary point of all violations, tells that the rows cannot hold.
 TOUCHING = 1e-9
-# A step shorter than this decides nothing.
-SHORTEST = 1e-6
 
 
 @kernel(inner=True)
-def write_pose(table, pool, q, state):
-    """Poses of the moving bodies into the state, in the user's coordinates."""
-    for b in range(table[BODIES]):
-        if table[table[SLOTS] + b] >= 0:
-            for k in range(3):
-                state[7 * b + k] = q[b, k] * pool[SCALE] + pool[REFERENCE + k]
-            for k in range(3, 7):
-                state[7 * b + k] = q[b, k]
+def choose_multipliers(shape, rows, here, shortened, active, gradient, scratch, gram, y, better_y):
+    """The better of y, of what the last step proposed, and after a shortened step of least squares; into y.
+
+    Returns the dual residual.
+    """
+    bases, one_sided, _last, last_row = shape
+    residual = here[3]
+    jacobian = here[4]
+    dual = dual_residual(bases, jacobian, rows, one_sided, residual, gradient, better_y, scratch)
+    other = dual_residual(bases, jacobian, rows, one_sided, residual, gradient, y, scratch)
+    if dual <= other:
+        for r in range(rows):
+            y[r] = better_y[r]
+    else:
+        dual = other
+    if shortened:
+        least_squares_multipliers(bases, jacobian, rows, one_sided, active, gradient, scratch, last_row, gram, better_y)
+        other = dual_residual(bases, jacobian, rows, one_sided, residual, gradient, better_y, scratch)
+        if other < dual:
+            dual = other
+            for r in range(rows):
+                y[r] = better_y[r]
+    return dual
 
 
 @kernel(inner=True)
-def write_rows(table, contacts, y, residual, free, size, state):
-    """Contacts, multipliers and residuals into the state, lengths in the user's unit."""
-    m = table[ROWS]
-    o = 7 * table[BODIES]
-    for k in range(table[CONTACTS]):
-        for i in range(4):
-            state[o + 4 * k + i] = contacts[k, i]
-    o += 4 * table[CONTACTS]
-    for r in range(m):
-        state[o + r] = y[r]
-        worst = residual[r]
-        k = table[table[ROW_TABLE] + ROW * r + CONTACT]
-        if free[k] >= 0:
-            # What a free pair lacks to be extremal is a violation of its contact, too.
-            for i in range(4):
-                if abs(residual[m + 4 * free[k] + i]) > abs(worst):
-                    worst = -abs(residual[m + 4 * free[k] + i])
-        state[o + m + r] = worst * size
+def weigh_rows(rows, one_sided, residual, y, mu, forces, active):
+    """Into active 1 / mu for the rows that count, into forces what they push with: -(y + c / mu)."""
+    for r in range(rows):
+        t = y[r] + residual[r] / mu
+        idle = one_sided[r] == 1 and t >= 0.0
+        forces[r] = 0.0 if idle else -t
+        active[r] = 0.0 if idle else 1.0 / mu
+
+
+@kernel(inner=True)
+def curve_rows(rows, residual, y, active, restoring, forces):
+    """Into forces the multipliers whose rows' curvature goes into the matrix."""
+    strongest = 0.0
+    for r in range(rows):
+        # Far from feasible, c / mu would drown the curvature of the objective; y is what it tends to.
+        forces[r] = (residual[r] if active[r] > 0.0 else 0.0) if restoring else y[r]
+        strongest = max(strongest, abs(forces[r]))
+    if strongest < WEAK:
+        # Forces on their way to zero: their curvature would only spoil the inertia, and cost the fast end.
+        for r in range(rows):
+            forces[r] = 0.0
+
+
+@kernel(inner=True)
+def shorten(table, n, radius, step):
+    """The factor that keeps a step in the radius and turns below a radian, and the largest component before it."""
+    longest = 0.0
+    turn = 0.0
+    for i in range(n):
+        longest = max(longest, abs(step[i]))
+        if i % 6 >= 3 and i < 6 * table[MOVING]:
+            turn = max(turn, abs(step[i]))
+    cut = min(1.0, radius / longest) if longest > 0.0 else 1.0
+    cut = min(cut, 1.0 / turn) if turn > 0.0 else cut
+    return cut, longest
 
 
 @kernel
 def solve_program(table, pool, settings, state, history):
-    """Solve in place. State: q (n, 7) | contacts (k, 4) | multipliers (m) | residuals (m) | results."""
+    """Solve in place. State: q (n, 7) | tracked (k, 4) | multipliers (m) | residuals (m) | results."""
     bodies = table[BODIES]
     pairs = table[CONTACTS]
+    tracks = table[TRACKED]
     m = table[ROWS]
     size = pool[SCALE]
-    o_contacts = 7 * bodies
-    o_y = o_contacts + 4 * pairs
-    o_residual = o_y + m
-    results = state[o_residual + m :]
-    q = np.empty((bodies, 7))
-    reach = 0.0
-    for b in range(bodies):
-        for k in range(3):
-            q[b, k] = (state[7 * b + k] - pool[REFERENCE + k]) / size
-            reach = max(reach, abs(state[7 * b + k]) / size)
-        for k in range(3, 7):
-            q[b, k] = state[7 * b + k]
-    contacts = np.empty((pairs, 4))
-    for k in range(pairs):
-        for i in range(4):
-            contacts[k, i] = state[o_contacts + 4 * k + i]
+    o_tracked = 7 * bodies
+    o_y = o_tracked + 4 * tracks
+    results = state[o_y + 2 * m :]
     # Rows and variables grow by four for every free pair.
     rows = m
     most = m + 4 * pairs
     n = 6 * table[MOVING]
-    free = np.empty(pairs, np.int64)
+    columns = EXTRA_COLUMN + 6 * table[EXTRA]
+    # A point of the search: poses, tracked values, records, residual, Jacobian.
+    here = (
+        np.empty((bodies, 7)),
+        np.empty((tracks, 4)),
+        np.empty((pairs + table[JOINTS], CONTACT_RECORD)),
+        np.empty(most),
+        np.empty((most, columns)),
+    )
+    trial = (
+        np.empty((bodies, 7)),
+        np.empty((tracks, 4)),
+        np.empty((pairs + table[JOINTS], CONTACT_RECORD)),
+        np.empty(most),
+        np.empty((most, columns)),
+    )
+    reach = 0.0
+    for b in range(bodies):
+        for k in range(7):
+            value = state[7 * b + k]
+            if k < 3:
+                reach = max(reach, abs(value) / size)
+                value = (value - pool[REFERENCE + k]) / size
+            here[0][b, k] = value
+            trial[0][b, k] = value
+    for k in range(tracks):
+        for i in range(4):
+            here[1][k, i] = state[o_tracked + 4 * k + i]
     for k in range(pairs):
-        free[k] = -1
-    bases = np.empty((most, 3), np.int64)
-    one_sided = np.empty(most, np.int64)
-    place_rows(table, free, bases, one_sided)
-    lengths = np.empty((pairs, 4))
-    vectors = np.empty((VECTORS, 3, VARIABLES))
-    block = np.empty((VARIABLES, VARIABLES))
+        for i in range(CONTACT_RECORD):
+            here[2][k, i] = 1.0
+    for r in range(most):
+        here[3][r] = math.inf
     y = np.zeros(most)
     better_y = np.zeros(most)
     for r in range(m):
         y[r] = state[o_y + r]
         better_y[r] = y[r]
-    trial_q = np.empty((bodies, 7))
-    for b in range(bodies):
-        for k in range(7):
-            trial_q[b, k] = q[b, k]
-    guess = np.empty((pairs, 4))
-    trial_contacts = np.empty((pairs, 4))
-    records = np.empty((pairs, CONTACT_RECORD))
-    trial_records = np.empty((pairs, CONTACT_RECORD))
-    residual = np.empty(most)
-    for r in range(most):
-        residual[r] = math.inf
+    free = np.empty(pairs, np.int64)
     for k in range(pairs):
-        for i in range(CONTACT_RECORD):
-            records[k, i] = 1.0
-    trial_residual = np.empty(most)
-    jacobian = np.empty((most, VARIABLES))
-    trial_jacobian = np.empty((most, VARIABLES))
-    active = np.empty(most)
-    gram = np.empty((most, most))
+        free[k] = -1
+    # What pairs need: which are free, the lengths of their coordinates, room for their derivatives; a guess of all.
+    loose = (
+        free,
+        np.empty((pairs, 4)),
+        np.empty((VECTORS if pairs > 0 else 0, 3, VARIABLES)),
+        np.empty((VARIABLES if pairs > 0 else 0, VARIABLES)),
+        np.empty((tracks, 4)),
+    )
+    # Where rows stand: variables, sides, and the envelopes of matrices of variables and of rows.
+    shape = (
+        np.empty((most, 3 + table[EXTRA]), np.int64),
+        np.empty(most, np.int64),
+        np.empty(n + 4 * pairs, np.int64),
+        np.empty(most, np.int64),
+    )
+    bases, one_sided, last, last_row = shape
+    place_rows(table, free, bases, one_sided)
+    envelope(table, bases, rows, n, last, last_row)
+    o_room = table[TAPE_ROOM]
+    room = (np.empty(table[o_room]), np.empty(table[o_room + 1]), np.empty(table[o_room + 2]))
+    active = np.zeros(most)
     forces = np.zeros(most)
+    gram = np.empty((most, most))
     gradient = np.empty(n)
-    descent = np.empty(n)
-    step = np.empty(n)
-    straight = np.empty(n)
+    # Right side or scratch, step, step before it was bent.
+    lines = (np.empty(n), np.empty(n), np.empty(n))
     lagrangian = np.empty((n, n))
     matrix = np.empty((n, n))
 
@@ -196,60 +241,48 @@ def solve_program(table, pool, settings, state, history):
     status = RUNNING
     results[CULPRIT] = -1.0
 
-    lost = start_contacts(table, pool, q, contacts, free, lengths)
-    count = free_folds(table, pool, records, contacts, forces, free, lengths, -1.0, -1)
+    lost = start_contacts(table, pool, here[0], here[1], free, loose[1])
+    count = free_folds(table, pool, here[2], here[1], active, free, loose[1], -1.0, -1)
     if lost < 0 and count == 0:
-        lost = evaluate(
-            table, pool, q, contacts, math.inf, free, lengths, vectors, contacts, records, residual, jacobian
-        )
+        lost = evaluate(table, pool, here[1], math.inf, loose, room, here)
     if lost >= 0:
         status = CONTACT_LOST
         results[CULPRIT] = float(lost)
-        value = objective(table, pool, q, gradient, lagrangian)
+        value = objective(table, pool, here[0], 0, room, last, gradient, lagrangian)
     lost = np.int64(-1)
     below = FREE_BELOW
     while status == RUNNING:
-        for r in range(rows):
-            forces[r] = 0.0 if one_sided[r] == 1 and y[r] + residual[r] / mu >= 0.0 else 1.0
-        count = free_folds(table, pool, records, contacts, forces, free, lengths, below, lost)
+        weigh_rows(rows, one_sided, here[3], y, mu, forces, active)
+        if pairs > 0:
+            count = free_folds(table, pool, here[2], here[1], active, free, loose[1], below, lost)
         if m + 4 * count != rows:
             for r in range(rows, most):
+                # New rows of tangency say nothing yet: least squares leave them out.
                 y[r] = 0.0
                 better_y[r] = 0.0
+                active[r] = 0.0
             rows = m + 4 * count
             n = 6 * table[MOVING] + 4 * count
             place_rows(table, free, bases, one_sided)
+            envelope(table, bases, rows, n, last, last_row)
             gradient = np.empty(n)
-            descent = np.empty(n)
-            step = np.empty(n)
-            straight = np.empty(n)
+            lines = (np.empty(n), np.empty(n), np.empty(n))
             lagrangian = np.empty((n, n))
             matrix = np.empty((n, n))
-            lost = evaluate(
-                table, pool, q, contacts, math.inf, free, lengths, vectors, contacts, records, residual, jacobian
-            )
+            lost = evaluate(table, pool, here[1], math.inf, loose, room, here)
         below = FREE_BELOW
         if lost >= 0 and free[lost] < 0:
             # A pair that is lost and cannot be freed (an idle row, a pole): nothing moves any more.
             results[CULPRIT] = float(lost)
             status = STALLED
-        lost = -1
-        value = objective(table, pool, q, gradient, lagrangian)
+        lost = np.int64(-1)
+        residual = here[3]
+        jacobian = here[4]
+        descent, step, straight = lines
+        value = objective(table, pool, here[0], 1, room, last, gradient, lagrangian)
         violation = violation_of(residual, one_sided, rows)
-        dual = dual_residual(bases, jacobian, rows, one_sided, residual, gradient, better_y, descent)
-        other = dual_residual(bases, jacobian, rows, one_sided, residual, gradient, y, descent)
-        if dual <= other:
-            for r in range(rows):
-                y[r] = better_y[r]
-        else:
-            dual = other
-        if iteration > 0 and alpha < 1.0:
-            least_squares_multipliers(bases, jacobian, rows, one_sided, forces, gradient, descent, gram, better_y)
-            other = dual_residual(bases, jacobian, rows, one_sided, residual, gradient, better_y, descent)
-            if other < dual:
-                dual = other
-                for r in range(rows):
-                    y[r] = better_y[r]
+        shortened = iteration > 0 and alpha < 1.0
+        dual = choose_multipliers(shape, rows, here, shortened, active, gradient, descent, gram, y, better_y)
         if iteration < history.shape[0]:
             history[iteration, 0] = value
             history[iteration, 1] = violation
@@ -263,6 +296,10 @@ def solve_program(table, pool, settings, state, history):
             break
         if iteration >= limit:
             status = ITERATION_LIMIT
+            break
+        if not math.isfinite(violation) or not math.isfinite(value) or not math.isfinite(dual):
+            # Only where the start is so: a step to such a place is not taken.
+            status = STALLED
             break
         if restoring and violation <= max(0.1 * entered, feasible):
             restoring = False
@@ -283,69 +320,32 @@ def solve_program(table, pool, settings, state, history):
                 y[r] = 0.0
             for i in range(n):
                 gradient[i] = 0.0
-                for j in range(n):
+                for j in range(i, last[i] + 1):
                     lagrangian[i, j] = 0.0
         # The right side and the matrix.
-        for r in range(rows):
-            t = y[r] + residual[r] / mu
-            idle = one_sided[r] == 1 and t >= 0.0
-            forces[r] = 0.0 if idle else -t
-            active[r] = 0.0 if idle else 1.0 / mu
+        weigh_rows(rows, one_sided, residual, y, mu, forces, active)
         for i in range(n):
             descent[i] = -gradient[i]
         add_transposed(bases, jacobian, rows, forces, descent)
-        strongest = 0.0
-        for r in range(rows):
-            # Far from feasible, c / mu would drown the curvature of the objective; y is what it tends to.
-            forces[r] = (residual[r] if active[r] > 0.0 else 0.0) if restoring else y[r]
-            strongest = max(strongest, abs(forces[r]))
-        if strongest < WEAK:
-            # Forces on their way to zero: their curvature would only spoil the inertia, and cost the fast end.
-            for r in range(rows):
-                forces[r] = 0.0
-        for r in range(m):
-            add_row_terms(
-                table,
-                pool,
-                r,
-                q,
-                contacts,
-                free,
-                lengths,
-                vectors,
-                block,
-                records,
-                jacobian,
-                forces,
-                active,
-                lagrangian,
-            )
+        curve_rows(rows, residual, y, active, restoring, forces)
+        add_row_terms(table, pool, loose, room, bases, here, forces, active, lagrangian)
         # What the inertia needs falls with the distance to the solution.
-        shift = factorize_shifted(lagrangian, n, max(min(0.25 * shift, dual), 1e-8), matrix)
+        shift = factorize_shifted(lagrangian, n, last, max(min(0.25 * shift, dual), 1e-8), matrix)
         if shift < 0.0:
             status = STALLED
             break
         for i in range(n):
             step[i] = descent[i]
-        substitute(matrix, n, step)
-        longest = 0.0
-        turn = 0.0
-        for i in range(n):
-            longest = max(longest, abs(step[i]))
-            if i % 6 >= 3 and i < 6 * table[MOVING]:
-                turn = max(turn, abs(step[i]))
-        # Turns stay below a radian; moves may grow as long as they succeed.
-        cut = min(1.0, radius / longest) if longest > 0.0 else 1.0
-        cut = min(cut, 1.0 / turn) if turn > 0.0 else cut
+        substitute(matrix, n, last, step)
+        cut, longest = shorten(table, n, radius, step)
         slope = 0.0
+        steepest = 0.0
         for i in range(n):
             step[i] *= cut
             straight[i] = step[i]
             slope -= descent[i] * step[i]
+            steepest = max(steepest, abs(descent[i]))
         if restoring:
-            steepest = 0.0
-            for i in range(n):
-                steepest = max(steepest, abs(descent[i]))
             if steepest <= 1e-9 * violation or longest < 1e-12:
                 status = INFEASIBLE if violation > TOUCHING else STALLED
                 break
@@ -355,66 +355,40 @@ def solve_program(table, pool, settings, state, history):
                     break
                 check_at = iteration + PATIENCE
                 check_violation = violation
-        # Line search on the augmented Lagrangian.
-        here = merit(residual, one_sided, rows, y, mu)
-        if not restoring:
-            here += value
-        noise = 1e-14 * (abs(here) + abs(value) + 1e-300)
-        alpha = 1.0
-        accepted = False
-        bends = 0
-        while alpha * longest * cut > 1e-9 * SHORTEST or alpha == 1.0:
-            move(table, q, step, alpha, trial_q)
-            carry(table, pool, bases, free, lengths, contacts, records, step, alpha, guess)
-            lost = evaluate(
-                table,
-                pool,
-                trial_q,
-                guess,
-                BEND,
-                free,
-                lengths,
-                vectors,
-                trial_contacts,
-                trial_records,
-                trial_residual,
-                trial_jacobian,
-            )
-            if lost < 0:
-                there = merit(trial_residual, one_sided, rows, y, mu)
-                if not restoring:
-                    there += objective(table, pool, trial_q, gradient, lagrangian)
-                if there <= here + 1e-4 * alpha * slope + noise:
-                    accepted = True
-                    break
-                if bends < 2:
-                    bends += 1
-                    for i in range(n):
-                        descent[i] = 0.0
-                    for r in range(rows):
-                        forces[r] = -(trial_residual[r] - (1.0 - alpha) * residual[r]) * active[r]
-                    add_transposed(bases, jacobian, rows, forces, descent)
-                    substitute(matrix, n, descent)
-                    for i in range(n):
-                        step[i] += descent[i] / alpha
-                    continue
-                if bends == 2:
-                    bends = 3
-                    for i in range(n):
-                        step[i] = straight[i]
-            alpha *= 0.5
-            if lost >= 0 and alpha * longest * cut < 0.01:
-                break
+        longest *= cut
+        accepted, alpha, lost = search(
+            table,
+            pool,
+            shape,
+            loose,
+            room,
+            here,
+            trial,
+            lines,
+            rows,
+            y,
+            0.0 if restoring else value,
+            value,
+            restoring,
+            mu,
+            slope,
+            longest,
+            matrix,
+            active,
+            forces,
+            gradient,
+            lagrangian,
+        )
         if not accepted:
             if lost < 0:
                 # Perhaps a fold is near enough to matter; else nothing moves any more.
                 below = 0.3
                 for k in range(pairs):
-                    if free[k] < 0 and abs(records[k, FOLD]) < below:
-                        lost = k
+                    if free[k] < 0 and abs(here[2][k, FOLD]) < below:
+                        lost = np.int64(k)
             if lost >= 0 and free[lost] < 0:
                 continue
-            lost = -1
+            lost = np.int64(-1)
             if not restoring and violation > feasible and restorations < RESTORATIONS:
                 restoring = True
                 restorations += 1
@@ -428,57 +402,24 @@ def solve_program(table, pool, settings, state, history):
                 better_y[r] = y[r] + alpha * (times(bases, jacobian, r, straight) + residual[r]) / mu
                 if one_sided[r] == 1:
                     better_y[r] = min(better_y[r], 0.0)
-        q, trial_q = trial_q, q
-        contacts, trial_contacts = trial_contacts, contacts
-        records, trial_records = trial_records, records
-        residual, trial_residual = trial_residual, residual
-        jacobian, trial_jacobian = trial_jacobian, jacobian
+        here, trial = trial, here
         if alpha == 1.0:
             if cut == 1.0:
                 mu = max(0.1 * mu, settings[PENALTY_FLOOR])
             radius = min(2.0 * radius, 1e6)
         else:
-            radius = max(2.0 * alpha * longest * cut, SHORTEST)
+            radius = max(2.0 * alpha * longest, SHORTEST)
         iteration += 1
 
-    write_pose(table, pool, q, state)
+    write_pose(table, pool, here[0], state)
     if status != CONTACT_LOST:
-        # The pose as it is returned, rounded to the user's coordinates, judged afresh.
-        for b in range(bodies):
-            for k in range(3):
-                trial_q[b, k] = (state[7 * b + k] - pool[REFERENCE + k]) / size
-            for k in range(3, 7):
-                trial_q[b, k] = q[b, k]
-        lost = evaluate(
-            table,
-            pool,
-            trial_q,
-            contacts,
-            BEND,
-            free,
-            lengths,
-            vectors,
-            trial_contacts,
-            trial_records,
-            trial_residual,
-            trial_jacobian,
-        )
-        violation = violation_of(trial_residual, one_sided, rows) if lost < 0 else math.inf
-        if status == SOLVED and not (
-            violation <= 1.25 * feasible and free_pairs_hold(table, pool, trial_q, contacts, free, 1e-9)
-        ):
+        holds, violation = judge(table, pool, state, loose, room, shape, rows, here, trial, 1.25 * feasible)
+        if status == SOLVED and not holds:
             status = STALLED
-        if lost < 0:
-            residual, trial_residual = trial_residual, residual
-    write_rows(table, contacts, y, residual, free, size, state)
+    results[IMPROPER] = write_rows(table, here, y, free, size, state)
     results[STATUS] = float(status)
     results[COUNT] = float(iteration)
     results[OBJECTIVE] = value
     results[VIOLATION] = violation * size
     results[DUAL] = dual
-    results[IMPROPER] = 0.0
-    for r in range(m):
-        k = table[table[ROW_TABLE] + ROW * r + CONTACT]
-        if free[k] < 0 and records[k, PROPER] == 0.0 and abs(residual[r]) <= TOUCHING:
-            results[IMPROPER] += 1.0
     return status

@@ -8,12 +8,11 @@ from assembly._kernel import kernel
 from assembly.constraints.program import (
     BODY_F,
     BODY_G,
-    CONTACT,
+    CONTACTS,
     FOLD,
     ONE_SIDED,
     ROW,
     ROW_TABLE,
-    ROWS,
     SURFACE_F,
     SURFACE_G,
 )
@@ -40,9 +39,8 @@ def start_contacts(table, pool, q, contacts, free, lengths):
 
     Where a pair does not exist yet (a face tilted against another), its coordinates become unknowns at once.
     """
-    for r in range(table[ROWS]):
-        row = table[ROW_TABLE] + ROW * r
-        k = table[row + CONTACT]
+    for k in range(table[CONTACTS]):
+        row = table[ROW_TABLE] + ROW * k
         if not math.isnan(contacts[k, 0]):
             continue
         i = table[row + BODY_F]
@@ -56,16 +54,15 @@ def start_contacts(table, pool, q, contacts, free, lengths):
 
 
 @kernel(inner=True)
-def free_folds(table, pool, records, contacts, forces, free, lengths, below, lost):
+def free_folds(table, pool, records, contacts, active, free, lengths, below, lost):
     """Mark the pairs near a fold, and the lost one, as free. Returns how many are free now.
 
     An idle one-sided row asks nothing of its pair.
     """
     count = 0
-    for r in range(table[ROWS]):
-        row = table[ROW_TABLE] + ROW * r
-        k = table[row + CONTACT]
-        idle = table[row + ONE_SIDED] == 1 and forces[r] == 0.0
+    for k in range(table[CONTACTS]):
+        row = table[ROW_TABLE] + ROW * k
+        idle = table[row + ONE_SIDED] == 1 and active[k] == 0.0
         if free[k] < 0 and not idle and (abs(records[k, FOLD]) < below or k == lost):
             free_pair(table, pool, row, k, contacts, free, lengths)
         if free[k] >= 0:
@@ -80,9 +77,8 @@ def free_pairs_hold(table, pool, q, contacts, free, tolerance):
 
     Its own rows do not tell at a pole or an apex: there a tangent vanishes, and its row with it.
     """
-    for r in range(table[ROWS]):
-        row = table[ROW_TABLE] + ROW * r
-        k = table[row + CONTACT]
+    for k in range(table[CONTACTS]):
+        row = table[ROW_TABLE] + ROW * k
         if free[k] < 0:
             continue
         i = table[row + BODY_F]

@@ -1,4 +1,8 @@
-"""The dense step: Cholesky factorization that says whether the matrix is positive definite."""
+"""The step: Cholesky factorization in an envelope, which says whether the matrix is positive definite.
+
+Row i of the upper triangle has entries up to column last[i], and last never falls: so fill-in stays inside. Bodies are
+numbered (`packing.py`) so that the envelope of a chain or a tree is narrow; that of a small scene is all.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +12,7 @@ from assembly._kernel import kernel
 
 
 @kernel(inner=True)
-def factorize(m, n):
+def factorize(m, n, last):
     """Cholesky in the upper triangle of m, m = U^T U, diagonal stored inverted; False where not positive definite.
 
     Right-looking: rows are updated along memory, which vectorizes.
@@ -17,45 +21,46 @@ def factorize(m, n):
         pivot = m[k, k]
         if not pivot > 0.0:
             return False
+        end = last[k] + 1
         inverse = 1.0 / math.sqrt(pivot)
         m[k, k] = inverse
-        for j in range(k + 1, n):
+        for j in range(k + 1, end):
             m[k, j] *= inverse
-        for i in range(k + 1, n):
+        for i in range(k + 1, end):
             f = m[k, i]
             if f != 0.0:
-                for j in range(i, n):
+                for j in range(i, end):
                     m[i, j] -= f * m[k, j]
     return True
 
 
 @kernel(inner=True)
-def substitute(m, n, b):
+def substitute(m, n, last, b):
     """Solve U^T U x = b in place, for the factor that `factorize` left."""
     for k in range(n):
         s = b[k] * m[k, k]
         b[k] = s
-        for i in range(k + 1, n):
+        for i in range(k + 1, last[k] + 1):
             b[i] -= m[k, i] * s
     for k in range(n - 1, -1, -1):
         s = b[k]
-        for i in range(k + 1, n):
+        for i in range(k + 1, last[k] + 1):
             s -= m[k, i] * b[i]
         b[k] = s * m[k, k]
 
 
 @kernel(inner=True)
-def factorize_shifted(lagrangian, n, shift, matrix):
+def factorize_shifted(lagrangian, n, last, shift, matrix):
     """Factorize lagrangian + d I with the first d from `shift` up that makes it positive definite; -1: none."""
     scale = 1.0
     for i in range(n):
         scale = max(scale, abs(lagrangian[i, i]))
     while shift <= 1e8 * scale:
         for i in range(n):
-            for j in range(i, n):
+            for j in range(i, last[i] + 1):
                 matrix[i, j] = lagrangian[i, j]
             matrix[i, i] += shift
-        if factorize(matrix, n):
+        if factorize(matrix, n, last):
             return shift
         shift = max(8.0 * shift, 1e-6)
     return -1.0

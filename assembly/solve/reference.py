@@ -195,14 +195,14 @@ class ReferenceSolver:
         self._fixed = [k for k, body in enumerate(scene.bodies) if body.fixed]
         patches: dict[NurbsSurface, _Patch] = {}
         self._pairs: list[_Pair] = []
-        for contact, faces in zip(scene.constraints, packed.faces, strict=True):
+        for contact, faces in zip(packed.contacts, packed.faces, strict=True):
             for side in faces:
                 if side.face.surface not in patches:
                     patches[side.face.surface] = _Patch(side.face.surface, packed.scale)
             f, g = (patches[side.face.surface] for side in faces)
             i, j = (scene.bodies.index(body) for body in contact.bodies)
             self._pairs.append(_Pair(faces, (i, j), (f, g)))
-        self._one_sided = np.array([contact.unilateral for contact in scene.constraints], dtype=bool)
+        self._one_sided = np.array([contact.unilateral for contact in packed.contacts], dtype=bool)
         self._terms: list[tuple[PointDistance | Posture, int]] = []
         self._build(scene)
 
@@ -216,7 +216,7 @@ class ReferenceSolver:
         value = ca.MX(0)
         given: list[ca.MX] = []
         for sign, term in scene.objectives or ((1.0, Posture()),):
-            weight = sign * term.weight / self._packed.weight
+            weight = sign * term.weight * self._packed.scale**2 / self._packed.unit
             if isinstance(term, PointDistance):
                 k = scene.bodies.index(term.point.body)
                 given.append(ca.MX.sym("target", 3))
@@ -263,7 +263,7 @@ class ReferenceSolver:
             raise InputError("scene was changed after this solver was made; expected a new ReferenceSolver")
         state = self._scene._start(packed, q0, starts)
         q = state[: packed.contacts_at].reshape(-1, 7)
-        parameters = state[packed.contacts_at : packed.multipliers_at].reshape(-1, 4)
+        parameters = state[packed.contacts_at : packed.angles_at].reshape(-1, 4)
         p = self._given(q)
         found = [
             pair.find(q, None if np.isnan(at).any() else at) for pair, at in zip(self._pairs, parameters, strict=True)
@@ -329,7 +329,7 @@ class ReferenceSolver:
                 status = Status.STALLED
         state = np.zeros(packed.results_at + RESULTS)
         state[: packed.contacts_at] = q.ravel()
-        state[packed.contacts_at : packed.multipliers_at] = found.parameters.ravel()
+        state[packed.contacts_at : packed.angles_at] = found.parameters.ravel()
         state[packed.multipliers_at : packed.residuals_at] = forces
         state[packed.residuals_at : packed.results_at] = found.gaps
         results = state[packed.results_at :]

@@ -1,42 +1,134 @@
-"""What the loop does with rows: their places among the unknowns, products with the Jacobian, the merit."""
+"""What the loop does with rows: their places among the unknowns, products with the Jacobian, the merit.
+
+`bases` says where the variables of each row stand, negative for none: twist of f, twist of g, a free pair's
+coordinates, then twists of further bodies.
+"""
 
 from __future__ import annotations
+
+import numpy as np
 
 from assembly._kernel import kernel
 from assembly.constraints.program import (
     BODIES,
     BODY_F,
     BODY_G,
-    CONTACT,
+    CONTACTS,
+    EXTRA_COLUMN,
+    FREE_COLUMN,
+    JOINT_ROW,
+    KIND,
     MOVING,
     ONE_SIDED,
     ROW,
     ROW_TABLE,
     ROWS,
+    SECOND,
+    SECOND_BODY_F,
+    SECOND_BODY_G,
     SLOTS,
+    SURFACE_F,
+    SURFACE_G,
+    TAPE_BODIES,
+    TAPE_LIST,
+    TAPE_RECORD,
+    TAPE_ROW_AT,
+    TAPE_TABLE,
+    TAPE_VALUES,
+    TAPES,
+    TERMS,
+    TRACKED,
 )
+from assembly.constraints.terms import TAPE_TERM, TERM, TERM_KIND, TERM_TABLE, TERM_TAPE
 from assembly.kinematics.motion import retract
 from assembly.proximity.extremal import into_domain
 from assembly.proximity.velocity import RATES, ZED
 from assembly.solve.linear import factorize, substitute
 
 
+@kernel(inline=True)
+def slot(table, body):
+    """Where a body's twist stands among the unknowns; negative for a fixed one, and for none."""
+    return 6 * table[table[SLOTS] + body] if body >= 0 else -1
+
+
 @kernel(inner=True)
 def place_rows(table, free, bases, one_sided):
-    """Where each row's variables stand (twist of f, twist of g, free coordinates; negative: none), and its side."""
+    """Where each row's variables stand, and its side."""
     for r in range(table[ROWS]):
         row = table[ROW_TABLE] + ROW * r
-        k = table[row + CONTACT]
         one_sided[r] = table[row + ONE_SIDED]
-        bases[r, 0] = 6 * table[table[SLOTS] + table[row + BODY_F]]
-        bases[r, 1] = 6 * table[table[SLOTS] + table[row + BODY_G]]
-        bases[r, 2] = 6 * table[MOVING] + 4 * free[k] if free[k] >= 0 else -1
-        if free[k] >= 0:
+        for b in range(bases.shape[1]):
+            bases[r, b] = -1
+        bases[r, 0] = slot(table, table[row + BODY_F])
+        bases[r, 1] = slot(table, table[row + BODY_G])
+        second = table[row + SECOND]
+        if table[row + KIND] == JOINT_ROW and second >= 0:
+            bases[r, 3] = slot(table, table[second + SECOND_BODY_F])
+            bases[r, 4] = slot(table, table[second + SECOND_BODY_G])
+    for r in range(table[CONTACTS]):
+        if free[r] >= 0:
+            bases[r, 2] = 6 * table[MOVING] + 4 * free[r]
             for i in range(4):
-                e = table[ROWS] + 4 * free[k] + i
+                e = table[ROWS] + 4 * free[r] + i
                 one_sided[e] = 0
-                for j in range(3):
+                for j in range(bases.shape[1]):
                     bases[e, j] = bases[r, j]
+    for t in range(table[TAPES]):
+        tape = table[TAPE_TABLE] + TAPE_RECORD * t
+        for v in range(table[tape + TAPE_VALUES]):
+            for b in range(2, table[tape + TAPE_BODIES]):
+                bases[table[tape + TAPE_ROW_AT] + v, b + 1] = slot(table, table[table[tape + TAPE_LIST] + b])
+
+
+@kernel(inline=True)
+def width(block):
+    return 4 if block == 2 else 6
+
+
+@kernel(inner=True)
+def envelope(table, bases, rows, n, last, last_row):
+    """How far the rows of the Lagrangian's Hessian reach, and those of J J^T (see `linear.factorize`)."""
+    for i in range(n):
+        last[i] = i
+    for i in range(0, 6 * table[MOVING], 6):
+        last[i] = i + 5
+    for r in range(rows):
+        low = n
+        high = -1
+        for b in range(bases.shape[1]):
+            at = bases[r, b]
+            if at >= 0:
+                low = min(low, at)
+                high = max(high, at + width(b) - 1)
+        if high >= 0:
+            last[low] = max(last[low], high)
+    for t in range(table[TERMS]):
+        term = table[TERM_TABLE] + TERM * t
+        if table[term + TERM_KIND] == TAPE_TERM:
+            tape = table[term + TERM_TAPE]
+            low = n
+            high = -1
+            for b in range(table[tape + TAPE_BODIES]):
+                at = slot(table, table[table[tape + TAPE_LIST] + b])
+                if at >= 0:
+                    low = min(low, at)
+                    high = max(high, at + 5)
+            if high >= 0:
+                last[low] = max(last[low], high)
+    for i in range(1, n):
+        last[i] = max(last[i], last[i - 1])
+    # Rows meet in J J^T where they share a variable.
+    latest = np.empty(n, np.int64)
+    for r in range(rows):
+        for b in range(bases.shape[1]):
+            if bases[r, b] >= 0:
+                latest[bases[r, b]] = r
+    for r in range(rows):
+        last_row[r] = r if r == 0 else max(r, last_row[r - 1])
+        for b in range(bases.shape[1]):
+            if bases[r, b] >= 0:
+                last_row[r] = max(last_row[r], latest[bases[r, b]])
 
 
 @kernel(inner=True)
@@ -54,7 +146,12 @@ def times(bases, jacobian, r, d):
     u = bases[r, 2]
     if u >= 0:
         for k in range(4):
-            s += jacobian[r, 12 + k] * d[u + k]
+            s += jacobian[r, FREE_COLUMN + k] * d[u + k]
+    for b in range(3, bases.shape[1]):
+        at = bases[r, b]
+        if at >= 0:
+            for k in range(6):
+                s += jacobian[r, EXTRA_COLUMN + 6 * (b - 3) + k] * d[at + k]
     return s
 
 
@@ -72,7 +169,12 @@ def add_row(bases, jacobian, r, factor, out):
     u = bases[r, 2]
     if u >= 0:
         for k in range(4):
-            out[u + k] += factor * jacobian[r, 12 + k]
+            out[u + k] += factor * jacobian[r, FREE_COLUMN + k]
+    for b in range(3, bases.shape[1]):
+        at = bases[r, b]
+        if at >= 0:
+            for k in range(6):
+                out[at + k] += factor * jacobian[r, EXTRA_COLUMN + 6 * (b - 3) + k]
 
 
 @kernel(inner=True)
@@ -125,45 +227,38 @@ def move(table, q, d, alpha, out):
 
 
 @kernel(inner=True)
-def carry(table, pool, bases, free, lengths, contacts, records, d, alpha, out):
-    """Contact coordinates along alpha d: by the contact velocity, or, for a free pair, by its own unknowns."""
-    for r in range(table[ROWS]):
-        row = table[ROW_TABLE] + ROW * r
-        k = table[row + CONTACT]
-        f = bases[r, 0]
-        g = bases[r, 1]
-        u = bases[r, 2]
-        if u >= 0:
-            out[k, 0], out[k, 1], _clamped = into_domain(
-                table,
-                pool,
-                table[row + 3],
-                contacts[k, 0] + alpha * d[u] / lengths[k, 0],
-                contacts[k, 1] + alpha * d[u + 1] / lengths[k, 1],
-            )
-            out[k, 2], out[k, 3], _clamped = into_domain(
-                table,
-                pool,
-                table[row + 4],
-                contacts[k, 2] + alpha * d[u + 2] / lengths[k, 2],
-                contacts[k, 3] + alpha * d[u + 3] / lengths[k, 3],
-            )
-            continue
+def carry(table, pool, bases, free, lengths, tracked, records, d, alpha, out):
+    """Contact coordinates along alpha d: by the contact velocity, or, for a free pair, by its own unknowns.
+
+    Angles start from where they are: a step turns no body by more than a radian.
+    """
+    for k in range(table[CONTACTS], table[TRACKED]):
+        out[k, 0] = tracked[k, 0]
+    for k in range(table[CONTACTS]):
+        row = table[ROW_TABLE] + ROW * k
+        f = bases[k, 0]
+        g = bases[k, 1]
+        u = bases[k, 2]
         for i in range(4):
-            out[k, i] = contacts[k, i]
-        for j in range(4):
-            s = 0.0
-            for i in range(6):
-                if f >= 0:
-                    s += records[k, ZED + 12 * j + i] * d[f + i]
-                if g >= 0:
-                    s += records[k, ZED + 12 * j + 6 + i] * d[g + i]
-            s *= alpha
-            for i in range(4):
-                out[k, i] += records[k, RATES + 4 * i + j] * s
+            out[k, i] = tracked[k, i]
+            if u >= 0:
+                out[k, i] += alpha * d[u + i] / lengths[k, i]
+        if u < 0:
+            for j in range(4):
+                s = 0.0
+                for i in range(6):
+                    if f >= 0:
+                        s += records[k, ZED + 12 * j + i] * d[f + i]
+                    if g >= 0:
+                        s += records[k, ZED + 12 * j + 6 + i] * d[g + i]
+                s *= alpha
+                for i in range(4):
+                    out[k, i] += records[k, RATES + 4 * i + j] * s
         # The prediction may run over the end of a patch; Newton starts inside.
-        out[k, 0], out[k, 1], _clamped = into_domain(table, pool, table[row + 3], out[k, 0], out[k, 1])
-        out[k, 2], out[k, 3], _clamped = into_domain(table, pool, table[row + 4], out[k, 2], out[k, 3])
+        for side in range(2):
+            surface = table[row + (SURFACE_F if side == 0 else SURFACE_G)]
+            i = 2 * side
+            out[k, i], out[k, i + 1], _clamped = into_domain(table, pool, surface, out[k, i], out[k, i + 1])
 
 
 @kernel(inner=True)
@@ -183,20 +278,31 @@ def dual_residual(bases, jacobian, rows, one_sided, residual, gradient, y, scrat
 
 
 @kernel(inner=True)
-def least_squares_multipliers(bases, jacobian, rows, one_sided, active, gradient, scratch, gram, y):
+def least_squares_multipliers(bases, jacobian, rows, one_sided, active, gradient, scratch, last_row, gram, y):
     """The multipliers of the active rows that leave the smallest grad f + J^T y."""
-    n = gradient.size
+    for i in range(gradient.size):
+        scratch[i] = 0.0
     for r in range(rows):
-        for i in range(n):
-            scratch[i] = 0.0
         if active[r] > 0.0:
             add_row(bases, jacobian, r, 1.0, scratch)
-        for s in range(r, rows):
+        for s in range(r, last_row[r] + 1):
             gram[r, s] = times(bases, jacobian, s, scratch) if active[s] > 0.0 else 0.0
         gram[r, r] += 1e-10 if active[r] > 0.0 else 1.0
         y[r] = -times(bases, jacobian, r, gradient) if active[r] > 0.0 else 0.0
-    if factorize(gram, rows):
-        substitute(gram, rows, y)
+        if active[r] > 0.0:
+            clear_row(bases, r, scratch)
+    if factorize(gram, rows, last_row):
+        substitute(gram, rows, last_row, y)
     for r in range(rows):
         if one_sided[r] == 1:
             y[r] = min(y[r], 0.0)
+
+
+@kernel(inner=True)
+def clear_row(bases, r, out):
+    """Zeros where row r has variables."""
+    for b in range(bases.shape[1]):
+        at = bases[r, b]
+        if at >= 0:
+            for k in range(width(b)):
+                out[at + k] = 0.0

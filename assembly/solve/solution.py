@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.constraints.constraint import Constraint
 from assembly.constraints.contact import Contact
 from assembly.constraints.packing import Packed
 from assembly.errors import InputError
@@ -41,11 +42,13 @@ class Scene:
     def __init__(
         self,
         bodies: tuple[Body, ...],
+        constraints: tuple[Constraint, ...],
         contacts: tuple[Contact, ...],
         faces: tuple[tuple[BodyFace, BodyFace], ...],
         scale: float,
     ) -> None:
         self.bodies = bodies
+        self.constraints = constraints
         self.contacts = contacts
         self.faces = faces
         self.scale = scale
@@ -110,7 +113,7 @@ class Solution:
 
     @property
     def _parameters(self) -> Array:
-        return self._state[self._packed.contacts_at : self._packed.multipliers_at].reshape(-1, 4)
+        return self._state[self._packed.contacts_at : self._packed.angles_at].reshape(-1, 4)
 
     @property
     def _residuals(self) -> Array:
@@ -127,7 +130,7 @@ class Solution:
     @property
     def objective(self) -> float:
         """Value of the objective, in the user's units."""
-        return self._result(OBJECTIVE) * self._packed.scale**2 * self._packed.weight
+        return self._result(OBJECTIVE) * self._packed.unit
 
     @property
     def feasibility(self) -> float:
@@ -151,18 +154,24 @@ class Solution:
 
     @cached_property
     def violations(self) -> dict[str, float]:
-        """Violation of every constraint, by name, in the user's units."""
+        """Violation of every constraint, by name: its largest; lengths in the user's unit, angles in radians."""
+        packed = self._packed
+        each = np.where(packed.one_sided, np.maximum(-self._residuals, 0.0), np.abs(self._residuals))
         return {
-            contact.name: float(max(-c, 0.0) if contact.unilateral else abs(c))
-            for contact, c in zip(self._scene.contacts, self._residuals, strict=True)
+            constraint.name: float(each[rows].max(initial=0.0))
+            for constraint, rows in zip(self._scene.constraints, packed.spans, strict=True)
         }
 
     @cached_property
     def multipliers(self) -> dict[str, Array]:
-        """Multipliers of every constraint, by name: forces when the objective is an energy."""
+        """Multipliers of every constraint's rows, by name: forces and torques when the objective is an energy."""
         packed = self._packed
-        forces = self._state[packed.multipliers_at : packed.residuals_at] * (packed.scale * packed.weight)
-        return {contact.name: forces[k : k + 1] for k, contact in enumerate(self._scene.contacts)}
+        forces = self._state[packed.multipliers_at : packed.residuals_at] * packed.unit
+        forces = np.where(packed.lengths, forces / packed.scale, forces)
+        return {
+            constraint.name: forces[rows]
+            for constraint, rows in zip(self._scene.constraints, packed.spans, strict=True)
+        }
 
     @cached_property
     def contacts(self) -> dict[str, ContactPair]:

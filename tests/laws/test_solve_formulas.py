@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly.constraints.program import objective
+from assembly.constraints.terms import objective
 from assembly.geometry.spline import SURFACE_RECORD
 from assembly.kinematics.pose import multiply, retract, rotation_matrix, skew
 from assembly.proximity import gap_hessian
@@ -118,7 +118,10 @@ def objective_at(scene, q):
     packed = scene.packed()
     assert packed.scale == 1.0 and not packed.reference.any()
     gradient, hessian = np.empty(6), np.empty((6, 6))
-    return objective(packed.table, packed.pool, q, gradient, hessian), gradient, hessian
+    room = (np.empty(0), np.empty(0), np.empty(0))
+    value = objective(packed.table, packed.pool, q, 1, room, np.full(6, 5), gradient, hessian)
+    # The kernel writes the upper triangle.
+    return value, gradient, np.triu(hessian) + np.triu(hessian, 1).T
 
 
 def one_body(term):

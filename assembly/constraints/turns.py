@@ -1,0 +1,83 @@
+"""Which turn an angle is on when a solve starts: angles go on past a whole turn, poses do not tell how often.
+
+A driven angle starts on the turn of its value. A coupled one keeps, in a warm start, the turn it has; otherwise it is
+on the turn that its coupling asks for, where the other side is known. What is left is looked for within its limits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from math import inf, pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.constraints.constraint import Coordinate, Equation
+
+__all__ = ["Turns"]
+
+Array = NDArray[np.float64]
+Evaluate = Callable[[Coordinate, float], float]
+
+
+class Turns:
+    """The angles of a scene, in the order of their tracked values.
+
+    Parameters
+    ----------
+    angles : sequence of Coordinate
+    equations : sequence of (Equation, int)
+        All rows, and where the value of each is in the pool.
+    """
+
+    def __init__(self, angles: Sequence[Coordinate], equations: Sequence[tuple[Equation, int]]) -> None:
+        self._places = {id(angle): k for k, angle in enumerate(angles)}
+        self._drives: list[int | None] = [None] * len(angles)
+        self._limits: list[list[Equation]] = [[] for _ in angles]
+        self._couplings = [equation for equation, _ in equations if len(equation.terms) > 1]
+        for equation, at in equations:
+            k = self._places.get(id(equation.terms[0][1]))
+            if k is None or len(equation.terms) > 1:
+                continue
+            if equation.one_sided:
+                self._limits[k].append(equation)
+            else:
+                self._drives[k] = at
+        coupled = {id(coordinate) for equation in self._couplings for _, coordinate in equation.terms}
+        self._coupled = [id(angle) in coupled for angle in angles]
+
+    def start(self, pool: Array, near: Array, warm: bool, evaluate: Evaluate) -> None:
+        """Write where each angle is looked for into `near`, which has the values found last of a warm start.
+
+        `evaluate` gives the value of a coordinate at the start, an angle nearest to a number.
+        """
+        known = [True] * len(near)
+        for k, drive in enumerate(self._drives):
+            if drive is not None and not (warm and self._coupled[k]):
+                near[k] = pool[drive]
+            elif not warm:
+                known[k] = not self._coupled[k]
+                near[k] = self._within_limits(k)
+        while not all(known):
+            if not any(self._follow(equation, near, known, evaluate) for equation in self._couplings):
+                # Nothing tells: it is where its limits are.
+                known[known.index(False)] = True
+
+    def _within_limits(self, k: int) -> float:
+        lower = max((e.current() for e in self._limits[k] if e.terms[0][0] > 0.0), default=-inf)
+        upper = min((-e.current() for e in self._limits[k] if e.terms[0][0] < 0.0), default=inf)
+        if upper - lower < 2.0 * pi:
+            return 0.5 * (lower + upper)
+        return min(max(0.0, lower), upper)
+
+    def _follow(self, equation: Equation, near: Array, known: list[bool], evaluate: Evaluate) -> bool:
+        """Find the turn of one side of a coupling from the other; whether there was one to find."""
+        for (factor, this), (other_factor, other) in (equation.terms, equation.terms[::-1]):
+            k = self._places.get(id(this))
+            j = self._places.get(id(other))
+            if k is not None and not known[k] and (j is None or known[j]):
+                value = evaluate(other, 0.0 if j is None else float(near[j]))
+                near[k] = (equation.current() - other_factor * value) / factor
+                known[k] = True
+                return True
+        return False

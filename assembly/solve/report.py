@@ -1,0 +1,85 @@
+"""What a solve leaves in its state: the pose judged afresh, rows in the user's units."""
+
+from __future__ import annotations
+
+import math
+
+from assembly._kernel import kernel
+from assembly.constraints.program import (
+    BODIES,
+    CONTACTS,
+    IS_LENGTH,
+    PROPER,
+    REFERENCE,
+    ROW,
+    ROW_TABLE,
+    ROWS,
+    SCALE,
+    SLOTS,
+    TRACKED,
+    evaluate,
+)
+from assembly.proximity.extremal import BEND
+from assembly.solve.contacts import free_pairs_hold
+from assembly.solve.rows import violation_of
+
+# A gap that counts as touching where crossing surfaces are reported.
+TOUCHING = 1e-9
+
+
+@kernel(inner=True)
+def write_pose(table, pool, q, state):
+    """Poses of the moving bodies into the state, in the user's coordinates."""
+    for b in range(table[BODIES]):
+        if table[table[SLOTS] + b] >= 0:
+            for k in range(3):
+                state[7 * b + k] = q[b, k] * pool[SCALE] + pool[REFERENCE + k]
+            for k in range(3, 7):
+                state[7 * b + k] = q[b, k]
+
+
+@kernel(inner=True)
+def judge(table, pool, state, loose, room, shape, rows, here, trial, bound):
+    """The pose as it is returned, rounded to the user's coordinates, evaluated afresh into `trial`.
+
+    Residuals found are copied to `here`. Returns whether every row holds within the bound, and the largest violation.
+    """
+    q = trial[0]
+    for b in range(table[BODIES]):
+        for k in range(3):
+            q[b, k] = (state[7 * b + k] - pool[REFERENCE + k]) / pool[SCALE]
+        for k in range(3, 7):
+            q[b, k] = state[7 * b + k]
+    lost = evaluate(table, pool, here[1], BEND, loose, room, trial)
+    if lost >= 0:
+        return False, math.inf
+    for r in range(rows):
+        here[3][r] = trial[3][r]
+    violation = violation_of(trial[3], shape[1], rows)
+    return violation <= bound and free_pairs_hold(table, pool, q, here[1], loose[0], 1e-9), violation
+
+
+@kernel(inner=True)
+def write_rows(table, here, y, free, size, state):
+    """Tracked values, multipliers and residuals into the state; returns at how many contacts surfaces cross."""
+    _q, tracked, records, residual, _jacobian = here
+    m = table[ROWS]
+    o = 7 * table[BODIES]
+    for k in range(table[TRACKED]):
+        for i in range(4):
+            state[o + 4 * k + i] = tracked[k, i]
+    o += 4 * table[TRACKED]
+    crossing = 0.0
+    for r in range(m):
+        state[o + r] = y[r]
+        worst = residual[r]
+        if r < table[CONTACTS]:
+            if free[r] >= 0:
+                # What a free pair lacks to be extremal is a violation of its contact, too.
+                for i in range(4):
+                    if abs(residual[m + 4 * free[r] + i]) > abs(worst):
+                        worst = -abs(residual[m + 4 * free[r] + i])
+            elif records[r, PROPER] == 0.0 and abs(worst) <= TOUCHING:
+                crossing += 1.0
+        state[o + m + r] = worst * size if table[table[ROW_TABLE] + ROW * r + IS_LENGTH] == 1 else worst
+    return crossing

@@ -1,0 +1,86 @@
+"""The line search on the augmented Lagrangian.
+
+A step that the rows' curvature spoils is bent back onto the rows, with the factorization at hand, before it is
+shortened.
+"""
+
+from __future__ import annotations
+
+from assembly._kernel import kernel
+from assembly.constraints.program import evaluate
+from assembly.constraints.terms import objective
+from assembly.proximity.extremal import BEND
+from assembly.solve.linear import substitute
+from assembly.solve.rows import add_transposed, carry, merit, move
+
+# A step shorter than this decides nothing.
+SHORTEST = 1e-6
+
+
+@kernel(inner=True)
+def search(
+    table,
+    pool,
+    shape,
+    loose,
+    room,
+    here,
+    trial,
+    lines,
+    rows,
+    y,
+    base,
+    value,
+    restoring,
+    mu,
+    slope,
+    longest,
+    matrix,
+    active,
+    forces,
+    gradient,
+    lagrangian,
+):
+    """Try alpha times the step, alpha from 1 down, until the augmented Lagrangian falls enough.
+
+    The trial point is left in `trial`. Returns whether one was accepted, alpha, and the contact lost by the last trial
+    or -1. `base` is the objective's part of the merit here, `longest` the largest component of the step.
+    """
+    bases, one_sided, last, _last_row = shape
+    descent, step, straight = lines
+    n = descent.size
+    residual = here[3]
+    here_merit = merit(residual, one_sided, rows, y, mu) + base
+    noise = 1e-14 * (abs(here_merit) + abs(value) + 1e-300)
+    alpha = 1.0
+    bends = 0
+    lost = -1
+    while alpha * longest > 1e-9 * SHORTEST or alpha == 1.0:
+        move(table, here[0], step, alpha, trial[0])
+        carry(table, pool, bases, loose[0], loose[1], here[1], here[2], step, alpha, loose[4])
+        lost = evaluate(table, pool, loose[4], BEND, loose, room, trial)
+        if lost < 0:
+            there = merit(trial[3], one_sided, rows, y, mu)
+            if not restoring:
+                there += objective(table, pool, trial[0], 0, room, last, gradient, lagrangian)
+            if there <= here_merit + 1e-4 * alpha * slope + noise:
+                return True, alpha, lost
+            if bends < 2:
+                bends += 1
+                for i in range(n):
+                    descent[i] = 0.0
+                for r in range(rows):
+                    forces[r] = -(trial[3][r] - (1.0 - alpha) * residual[r]) * active[r]
+                add_transposed(bases, trial[4], rows, forces, descent)
+                substitute(matrix, n, last, descent)
+                for i in range(n):
+                    step[i] += descent[i] / alpha
+                continue
+            if bends == 2:
+                bends = 3
+                for i in range(n):
+                    step[i] = straight[i]
+        alpha *= 0.5
+        if lost >= 0 and alpha * longest < 0.01:
+            break
+    return False, alpha, lost
