@@ -105,7 +105,7 @@ def swing(component, records, k):
     x = 1.0 - dot(z, v)
     if x < SERIES:
         # phi = sum_n x^n prod_{i <= n} i / (2 i + 1): arcsin(y) / (y sqrt(1 - y^2)) with y^2 = x / 2.
-        phi = 1.0 + x * (1 / 3 + x * (2 / 15 + x * (2 / 35 + x * (8 / 315 + x * (8 / 693)))))
+        phi = 1.0 + x * (1 / 3 + x * (2 / 15 + x * (2 / 35 + x * (8 / 315))))
         e = -(1 / 3 + x * (4 / 15 + x * (6 / 35 + x * (32 / 315 + x * (40 / 693)))))
         second = 4 / 15 + x * (12 / 35 + x * (96 / 315 + x * (160 / 693)))
         return phi * a, u, hu, cross(v, z), phi, e * a, e * a, e, second * a

@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING
 from assembly._lazy import lazy_names
 
 if TYPE_CHECKING:
+    from assembly.view.animation import animate as animate
     from assembly.view.browser import show as show
     from assembly.view.page import save_html as save_html
 else:
     __getattr__, __dir__, __all__ = lazy_names(
         __name__,
         {
+            "animate": "assembly.view.animation",
             "save_html": "assembly.view.page",
             "show": "assembly.view.browser",
         },

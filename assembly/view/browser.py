@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import redirect_stdout
 from io import StringIO
 from typing import Any
+from weakref import WeakSet
 
 from numpy.typing import ArrayLike
 
 from assembly.assembly import Assembly
+from assembly.kinematics.ellipsoid import Ellipsoid
 from assembly.solve.solution import Solution
-from assembly.view.commands import commands
+from assembly.view.commands import commands, motion, stillness
+from assembly.view.item import Picture
 from assembly.view.picture import DIRECTION, draw
 
 with warnings.catch_warnings():
@@ -20,9 +23,11 @@ with warnings.catch_warnings():
     warnings.simplefilter("ignore", DeprecationWarning)
     from meshcat import Visualizer
 
-__all__ = ["show"]
+__all__ = ["display", "show"]
 
 _running: list[Visualizer] = []
+# Windows of visualizers in which something moves.
+_moving: WeakSet[Any] = WeakSet()
 
 
 class _Sent:
@@ -45,11 +50,33 @@ def _visualizer() -> Visualizer:
     return _running[0]
 
 
+def display(
+    picture: Picture, open: bool, visualizer: Visualizer | None, seconds: float = 0.0, loop: bool = False
+) -> Visualizer:
+    """Send a picture to a visualizer, in the place of what was there; a moving one lasts so many seconds."""
+    if visualizer is not None and not isinstance(visualizer, Visualizer):
+        raise TypeError(f"visualizer is {visualizer!r}; expected a meshcat.Visualizer")
+    target = _visualizer() if visualizer is None else visualizer
+    for command in commands(picture):
+        target.window.send(_Sent(command))
+    if seconds > 0.0:
+        target.window.send(_Sent(motion(picture, seconds, loop)))
+        _moving.add(target.window)
+    elif target.window in _moving:
+        # Else it would go on, unseen, and its slider would stay.
+        target.window.send(_Sent(stillness()))
+        _moving.discard(target.window)
+    if open:
+        target.open()
+    return target
+
+
 def show(
     scene: Assembly,
     solution: Solution | None = None,
     open: bool = False,
     *,
+    ellipsoids: Ellipsoid | Iterable[Ellipsoid] = (),
     direction: ArrayLike = DIRECTION,
     visualizer: Visualizer | None = None,
 ) -> Visualizer:
@@ -62,6 +89,8 @@ def show(
         Bodies stand where it says, and its contacts are shown; else they stand where they were made.
     open : bool
         Whether to open a browser window. Without it nothing is opened; `visualizer.url()` is the address.
+    ellipsoids : Ellipsoid or several
+        Drawn beside the bodies, half transparent, with their axes.
     direction : (3,)
         From the scene to the eye; z is upward.
     visualizer : meshcat.Visualizer, optional
@@ -77,12 +106,4 @@ def show(
     InputError, TypeError
         See the message; nothing is started then.
     """
-    picture = draw(scene, solution, direction)
-    if visualizer is not None and not isinstance(visualizer, Visualizer):
-        raise TypeError(f"visualizer is {visualizer!r}; expected a meshcat.Visualizer")
-    target = _visualizer() if visualizer is None else visualizer
-    for command in commands(picture):
-        target.window.send(_Sent(command))
-    if open:
-        target.open()
-    return target
+    return display(draw(scene, solution, direction, ellipsoids), open, visualizer)

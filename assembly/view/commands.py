@@ -12,11 +12,13 @@ import numpy as np
 import umsgpack
 from numpy.typing import NDArray
 
+from assembly.view.item import FIELD_OF_VIEW, Item, Picture
 from assembly.view.mesh import Mesh
-from assembly.view.picture import FIELD_OF_VIEW, Color, Item, Picture
+from assembly.view.motion import quaternions
 
-__all__ = ["ROOT", "commands", "packed"]
+__all__ = ["ROOT", "Command", "commands", "motion", "packed", "stillness"]
 
+Array = NDArray[np.float64]
 Command = dict[str, Any]
 # Everything drawn hangs here, so that it can be taken away at once.
 ROOT = "/assembly"
@@ -24,14 +26,20 @@ _CAMERA = "/Cameras/default/rotated/<object>"
 _LIGHT = "/Lights/FillLight/<object>"
 # From above to below.
 _BACKGROUND = ((1.0, 1.0, 1.0), (0.87, 0.90, 0.94))
+# What changes less is not seen, nor kept by single precision.
+_MOTIONLESS = 1e-9
 _IDENTITY = np.eye(4).ravel().tolist()
 
 
+def _numbers(values: NDArray[Any], kind: str) -> umsgpack.Ext:
+    code, dtype = {"float": (0x17, "<f4"), "index": (0x16, "<u4")}[kind]
+    return umsgpack.Ext(code, np.ascontiguousarray(values, dtype=dtype).tobytes())
+
+
 def _array(rows: NDArray[Any], kind: str) -> Command:
-    code, name, dtype = {"float": (0x17, "Float32Array", "<f4"), "index": (0x16, "Uint32Array", "<u4")}[kind]
+    name = {"float": "Float32Array", "index": "Uint32Array"}[kind]
     size = rows.shape[1] if kind == "float" else 1
-    data = umsgpack.Ext(code, np.ascontiguousarray(rows, dtype=dtype).tobytes())
-    return {"itemSize": size, "type": name, "array": data, "normalized": False}
+    return {"itemSize": size, "type": name, "array": _numbers(rows, kind), "normalized": False}
 
 
 def _geometry(mesh: Mesh, identifier: str) -> Command:
@@ -40,8 +48,8 @@ def _geometry(mesh: Mesh, identifier: str) -> Command:
     return {"uuid": identifier, "type": "BufferGeometry", "data": data}
 
 
-def _material(color: Color, in_front: bool, identifier: str) -> Command:
-    red, green, blue = (round(255.0 * part) for part in color)
+def _material(item: Item, identifier: str) -> Command:
+    red, green, blue = (round(255.0 * part) for part in item.color)
     material: Command = {
         "uuid": identifier,
         "type": "MeshPhongMaterial",
@@ -50,9 +58,12 @@ def _material(color: Color, in_front: bool, identifier: str) -> Command:
         "shininess": 70.0,
         "side": 2,  # both sides: open surfaces have an inside to look at
     }
-    if in_front:
+    if item.in_front:
         # Transparent things are drawn last.
         material.update(transparent=True, opacity=0.85, depthTest=False)
+    elif item.opacity < 1.0:
+        # The near side only, and nothing behind it is left out.
+        material.update(transparent=True, opacity=item.opacity, depthWrite=False, side=0)
     return material
 
 
@@ -73,7 +84,7 @@ def commands(picture: Picture) -> Iterator[Command]:
         described = {
             "metadata": {"version": 4.5, "type": "Object"},
             "geometries": [_geometry(item.mesh, f"{path}:geometry")],
-            "materials": [_material(item.color, item.in_front, f"{path}:material")],
+            "materials": [_material(item, f"{path}:material")],
             "object": {
                 "uuid": path,
                 "type": "Mesh",
@@ -97,6 +108,39 @@ def commands(picture: Picture) -> Iterator[Command]:
     light = picture.eye + 0.9 * left + [0.0, 0.0, 0.9 * np.linalg.norm(picture.eye)]
     yield _property(_LIGHT, "position", (10.0 * light).tolist())
     yield _property(_LIGHT, "intensity", 0.45)
+
+
+def _tracks(item: Item, seconds: Array, always: bool) -> list[Command]:
+    """What changes of an item's place; if nothing does, its position where there must be something."""
+    e = quaternions(item.rotation.reshape(-1, 3, 3))
+    series = {
+        "position": ("vector3", item.position.reshape(-1, 3)),
+        "quaternion": ("quaternion", np.roll(e, -1, axis=1)),  # scalar last
+        "scale": ("vector3", item.scale.reshape(-1, 3)),
+    }
+    return [
+        {"name": f".{name}", "type": kind, "times": _numbers(seconds, "float"), "values": _numbers(values, "float")}
+        for name, (kind, values) in series.items()
+        if np.ptp(values, axis=0).max() > _MOTIONLESS or (always and name == "position")
+    ]
+
+
+def motion(picture: Picture, seconds: float, loop: bool) -> Command:
+    """The command that moves what `commands` has drawn, once in so many seconds or again and again."""
+    times = picture.times * (seconds / picture.times[-1])
+    animations = []
+    for item in picture.items:
+        # The motion lasts as long where nothing moves.
+        tracks = _tracks(item, times, always=item is picture.items[0])
+        if tracks:
+            animations.append({"path": _path(item), "clip": {"fps": 1.0, "name": "motion", "tracks": tracks}})
+    options = {"play": True, "repetitions": float("inf") if loop else 1}
+    return {"type": "set_animation", "path": ROOT, "animations": animations, "options": options}
+
+
+def stillness() -> Command:
+    """The command that ends a motion."""
+    return {"type": "set_animation", "path": ROOT, "animations": [], "options": {"play": False}}
 
 
 def packed(command: Command) -> bytes:

@@ -1,4 +1,4 @@
-"""A picture as one HTML file that needs no server and no network.
+"""A picture, still or moving, as one HTML file that needs no server and no network.
 
 The file holds meshcat's viewer, which comes with the meshcat package, and the commands that draw the picture.
 """
@@ -6,6 +6,7 @@ The file holds meshcat's viewer, which comes with the meshcat package, and the c
 from __future__ import annotations
 
 from base64 import b64encode
+from collections.abc import Iterable
 from html import escape
 from importlib.util import find_spec
 from os import PathLike
@@ -14,11 +15,12 @@ from pathlib import Path
 from numpy.typing import ArrayLike
 
 from assembly.assembly import Assembly
+from assembly.kinematics.ellipsoid import Ellipsoid
 from assembly.solve.solution import Solution
-from assembly.view.commands import commands, packed
+from assembly.view.commands import Command, commands, packed
 from assembly.view.picture import DIRECTION, draw
 
-__all__ = ["save_html"]
+__all__ = ["player", "save_html", "write_page"]
 
 _PAGE = """<!DOCTYPE html>
 <html lang="en">
@@ -28,6 +30,13 @@ _PAGE = """<!DOCTYPE html>
 <style>
 body {{ margin: 0; }}
 #meshcat-pane {{ width: 100vw; height: 100vh; overflow: hidden; }}
+#player {{ position: fixed; left: 50%; bottom: 18px; transform: translateX(-50%); width: min(640px, 80vw);
+  display: flex; align-items: center; gap: 12px; padding: 8px 16px; border-radius: 12px; box-sizing: border-box;
+  background: rgba(255, 255, 255, 0.8); box-shadow: 0 1px 6px rgba(0, 0, 0, 0.2); font: 14px sans-serif; color: #333; }}
+#player button {{ border: 0; background: none; padding: 4px; line-height: 0; cursor: pointer; }}
+#player input[type=range] {{ flex: 1; min-width: 0; accent-color: #333; }}
+#player output {{ white-space: nowrap; font-variant-numeric: tabular-nums; }}
+#player label {{ white-space: nowrap; }}
 </style>
 </head>
 <body>
@@ -39,8 +48,42 @@ for (const command of [
 {commands}
 ]) viewer.handle_command_bytearray(Uint8Array.from(atob(command), c => c.charCodeAt(0)));
 </script>
-</body>
+{player}</body>
 </html>
+"""
+# The viewer's own player is in its menu, and answers to its slider only once it has played. `#frame=12` at the end of
+# the page's address opens it there, paused.
+_PLAYER = """<div id="player">
+<button id="play" type="button" aria-label="play or pause"><svg width="18" height="18"><path id="sign"/></svg></button>
+<input id="slider" type="range" min="0" max="{last}" step="any" value="0" aria-label="frame">
+<output id="frame"></output>
+<label><input id="loop" type="checkbox"{checked}> loop</label>
+</div>
+<script>
+const part = Object.fromEntries(
+  ["play", "sign", "slider", "frame", "loop"].map(id => [id, document.getElementById(id)]));
+const animator = viewer.animator;
+function seek(frame) {{
+  animator.pause();
+  animator.seek(frame / {last} * animator.duration);
+  animator.display_progress(frame / {last} * animator.duration);
+}}
+part.play.onclick = () => animator.playing ? animator.pause() : animator.play();
+part.slider.oninput = () => seek(Number(part.slider.value));
+// Three.js's LoopRepeat and LoopOnce.
+part.loop.onchange = () => animator.actions.forEach(
+  action => part.loop.checked ? action.setLoop(2201, Infinity) : action.setLoop(2200, 1));
+const asked = /^#frame=([0-9.]+)$/.exec(location.hash);
+if (asked) seek(Math.min(Number(asked[1]), {last}));
+function follow() {{
+  requestAnimationFrame(follow);
+  const frame = animator.time / animator.duration * {last};
+  part.slider.value = frame;
+  part.frame.value = `frame ${{Math.round(frame)}} of {last}`;
+  part.sign.setAttribute("d", animator.playing ? "M3 2h4v14h-4z M11 2h4v14h-4z" : "M4 2l12 7l-12 7z");
+}}
+follow();
+</script>
 """
 
 
@@ -52,19 +95,34 @@ def _viewer() -> str:
     return (folder / "viewer" / "dist" / "main.min.js").read_text(encoding="utf-8")
 
 
+def write_page(path: str | PathLike[str], title: str | None, drawing: Iterable[Command], controls: str = "") -> None:
+    """Write a page of commands; the file's name is the title where none is given."""
+    lines = ",\n".join(f'"{b64encode(packed(command)).decode("ascii")}"' for command in drawing)
+    heading = escape(Path(path).stem if title is None else title)
+    page = _PAGE.format(title=heading, viewer=_viewer(), commands=lines, player=controls)
+    Path(path).write_text(page, encoding="utf-8")
+
+
+def player(frames: int, loop: bool) -> str:
+    """Controls of a page's motion: play and pause, a slider over the frames, a loop."""
+    return _PLAYER.format(last=frames - 1, checked=" checked" if loop else "")
+
+
 def save_html(
     path: str | PathLike[str],
     scene: Assembly,
     solution: Solution | None = None,
     *,
+    ellipsoids: Ellipsoid | Iterable[Ellipsoid] = (),
     direction: ArrayLike = DIRECTION,
     title: str | None = None,
 ) -> None:
     """Write a scene as one HTML file to turn around in any browser, without server or network.
 
-    Bodies are colored by their names ("red") or in turn, fixed ones grayer. Contacts are balls with the
-    normal as an arrow, amber, or magenta where the surfaces interpenetrate. A point that is drawn to a target is
-    joined with a cross at the target.
+    Bodies are colored by their names ("red") or in turn, fixed ones grayer. A body without a shape is drawn as rods
+    between its joints, a joint as a ball with an arrow along its z axis. Contacts are balls with the normal as an
+    arrow, amber, or magenta where the surfaces interpenetrate. A point that is drawn to a target is joined with a
+    cross at the target.
 
     Parameters
     ----------
@@ -72,6 +130,8 @@ def save_html(
     scene : Assembly
     solution : Solution, optional
         Bodies stand where it says, and its contacts are shown; else they stand where they were made.
+    ellipsoids : Ellipsoid or several
+        Drawn beside the bodies, half transparent, with their axes.
     direction : (3,)
         From the scene to the eye; z is upward.
     title : str, optional
@@ -82,7 +142,4 @@ def save_html(
     InputError, TypeError
         See the message; also a scene without bodies, or a solution of other bodies.
     """
-    picture = draw(scene, solution, direction)
-    lines = ",\n".join(f'"{b64encode(packed(command)).decode("ascii")}"' for command in commands(picture))
-    heading = escape(Path(path).stem if title is None else title)
-    Path(path).write_text(_PAGE.format(title=heading, viewer=_viewer(), commands=lines), encoding="utf-8")
+    write_page(path, title, commands(draw(scene, solution, direction, ellipsoids)))

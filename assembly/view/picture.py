@@ -1,4 +1,4 @@
-"""What there is to see in a scene: bodies, contacts, targets, and the eye that looks at them.
+"""What there is to see in a scene: bodies, joints, contacts, targets, ellipsoids, and the eye that looks at them.
 
 Everything is placed about the middle of the scene and scaled to its size, so that a scene far from the origin, or
 in micrometres, looks the same in a browser that computes with single precision.
@@ -6,9 +6,7 @@ in micrometres, looks the same in a browser that computes with single precision.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from functools import lru_cache
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import cycle
 
 import numpy as np
@@ -17,24 +15,32 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.assembly import Assembly
 from assembly.constraints.objectives import PointDistance
 from assembly.errors import InputError, vector
-from assembly.geometry import shapes
-from assembly.geometry.face import Face
 from assembly.kinematics.body import Body
-from assembly.proximity.pairs import ContactPair
+from assembly.kinematics.ellipsoid import Ellipsoid
 from assembly.solve.solution import Solution
-from assembly.view.mesh import Mesh, body_mesh, face_mesh, joined
+from assembly.view.item import Color, Item, Picture, Place, Stations, framed
+from assembly.view.marks import arrow, ball, cross
+from assembly.view.mesh import Mesh, body_mesh
+from assembly.view.motion import aligned, sample_times
+from assembly.view.series import (
+    Ellipsoids,
+    Pairs,
+    Trajectory,
+    contact_series,
+    ellipsoid_series,
+    poses_at,
+    solution_rows,
+    stills,
+    trajectory_rows,
+)
+from assembly.view.skeleton import JOINT, MARK, fineness, held_points, joint_items, joint_tips, line, link_mesh
 
-__all__ = ["DIRECTION", "FIELD_OF_VIEW", "Item", "Picture", "draw"]
+__all__ = ["DIRECTION", "draw", "film"]
 
 Array = NDArray[np.float64]
-Color = tuple[float, float, float]
 
 # From the scene to the eye: from the front, a little from the right and from above.
 DIRECTION = (0.65, -1.0, 0.3)
-FIELD_OF_VIEW = 30.0  # degrees, from bottom to top
-# Width over height that the picture is framed for; wider windows show more at the sides.
-_ASPECT = 1.4
-_MARGIN = 1.08
 
 # A body that is named after a color has it; the others take the rest of the first nine in turn.
 _NAMED: dict[str, Color] = {
@@ -52,77 +58,25 @@ _NAMED: dict[str, Color] = {
     "white": (0.93, 0.93, 0.92),
 }
 _PALETTE = tuple(_NAMED.values())[:9]
-_GRAY = np.array([0.60, 0.62, 0.66])
+_GROUND: Color = (0.60, 0.62, 0.66)
+_GRAY = np.array(_GROUND)
 _TOUCHING: Color = (1.00, 0.72, 0.10)
 _PENETRATING: Color = (0.95, 0.05, 0.65)
 _WISH: Color = (0.16, 0.17, 0.20)
-# Radius of markers, in parts of the scene's, and the gap below which surfaces interpenetrate.
-_MARK = 0.014
+_ELLIPSOID: Color = (0.35, 0.20, 0.80)
+# Half the width of the cross at a target, in parts of the scene's radius.
+_ARM = 3.0 * MARK
+# The gap, in parts of the scene's radius, below which surfaces interpenetrate.
 _PENETRATION = -1e-9
-
-
-@dataclass(frozen=True, eq=False)
-class Item:
-    """One thing to see.
-
-    Attributes
-    ----------
-    path : tuple of str
-        Its place in the tree of things.
-    mesh : Mesh
-        In its own coordinates, about their origin.
-    matrix : (4, 4)
-        From these to the picture's: rotation, scale and position.
-    color : red, green, blue from 0 to 1
-    in_front : bool
-        Seen through what stands before it.
-    """
-
-    path: tuple[str, ...]
-    mesh: Mesh
-    matrix: Array
-    color: Color
-    in_front: bool = False
-
-    @property
-    def points(self) -> Array:
-        """Vertices in the picture's coordinates, (n, 3)."""
-        points: Array = self.mesh.vertices @ self.matrix[:3, :3].T + self.matrix[:3, 3]
-        return points
-
-
-@dataclass(frozen=True, eq=False)
-class Picture:
-    """Things to see, about the origin and of radius one, and the eye (3,) that looks at the origin, z upward."""
-
-    items: tuple[Item, ...]
-    eye: Array
-
-
-def _matrix(rotation: Array, position: Array) -> Array:
-    matrix = np.eye(4)
-    matrix[:3, :3], matrix[:3, 3] = rotation, position
-    return matrix
-
-
-@lru_cache(maxsize=1)
-def _ball() -> Mesh:
-    return face_mesh(Face(shapes.sphere(1.0)), 400)
-
-
-def _rod(start: Array, end: Array, radius: float, head: float = 0.0) -> Mesh:
-    """A round rod between two points; with a head, the last 2.5 radii of it are a cone of that radius."""
-    length = float(np.linalg.norm(end - start))
-    axis = (end - start) / length
-    across = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
-    across /= np.linalg.norm(across)
-    tip = min(2.5 * head, 0.5 * length)
-    shaft = face_mesh(Face(shapes.cylinder(radius, length - tip)), 400)
-    parts = [shaft.transformed(_matrix(np.eye(3), np.array([0.0, 0.0, 0.5 * (length - tip)])))]
-    if head > 0.0:
-        cone = face_mesh(Face(shapes.cone(head, tip)), 400)
-        parts.append(cone.transformed(_matrix(np.eye(3), np.array([0.0, 0.0, length - 0.5 * tip]))))
-    return joined(parts).transformed(_matrix(np.column_stack([across, np.cross(axis, across), axis]), start))
+# Half the thickness of an ellipsoid that is flat, in parts of the scene's radius, and how much hides what is behind it.
+_THIN = 0.004
+_VEIL = 0.35
+# Vertices of a ball that is not small.
+_SMOOTH = 2000
+# How much farther the eye is from a film, for the controls below.
+_ROOM = 1.15
+# Directions in which a body's outermost vertices stand for all when the frame of a film is looked for.
+_OUTLOOKS = 200
 
 
 def _colors(bodies: Sequence[Body]) -> Iterator[Color]:
@@ -131,63 +85,147 @@ def _colors(bodies: Sequence[Body]) -> Iterator[Color]:
     free = [color for color in _PALETTE if color not in [_NAMED.get(name) for name in names]]
     turns = cycle(free or _PALETTE)
     for body, name in zip(bodies, names, strict=True):
+        if body.fixed and not body.faces and name not in _NAMED:
+            # The ground of a mechanism.
+            yield _GROUND
+            continue
         color = np.array(_NAMED[name] if name in _NAMED else next(turns))
         red, green, blue = (0.75 * color + 0.25 * _GRAY if body.fixed else color).tolist()
         yield red, green, blue
 
 
-def _contact(name: str, pair: ContactPair, place: _Place) -> Iterator[Item]:
-    """A ball at each point, and the normal of the first surface as an arrow."""
-    color = _PENETRATING if pair.gap * place.scale < _PENETRATION else _TOUCHING
-    f, g = place(pair.points)
+def _bodies(
+    scene: Assembly,
+    meshes: dict[Body, Mesh | None],
+    held: dict[Body, Array],
+    stations: Stations,
+    place: Place,
+    size: float,
+) -> Iterator[Item]:
+    for (body, mesh), color in zip(meshes.items(), _colors(scene.bodies), strict=True):
+        path, rotation = ("bodies", body.name), stations.rotation(body)
+        if mesh is None and not len(held[body]):
+            yield Item(path, ball(), color, place(stations.points(body, np.zeros(3))), rotation, np.full(3, MARK))
+            continue
+        scale = np.full(3, place.scale)
+        if mesh is None:
+            mesh, scale = link_mesh(place.scale * held[body], size), np.ones(3)
+        # About its own middle, for a shape that was drawn far from the origin of its body.
+        middle = 0.5 * (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0))
+        about = Mesh(mesh.vertices - middle, mesh.normals, mesh.triangles)
+        position = place(stations.points(body, scale * middle / place.scale))
+        yield Item(path, about, color, position, rotation, scale)
+
+
+def _contact(pair: Pairs, place: Place) -> Iterator[Item]:
+    """A ball at each point, and the normal of the first surface as an arrow; nothing while there is no pair."""
+    color = _PENETRATING if pair.gaps.min() * place.scale < _PENETRATION else _TOUCHING
+    shown = pair.shown[:, None]
+    f, g = place(pair.points[:, 0]), place(pair.points[:, 1])
     for label, point in (("point", f), ("other point", g)):
-        yield Item(("contacts", name, label), _ball(), _matrix(_MARK * np.eye(3), point), color, in_front=True)
-    arrow = _rod(np.zeros(3), 7.0 * _MARK * pair.normal, 0.22 * _MARK, 0.7 * _MARK)
-    yield Item(("contacts", name, "normal"), arrow, _matrix(np.eye(3), f), color, in_front=True)
+        path = ("contacts", pair.name, label)
+        yield Item(path, ball(), color, point, scale=shown * np.full(3, MARK), in_front=True)
+    mesh, path = arrow(0.0, 7.0 * MARK, 0.22 * MARK, 0.7 * MARK), ("contacts", pair.name, "normal")
+    yield Item(path, mesh, color, f, aligned(pair.normals), shown * np.ones(3), in_front=True)
 
 
-def _wish(name: str, target: Array, point: Array) -> Iterator[Item]:
-    """A cross at the target, a ball at the point that is drawn to it, and a line between them."""
-    arms = 3.0 * _MARK * np.eye(3)
-    cross = joined([_rod(-arm, arm, 0.3 * _MARK) for arm in arms])
-    yield Item(("targets", name, "target"), cross, _matrix(np.eye(3), target), _WISH)
-    yield Item(("targets", name, "point"), _ball(), _matrix(0.8 * _MARK * np.eye(3), point), _WISH)
-    if np.linalg.norm(target - point) > 2.0 * _MARK:
-        line = _rod(np.zeros(3), target - point, 0.25 * _MARK)
-        yield Item(("targets", name, "line"), line, _matrix(np.eye(3), point), _WISH)
+def _wish(name: str, target: Array, point: Array, radius: float) -> Iterator[Item]:
+    """A cross at the target, a ball at the point (k, 3) that is drawn to it, and a line between them."""
+    yield Item(("targets", name, "target"), cross(_ARM, 0.3 * MARK), _WISH, target)
+    yield Item(("targets", name, "point"), ball(), _WISH, point, scale=np.full(3, radius))
+    if np.linalg.norm(target - point, axis=1).max() > 2.0 * MARK:
+        ends = np.broadcast_to(target, point.shape)
+        yield line(("targets", name, "line"), point, ends, 0.25 * MARK, _WISH)
 
 
-@dataclass(frozen=True)
-class _Place:
-    """From the world to the picture: the point (3,) that becomes the origin, then a scale."""
-
-    middle: Array
-    scale: float
-
-    def __call__(self, points: Array) -> Array:
-        return (points - self.middle) * self.scale
-
-
-def _frame(points: Array, direction: Array) -> tuple[_Place, float]:
-    """Where to place points (n, 3) so that the eye sees them filling its view; and its distance."""
-    toward = direction / np.linalg.norm(direction)
-    right = np.cross([0.0, 0.0, 1.0], toward)
-    # Straight from above or below, x is to the right.
-    right = right / np.linalg.norm(right) if np.linalg.norm(right) > 1e-6 else np.array([1.0, 0.0, 0.0])
-    axes = np.column_stack([right, np.cross(toward, right), toward])
-    corner = points[0]
-    seen = (points - corner) @ axes
-    middle = 0.5 * (seen.min(axis=0) + seen.max(axis=0))
-    seen -= middle
-    radius = float(np.linalg.norm(seen, axis=1).max()) or 1.0
-    half = np.tan(np.deg2rad(0.5 * FIELD_OF_VIEW))
-    needed = seen[:, 2] + np.maximum(np.abs(seen[:, 0]) / _ASPECT, np.abs(seen[:, 1])) / half
-    # Not so near that a single point or a flat scene fills nothing and hides behind the eye.
-    distance = max(_MARGIN * float(needed.max()) / radius, 1.2)
-    return _Place(corner + axes @ middle, 1.0 / radius), distance
+def _ellipsoid(name: str, shape: Ellipsoids, place: Place) -> Iterator[Item]:
+    """The solid, which can be seen through, and its axes as rods."""
+    color = _ELLIPSOID if shape.color is None else shape.color
+    center, lengths = place(shape.centers), place.scale * shape.lengths
+    path = ("ellipsoids", name, "solid")
+    yield Item(path, ball(_SMOOTH), color, center, shape.axes, np.maximum(lengths, _THIN), opacity=_VEIL)
+    for k in range(3):
+        if lengths[:, k].max() > 0.0:
+            half = lengths[:, k, None] * shape.axes[:, :, k]
+            yield line(("ellipsoids", name, f"axis {k + 1}"), center - half, center + half, 0.25 * MARK, color)
 
 
-def draw(scene: Assembly, solution: Solution | None = None, direction: ArrayLike = DIRECTION) -> Picture:
+def _outermost(vertices: Array) -> Array:
+    """The vertices that are outermost in some of many directions, spread evenly over the sphere."""
+    k = np.arange(_OUTLOOKS) + 0.5
+    height, turn = 1.0 - 2.0 * k / _OUTLOOKS, np.pi * (1.0 + np.sqrt(5.0)) * k
+    level = np.sqrt(1.0 - height**2)
+    directions = np.column_stack([level * np.cos(turn), level * np.sin(turn), height])
+    result: Array = vertices[np.unique((vertices @ directions.T).argmax(axis=0))]
+    return result
+
+
+def _outline(
+    meshes: dict[Body, Mesh | None], held: dict[Body, Array], stations: Stations, ellipsoids: Sequence[Ellipsoids]
+) -> Iterator[Array]:
+    """Points (k, m, 3) of the world that the eye is to see of bodies and ellipsoids."""
+    for body, mesh in meshes.items():
+        if mesh is None:
+            yield stations.points(body, held[body] if len(held[body]) else np.zeros((1, 3)))
+        else:
+            yield stations.points(body, mesh.vertices if stations.count == 1 else _outermost(mesh.vertices))
+    for shape in ellipsoids:
+        solid = ball().vertices * shape.lengths[:, None]
+        yield solid @ np.swapaxes(shape.axes, 1, 2) + shape.centers[:, None]
+
+
+def _picture(
+    scene: Assembly,
+    stations: Stations,
+    times: Array,
+    pairs: Sequence[Pairs],
+    ellipsoids: Sequence[Ellipsoids],
+    toward: Array,
+) -> Picture:
+    meshes = {body: body_mesh(body) for body in scene.bodies}
+    held = held_points(scene)
+    wishes = [objective for _, objective in scene.objectives if isinstance(objective, PointDistance)]
+    drawn = [stations.points(wish.point.body, wish.point.coordinates) for wish in wishes]
+    seen = [*_outline(meshes, held, stations, ellipsoids), *drawn, *(wish.target for wish in wishes)]
+    outline = np.concatenate([points.reshape(-1, 3) for points in seen])
+    radius = 0.5 * float(np.linalg.norm(np.ptp(outline, axis=0)))
+    arms = _ARM * radius * np.concatenate([np.eye(3), -np.eye(3)])
+    tips = [wish.target + arms for wish in wishes]
+    size = fineness(scene, held, radius)
+    place, distance = framed(np.concatenate([outline, *tips, joint_tips(scene, stations, size * radius)]), toward)
+
+    items = list(_bodies(scene, meshes, held, stations, place, size))
+    items.extend(joint_items(scene, stations, place, size))
+    for pair in pairs:
+        items.extend(_contact(pair, place))
+    for k, (wish, point) in enumerate(zip(wishes, drawn, strict=True)):
+        thick = 0.8 * MARK if wish.point.body.faces else size * JOINT
+        items.extend(_wish(f"target {k + 1}", place(wish.target), place(point), thick))
+    for k, shape in enumerate(ellipsoids):
+        items.extend(_ellipsoid(f"ellipsoid {k + 1}", shape, place))
+    if stations.count > 1:
+        distance *= _ROOM
+    return Picture(tuple(items), distance * toward / np.linalg.norm(toward), times)
+
+
+def _checked(scene: Assembly, direction: ArrayLike) -> Array:
+    """The direction to the eye, of a scene that can be drawn."""
+    if not isinstance(scene, Assembly):
+        raise TypeError(f"scene is {scene!r}; expected an Assembly")
+    if not scene.bodies:
+        raise InputError("scene has no bodies; expected one at least")
+    toward = vector("direction", direction)
+    if not np.linalg.norm(toward) > 0.0:
+        raise InputError(f"direction is {toward.tolist()}; expected a direction other than zero")
+    return toward
+
+
+def draw(
+    scene: Assembly,
+    solution: Solution | None = None,
+    direction: ArrayLike = DIRECTION,
+    ellipsoids: Ellipsoid | Iterable[Ellipsoid] = (),
+) -> Picture:
     """Place everything there is to see.
 
     Parameters
@@ -198,49 +236,48 @@ def draw(scene: Assembly, solution: Solution | None = None, direction: ArrayLike
         they were made.
     direction : (3,)
         From the scene to the eye.
+    ellipsoids : Ellipsoid or several
 
     Raises
     ------
     InputError, TypeError
         A scene without bodies, a solution of other bodies, or something that is neither.
     """
-    if not isinstance(scene, Assembly):
-        raise TypeError(f"scene is {scene!r}; expected an Assembly")
+    toward = _checked(scene, direction)
     if solution is not None and not isinstance(solution, Solution):
         raise TypeError(f"solution is {solution!r}; expected a Solution, or None")
-    if not scene.bodies:
-        raise InputError("scene has no bodies; expected one at least")
-    toward = vector("direction", direction)
-    if not np.linalg.norm(toward) > 0.0:
-        raise InputError(f"direction is {toward.tolist()}; expected a direction other than zero")
-    poses = {body: body.pose if solution is None else solution.pose(body) for body in scene.bodies}
-    meshes = {body: body_mesh(body) for body in scene.bodies}
-    wishes = [
-        (objective.target, poses[objective.point.body].apply(objective.point.coordinates))
-        for _, objective in scene.objectives
-        if isinstance(objective, PointDistance)
-    ]
-    points = [
-        poses[body].apply(np.zeros((1, 3)) if (mesh := meshes[body]) is None else mesh.vertices)
-        for body in scene.bodies
-    ]
-    place, distance = _frame(np.concatenate([*points, *np.reshape(wishes, (-1, 1, 3))]), toward)
+    q = scene.q if solution is None else solution_rows(scene, solution)
+    times = np.zeros(1)
+    pairs = [] if solution is None else contact_series([solution], times)
+    return _picture(scene, Stations(scene.bodies, q[None]), times, pairs, stills(ellipsoids), toward)
 
-    items: list[Item] = []
-    for (body, mesh), color in zip(meshes.items(), _colors(scene.bodies), strict=True):
-        rotation, position = poses[body].matrix[:3, :3], poses[body].position
-        if mesh is None:
-            items.append(Item(("bodies", body.name), _ball(), _matrix(_MARK * np.eye(3), place(position)), color))
-            continue
-        # About its own middle, for a shape that was drawn far from the origin of its body.
-        middle = 0.5 * (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0))
-        about = Mesh(mesh.vertices - middle, mesh.normals, mesh.triangles)
-        matrix = _matrix(place.scale * rotation, place(rotation @ middle + position))
-        items.append(Item(("bodies", body.name), about, matrix, color))
-    if solution is not None:
-        for name, pair in solution.contacts.items():
-            if np.isfinite(pair.points).all():
-                items.extend(_contact(name, pair, place))
-    for k, (target, point) in enumerate(wishes):
-        items.extend(_wish(f"target {k + 1}", place(target), place(point)))
-    return Picture(tuple(items), distance * toward / np.linalg.norm(toward))
+
+def film(
+    scene: Assembly,
+    trajectory: Trajectory,
+    direction: ArrayLike = DIRECTION,
+    ellipsoids: Ellipsoid | Iterable[Ellipsoid | Iterable[Ellipsoid]] = (),
+) -> Picture:
+    """Place everything there is to see at the frames of a trajectory, and between them.
+
+    Parameters
+    ----------
+    scene : Assembly
+    trajectory : (frames, n, 7) or sequence of Solution
+        Two frames at least. Contacts are those of the solutions, if they are solutions.
+    direction : (3,)
+        From the scene to the eye.
+    ellipsoids : Ellipsoid, or for each frame one or several
+        A single one stays as it is.
+
+    Raises
+    ------
+    InputError, TypeError
+        A scene without bodies, a trajectory of another shape or of other bodies.
+    """
+    toward = _checked(scene, direction)
+    q, solutions = trajectory_rows(scene, trajectory)
+    times = sample_times(q)
+    shapes = ellipsoid_series(ellipsoids, len(q), times)
+    stations = Stations(scene.bodies, poses_at(q, times))
+    return _picture(scene, stations, times, contact_series(solutions, times), shapes, toward)

@@ -22,17 +22,31 @@ FLAGS = (
 NO_MENU = "<style>.dg { display: none }</style></head>"
 
 
-def photograph(page: Path, picture: Path, width: int = 700, height: int = 500, scale: float = 1.0) -> None:
-    """Write a PNG of a page; network addresses do not resolve for it."""
+def _run(page: Path, fragment: str, script: str, *options: str) -> subprocess.CompletedProcess[str]:
+    """Open a page at a fragment, `#...`, with a script at its end; network addresses do not resolve for it."""
     assert BROWSER is not None
     with tempfile.TemporaryDirectory() as folder:
         bare = Path(folder, "page.html")
-        bare.write_text(page.read_text(encoding="utf-8").replace("</head>", NO_MENU, 1), encoding="utf-8")
-        command = [BROWSER, *FLAGS, f"--user-data-dir={folder}/profile", f"--window-size={width},{height}"]
-        command += ["--host-resolver-rules=MAP * ~NOTFOUND", f"--force-device-scale-factor={scale}"]
-        command += [f"--screenshot={picture.absolute()}", bare.as_uri()]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+        text = page.read_text(encoding="utf-8").replace("</head>", NO_MENU, 1)
+        bare.write_text(text.replace("</body>", f"<script>{script}</script></body>"), encoding="utf-8")
+        command = [BROWSER, *FLAGS, f"--user-data-dir={folder}/profile", "--host-resolver-rules=MAP * ~NOTFOUND"]
+        command += [*options, bare.as_uri() + fragment]
+        return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+
+
+def photograph(
+    page: Path, picture: Path, width: int = 700, height: int = 500, scale: float = 1.0, fragment: str = ""
+) -> None:
+    """Write a PNG of a page."""
+    size = (f"--window-size={width},{height}", f"--force-device-scale-factor={scale}")
+    done = _run(page, fragment, "", *size, f"--screenshot={picture.absolute()}")
     assert picture.is_file(), done.stderr
+
+
+def title_after(page: Path, script: str, fragment: str = "") -> str:
+    """The title that a script gives a page within the time of a picture."""
+    done = _run(page, fragment, script, "--dump-dom")
+    return done.stdout.partition("<title>")[2].partition("</title>")[0]
 
 
 def decoded(picture: Path) -> np.ndarray:
@@ -73,5 +87,6 @@ def decoded(picture: Path) -> np.ndarray:
 
 
 if __name__ == "__main__":
-    # python tests/view/chromium.py page.html picture.png [width height scale]
-    photograph(Path(sys.argv[1]), Path(sys.argv[2]), *map(int, sys.argv[3:5]), *map(float, sys.argv[5:6]))
+    # python tests/view/chromium.py page.html picture.png [width height [scale [#frame=12]]]
+    numbers = (*map(int, sys.argv[3:5]), *map(float, sys.argv[5:6]))
+    photograph(Path(sys.argv[1]), Path(sys.argv[2]), *numbers, fragment="".join(sys.argv[6:7]))

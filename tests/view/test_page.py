@@ -11,6 +11,7 @@ import pytest
 import umsgpack
 
 import assembly as asm
+from assembly.kinematics.ellipsoid import Ellipsoid
 from assembly.view.commands import ROOT, commands
 from assembly.view.picture import draw
 
@@ -118,3 +119,19 @@ def test_no_body_no_hue(photo, tmp_path):
     strong = np.ptp(pixels, axis=2) > 60
     assert strong.mean() > 0.1
     assert (pixels[strong].argmax(axis=1) == 0).all()
+
+
+def test_a_browser_shows_an_ellipsoid_and_what_is_behind_it(photo, tmp_path):
+    scene = asm.Assembly([asm.Body("green", asm.shapes.sphere(0.5))])
+    veil = Ellipsoid((0, 0, 0), np.eye(3), (2, 2, 2), (1, 0, 0))
+    asm.view.save_html(tmp_path / "veil.html", scene, ellipsoids=veil)
+    pixels = photo(tmp_path / "veil.html").astype(int)
+    height, width, _ = pixels.shape
+    rows = pixels[height // 2 - 15 : height // 2 + 15]
+    # The ball in the middle keeps something of its color, the veil beside it is red, and beside that it is light.
+    middle, beside = (
+        np.median(rows[:, width // 2 + x - 15 : width // 2 + x + 15].reshape(-1, 3), axis=0) for x in (0, -75)
+    )
+    assert middle[1] > middle[2] + 20
+    assert beside[0] > beside[1] + 40 and abs(beside[1] - beside[2]) < 40
+    assert pixels[:, [0, -1]].min() > 200

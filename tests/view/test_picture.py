@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 
 import assembly as asm
+from assembly.kinematics.ellipsoid import Ellipsoid
 from assembly.kinematics.pose import retract
-from assembly.view.picture import FIELD_OF_VIEW, draw
+from assembly.view.commands import commands
+from assembly.view.item import FIELD_OF_VIEW
+from assembly.view.picture import draw
 
 TOUCHING, PENETRATING = (1.00, 0.72, 0.10), (0.95, 0.05, 0.65)
 
@@ -147,6 +150,51 @@ def test_a_body_without_a_shape_is_a_mark():
     assert np.isfinite(lonely.eye).all()
 
 
+def test_ellipsoids(balls):
+    axes = np.linalg.qr(np.random.default_rng(4).normal(size=(3, 3)))[0]
+    whole = Ellipsoid((1.0, -3.0, 2.0), axes, (2.0, 0.5, 1.0))
+    line = Ellipsoid((1.0, 3.0, 2.0), axes, (0.0, 1.5, 0.0), (0.9, 0.1, 0.1))
+    picture = draw(balls, ellipsoids=[whole, line])
+    red = item(picture, "bodies", "red")
+    scale = np.linalg.norm(red.matrix[:3, 0])
+    solid = item(picture, "ellipsoids", "ellipsoid 1", "solid")
+    points = (solid.points - center(red)) / scale
+    # The equation of the ellipsoid, with squares of 2-fold coordinates.
+    assert (((points - whole.center) @ axes / whole.lengths) ** 2).sum(axis=1) == pytest.approx(1.0, abs=1e-12)
+    assert 0.0 < solid.opacity < 1.0
+    # Its axes end on it.
+    for k in range(3):
+        rod = item(picture, "ellipsoids", "ellipsoid 1", f"axis {k + 1}")
+        along = ((rod.points - center(red)) / scale - whole.center) @ axes[:, k]
+        assert (along.min(), along.max()) == pytest.approx((-whole.lengths[k], whole.lengths[k]), abs=1e-12)
+    # What is flat has a little thickness, and no axis where it has no length.
+    flat = (item(picture, "ellipsoids", "ellipsoid 2", "solid").points - center(red)) / scale - line.center
+    assert np.abs(flat @ axes[:, 1]).max() == pytest.approx(1.5, abs=1e-12)
+    assert 0.0 < np.abs(flat @ axes[:, [0, 2]]).max() < 0.01 / scale
+    parts = [i.path[1:] for i in picture.items if i.path[0] == "ellipsoids"]
+    assert parts[4:] == [("ellipsoid 2", "solid"), ("ellipsoid 2", "axis 2")]
+    assert item(picture, "ellipsoids", "ellipsoid 2", "solid").color == (0.9, 0.1, 0.1) != solid.color
+    # All in the frame, which is wider than that of the balls.
+    assert np.linalg.norm(solid.points, axis=1).max() < 1.0 + 1e-3
+    assert scale < np.linalg.norm(item(draw(balls), "bodies", "red").matrix[:3, 0])
+    assert len(draw(balls, ellipsoids=whole).items) == len(draw(balls).items) + 4
+
+
+def test_what_is_half_transparent_hides_nothing(balls):
+    picture = draw(balls, ellipsoids=Ellipsoid((0, 0, 0), np.eye(3), (1, 1, 1)))
+    materials = {c["path"].split("/")[-1]: c["object"]["materials"][0] for c in commands(picture) if "object" in c}
+    assert materials["solid"]["transparent"] and not materials["solid"]["depthWrite"]
+    assert materials["solid"]["opacity"] == pytest.approx(0.35, abs=0)
+    assert not any("transparent" in materials[name] for name in ("red", "axis 1", "target"))
+
+
+def test_the_ground_of_a_mechanism_is_gray():
+    bodies = [asm.Body("base", fixed=True), asm.Body("link"), asm.Body("green", position=(1, 0, 0), fixed=True)]
+    base, link, green = (i.color for i in draw(asm.Assembly(bodies)).items)
+    assert np.ptp(base) < 0.1 < np.ptp(green) < np.ptp(link)
+    assert int(np.argmax(green)) == 1
+
+
 def test_bad_input(balls):
     with pytest.raises(TypeError, match="scene is 'x'; expected an Assembly"):
         draw("x")
@@ -156,6 +204,8 @@ def test_bad_input(balls):
         draw(asm.Assembly())
     with pytest.raises(ValueError, match=r"direction is \[0.0, 0.0, 0.0\]"):
         draw(balls, direction=(0, 0, 0))
+    with pytest.raises(TypeError, match="ellipsoids is 3; expected an Ellipsoid or several"):
+        draw(balls, ellipsoids=3)
     other = asm.Assembly([asm.Body("elsewhere", asm.shapes.sphere(1.0))])
     with pytest.raises(ValueError, match="expected one of 'red', 'green', 'blue'"):
         draw(other, balls.solve())

@@ -1,0 +1,94 @@
+"""A trajectory that plays, in a browser window or in a file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from os import PathLike
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from assembly.assembly import Assembly
+from assembly.errors import InputError, positive
+from assembly.kinematics.ellipsoid import Ellipsoid
+from assembly.view.commands import commands, motion
+from assembly.view.page import player, write_page
+from assembly.view.picture import DIRECTION, film
+from assembly.view.series import Trajectory
+
+if TYPE_CHECKING:
+    from meshcat import Visualizer
+
+__all__ = ["animate"]
+
+
+def animate(
+    scene: Assembly,
+    trajectory: Trajectory,
+    path: str | PathLike[str] | None = None,
+    *,
+    seconds: float = 5.0,
+    loop: bool = True,
+    ellipsoids: Ellipsoid | Iterable[Ellipsoid | Iterable[Ellipsoid]] = (),
+    direction: ArrayLike = DIRECTION,
+    title: str | None = None,
+    open: bool = False,
+    visualizer: Visualizer | None = None,
+) -> Visualizer | None:
+    """Play a trajectory, in a meshcat visualizer or, with a path, in one HTML file without server or network.
+
+    All frames take the same time. Between two frames a body moves along a screw, at constant speed. What is drawn
+    is what `save_html` draws; contacts are those of the solutions, in magenta if the surfaces interpenetrate in any
+    frame; targets are where they are now.
+
+    The file plays by itself; it has a button to pause, a slider over the frames and a box to loop. `#frame=12` at
+    the end of its address opens it there, paused. The visualizer has the like in its menu.
+
+    Parameters
+    ----------
+    scene : Assembly
+    trajectory : (frames, n, 7) or sequence of Solution
+        Poses of all bodies, rows as in `scene.q`, or solutions of the scene; two frames at least.
+    path : str or path, optional
+        The file to write.
+    seconds : float
+        From the first frame to the last.
+    loop : bool
+        Whether it starts again at the end.
+    ellipsoids : Ellipsoid, or for each frame one or several
+        A single one stays as it is.
+    direction : (3,)
+        From the scene to the eye; z is upward.
+    title : str, optional
+        Of the page; the file's name by default.
+    open : bool
+        Whether to open a browser window on the visualizer; not with a path.
+    visualizer : meshcat.Visualizer, optional
+        As in `show`; not with a path.
+
+    Returns
+    -------
+    meshcat.Visualizer, or None with a path
+
+    Raises
+    ------
+    InputError, TypeError
+        See the message; nothing is written or started then.
+    """
+    duration = positive("seconds", seconds)
+    if not isinstance(loop, (bool, np.bool_)):
+        raise InputError(f"loop is {loop!r}; expected True or False")
+    picture = film(scene, trajectory, direction, ellipsoids)
+    if path is None:
+        if title is not None:
+            raise InputError(f"title is {title!r} without a path; expected a path to write a page to, or no title")
+        # Its import of meshcat is for those who want a window.
+        from assembly.view.browser import display
+
+        return display(picture, open, visualizer, duration, loop)
+    if open or visualizer is not None:
+        raise InputError("open or visualizer is given with a path; expected either a file or a window")
+    frames = round(float(picture.times[-1])) + 1
+    write_page(path, title, [*commands(picture), motion(picture, duration, loop)], player(frames, loop))
+    return None

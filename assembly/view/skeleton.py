@@ -1,0 +1,146 @@
+"""Links and joints of a mechanism.
+
+A body without a shape is drawn as rods between the places where it is held or drawn: the origins of its joints'
+frames and the points that objectives name. A joint is a ball, and an arrow along each z axis that its rows speak of:
+none for Spherical and Distance, one for Revolute, two for Universal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.assembly import Assembly
+from assembly.constraints.joint import Joint
+from assembly.constraints.objectives import PointDistance
+from assembly.constraints.primitives import COINCIDENT, DISTANCE, SLIDE
+from assembly.kinematics.body import Body
+from assembly.view.item import Color, Item, Place, Stations
+from assembly.view.marks import arrow, ball, rods, stick
+from assembly.view.mesh import Mesh
+from assembly.view.motion import aligned
+
+__all__ = ["JOINT", "MARK", "fineness", "held_points", "joint_items", "joint_tips", "line", "link_mesh"]
+
+Array = NDArray[np.float64]
+# Sizes in parts of the scene's radius: radii of marks, rods and joints, reach of arrows behind and before their origin.
+MARK = 0.014
+_ROD = 0.014
+JOINT = 0.022
+_BACK, _FORTH = -0.07, 0.14
+# Links shorter than this part of the scene's radius have smaller rods and joints, but not smaller than that.
+_SHORT, _LEAST = 0.12, 0.15
+_COLOR: Color = (0.20, 0.22, 0.27)
+# Points of a body that differ by less, in parts of their distance from its origin, are one.
+_COINCIDENT = 1e-9
+# Directions that differ by less [rad] look the same.
+_PARALLEL = 0.02
+
+
+def _joints(scene: Assembly) -> list[Joint]:
+    return [constraint for constraint in scene.constraints if isinstance(constraint, Joint)]
+
+
+def held_points(scene: Assembly) -> dict[Body, Array]:
+    """Points (m, 3) of each body without a shape where joints hold it or objectives draw it, in body coordinates.
+
+    Where they are all one, the body's origin is another.
+    """
+    found: dict[Body, list[Array]] = {body: [] for body in scene.bodies if not body.faces}
+    frames = [frame for joint in _joints(scene) for frame in (joint.frame_a, joint.frame_b)]
+    points = [objective.point for _, objective in scene.objectives if isinstance(objective, PointDistance)]
+    for body, coordinates in [*((f.body, f.origin) for f in frames), *((p.body, p.coordinates) for p in points)]:
+        if body in found:
+            found[body].append(coordinates)
+    for places in found.values():
+        if places and np.ptp(places, axis=0).max() <= _COINCIDENT * np.abs(places).max():
+            places.append(np.zeros(3))
+    return {body: np.array(places).reshape(-1, 3) for body, places in found.items()}
+
+
+def fineness(scene: Assembly, held: dict[Body, Array], radius: float) -> float:
+    """Factor of the sizes of rods and joints: 1, or less where links are short beside the scene's radius."""
+    linked = dict.fromkeys(body for joint in _joints(scene) for body in joint.bodies)
+    sizes = [body.size if body.faces else float(np.linalg.norm(np.ptp(held[body], axis=0))) for body in linked]
+    sizes = [size for size in sizes if size > 0.0]
+    return float(np.clip(np.median(sizes) / (_SHORT * radius), _LEAST, 1.0)) if sizes else 1.0
+
+
+def link_mesh(points: Array, size: float) -> Mesh:
+    """A body that is held at points (m, 3), one at least, in parts of the scene's radius about the body's origin.
+
+    Up to three points are joined with each other, more as a tree of the shortest rods.
+    """
+    radius = size * _ROD
+    apart = [p for k, p in enumerate(points) if (np.linalg.norm(points[:k] - p, axis=1) > radius).all()]
+    places = np.array(apart)
+    every = list(combinations(range(len(places)), 2))
+    return rods(places, every if len(places) <= 3 else _tree(places), radius)
+
+
+def _tree(points: Array) -> list[tuple[int, int]]:
+    """Pairs of points whose rods connect them all with the least length (Prim's algorithm)."""
+    nearest = np.linalg.norm(points - points[0], axis=1)
+    nearest[0] = np.inf
+    neighbor = np.zeros(len(points), dtype=np.int64)
+    pairs: list[tuple[int, int]] = []
+    reached = {0}
+    while len(reached) < len(points):
+        new = int(nearest.argmin())
+        pairs.append((int(neighbor[new]), new))
+        reached.add(new)
+        distance = np.linalg.norm(points - points[new], axis=1)
+        nearer = distance < nearest
+        nearer[list(reached)] = False
+        nearest[nearer], neighbor[nearer] = distance[nearer], new
+        nearest[new] = np.inf
+    return pairs
+
+
+def line(path: tuple[str, ...], start: Array, end: Array, radius: float, color: Color, in_front: bool = False) -> Item:
+    """A rod between points (k, 3) that may move."""
+    way = end - start
+    length = np.linalg.norm(way, axis=1, keepdims=True)
+    scale = np.concatenate([np.full_like(length, radius), np.full_like(length, radius), length], axis=1)
+    return Item(path, stick(), color, start, aligned(way), scale, in_front)
+
+
+def joint_tips(scene: Assembly, stations: Stations, radius: float) -> Array:
+    """Ends (m, 3) of joints' arrows in the world, which a picture is to hold, for a scene's radius times fineness."""
+    tips = [
+        stations.points(frame.body, frame.origin + reach * radius * frame.axes[:, 2])
+        for joint in _joints(scene)
+        for frame in (joint.frame_a, joint.frame_b)
+        for reach in (_BACK, _FORTH)
+    ]
+    return np.concatenate([np.empty((0, 3)), *tips])
+
+
+def joint_items(scene: Assembly, stations: Stations, place: Place, size: float) -> Iterator[Item]:
+    """What there is to see of each joint."""
+    thick = np.full(3, size * JOINT)
+    axis = arrow(size * _BACK, size * _FORTH, 0.35 * size * _ROD, 1.1 * size * _ROD)
+    for joint in _joints(scene):
+        kinds = {coordinate.kind for row in joint.equations for _, coordinate in row.terms}
+        a, b = (place(stations.points(frame.body, frame.origin)) for frame in (joint.frame_a, joint.frame_b))
+        turn_a, turn_b = (stations.rotation(f.body) @ f.axes for f in (joint.frame_a, joint.frame_b))
+        in_front = any(body.faces for body in joint.bodies)
+        meets = bool(kinds & {COINCIDENT, SLIDE, DISTANCE})
+        gap = float(np.linalg.norm(b - a, axis=1).max())
+        sine = np.linalg.norm(np.cross(turn_a[:, :, 2], turn_b[:, :, 2]), axis=1).max()
+
+        parts: list[tuple[str, Mesh, Array, Array, Array]] = [("ball", ball(), a, np.eye(3), thick)]
+        if kinds - {COINCIDENT, DISTANCE}:
+            parts.append(("axis", axis, a, turn_a, np.ones(3)))
+        if gap > size * MARK:
+            parts.append(("other ball", ball(), b, np.eye(3), thick))
+        # The second arrow of a hinge lies on the first.
+        if kinds - {COINCIDENT, DISTANCE, SLIDE} and not (meets and sine < _PARALLEL):
+            parts.append(("other axis", axis, b, turn_b, np.ones(3)))
+        for what, mesh, position, rotation, scale in parts:
+            yield Item(("joints", joint.name, what), mesh, _COLOR, position, rotation, scale, in_front)
+        if meets and gap > 2.0 * size * MARK:
+            yield line(("joints", joint.name, "line"), a, b, 0.35 * size * _ROD, _COLOR, in_front)
