@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from assembly.constraints.contact import Contact as Contact
     from assembly.constraints.couplings import Gear as Gear
     from assembly.constraints.couplings import RackPinion as RackPinion
+    from assembly.constraints.dexterity import Dexterity as Dexterity
     from assembly.constraints.expression import Expression as Expression
     from assembly.constraints.joints import Cylindrical as Cylindrical
     from assembly.constraints.joints import Fixed as Fixed
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
     from assembly.geometry.face import Face as Face
     from assembly.geometry.surface import NurbsSurface as NurbsSurface
     from assembly.kinematics.body import Body as Body
+    from assembly.kinematics.ellipsoid import Ellipsoid as Ellipsoid
     from assembly.kinematics.pose import Pose as Pose
     from assembly.proximity.pairs import ContactPair as ContactPair
     from assembly.scene_file import load as load
@@ -58,7 +60,9 @@ else:
             "Contact": "assembly.constraints.contact",
             "ContactPair": "assembly.proximity.pairs",
             "Cylindrical": "assembly.constraints.joints",
+            "Dexterity": "assembly.constraints.dexterity",
             "Distance": "assembly.constraints.placements",
+            "Ellipsoid": "assembly.kinematics.ellipsoid",
             "Expression": "assembly.constraints.expression",
             "Face": "assembly.geometry.face",
             "Fixed": "assembly.constraints.joints",

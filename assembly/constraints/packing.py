@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import prod, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from assembly.constraints import program, tape, terms
 from assembly.constraints.constraint import Constraint, Coordinate, Equation, FramePair, structure_changes
 from assembly.constraints.contact import Contact
 from assembly.constraints.couplings import Coupling
+from assembly.constraints.dexterity import MEASURES, TASKS, Dexterity
 from assembly.constraints.expression import Expression
 from assembly.constraints.joint import Joint
 from assembly.constraints.numbering import gathering_order, number_bodies
@@ -153,7 +155,6 @@ class Packed:
         header[program.ROW_TABLE], _ = self._add(
             [field for row in rows for field in row + [0] * (program.ROW - len(row))]
         )
-        header[program.JOINT_TABLE] = self._joints()
         header[program.GATHER_TABLE] = self._gathering(bodies, rows)
         terms_: list[list[int]] = []
         for sign, objective in objectives:
@@ -161,6 +162,8 @@ class Packed:
         header[program.TERM_TABLE], _ = self._add(
             [field for term in terms_ for field in term + [0] * (terms.TERM - len(term))]
         )
+        # Terms have joints with frames, too.
+        header[program.JOINT_TABLE] = self._joints()
         header[program.TAPE_ROOM], _ = self._add(self._room)
         header[program.BODIES] = len(bodies)
         header[program.MOVING] = int(slots.max()) + 1
@@ -170,6 +173,7 @@ class Packed:
         header[program.ROWS] = len(rows)
         header[program.EXTRA] = extra
         header[program.TERMS] = len(terms_)
+        header[program.DEXTERITIES] = sum(term[0] == terms.DEXTERITY for term in terms_)
         self._table[0] = header
         table = np.array([row[:6] for row in rows], dtype=np.int64).reshape(-1, 6)
         self.owners = np.array(owners, dtype=np.int64)
@@ -193,7 +197,21 @@ class Packed:
 
     def _natural_unit(self, objective: Objective) -> float:
         """What an objective of order one in scaled lengths counts in the user's units."""
-        return 1.0 if isinstance(objective, Expression) else self.scale**2
+        if isinstance(objective, Expression):
+            return 1.0
+        if not isinstance(objective, Dexterity):
+            return self.scale**2
+        task = objective.tip_task
+        linear, angular = self.scale, task.length if task.task == "pose" else 1.0
+        columns = [1.0 if freedom.coordinate.is_angle else 1.0 / self.scale for freedom in task.inputs]
+        entry = {"position": linear, "rotation": angular, "pose": sqrt(linear * angular)}[task.task]
+        entry *= prod(columns) ** (1.0 / len(columns))
+        powers = {
+            "manipulability": min(task.rows, len(columns)),
+            "smallest_singular_value": 1,
+            "force_transmission": -1,
+        }
+        return float(entry ** powers.get(objective.measure, 0))
 
     def _coordinate(self, coordinate: Coordinate) -> tuple[list[int], list[int]]:
         """The fields of a coordinate in a row, and its bodies."""
@@ -261,7 +279,10 @@ class Packed:
         return records[key]
 
     def _terms(self, weight: float, objective: Objective, bodies: Sequence[Body]) -> list[list[int]]:
-        weight *= self._natural_unit(objective) / self.unit
+        if isinstance(objective, (Dexterity, Expression)):
+            weight /= self.unit  # their values are in the user's units
+        else:
+            weight *= self._natural_unit(objective) / self.unit
         if isinstance(objective, PointDistance):
             point = objective.point.coordinates / self.scale
             _, at = self._add(pool=[weight, *point, 0.0, 0.0, 0.0])
@@ -269,6 +290,8 @@ class Packed:
             return [[terms.POINT_DISTANCE, self._places[id(objective.point.body)], at]]
         if isinstance(objective, FrameDistance):
             return self._frame_terms(weight, objective)
+        if isinstance(objective, Dexterity):
+            return [[terms.DEXTERITY, *self._dexterity(weight, objective)]]
         if isinstance(objective, Expression):
             _, at = self._add(pool=[weight])
             listed, _ = self._add(self._tape(objective, -1))
@@ -285,6 +308,20 @@ class Packed:
                 _, at = self._add(pool=[weight, *place, *row[3:], weight * lever**2])
                 records.append([terms.POSTURE, k, at, 0, int(objective.reference is None)])
         return records
+
+    def _dexterity(self, weight: float, objective: Dexterity) -> list[int]:
+        """Body, parameters and record of a term (`solve/dexterity.py`)."""
+        task = objective.tip_task
+        fields = [MEASURES.index(objective.measure), TASKS.index(task.task), len(task.inputs)]
+        factors = []
+        for freedom in task.inputs:
+            coordinate, bodies = self._coordinate(freedom.coordinate)
+            fields += [*coordinate, *bodies]
+            factors.append(1.0 if freedom.coordinate.is_angle else 1.0 / self.scale)
+        direction = np.zeros(6) if objective.direction is None else np.resize(objective.direction, 6)
+        turn = task.length if task.task == "pose" else 1.0
+        _, at = self._add(pool=[weight, *(task.origin / self.scale), self.scale, turn, *direction, *factors])
+        return [self._places[id(task.tip.body)], at, self._add(fields)[0]]
 
     def _frame_terms(self, weight: float, objective: FrameDistance) -> list[list[int]]:
         """A frame's origin drawn to a point, and its body turned to a quaternion."""
@@ -348,6 +385,8 @@ def _scene_size(
             marks[id(term.point.body)].append(term.point.coordinates)
         elif isinstance(term, FrameDistance):
             marks[id(term.frame.body)].append(term.frame.origin)
+        elif isinstance(term, Dexterity):
+            marks[id(term.tip_task.tip.body)].append(term.tip_task.origin)
     sizes = [max(body.size, _spread(marks[id(body)])) for body in bodies]
     size = max(sizes)
     if not size > 0.0:

@@ -27,10 +27,11 @@ from assembly.proximity.free_pair import VARIABLES, free_hessian, free_rows
 from assembly.proximity.start import global_start
 from assembly.proximity.velocity import GAP, RECORD, add_gap_terms, gradient_row, store_record
 
-# Header of the table: counts, then where its parts begin; whether nobody asked for the objective.
+# Header of the table: counts, then where its parts begin; whether nobody asked for the
+# objective, and how many of its terms are dexterities.
 BODIES, MOVING, CONTACTS, TRACKED, JOINTS, ROWS, TAPES, TERMS, EXTRA = 0, 1, 2, 3, 4, 5, 6, 7, 8
 SLOTS, ROW_TABLE, JOINT_TABLE, TAPE_TABLE, TERM_TABLE, TAPE_ROOM, GATHER_TABLE = 9, 10, 11, 12, 13, 14, 15
-IMPLICIT, HEADER = 16, 17
+IMPLICIT, DEXTERITIES, HEADER = 16, 17, 18
 # A row: kind, its two bodies (-1: none), whether it is one-sided (residual >= 0), whether it prescribes a freedom, and
 # whether its residual is a length. Row k is that of contact k.
 ROW = 14

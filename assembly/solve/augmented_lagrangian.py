@@ -62,7 +62,7 @@ from assembly.solve.rows import (
     times,
     violation_of,
 )
-from assembly.solve.search import SHORTEST, search
+from assembly.solve.search import SHORTEST, goal, search
 
 # Outcomes; `solution.Status` gives each a sentence. RUNNING is none of them.
 SOLVED, INFEASIBLE, STALLED, ITERATION_LIMIT, CONTACT_LOST, RUNNING = 0, 1, 2, 3, 4, 5
@@ -331,7 +331,7 @@ def solve_program(table, pool, settings, state, history):
         jacobian = here[4]
         descent, step, straight = lines
         violation = violation_of(residual, one_sided, rows)
-        value = objective(table, pool, here[0], 1, room, last, gradient, lagrangian)
+        value = goal(table, pool, shape, rows, loose, room, here, 1, gradient, lagrangian)
         shortened = iteration > 0 and alpha < 1.0
         # At the start both are the same; later a tenth of the last residual is good.
         good = math.inf if iteration == 0 else 0.1 * last_dual

@@ -14,6 +14,7 @@ from assembly.constraints.program import (
     BODY_F,
     BODY_G,
     CONTACTS,
+    DEXTERITIES,
     EXTRA_COLUMN,
     FREE_COLUMN,
     JOINT_ROW,
@@ -116,6 +117,8 @@ def envelope(table, bases, rows, n, last, last_row):
                     high = max(high, at + 5)
             if high >= 0:
                 last[low] = max(last[low], high)
+    if table[DEXTERITIES] > 0:
+        last[0] = n - 1
     for i in range(1, n):
         last[i] = max(last[i], last[i - 1])
     # Rows meet in J J^T where they share a variable.

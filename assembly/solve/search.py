@@ -7,14 +7,24 @@ shortened.
 from __future__ import annotations
 
 from assembly._kernel import kernel
-from assembly.constraints.program import evaluate
+from assembly.constraints.program import DEXTERITIES, evaluate
 from assembly.constraints.terms import objective
 from assembly.proximity.extremal import BEND
+from assembly.solve.dexterity import add_dexterities
 from assembly.solve.linear import substitute
 from assembly.solve.rows import add_transposed, carry, merit, move
 
 # A step shorter than this decides nothing.
 SHORTEST = 1e-6
+
+
+@kernel(inner=True)
+def goal(table, pool, shape, rows, loose, room, point, order, gradient, hessian):
+    """The objective at a point whose rows are evaluated; from order 1 on its gradient and the Hessian's upper half."""
+    value = objective(table, pool, point[0], order, room, shape[2], gradient, hessian)
+    if table[DEXTERITIES] > 0:
+        value += add_dexterities(table, pool, shape, rows, loose, room, point, order, gradient, hessian)
+    return value
 
 
 @kernel(inner=True)
@@ -62,7 +72,7 @@ def search(
         if lost < 0:
             there = merit(trial[3], one_sided, rows, y, mu)
             if not restoring:
-                there += objective(table, pool, trial[0], 0, room, last, gradient, lagrangian)
+                there += goal(table, pool, shape, rows, loose, room, trial, 0, gradient, lagrangian)
             if there <= here_merit + 1e-4 * alpha * slope + noise:
                 return True, alpha, lost
             if bends < 2:

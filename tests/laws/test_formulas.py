@@ -361,9 +361,7 @@ def test_the_frame_at_a_pole(surface, curvatures, reverse):
             out = face.normal(*place)
             errors.append([abs(off @ out), np.linalg.norm(off), np.linalg.norm(normal - out)])
             # Positive where the outward normal is n.
-            np.testing.assert_allclose(
-                np.sort(face.sign * np.linalg.eigvalsh(full(a))), curvatures, rtol=0, atol=1e-12
-            )
+            np.testing.assert_allclose(np.sort(face.sign * np.linalg.eigvalsh(full(a))), curvatures, rtol=0, atol=1e-12)
         ratio = np.array(errors[0]) / errors[1]
         # Halving the distance divides them by 8 and by 4, or more.
         assert ratio[0] > 7.8 and ratio[1:].min() > 3.8
