@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from assembly.proximity.pairs import ContactPair as ContactPair
     from assembly.scene_file import load as load
     from assembly.solve import reference as reference
+    from assembly.solve.mobility import Mobility as Mobility
     from assembly.solve.solution import Solution as Solution
     from assembly.solve.solution import Status as Status
 else:
@@ -68,6 +69,7 @@ else:
             "Fixed": "assembly.constraints.joints",
             "FrameDistance": "assembly.constraints.objectives",
             "Gear": "assembly.constraints.couplings",
+            "Mobility": "assembly.solve.mobility",
             "NurbsCurve": "assembly.geometry.curve",
             "NurbsSurface": "assembly.geometry.surface",
             "Parallel": "assembly.constraints.joints",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from os import PathLike
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,6 +21,9 @@ from assembly.proximity.pairs import inside
 from assembly.solve.augmented_lagrangian import HISTORY, ITERATIONS, RESULTS, solve_program
 from assembly.solve.options import Options
 from assembly.solve.solution import Scene, Solution, Status
+
+if TYPE_CHECKING:
+    from assembly.solve.mobility import Mobility
 
 __all__ = ["Assembly"]
 
@@ -196,11 +199,7 @@ class Assembly:
     def _start(self, packed: Packed, q0: ArrayLike | Solution | None, starts: Mapping[str, ArrayLike] | None) -> Array:
         """State of the loop: configuration, contact parameters (NaN: to be found), multipliers, room for results."""
         if isinstance(q0, Solution):
-            if q0._packed is not packed:
-                raise InputError(
-                    "q0 is a solution of another assembly, or of this one before a change; expected its own"
-                )
-            state = q0._state.copy()
+            state = self._own("q0", packed, q0)._state.copy()
             q = state[: packed.contacts_at].reshape(-1, 7)
         else:
             state = np.zeros(packed.results_at + RESULTS)
@@ -212,6 +211,14 @@ class Assembly:
         packed.refresh()
         packed.start_angles(q, state, isinstance(q0, Solution))
         return state
+
+    @staticmethod
+    def _own(name: str, packed: Packed, solution: Solution) -> Solution:
+        if solution._packed is not packed:
+            raise InputError(
+                f"{name} is a solution of another assembly, or of this one before a change; expected its own"
+            )
+        return solution
 
     def _place_starts(self, packed: Packed, state: Array, starts: Mapping[str, ArrayLike]) -> None:
         if not isinstance(starts, Mapping):
@@ -226,6 +233,42 @@ class Assembly:
             at = packed.contacts_at + 4 * k
             what = f"starts[{name!r}]"
             state[at : at + 4] = inside(what, vector(what, value, 4), surfaces)
+
+    def mobility(
+        self, q: ArrayLike | Solution | None = None, *, drives: bool = True, tolerance: float | None = None
+    ) -> Mobility:
+        """Degrees of freedom at a pose, free motions, redundant and conflicting constraints.
+
+        Parameters
+        ----------
+        q : (n, 7) or Solution, optional
+            A row a body, or a solution of this assembly; the bodies' own poses by default. Where they violate
+            constraints the counts are those of that pose, and `feasibility` says by how much.
+        drives : bool
+            Whether driven values count as constraints.
+        tolerance : float, optional
+            Singular values below it count as zero; see `Mobility.tolerance`.
+
+        Returns
+        -------
+        Mobility
+            Print it for a table.
+
+        Raises
+        ------
+        InputError
+            Wrong shapes, a contact without a pair at the pose, a solution of another assembly.
+        """
+        from assembly.solve.mobility import Mobility
+
+        if not isinstance(drives, (bool, np.bool_)):
+            raise InputError(f"drives is {drives!r}; expected True or False")
+        packed = self.packed()
+        assert self._scene is not None
+        solved = isinstance(q, Solution)
+        # A solution keeps the values it was solved with.
+        state = self._own("q", packed, q)._state if isinstance(q, Solution) else self._start(packed, q, None)
+        return Mobility.at(self._scene, packed, state, solved=solved, drives=bool(drives), tolerance=tolerance)
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the scene as JSON; `asm.load` reads it back."""

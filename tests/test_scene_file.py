@@ -5,8 +5,6 @@ import json
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import assembly as asm
 from assembly.errors import InputError
@@ -238,7 +236,7 @@ def test_what_is_wrong_is_named_by_its_path(case, document, load_document, tmp_p
         (b"\xff\xfe\xfa", "is not JSON"),
         (b"ISO-10303-21;", "is not JSON"),
         (b"[" * 100_000, "is not JSON"),
-        (b"[]", 'document is a list of 0; expected a scene of format'),
+        (b"[]", "document is a list of 0; expected a scene of format"),
         (b"null", "document is null"),
         (b'"assembly-scene"', "document is"),
         (b'{"format": "assembly-scene", "format": 1}', "field 'format' stands twice"),
@@ -279,132 +277,15 @@ def test_kinds_that_a_file_does_not_hold_are_refused_before_a_file_is_touched(tm
     bodies = [asm.Body("a", ball), asm.Body("b", ball, (3, 0, 0))]
     scene = asm.Assembly(bodies)
     scene.constrain(Weld(*bodies))
-    with pytest.raises(InputError, match="expected a Contact, which is what scene files hold"):
+    with pytest.raises(
+        InputError,
+        match=r"constraints\[0\] is Contact\(.*; expected one of what scene files hold: Contact, Fixed, .*Expression$",
+    ):
         scene.save(path)
     scene = asm.Assembly(bodies)
     scene.minimize(Reach(bodies[0].point(0, 0, 0), (1, 2, 3)))
-    with pytest.raises(InputError, match="expected PointDistance or Posture"):
+    with pytest.raises(
+        InputError, match=r"objective\[0\] is PointDistance\(.*; expected one of what scene files hold: PointDistance"
+    ):
         scene.save(path)
     assert not path.exists()
-
-
-# Fuzzing: whatever happens to a valid document, it loads or says what is wrong.
-
-
-def places(value, path=()):
-    """Paths of all values in a document."""
-    yield path
-    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
-    for key, item in items:
-        yield from places(item, (*path, key))
-
-
-@st.composite
-def small_documents(draw):
-    """A document small enough that changes hit every kind of field, and changed in a few places."""
-    patch = {
-        "name": None,
-        "degree": [1, 1],
-        "knots": [[0, 0, 1, 1], [0.0, 0.0, 1.0, 1.0]],
-        "control_points": [[[0, 0, 0], [0, 1, 0]], [[1, 0, 0], [1, 1, 0]]],
-        "weights": [[1, 1], [1, 1]],
-    }
-    bodies = [
-        {
-            "name": name,
-            "fixed": name == "a",
-            "position": [0, 0, k],
-            "quaternion": [1, 0, 0, 0],
-            "shape": [{"surface": 0, "name": "top", "reversed": False}],
-        }
-        for k, name in enumerate("ab")
-    ]
-    sides = {"a": {"body": "a", "face": None}, "b": {"body": "b", "face": "top"}}
-    head = {"sign": 1, "weight": 1.0}
-    document = {
-        "format": "assembly-scene",
-        "version": 1,
-        "surfaces": [patch],
-        "bodies": bodies,
-        "constraints": [{"type": "contact", "name": "a-b", **sides, "unilateral": False}],
-        "objective": [
-            {"type": "point_distance", **head, "body": "b", "point": [0, 0, 0], "target": [1, 2, 3]},
-            {"type": "posture", **head, "reference": [[0, 0, 0, 1, 0, 0, 0]] * 2},
-        ],
-    }
-    document = json.loads(json.dumps(document))
-    whole = copy.deepcopy(document)
-    scalars = st.one_of(
-        st.none(),
-        st.booleans(),
-        st.integers(),
-        st.floats(),
-        st.sampled_from([1e-320, 1e154, 1e308, -1e308, 10**400, 10**4000, 0, 1, -1, 2]),
-        st.text(max_size=3),
-        st.sampled_from(["a", "b", "top", "contact", "posture", "point_distance"]),
-    )
-    values = st.recursive(
-        scalars, lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=2), inner, max_size=2)
-    )
-    for _ in range(draw(st.integers(1, 3))):
-        *way, last = draw(st.sampled_from([path for path in places(document) if path]))
-        place = document
-        for key in way:
-            place = place[key]
-        match draw(st.sampled_from(["change", "change", "elsewhere", "delete", "repeat"])):
-            case "change":
-                place[last] = draw(values)
-            case "elsewhere":
-                found = whole
-                for key in draw(st.sampled_from(list(places(whole)))):
-                    found = found[key]
-                place[last] = copy.deepcopy(found)
-            case "delete":
-                del place[last]
-            case "repeat":
-                twin = copy.deepcopy(place[last])
-                if isinstance(place, list):
-                    place.insert(last, twin)
-                else:
-                    place[draw(st.text(max_size=2))] = twin
-    return document
-
-
-@settings(max_examples=300)
-@given(small_documents())
-def test_a_changed_document_loads_or_raises_input_error(tmp_path_factory, document):
-    path = tmp_path_factory.getbasetemp() / "fuzz.json"
-    path.write_text(json.dumps(document))
-    try:
-        scene = asm.load(path)
-    except InputError as error:
-        assert str(error).startswith(f"{path}: ")
-        return
-    scene.save(path)
-    first = path.read_bytes()
-    asm.load(path).save(path)
-    assert path.read_bytes() == first
-
-
-@settings(max_examples=150)
-@given(st.data())
-def test_damaged_bytes_load_or_raise_input_error(tmp_path_factory, document, data):
-    path = tmp_path_factory.getbasetemp() / "damaged.json"
-    text = bytearray(json.dumps(document).encode())
-    for _ in range(data.draw(st.integers(1, 4))):
-        at = data.draw(st.integers(0, len(text) - 1))
-        match data.draw(st.sampled_from(["byte", "cut", "drop", "digit"])):
-            case "byte":
-                text[at] = data.draw(st.integers(0, 255))
-            case "cut":
-                del text[max(at, 1) :]
-            case "drop":
-                del text[at : at + data.draw(st.integers(1, 20))]
-                text = text or bytearray(b" ")
-            case "digit":
-                text[at:at] = data.draw(st.sampled_from([b"9", b"e9", b"-", b".", b"NaN", b"null", b'"', b"[", b"}"]))
-    path.write_bytes(bytes(text))
-    try:
-        asm.load(path)
-    except InputError as error:
-        assert str(path) in str(error)

@@ -1,0 +1,274 @@
+"""What stands in a scene file: a table of the fields of every kind of thing. A kind that is not here is not saved."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from operator import methodcaller
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.constraints.constraint import Freedom
+from assembly.constraints.contact import Contact
+from assembly.constraints.couplings import Gear, RackPinion
+from assembly.constraints.expression import Expression
+from assembly.constraints.joints import (
+    Cylindrical,
+    Fixed,
+    Parallel,
+    Perpendicular,
+    Planar,
+    Prismatic,
+    Revolute,
+    Screw,
+    Spherical,
+    Universal,
+)
+from assembly.constraints.objectives import FrameDistance, PointDistance, Posture
+from assembly.constraints.placements import Angle, Distance, PointOnLine, PointOnPlane
+from assembly.errors import InputError
+from assembly.geometry.face import Face
+from assembly.geometry.surface import NurbsSurface
+from assembly.kinematics.body import Body, BodyFace, Frame
+from assembly.kinematics.pose import Pose
+from assembly.scene_file.fields import at, bad, each, flag, members, number, or_null, table, text, vector, whole
+from assembly.scene_file.records import Field, Listed, OneOf, Parts, Plain, Record
+
+__all__ = ["BODY", "CONSTRAINTS", "OBJECTIVES", "SURFACE", "refers_to_joints"]
+
+# Axes of a frame are unit vectors at right angles to this; nine digits of a decimal do.
+RIGHT_ANGLES = 1e-9
+
+
+class _Surface:
+    """The index of a surface, so that one that many faces share is there once."""
+
+    def write(self, path: str, value: NurbsSurface, parts: Parts) -> int:
+        return parts.index(value)
+
+    def read(self, path: str, value: Any, parts: Parts) -> NurbsSurface:
+        index = whole(path, value)
+        if not 0 <= index < len(parts.surfaces):
+            raise bad(path, index, f"an index of one of {len(parts.surfaces)} surfaces")
+        return parts.surfaces[index]
+
+
+class _BodyName:
+    """A body of the scene by its name."""
+
+    def write(self, path: str, value: Body, parts: Parts) -> str:
+        return value.name
+
+    def read(self, path: str, value: Any, parts: Parts) -> Body:
+        name = text(path, value)
+        with at(path):
+            return parts.scene.body(name)
+
+
+class _Side:
+    """A face of a body, or the body."""
+
+    def write(self, path: str, value: Body | BodyFace, parts: Parts) -> dict[str, Any]:
+        if isinstance(value, Body):
+            return {"body": value.name, "face": None}
+        return {"body": value.body.name, "face": value.name}
+
+    def read(self, path: str, value: Any, parts: Parts) -> Body | BodyFace:
+        body_name, face_name = members(path, value, ("body", "face"))
+        body = BODY_NAME.read(f"{path}.body", body_name, parts)
+        label = or_null(text)(f"{path}.face", face_name)
+        if label is None:
+            return body
+        with at(f"{path}.face"):
+            return body.face(label)
+
+
+class _Freedom:
+    """A freedom of a joint of the same file."""
+
+    def write(self, path: str, value: Freedom, parts: Parts) -> dict[str, Any]:
+        joint = value.joint
+        if parts.joints.get(joint.name) is not joint:
+            raise InputError(
+                f"{path} is freedom {value.name!r} of joint {joint.name!r}, which is not in the assembly; "
+                "expected a joint that scene.constrain was given, for files refer to joints by name"
+            )
+        return {"joint": joint.name, "freedom": value.name}
+
+    def read(self, path: str, value: Any, parts: Parts) -> Freedom:
+        joint_name, freedom_name = members(path, value, ("joint", "freedom"))
+        name = text(f"{path}.joint", joint_name)
+        if name not in parts.joints:
+            known = ", ".join(map(repr, parts.joints)) or "none, the file has no joints"
+            raise bad(f"{path}.joint", name, f"a joint of the file: {known}")
+        label = text(f"{path}.freedom", freedom_name)
+        with at(f"{path}.freedom"):
+            return parts.joints[name].freedom(label)
+
+
+def _array(values: Sequence[Any]) -> NDArray[np.float64]:
+    array = np.array(values, dtype=np.float64)
+    array.flags.writeable = False
+    return array
+
+
+def _to_list(array: NDArray[np.float64]) -> list[Any]:
+    values: list[Any] = array.tolist()
+    return values
+
+
+def _read_axes(path: str, value: Any) -> NDArray[np.float64]:
+    """Columns x, y, z of what stands as rows in a file; right to the bit, so not normalized."""
+    rows = _array(each(path, value, vector, 3))
+    # Lengths first: squares of large numbers overflow.
+    if not (np.abs(rows).max() < 2.0 and np.abs(rows @ rows.T - np.eye(3)).max() <= RIGHT_ANGLES):
+        raise InputError(f"{path} is {rows.tolist()}; expected unit vectors x, y, z at right angles")
+    if not np.linalg.det(rows) > 0.0:
+        raise InputError(f"{path} is {rows.tolist()}, left-handed; expected z = x cross y")
+    return _array(rows.T.tolist())
+
+
+def _read_limits(path: str, value: Any) -> list[float | None]:
+    return each(path, value, or_null(number), 2)
+
+
+def _free(*names: str) -> tuple[Field, ...]:
+    """Driven values and limits of freedoms; with one freedom its limits have no name of their own."""
+    limits = ["limits"] if len(names) == 1 else [f"{name}_limits" for name in names]
+    return tuple(
+        made for name, its in zip(names, limits, strict=True) for made in (Field(name, DRIVEN), Field(its, LIMITS))
+    )
+
+
+def _point_distance(body: Body, point: list[float], target: list[float], weight: float) -> PointDistance:
+    return PointDistance(body.point(*point), target, weight)
+
+
+NUMBER = Plain(number)
+NUMBERS = Plain(table(1), _to_list)
+VECTOR = Plain(vector, _to_list)
+SURFACE_INDEX = _Surface()
+BODY_NAME = _BodyName()
+SIDE = _Side()
+FREEDOM = _Freedom()
+DRIVEN = Plain(or_null(number))
+LIMITS = Plain(or_null(_read_limits), lambda limits: None if limits is None else list(limits))
+FRAME = Record(
+    Frame,
+    Field("body", BODY_NAME),
+    Field("origin", Plain(lambda path, value: _array(vector(path, value)), _to_list)),
+    Field("axes", Plain(_read_axes, lambda array: array.T.tolist())),
+)
+POSE = Record(Pose, Field("position", NUMBERS), Field("quaternion", NUMBERS))
+LINES = Plain(
+    lambda path, value: "\n".join(each(path, value, text)),
+    lambda document: document.splitlines(),
+)
+
+NAME = Field("name", Plain(text))
+UNILATERAL = Field("unilateral", Plain(flag))
+WEIGHT = Field("weight", NUMBER)
+FRAMES = (Field("frame_a", FRAME), Field("frame_b", FRAME))
+POINTS = (Field("point_a", FRAME, "frame_a"), Field("point_b", FRAME, "frame_b"))
+# Of a point on a line or a plane, frame a is that of the line or the plane.
+POINT_AND_FRAME = (Field("point", FRAME, "frame_b"), Field("frame", FRAME, "frame_a"))
+AXES = Field("axes", Plain(text))
+OFFSET = Field("offset", NUMBER)
+HELD = (Field("value", DRIVEN), Field("limits", LIMITS))
+
+SURFACE = Record(
+    NurbsSurface,
+    Field("name", Plain(or_null(text))),
+    Field("degree", Plain(lambda path, value: each(path, value, whole, 2), list)),
+    Field(
+        "knots",
+        Plain(lambda path, value: each(path, value, table(1), 2), lambda knots: [*map(_to_list, knots)]),
+    ),
+    Field("control_points", Plain(table(3), _to_list)),
+    Field("weights", Plain(table(2), _to_list)),
+)
+BODY_FACE = Record(
+    Face,
+    Field("surface", SURFACE_INDEX, "face.surface"),
+    NAME,
+    Field("reversed", Plain(flag), "face.reversed"),
+)
+BODY = Record(
+    Body,
+    NAME,
+    Field("fixed", Plain(flag)),
+    Field("position", NUMBERS, "pose.position"),
+    Field("quaternion", NUMBERS, "pose.quaternion"),
+    Field("shape", Listed(BODY_FACE), "faces"),
+    make=lambda shape, **others: Body(shape=shape or None, **others),
+)
+EXPRESSION = Record(
+    Expression,
+    NAME,
+    Field("bodies", Listed(BODY_NAME)),
+    Field("function", LINES, methodcaller("document"), "document"),
+    UNILATERAL,
+    Field("scale", NUMBER),
+    WEIGHT,
+    make=Expression.from_document,
+)
+
+
+CONSTRAINTS = OneOf(
+    {
+        "contact": Record(Contact, NAME, Field("a", SIDE), Field("b", SIDE), UNILATERAL),
+        "fixed": Record(Fixed, NAME, *FRAMES, AXES),
+        "revolute": Record(Revolute, NAME, *FRAMES, AXES, *_free("angle")),
+        "prismatic": Record(Prismatic, NAME, *FRAMES, AXES, *_free("slide")),
+        "cylindrical": Record(Cylindrical, NAME, *FRAMES, AXES, *_free("angle", "slide")),
+        "screw": Record(Screw, NAME, *FRAMES, Field("pitch", NUMBER), AXES, *_free("angle", "slide")),
+        "planar": Record(Planar, NAME, *FRAMES, AXES, OFFSET, *_free("x", "y", "angle")),
+        "spherical": Record(Spherical, NAME, *FRAMES, *_free("swing", "azimuth", "twist")),
+        "universal": Record(Universal, NAME, *FRAMES, *_free("angle_a", "angle_b")),
+        "parallel": Record(Parallel, NAME, *FRAMES, AXES, *_free("angle")),
+        "perpendicular": Record(Perpendicular, NAME, *FRAMES),
+        "point_on_line": Record(PointOnLine, NAME, *POINT_AND_FRAME, *_free("slide")),
+        "point_on_plane": Record(PointOnPlane, NAME, *POINT_AND_FRAME, OFFSET, *_free("x", "y")),
+        "distance": Record(Distance, NAME, *POINTS, *HELD),
+        "angle": Record(Angle, NAME, *FRAMES, *HELD),
+        "gear": Record(
+            Gear, NAME, Field("a", FREEDOM, "leader"), Field("b", FREEDOM, "follower"), Field("ratio", NUMBER), OFFSET
+        ),
+        "rack_pinion": Record(
+            RackPinion,
+            NAME,
+            Field("pinion", FREEDOM, "leader"),
+            Field("rack", FREEDOM, "follower"),
+            Field("radius", NUMBER),
+            OFFSET,
+        ),
+        "expression": EXPRESSION,
+    }
+)
+OBJECTIVES = OneOf(
+    {
+        "point_distance": Record(
+            PointDistance,
+            WEIGHT,
+            Field("body", BODY_NAME, "point.body"),
+            Field("point", VECTOR, "point.coordinates"),
+            Field("target", NUMBERS),
+            make=_point_distance,
+        ),
+        "frame_distance": Record(
+            FrameDistance, WEIGHT, Field("frame", FRAME), Field("target", POSE), Field("length", NUMBER)
+        ),
+        "posture": Record(
+            Posture,
+            WEIGHT,
+            Field("reference", Plain(or_null(table(2)), lambda rows: None if rows is None else rows.tolist())),
+        ),
+        "expression": EXPRESSION,
+    }
+)
+
+
+def refers_to_joints(record: Record) -> bool:
+    """Whether a thing can only be made when the joints are there."""
+    return any(item.form is FREEDOM for item in record.fields)

@@ -1,0 +1,78 @@
+"""Which constraints cannot hold together: minimal sets, each of whose members is needed for the contradiction.
+
+Where the sum of squared violations is stationary, J^T c = 0: violations carry one another like forces, and those of
+zero carry nothing. What is violated there is a contradictory set already. Its members are left out one by one: what
+stays contradictory without one does not need it (a deletion filter: Chinneck & Dravnieks, Locating minimal infeasible
+constraint sets in linear programs, 1991). Whether a set can hold is asked of the solver, from the pose and from a few
+poses about it; so a set is minimal as far as the solver sees.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.kinematics.pose import retract
+from assembly.solve.subset import Problem, Snapshot
+
+__all__ = ["conflicting_sets"]
+
+Array = NDArray[np.float64]
+# A violation below this part of the largest carries nothing.
+IDLE = 1e-6
+# How far about the pose starts are, in sizes of the scene and radians; a pose may be a saddle by symmetry.
+STARTS = (0.0, 0.03, 0.3)
+
+
+def conflicting_sets(snapshot: Snapshot) -> list[tuple[int, ...]]:
+    """Disjoint minimal sets of constraints that cannot hold together near a pose, by their places; [] where all can."""
+    starts = [_about(snapshot, reach) for reach in STARTS]
+    left = list(range(len(snapshot.scene.constraints)))
+    found: list[tuple[int, ...]] = []
+    while left:
+        violations = _attempt(snapshot, left, starts)
+        if violations is None:
+            break
+        loaded = [k for k, value in zip(left, violations, strict=True) if value > IDLE * violations.max()]
+        core = loaded if _attempt(snapshot, loaded, starts) is not None else left
+        for k in list(core):
+            without = [other for other in core if other != k]
+            if without and _attempt(snapshot, without, starts) is not None:
+                core = without
+        found.append(tuple(core))
+        left = [k for k in left if k not in core]
+    return found
+
+
+def _attempt(snapshot: Snapshot, which: Sequence[int], starts: Sequence[Array]) -> Array | None:
+    """Least violations of some constraints, from the start where they were least; None if they can hold."""
+    problem = snapshot.problem(which)
+    best: Array | None = None
+    for q in starts:
+        solution = problem.solve(q)
+        if problem.holds(solution):
+            return None
+        violations = _of_places(problem, problem.violations(solution), snapshot, which)
+        if best is None or violations.max() < best.max():
+            best = violations
+    return best
+
+
+def _of_places(problem: Problem, violations: Array, snapshot: Snapshot, which: Sequence[int]) -> Array:
+    """Violations of the constraints asked for; of those without rows 0."""
+    named = dict(zip((item.name for item in problem.constraints), violations, strict=True))
+    return np.array([named.get(snapshot.scene.constraints[k].name, 0.0) for k in which])
+
+
+def _about(snapshot: Snapshot, reach: float) -> Array:
+    """The pose, every moving body shifted and turned by about `reach`, the same way in every run."""
+    rng = np.random.default_rng(0)
+    q = snapshot.q.copy()
+    if reach > 0.0:
+        for k, body in enumerate(snapshot.scene.bodies):
+            if not body.fixed:
+                step = reach * rng.normal(size=6) / np.sqrt(3.0)
+                q[k] = retract(q[k], step * np.repeat([snapshot.scene.scale, 1.0], 3))
+    return q

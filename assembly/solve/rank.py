@@ -1,0 +1,145 @@
+"""Rank and null space of rows of mixed units, free of scale and of where bodies have their origins.
+
+Lengths come divided by the scene's size. The twist of each body is taken at the point about which the moments of its
+rows are least, so that it does not matter where the body's origin is; then every row is divided by its length. The
+singular values of the result are of order one, or tell of dependent rows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["HELD", "SMALLEST", "Balanced", "orthonormal", "tolerance_at"]
+
+Array = NDArray[np.float64]
+# Of a pose that is exact to rounding.
+SMALLEST = 1e-7
+# A violation that counts as none, lengths over the scene's size; where there is more, the pose is taken as it is.
+HELD = 1e-9
+# Within this factor of the tolerance the largest gap between singular values decides.
+NEAR = 10.0
+
+
+def tolerance_at(residual: float) -> float:
+    """The singular value that counts as zero where the rows hold to a residual, lengths over the scene's size.
+
+    Where rows have no first-order part along some motion, a residual c leaves the pose uncertain by the square root
+    of c, and singular values with it.
+    """
+    return max(SMALLEST, 10.0 * float(np.sqrt(residual))) if residual <= HELD else SMALLEST
+
+
+@dataclass(frozen=True, eq=False)
+class Balanced:
+    """Rows made ready for rank decisions.
+
+    Attributes
+    ----------
+    rows : (m, 6 k)
+        In the twists of k bodies, each at its own center; of length one, or zero.
+    centers : (k, 3)
+        From the bodies' origins, world axes.
+    tolerance : float
+        Singular values below count as zero.
+    near : float
+        Within this factor of the tolerance the widest gap between singular values decides.
+    """
+
+    rows: Array
+    centers: Array
+    tolerance: float
+    near: float
+
+    @classmethod
+    def of(cls, jacobian: Array, residual: float, tolerance: float | None = None) -> Balanced:
+        """Balance rows in twists at the bodies' origins that hold to a residual; a tolerance decides if it is given."""
+        blocks = jacobian.reshape(len(jacobian), -1, 6)
+        centers = np.array([_center(blocks[:, b]) for b in range(blocks.shape[1])]).reshape(-1, 3)
+        shifted = blocks.copy()
+        shifted[:, :, 3:] -= np.cross(centers[None], blocks[:, :, :3])
+        rows: Array = shifted.reshape(jacobian.shape)
+        lengths = np.linalg.norm(rows, axis=1, keepdims=True)
+        expected = tolerance_at(residual)
+        counts = lengths > expected
+        rows = np.where(counts, rows / np.where(counts, lengths, 1.0), 0.0)
+        return cls(rows, centers, expected, NEAR) if tolerance is None else cls(rows, centers, tolerance, 1.0)
+
+    @cached_property
+    def _svd(self) -> tuple[Array, Array]:
+        """Singular values, as many as columns, and right singular vectors as rows."""
+        m, n = self.rows.shape
+        if m == 0 or n == 0:
+            return np.zeros(n), np.eye(n)
+        values, right = np.linalg.svd(self.rows, full_matrices=m < n)[1:]
+        return np.pad(values, (0, n - len(values))), right
+
+    @property
+    def singular_values(self) -> Array:
+        """Singular values of the rows, falling, (6 k,)."""
+        return self._svd[0]
+
+    @cached_property
+    def rank(self) -> int:
+        """How many singular values count."""
+        return self._cut(self.singular_values)
+
+    @cached_property
+    def free(self) -> Array:
+        """Orthonormal motions that no row forbids, (d, 6 k): twists at the bodies' origins."""
+        motions = self._svd[1][self.rank :].reshape(-1, len(self.centers), 6).copy()
+        motions[:, :, :3] -= np.cross(motions[:, :, 3:], self.centers[None])
+        return orthonormal(motions.reshape(len(motions), 6 * len(self.centers)))
+
+    def rank_of(self, which: NDArray[np.int64] | list[int]) -> int:
+        """Rank of some of the rows."""
+        if len(which) == 0:
+            return 0
+        values: Array = np.linalg.svd(self.rows[which], compute_uv=False)
+        return self._cut(values)
+
+    def _cut(self, values: Array) -> int:
+        """How many of falling singular values count."""
+        if not values[0] > self.tolerance:
+            return 0
+        low = max(1, int(np.count_nonzero(values > self.near * self.tolerance)))
+        high = max(1, int(np.count_nonzero(values > self.tolerance / self.near)))
+        # What is smaller than this is rounding.
+        logs = np.log(np.maximum(np.append(values, 0.0), 1e-16))
+        return low + int(np.argmax(logs[low - 1 : high] - logs[low : high + 1]))
+
+    @cached_property
+    def dependencies(self) -> Array:
+        """Orthonormal combinations of rows that vanish, (m - rank, m)."""
+        left = np.linalg.svd(self.rows)[0]
+        return left[:, self.rank :].T
+
+
+def _center(blocks: Array) -> Array:
+    """The point about which the moments h - c x n of forces and moments (m, 6) are least, from the origin."""
+    n, h = blocks[:, :3], blocks[:, 3:]
+    # sum (n.n I - n n^T) c = sum n x h
+    normal = np.sum(n * n) * np.eye(3) - n.T @ n
+    center: Array = np.linalg.pinv(normal, rcond=1e-9, hermitian=True) @ np.cross(n, h).sum(axis=0)
+    return center
+
+
+def orthonormal(motions: Array) -> Array:
+    """An orthonormal basis of the span of independent rows, near to coordinate axes and the same in every run.
+
+    Each is the unit motion nearest to a coordinate axis, that which has most of it in what is left of the span.
+    """
+    left = np.linalg.qr(motions.T)[0].T
+    basis = []
+    while len(left):
+        most = np.linalg.norm(left, axis=0)
+        # The first of those that are the same up to rounding.
+        axis = int(np.flatnonzero(most >= (1.0 - 1e-6) * most.max())[0])
+        along = left[:, axis] / most[axis]
+        basis.append(along @ left)
+        # What is orthogonal to it.
+        left = np.linalg.svd(along[None])[2][1:] @ left
+    return np.array(basis).reshape(motions.shape)

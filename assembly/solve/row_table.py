@@ -1,0 +1,177 @@
+"""Rows, their dense Jacobian and the objective's gradient at a state: what diagnosis and statics look at.
+
+Columns are twists of all bodies in the scene's order, fixed ones too, lengths over the scene's size; then four
+coordinates of every contact whose pair is at a fold (`proximity/free_pair.py`). Rows are those of the program, then
+four of tangency for every such contact.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from assembly._kernel import kernel
+from assembly.constraints.program import (
+    BODIES,
+    BODY_F,
+    BODY_G,
+    CONTACT_RECORD,
+    CONTACTS,
+    EXTRA,
+    EXTRA_COLUMN,
+    FREE_COLUMN,
+    JOINT_ROW,
+    JOINTS,
+    KIND,
+    MOVING,
+    REFERENCE,
+    ROW,
+    ROW_TABLE,
+    ROWS,
+    SCALE,
+    SECOND,
+    SECOND_BODY_F,
+    SECOND_BODY_G,
+    SLOTS,
+    TAPE_BODIES,
+    TAPE_LIST,
+    TAPE_RECORD,
+    TAPE_ROOM,
+    TAPE_ROW_AT,
+    TAPE_TABLE,
+    TAPE_VALUES,
+    TAPES,
+    TRACKED,
+    evaluate,
+)
+from assembly.constraints.terms import objective
+from assembly.proximity.free_pair import VARIABLES, VECTORS
+from assembly.solve.augmented_lagrangian import FREE_BELOW
+from assembly.solve.contacts import free_folds, start_contacts
+from assembly.solve.rows import envelope, place_rows
+
+
+@kernel(inner=True)
+def scaled_poses(table, pool, state, q):
+    """Poses of a state as the program has them."""
+    for b in range(table[BODIES]):
+        for k in range(3):
+            q[b, k] = (state[7 * b + k] - pool[REFERENCE + k]) / pool[SCALE]
+        for k in range(3, 7):
+            q[b, k] = state[7 * b + k]
+
+
+@kernel(inner=True)
+def spread_block(packed, r, column, body, out):
+    """The six entries of row r from `column` on, to the twist of a body; -1 is none."""
+    if body >= 0:
+        for k in range(6):
+            out[r, 6 * body + k] += packed[r, column + k]
+
+
+@kernel(inner=True)
+def spread_rows(table, free, count, packed, out):
+    """All rows of the program's Jacobian, from the twists of their own bodies to all columns."""
+    m = table[ROWS]
+    for r in range(m + 4 * count):
+        for j in range(out.shape[1]):
+            out[r, j] = 0.0
+    for r in range(m):
+        row = table[ROW_TABLE] + ROW * r
+        spread_block(packed, r, 0, table[row + BODY_F], out)
+        spread_block(packed, r, 6, table[row + BODY_G], out)
+        second = table[row + SECOND]
+        if table[row + KIND] == JOINT_ROW and second >= 0:
+            spread_block(packed, r, EXTRA_COLUMN, table[second + SECOND_BODY_F], out)
+            spread_block(packed, r, EXTRA_COLUMN + 6, table[second + SECOND_BODY_G], out)
+    for k in range(table[CONTACTS]):
+        if free[k] >= 0:
+            row = table[ROW_TABLE] + ROW * k
+            e = m + 4 * free[k]
+            at = 6 * table[BODIES] + 4 * free[k]
+            for i in range(4):
+                spread_block(packed, e + i, 0, table[row + BODY_F], out)
+                spread_block(packed, e + i, 6, table[row + BODY_G], out)
+                out[k, at + i] = packed[k, FREE_COLUMN + i]
+                for j in range(4):
+                    out[e + i, at + j] = packed[e + i, FREE_COLUMN + j]
+    for t in range(table[TAPES]):
+        tape = table[TAPE_TABLE] + TAPE_RECORD * t
+        for v in range(table[tape + TAPE_VALUES]):
+            for b in range(2, table[tape + TAPE_BODIES]):
+                body = table[table[tape + TAPE_LIST] + b]
+                spread_block(packed, table[tape + TAPE_ROW_AT] + v, EXTRA_COLUMN + 6 * (b - 2), body, out)
+
+
+@kernel
+def rows_at(table, pool, state, free, residual, jacobian):
+    """Evaluate all rows at a state. Returns a contact that has no pair there, or -1.
+
+    state : tracked values are overwritten by those found; NaN parameters of a contact are found by a global start
+    free (contacts) : place among the contacts at folds, or -1
+    residual (m + 4 contacts), jacobian (m + 4 contacts, 6 bodies + 4 contacts) : as many rows and columns are written
+    as there are folds
+    """
+    pairs = table[CONTACTS]
+    tracks = table[TRACKED]
+    most = table[ROWS] + 4 * pairs
+    q = np.empty((table[BODIES], 7))
+    tracked = state[7 * table[BODIES] :][: 4 * tracks].reshape((tracks, 4))
+    start = np.empty((tracks, 4))
+    records = np.ones((pairs + table[JOINTS], CONTACT_RECORD))
+    packed = np.zeros((most, EXTRA_COLUMN + 6 * table[EXTRA]))
+    point = (q, tracked, records, residual, packed)
+    o = table[TAPE_ROOM]
+    room = (np.empty(table[o]), np.empty(table[o + 1]), np.empty(table[o + 2]))
+    loose = (
+        free,
+        np.empty((pairs, 4)),
+        np.empty((VECTORS if pairs > 0 else 0, 3, VARIABLES)),
+        np.empty((VARIABLES if pairs > 0 else 0, VARIABLES)),
+        np.empty((tracks, 4)),
+    )
+    scaled_poses(table, pool, state, q)
+    for k in range(pairs):
+        free[k] = -1
+    lost = start_contacts(table, pool, q, tracked, free, loose[1])
+    if lost >= 0:
+        return lost
+    # Every contact counts here, also one that pushes nothing.
+    active = np.ones(most)
+    count = free_folds(table, pool, records, tracked, active, free, loose[1], -1.0, lost)
+    while True:
+        for k in range(tracks):
+            for i in range(4):
+                start[k, i] = tracked[k, i]
+        lost = evaluate(table, pool, start, math.inf, loose, room, point)
+        before = count
+        count = free_folds(table, pool, records, tracked, active, free, loose[1], FREE_BELOW, lost)
+        if count == before:
+            break
+    if lost < 0:
+        spread_rows(table, free, count, packed, jacobian)
+    return lost
+
+
+@kernel
+def gradient_at(table, pool, state, gradient):
+    """The objective's gradient in the twists of all bodies (6 bodies), zero for fixed ones. Returns its value."""
+    n = 6 * table[MOVING]
+    q = np.empty((table[BODIES], 7))
+    scaled_poses(table, pool, state, q)
+    o = table[TAPE_ROOM]
+    room = (np.empty(table[o]), np.empty(table[o + 1]), np.empty(table[o + 2]))
+    rows = table[ROWS]
+    bases = np.empty((rows, 3 + table[EXTRA]), np.int64)
+    sides = np.empty(rows, np.int64)
+    last = np.empty(n, np.int64)
+    place_rows(table, np.full(table[CONTACTS], -1), bases, sides)
+    envelope(table, bases, rows, n, last, sides)
+    slopes = np.empty(n)
+    value = objective(table, pool, q, 1, room, last, slopes, np.empty((n, n)))
+    for b in range(table[BODIES]):
+        s = table[table[SLOTS] + b]
+        for k in range(6):
+            gradient[6 * b + k] = slopes[6 * s + k] if s >= 0 else 0.0
+    return value

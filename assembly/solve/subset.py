@@ -1,0 +1,170 @@
+"""Some of a scene's constraints, with the values they had at a state, as a problem of its own.
+
+Diagnosis asks what holds without this constraint, or along that motion. The scene may have changed since: driven
+values, limits and faces are those of the state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.constraints.constraint import Constraint, Equation
+from assembly.constraints.contact import Contact
+from assembly.constraints.couplings import Coupling
+from assembly.constraints.expression import Expression
+from assembly.constraints.packing import Packed, pack
+from assembly.solve.augmented_lagrangian import HISTORY, RESULTS, solve_program
+from assembly.solve.jacobian import Rows
+from assembly.solve.options import Options
+from assembly.solve.rank import HELD
+from assembly.solve.solution import Scene, Solution, Status
+
+__all__ = ["Problem", "Snapshot"]
+
+Array = NDArray[np.float64]
+_STATUSES = tuple(Status)
+
+
+class _Value(Constraint):
+    """Where a row that is kept reads its value."""
+
+    def __init__(self, value: float) -> None:
+        self.value = value
+
+
+class _Part(Coupling):
+    """Rows of a joint or a coupling as they were."""
+
+    def __init__(self, constraint: Constraint, equations: tuple[Equation, ...]) -> None:
+        Constraint.__init__(self, constraint.bodies, constraint.name)
+        self._equations = equations
+
+    @property
+    def equations(self) -> tuple[Equation, ...]:
+        return self._equations
+
+
+class Problem:
+    """Constraints between a scene's bodies, to be held by poses near given ones.
+
+    Parameters
+    ----------
+    scene : Scene
+    constraints : sequence of Constraint
+        Contacts name their faces.
+    near : mapping of id -> array
+        Where tracked values are looked for: parameters by name of a contact, angles by identity of a coordinate.
+    """
+
+    def __init__(self, scene: Scene, constraints: Sequence[Constraint], near: dict[str | int, Array]) -> None:
+        self.packed = pack(scene.bodies, constraints, ())
+        self._size = scene.scale
+        self._scene = Scene(
+            scene.bodies, tuple(constraints), tuple(self.packed.contacts), tuple(self.packed.faces), self.packed.scale
+        )
+        self._near = near
+
+    @property
+    def constraints(self) -> tuple[Constraint, ...]:
+        """The constraints of the problem."""
+        return self._scene.constraints
+
+    def solve(self, q: Array, after: Solution | None = None) -> Solution:
+        """The nearest poses that hold the constraints, from poses (n, 7); tracked values go on from a solution's."""
+        packed = self.packed
+        state = np.zeros(packed.results_at + RESULTS)
+        state[: packed.contacts_at] = q.ravel()
+        packed.refresh()
+        tracked = state[packed.contacts_at : packed.multipliers_at].reshape(-1, 4)
+        if after is not None:
+            tracked[:] = after._state[packed.contacts_at : packed.multipliers_at].reshape(-1, 4)
+        else:
+            for k, contact in enumerate(packed.contacts):
+                tracked[k] = self._near[contact.name]
+            for k, angle in enumerate(packed._angles):
+                tracked[len(packed.contacts) + k] = self._near[id(angle)]
+        history = np.empty((1, HISTORY))
+        code = solve_program(packed.table, packed.pool, Options().settings(), state, history)
+        return Solution(self._scene, packed, state, _STATUSES[code], 0.0, history)
+
+    def violations(self, solution: Solution) -> Array:
+        """Violations of the constraints, in their order: lengths over the size of the whole scene."""
+        packed = self.packed
+        values = solution._residuals
+        each = np.where(packed.one_sided, np.maximum(-values, 0.0), np.abs(values))
+        each = np.where(packed.lengths, each / self._size, each)
+        # What never had a pair does not hold.
+        each = np.where(np.isfinite(each), each, np.inf)
+        return np.array([each[rows].max(initial=0.0) for rows in packed.spans])
+
+    def holds(self, solution: Solution) -> bool:
+        """Whether all constraints hold at a solution."""
+        return solution.status is not Status.CONTACT_LOST and bool((self.violations(solution) <= HELD).all())
+
+
+class Snapshot:
+    """The constraints of a scene with the values they had at a state.
+
+    Parameters
+    ----------
+    scene, packed
+        As of the solution.
+    state : array
+    rows : Rows, optional
+        At the state.
+    solved : bool
+        Whether the state's residuals are those of its poses; values that were driven since then are told by them.
+    """
+
+    def __init__(self, scene: Scene, packed: Packed, state: Array, rows: Rows | None, solved: bool) -> None:
+        self.scene = scene
+        self.q = state[: packed.contacts_at].reshape(-1, 7)
+        tracked = state[packed.contacts_at : packed.multipliers_at].reshape(-1, 4)
+        self._near: dict[str | int, Array] = {contact.name: tracked[k] for k, contact in enumerate(packed.contacts)}
+        self._near |= {id(angle): tracked[len(packed.contacts) + k] for k, angle in enumerate(packed._angles)}
+        self._equations: dict[int, list[Equation]] = {}
+        stored = state[packed.residuals_at : packed.results_at]
+        now = {} if rows is None or not solved else dict(zip(rows.program_rows.tolist(), rows.residual, strict=True))
+        for r, (equation, at, unit) in enumerate(packed._values, len(packed.contacts)):
+            value = float(packed.pool[at]) * unit
+            # The row was coordinate - value; the coordinate is the same still.
+            change = float(now[r] * unit - stored[r]) if r in now else 0.0
+            if HELD * unit < abs(change) < np.inf:
+                value += change
+            source = None if equation.source is None else (_Value(value), "value")
+            kept = Equation(equation.terms, source, equation.one_sided, equation.is_drive)
+            self._equations.setdefault(int(packed.owners[r]), []).append(kept)
+        self._faces = {contact.name: packed.faces[k] for k, contact in enumerate(packed.contacts)}
+
+    def problem(self, which: Iterable[int] | None = None, one_sided: bool = True, drives: bool = True) -> Problem:
+        """The problem of some of the constraints, by their places; of all by default.
+
+        Parameters
+        ----------
+        which : iterable of int, optional
+        one_sided : bool
+            With limits, one-sided contacts and expressions.
+        drives : bool
+            With driven values.
+        """
+        places = range(len(self.scene.constraints)) if which is None else which
+        parts = [self._part(k, one_sided, drives) for k in places]
+        return Problem(self.scene, [part for part in parts if part is not None], self._near)
+
+    def _part(self, place: int, one_sided: bool, drives: bool) -> Constraint | None:
+        constraint = self.scene.constraints[place]
+        if isinstance(constraint, Contact):
+            if constraint.unilateral and not one_sided:
+                return None
+            return Contact(*self._faces[constraint.name], constraint.name, constraint.unilateral)
+        if isinstance(constraint, Expression):
+            return None if constraint.unilateral and not one_sided else constraint
+        kept = tuple(
+            row
+            for row in self._equations.get(place, ())
+            if (one_sided or not row.one_sided) and (drives or row.one_sided or not row.is_drive)
+        )
+        return _Part(constraint, kept) if kept else None
