@@ -30,7 +30,8 @@ from numba import njit, types
 from numba.core import caching, config, serialize
 from numba.core.compiler import CompileResult
 from numba.core.datamodel import models
-from numba.extending import intrinsic, overload, register_jitable, register_model
+from numba.core.typing.templates import infer, infer_global, make_overload_template
+from numba.extending import intrinsic, overload, register_model
 
 __all__ = ["kernel", "lane", "load_lanes", "store_xyz"]
 
@@ -187,6 +188,33 @@ class _Cache(caching._Cache):
         return self._folder / f"{self._title()}-{hashlib.sha256(key).hexdigest()[:32]}"
 
 
+class _OncePerSignature(dict[Any, Any]):
+    """Numba keys what it has compiled for kernels by types and by the caller's flags. Ours have flags of their own.
+
+    Without this a kernel is compiled once for callers that are copied into theirs, once for those that are not, and
+    once more for those that make arrays.
+    """
+
+    def __getitem__(self, key: Any) -> Any:
+        return super().__getitem__(key[:-1])
+
+    def __setitem__(self, key: Any, value: Any) -> None:
+        super().__setitem__(key[:-1], value)
+
+
+def _callable_from_kernels(function: Callable[..., Any], settings: dict[str, Any]) -> None:
+    """Let kernels call a function, compiled by these settings; in Python it stays what it is."""
+    options = {"no_cpython_wrapper": True, "nopython": True, **settings}
+
+    def implementation(*_arguments: Any, **_keywords: Any) -> Callable[..., Any]:
+        return function
+
+    template = make_overload_template(function, implementation, options, False, "never", False)
+    template._impl_cache = _OncePerSignature()
+    infer(template)
+    infer_global(function, types.Function(template))
+
+
 def kernel(
     function: Callable[..., Any] | None = None,
     *,
@@ -220,7 +248,8 @@ def kernel(
     fastmath: Any = False if exact else {"contract"}
     settings: dict[str, Any] = {"fastmath": fastmath, "error_model": "numpy", "nogil": True}
     if inline or inner:
-        return register_jitable(**settings, forceinline=inline, _nrt=allocates)(function)
+        _callable_from_kernels(function, {**settings, "forceinline": inline, "_nrt": allocates})
+        return function
     compiled = njit(**settings)(function)
     stamped = _PACKAGE in Path(function.__code__.co_filename).resolve().parents
     if not config.DISABLE_JIT and stamped and _FOLDER is not None:

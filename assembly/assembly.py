@@ -18,7 +18,7 @@ from assembly.errors import InputError, vector
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import pose_rows
 from assembly.proximity.pairs import inside
-from assembly.solve.augmented_lagrangian import HISTORY, ITERATIONS, RESULTS, solve_program
+from assembly.solve.augmented_lagrangian import GATHER, HISTORY, ITERATIONS, RESULTS, SCATTER, solve_program
 from assembly.solve.options import Options
 from assembly.solve.solution import Scene, Solution, Status
 
@@ -50,7 +50,7 @@ class Assembly:
     weights' ratios aside, and starts may change between solves without packing again.
     """
 
-    _loaded = False  # whether this process has the kernel
+    _loaded: ClassVar[set[int | None]] = set()  # which kernels this process has
 
     def __init__(self, bodies: Iterable[Body] = ()) -> None:
         self._bodies: list[Body] = []
@@ -188,12 +188,25 @@ class Assembly:
             settings = _WARM_SETTINGS if warm else _SETTINGS
         state = self._start(packed, q0, starts)
         history = np.empty((min(int(settings[ITERATIONS]), MOST_HISTORY) + 1, HISTORY))
-        if not Assembly._loaded:
+        arguments = (packed.table, packed.pool)
+        tips = packed.tips
+        if tips not in Assembly._loaded:
             # Loading the kernel, or compiling it, is no part of a solve's time.
-            solve_program(packed.table, packed.pool, _LOADING, state.copy(), history)
-            Assembly._loaded = True
+            solve_program(*arguments, _LOADING, state.copy(), history, tips)
+            Assembly._loaded.add(tips)
+        gathers = not warm and not self._objectives
+        if gathers:
+            settings = settings.copy()
+            settings[GATHER] = 1.0
         begin = perf_counter()
-        code = solve_program(packed.table, packed.pool, settings, state, history)
+        code = solve_program(*arguments, settings, state, history, tips)
+        if code != 0 and not gathers and state[packed.results_at + SCATTER] == 1.0:
+            # What the start itself did not lead to may be reached from gathered bodies.
+            settings = settings.copy()
+            settings[GATHER] = 1.0
+            other, rows = self._start(packed, q0, starts), np.empty_like(history)
+            if solve_program(*arguments, settings, other, rows, tips) == 0:
+                code, state, history = 0, other, rows
         return Solution(self._scene, packed, state, _STATUSES[code], perf_counter() - begin, history)
 
     def _start(self, packed: Packed, q0: ArrayLike | Solution | None, starts: Mapping[str, ArrayLike] | None) -> Array:

@@ -82,6 +82,8 @@ class Packed:
         implicit = not objectives
         self._build(bodies, constraints, objectives or [(1.0, Posture())])
         self._header[program.IMPLICIT] = int(implicit)
+        # What the loop is compiled for: None without a dexterity.
+        self.tips = 1 if self._header[program.DEXTERITIES] else None
         self.table = np.concatenate(self._table)
         self.pool = np.concatenate(self._pool)
         self._sources = [item for item in self._values if item[0].source is not None]

@@ -55,9 +55,11 @@ from assembly.solve.linear import factorize_shifted, forward, substitute
 from assembly.solve.report import judge, write_pose, write_rows
 from assembly.solve.rows import (
     add_transposed,
+    carry,
     dual_residual,
     envelope,
     least_squares_multipliers,
+    move,
     place_rows,
     times,
     violation_of,
@@ -67,9 +69,9 @@ from assembly.solve.search import SHORTEST, goal, search
 # Outcomes; `solution.Status` gives each a sentence. RUNNING is none of them.
 SOLVED, INFEASIBLE, STALLED, ITERATION_LIMIT, CONTACT_LOST, RUNNING = 0, 1, 2, 3, 4, 5
 # Settings, in scaled lengths.
-FEASIBILITY, STATIONARITY, ITERATIONS, PENALTY, PENALTY_FLOOR, RADIUS, SETTINGS = 0, 1, 2, 3, 4, 5, 8
+FEASIBILITY, STATIONARITY, ITERATIONS, PENALTY, PENALTY_FLOOR, RADIUS, GATHER, SETTINGS = 0, 1, 2, 3, 4, 5, 6, 8
 # Results at the end of the state.
-STATUS, COUNT, OBJECTIVE, VIOLATION, DUAL, CULPRIT, IMPROPER, RESULTS = 0, 1, 2, 3, 4, 5, 6, 8
+STATUS, COUNT, OBJECTIVE, VIOLATION, DUAL, CULPRIT, IMPROPER, SCATTER, RESULTS = 0, 1, 2, 3, 4, 5, 6, 7, 8
 HISTORY = 7  # figures an iteration: objective, feasibility, stationarity, mu, regularization, step length, radius
 # A pair this near to a fold (det H over |H|^2) gets its coordinates as unknowns.
 FREE_BELOW = 0.02
@@ -82,6 +84,9 @@ WEAK = 1e-3
 TOUCHING = 1e-9
 # Bodies are gathered where a start violates a row of a joint by more than this.
 SCATTERED = 0.5
+# Where violations are stationary, this much curvature downward makes a saddle of it; a small move leads off it, in a
+# direction that nothing but a scene made for it has as a symmetry. So often at most.
+SADDLE, KICK, KICKS = 1e-5, 1e-3, 3
 # A body turns by this much at most in a step, and this often a step is shortened by a larger shift.
 TURN = 1.0
 SHORTENINGS = 4
@@ -192,8 +197,11 @@ def scattered(table, residual, one_sided):
 
 
 @kernel
-def solve_program(table, pool, settings, state, history):
-    """Solve in place. State: q (n, 7) | tracked (k, 4) | multipliers (m) | residuals (m) | results."""
+def solve_program(table, pool, settings, state, history, tips):
+    """Solve in place. State: q (n, 7) | tracked (k, 4) | multipliers (m) | residuals (m) | results.
+
+    `tips` is None where no term of the objective is a dexterity.
+    """
     bodies = table[BODIES]
     pairs = table[CONTACTS]
     tracks = table[TRACKED]
@@ -276,6 +284,7 @@ def solve_program(table, pool, settings, state, history):
     restoring = False
     entered = math.inf
     restorations = 0
+    kicks = 0
     check_at = PATIENCE
     check_violation = math.inf
     iteration = 0
@@ -291,7 +300,8 @@ def solve_program(table, pool, settings, state, history):
         status = CONTACT_LOST
         results[CULPRIT] = float(lost)
         value = objective(table, pool, here[0], 0, room, last, gradient, lagrangian)
-    if status == RUNNING and scattered(table, here[3], one_sided):
+    results[SCATTER] = 1.0 if status == RUNNING and scattered(table, here[3], one_sided) else 0.0
+    if settings[GATHER] == 1.0 and results[SCATTER] == 1.0:
         gather(table, pool, bases, table[SLOTS], here)
         if table[IMPLICIT] == 1:
             recenter(table, pool, here[0])
@@ -331,7 +341,7 @@ def solve_program(table, pool, settings, state, history):
         jacobian = here[4]
         descent, step, straight = lines
         violation = violation_of(residual, one_sided, rows)
-        value = goal(table, pool, shape, rows, loose, room, here, 1, gradient, lagrangian)
+        value = goal(table, pool, shape, rows, loose, room, tips, here, 1, gradient, lagrangian)
         shortened = iteration > 0 and alpha < 1.0
         # At the start both are the same; later a tenth of the last residual is good.
         good = math.inf if iteration == 0 else 0.1 * last_dual
@@ -344,15 +354,15 @@ def solve_program(table, pool, settings, state, history):
             history[iteration, 4] = shift
             history[iteration, 5] = alpha
             history[iteration, 6] = radius
+        if not math.isfinite(violation) or not math.isfinite(value) or not math.isfinite(dual):
+            # Only where the start is so: a step to such a place is not taken.
+            status = STALLED
+            break
         if violation <= feasible and dual <= settings[STATIONARITY]:
             status = SOLVED
             break
         if iteration >= limit:
             status = ITERATION_LIMIT
-            break
-        if not math.isfinite(violation) or not math.isfinite(value) or not math.isfinite(dual):
-            # Only where the start is so: a step to such a place is not taken.
-            status = STALLED
             break
         if restoring and violation <= max(0.1 * entered, feasible):
             restoring = False
@@ -404,6 +414,17 @@ def solve_program(table, pool, settings, state, history):
             steepest = max(steepest, abs(descent[i]))
         if restoring:
             if steepest <= 1e-9 * violation or longest < 1e-12:
+                if kicks < KICKS and factorize_shifted(lagrangian, n, last, 1e-8, matrix) > SADDLE:
+                    # A saddle of the violations: axes that are parallel and are to stand at right angles, say.
+                    kicks += 1
+                    for i in range(n):
+                        step[i] = KICK * math.sin(kicks + i) if i < 6 * table[MOVING] else 0.0
+                    move(table, here[0], step, 1.0, trial[0])
+                    carry(table, pool, bases, free, loose[1], here[1], here[2], step, 1.0, loose[4])
+                    if evaluate(table, pool, loose[4], math.inf, loose, room, trial) < 0:
+                        here, trial = trial, here
+                        iteration += 1
+                        continue
                 status = INFEASIBLE if violation > TOUCHING else STALLED
                 break
             if iteration >= check_at:
@@ -419,6 +440,7 @@ def solve_program(table, pool, settings, state, history):
             shape,
             loose,
             room,
+            tips,
             here,
             trial,
             lines,

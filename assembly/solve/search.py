@@ -7,7 +7,7 @@ shortened.
 from __future__ import annotations
 
 from assembly._kernel import kernel
-from assembly.constraints.program import DEXTERITIES, evaluate
+from assembly.constraints.program import evaluate
 from assembly.constraints.terms import objective
 from assembly.proximity.extremal import BEND
 from assembly.solve.dexterity import add_dexterities
@@ -19,10 +19,13 @@ SHORTEST = 1e-6
 
 
 @kernel(inner=True)
-def goal(table, pool, shape, rows, loose, room, point, order, gradient, hessian):
-    """The objective at a point whose rows are evaluated; from order 1 on its gradient and the Hessian's upper half."""
+def goal(table, pool, shape, rows, loose, room, tips, point, order, gradient, hessian):
+    """The objective at a point whose rows are evaluated; from order 1 on its gradient and the Hessian's upper half.
+
+    `tips` is None where no term is a dexterity: then what these need is not even compiled.
+    """
     value = objective(table, pool, point[0], order, room, shape[2], gradient, hessian)
-    if table[DEXTERITIES] > 0:
+    if tips is not None:
         value += add_dexterities(table, pool, shape, rows, loose, room, point, order, gradient, hessian)
     return value
 
@@ -34,6 +37,7 @@ def search(
     shape,
     loose,
     room,
+    tips,
     here,
     trial,
     lines,
@@ -72,7 +76,7 @@ def search(
         if lost < 0:
             there = merit(trial[3], one_sided, rows, y, mu)
             if not restoring:
-                there += goal(table, pool, shape, rows, loose, room, trial, 0, gradient, lagrangian)
+                there += goal(table, pool, shape, rows, loose, room, tips, trial, 0, gradient, lagrangian)
             if there <= here_merit + 1e-4 * alpha * slope + noise:
                 return True, alpha, lost
             if bends < 2:
