@@ -51,6 +51,9 @@ if TYPE_CHECKING:
     from assembly.solve.mobility import Mobility as Mobility
     from assembly.solve.solution import Solution as Solution
     from assembly.solve.solution import Status as Status
+    from assembly.solve.tip import dexterity_ellipsoid as dexterity_ellipsoid
+    from assembly.solve.tip import dexterity_value as dexterity_value
+    from assembly.solve.tip import tip_jacobian as tip_jacobian
 else:
     __getattr__, __dir__, __all__ = lazy_names(
         __name__,
@@ -88,11 +91,14 @@ else:
             "Spherical": "assembly.constraints.joints",
             "Status": "assembly.solve.solution",
             "Universal": "assembly.constraints.joints",
+            "dexterity_ellipsoid": "assembly.solve.tip",
+            "dexterity_value": "assembly.solve.tip",
             "errors": "assembly.errors",
             "load": "assembly.scene_file",
             "proximity": "assembly.proximity",
             "reference": "assembly.solve.reference",
             "shapes": "assembly.geometry.shapes",
+            "tip_jacobian": "assembly.solve.tip",
             "view": "assembly.view",
         },
     )

@@ -1,15 +1,15 @@
 """What a pose is worth: its extremal pairs found afresh, their wrenches, and whether surfaces cross beside them.
 
-At a solution the wrenches of the contacts balance the objective,
+At a solution the wrenches of the contacts balance the objective and the other rows c,
 
-    grad f + sum_k y_k [-n, -(f - x_f) x n, n, (g - x_g) x n]_k = 0,
+    grad f + sum_r y_r grad c_r + sum_k y_k [-n, -(f - x_f) x n, n, (g - x_g) x n]_k = 0,
 
-all in twists. Nothing here uses the derivatives of a solver.
+all in twists. Of contacts nothing here uses the derivatives of a solver.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -90,18 +90,20 @@ class Audit:
     ----------
     parameters : (k, 4)
         Of the extremal pairs.
-    gaps : (k,)
-        In the user's units, as is `feasibility`, the largest violation.
+    residuals : (m,)
+        Of all rows, lengths over the scene's size.
+    feasibility : float
+        The largest violation, times the scene's size: in the user's unit of length.
     stationarity : float
-        The largest component of the Lagrangian's gradient, and what one-sided contacts lack in complementarity; scaled.
+        The largest component of the Lagrangian's gradient, and what one-sided rows lack in complementarity; scaled.
     held, balanced : bool
-        Whether every pair is extremal and its row holds; whether the gradient counts as zero.
+        Whether every pair is extremal and every row holds; whether the gradient counts as zero.
     crossing : bool
         Whether surfaces cross beside some pair.
     """
 
     parameters: Array
-    gaps: Array
+    residuals: Array
     feasibility: float
     stationarity: float
     held: bool
@@ -111,11 +113,14 @@ class Audit:
 
 def audit(
     contacts: Sequence[Sides],
+    others: Callable[[Array], Array],
     one_sided: NDArray[np.bool_],
     q: Array,
     parameters: Array,
     forces: Array,
     gradient: Array,
+    balance: Array,
+    aside: Array,
     moving: Sequence[int],
     scale: float,
 ) -> Audit:
@@ -123,34 +128,45 @@ def audit(
 
     Parameters
     ----------
-    contacts, one_sided : (k,)
+    contacts : (k,)
+    others : callable
+        (n, 7) -> residuals of the rows after those of the contacts, lengths over `scale`.
+    one_sided : (m,)
     q : (n, 7)
     parameters : (k, 4)
         Near the pairs.
-    forces : (k,)
-        Multipliers of the gaps, lengths over `scale`.
+    forces : (m,)
+        Multipliers of the rows, lengths over `scale`.
     gradient : (n, 6)
         Of the objective, in twists, lengths over `scale`.
+    balance : (n, 6)
+        The same with the forces of the rows after those of the contacts.
+    aside : array
+        The Lagrangian's gradient in what else is variable.
     moving : sequence of int
         Rows of q that are free.
     scale : float
         The scene's size.
     """
-    balance = gradient.copy()
+    balance = balance.copy()
     pairs = []
-    for contact, at, force in zip(contacts, parameters, forces, strict=True):
+    for contact, at, force in zip(contacts, parameters, forces[: len(contacts)], strict=True):
         pairs.append(contact.find_again(q, at))
         balance[contact.bodies] += force * contact.wrench(q, pairs[-1], scale)
-    gaps = np.array([pair.gap for pair in pairs])
-    feasibility = float(np.where(one_sided, np.maximum(-gaps, 0.0), np.abs(gaps)).max(initial=0.0))
-    slack = np.where(one_sided, np.maximum(forces, np.abs(forces * gaps / scale)), 0.0)
-    stationarity = max(float(np.abs(balance[moving]).max()), float(slack.max(initial=0.0)))
+    residuals = np.concatenate([[pair.gap / scale for pair in pairs], others(q)])
+    violation = float(np.where(one_sided, np.maximum(-residuals, 0.0), np.abs(residuals)).max(initial=0.0))
+    # A row without force is complementary wherever it stands, at an infinite residual, too.
+    slack = np.maximum(forces, np.abs(forces * np.where(forces == 0.0, 0.0, residuals)))[one_sided]
+    parts = np.concatenate([np.abs(balance[moving]).ravel(), np.abs(aside), slack])
+    # A user's expression may have no value, and so no gradient.
+    stationarity = float(np.nan_to_num(parts.max(initial=0.0), nan=np.inf, posinf=np.inf))
     return Audit(
         parameters=np.array([pair.parameters for pair in pairs]).reshape(-1, 4),
-        gaps=gaps,
-        feasibility=feasibility,
+        residuals=residuals,
+        feasibility=violation * scale,
         stationarity=stationarity,
-        held=feasibility <= FEASIBILITY * scale and all(map(is_extremal, pairs)),
-        balanced=stationarity <= STATIONARITY * (1.0 + float(np.abs(gradient).max())),
+        held=violation <= FEASIBILITY and all(map(is_extremal, pairs)),
+        # Without a gradient nothing is balanced.
+        balanced=stationarity <= STATIONARITY * (1.0 + float(np.abs(gradient).max())) < np.inf,
         crossing=any(contact.cross(q, pair) for contact, pair in zip(contacts, pairs, strict=True)),
     )

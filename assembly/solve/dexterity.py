@@ -319,6 +319,32 @@ def tip_rates(table, pool, record, o, body, system, q, rates, jacobian):
 
 
 @kernel(inner=True, allocates=True)
+def tip_slack(table, pool, record, o, body, system, q):
+    """The largest part of the tip's motion that neither the rows nor the inputs determine."""
+    b, d, beta, _used, _count = system
+    p, n = b.shape
+    task = table[record + TASK]
+    arm = matvec(rotation(q, body), load(pool, o + ARM))
+    s = slot(table, body)
+    unit = np.zeros((6, 1))
+    x = np.empty(p)
+    worst = 0.0
+    for i in range(task_rows(task)):
+        for r in range(n):
+            x[r] = 0.0
+        unit[i, 0] = 1.0
+        add_tip_force(pool, o, task, arm, unit, 0, s, x)
+        unit[i, 0] = 0.0
+        size = 0.0
+        for r in range(n):
+            size = max(size, abs(x[r]))
+        dual_squares(b, d, beta, x)
+        for r in range(p - n, p):
+            worst = max(worst, abs(REST * x[r]) / size if size > 0.0 else 0.0)
+    return worst
+
+
+@kernel(inner=True, allocates=True)
 def measure_jacobian(table, pool, record, o, jacobian, slopes):
     """A measure of the tip's Jacobian; its derivatives by the entries into `slopes`."""
     m, k = jacobian.shape

@@ -1,11 +1,12 @@
 """The same scene solved another way: one nonlinear program in full space, by CasADi and IPOPT.
 
 It shares neither evaluators nor derivatives nor the loop with `Assembly.solve`, and so checks it. Variables are the
-poses of moving bodies and the parameters of every contact; with e a quaternion, f and g points of the two surfaces,
-d = g - f and n the unit normal of f,
+poses of moving bodies, the parameters of every contact and angles (`reference_rows.py`); with e a quaternion, f and g
+points of the two surfaces, d = g - f and n the unit normal of f,
 
     minimize the objective   subject to   |e|^2 = 1   for every moving body,
     d.f_u = d.f_v = 0,   n.g_u = n.g_v = 0,   n.d = 0  (or >= 0)   for every contact,
+    a row for every equation of a joint or a coupling, and for every value of an expression,
 
 the extremal pair in the form that stays regular at contact (paper 001, section 3.2). Lengths are divided by the scene's
 size; parameters run at about unit speed. Multipliers of the first four rows vanish at a solution, so that the last
@@ -14,7 +15,7 @@ one's is that of the gap in the loop's reduced problem.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import lru_cache
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -22,20 +23,23 @@ from typing import TYPE_CHECKING, Any
 import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import qr
 
-from assembly.constraints.objectives import PointDistance, Posture
 from assembly.constraints.packing import Packed
 from assembly.errors import InputError
 from assembly.geometry.surface import NurbsSurface
-from assembly.kinematics.body import BodyFace
 from assembly.solve.augmented_lagrangian import COUNT, CULPRIT, DUAL, IMPROPER, OBJECTIVE, RESULTS, VIOLATION
-from assembly.solve.check import Sides, audit, is_extremal, twist_gradients
+from assembly.solve.check import audit, is_extremal, twist_gradients
+from assembly.solve.measure import Near
+from assembly.solve.reference_rows import Poses, Rows
+from assembly.solve.reference_surfaces import Pair, Patch
+from assembly.solve.reference_terms import Terms
 from assembly.solve.solution import Iteration, Solution, Status
 
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
 
-__all__ = ["ReferenceSolver", "solve", "spline_function"]
+__all__ = ["ReferenceSolver", "solve"]
 
 Array = NDArray[np.float64]
 # Lengths are near one, so tolerances are absolute; what falls short of them is left to the check of the pose.
@@ -51,110 +55,14 @@ _IPOPT: dict[str, Any] = {
     "perturb_always_cd": "yes",
     "max_iter": 500,
 }
+# Steps toward the equations, the violation at which they end and the one that counts as held there, and a row's part
+# across the others that counts as none; multipliers that tell of such rows.
+_PROJECTIONS, _EXACT, _HELD, _DEPENDENT, _ENDLESS = 30, 1e-13, 1e-8, 1e-6, 1e5
 _STATUSES = {
     "Solve_Succeeded": Status.SOLVED,
     "Infeasible_Problem_Detected": Status.INFEASIBLE,
     "Maximum_Iterations_Exceeded": Status.ITERATION_LIMIT,
 }
-# Samples a direction from which a surface's speed is taken.
-_GRID = 17
-
-
-def spline_function(surface: NurbsSurface) -> ca.Function:
-    """(u, v) -> S, Su, Sv by CasADi's own B-splines on homogeneous coordinates, to be differentiated further.
-
-    Closed directions wrap: u - period floor((u - low) / period), whose derivative is one, so nothing ends at the seam.
-    """
-    # The third derivatives of an exact Hessian want cubics: CasADi 3.8 frees memory twice on those of quadratics.
-    raised = surface.elevate([max(3, degree) for degree in surface.degree])
-    homogeneous = np.concatenate([raised.control_points * raised.weights[..., None], raised.weights[..., None]], axis=2)
-    # CasADi counts the outputs fastest, then u, then v.
-    coefficients = np.swapaxes(homogeneous, 0, 1).ravel()
-    x = ca.MX.sym("x", 2)
-    wrapped = []
-    for k, (low, high) in enumerate(surface.domain):
-        turns = ca.floor((x[k] - low) / (high - low)) if surface.closed[k] else 0
-        wrapped.append(x[k] - (high - low) * turns)
-    knots = [knots.tolist() for knots in raised.knots]
-    spline = ca.bspline(ca.vertcat(*wrapped), ca.DM(coefficients), knots, list(raised.degree), 4, {})
-    point = spline[:3] / spline[3]
-    rates = ca.jacobian(point, x)
-    return ca.Function("surface", [x], [point, rates[:, 0], rates[:, 1]], ["x"], ["S", "Su", "Sv"])
-
-
-class _Patch:
-    """A surface in scaled lengths, with parameters s = (u - low) speed that run at about unit speed."""
-
-    def __init__(self, surface: NurbsSurface, scale: float) -> None:
-        self.function = spline_function(surface.transformed(scale=1.0 / scale))
-        self.closed = np.array(surface.closed)
-        self.low, self.high = np.array(surface.domain).T
-        u, v = (np.linspace(low, high, _GRID) for low, high in surface.domain)
-        _, su, sv = surface.evaluate(u[:, None], v, 1)
-        self.speed = np.array([np.sqrt((rate**2).sum(axis=-1).mean()) for rate in (su, sv)]) / scale
-        self.upper = np.where(self.closed, np.inf, (self.high - self.low) * self.speed)
-        self.lower = np.where(self.closed, -np.inf, 0.0)
-
-    def expressions(self, s: ca.MX) -> list[ca.MX]:
-        """S, Su, Sv at the scaled parameters s."""
-        point, su, sv = self.function.call([self.low + s / self.speed], True, False)
-        return [point, su / self.speed[0], sv / self.speed[1]]
-
-    def scaled(self, parameters: Array) -> Array:
-        """Scaled parameters of the user's."""
-        return np.asarray((parameters - self.low) * self.speed)
-
-    def parameters(self, scaled: Array) -> Array:
-        """The user's parameters, in the domain."""
-        value = self.low + scaled / self.speed
-        wrapped = self.low + (value - self.low) % (self.high - self.low)
-        return np.asarray(np.where(self.closed, wrapped, np.clip(value, self.low, self.high)))
-
-
-def _rotation() -> ca.Function:
-    """The rotation matrix of e / |e|."""
-    e = ca.SX.sym("e", 4)
-    w, u = e[0], e[1:]
-    matrix = (w * w - ca.dot(u, u)) * ca.SX.eye(3) + 2 * w * ca.skew(u) + 2 * u @ u.T
-    return ca.Function("rotation", [e], [matrix / ca.dot(e, e)])
-
-
-def _posture(pose: ca.MX, reference: ca.MX, lever: float) -> ca.MX:
-    """|x - x0|^2 + lever^2 4 sin^2(angle / 2)."""
-    e, o = pose[3:], reference[3:]
-    # The vector part of o e^* is the axis times sin(angle / 2).
-    turn = e[0] * o[1:] - o[0] * e[1:] - ca.cross(o[1:], e[1:])
-    return ca.sumsqr(pose[:3] - reference[:3]) + 4.0 * lever**2 * ca.sumsqr(turn) / ca.dot(e, e)
-
-
-class _Pair(Sides):
-    """The rows of one contact."""
-
-    def __init__(
-        self, faces: tuple[BodyFace, BodyFace], bodies: tuple[int, int], patches: tuple[_Patch, _Patch]
-    ) -> None:
-        super().__init__(faces, bodies)
-        self.patches = patches
-
-    def rows(self, poses: Sequence[ca.MX], turns: Sequence[ca.MX], s: ca.MX) -> ca.MX:
-        """Four extremality rows, then the gap; in the axes of f."""
-        f, fu, fv = self.patches[0].expressions(s[:2])
-        g, gu, gv = self.patches[1].expressions(s[2:])
-        (x_f, x_g), (turn_f, turn_g) = ([values[k] for k in self.bodies] for values in (poses, turns))
-        turn = turn_f.T @ turn_g
-        d = turn_f.T @ (x_g[:3] - x_f[:3]) + turn @ g - f
-        n = ca.cross(fu, fv)
-        n *= self.faces[0].face.sign / ca.norm_2(n)
-        n_g = turn.T @ n
-        return ca.vertcat(ca.dot(d, fu), ca.dot(d, fv), ca.dot(n_g, gu), ca.dot(n_g, gv), ca.dot(n, d))
-
-    def scaled(self, parameters: Array) -> Array:
-        """The program's variables of the user's parameters."""
-        return np.concatenate([p.scaled(x) for p, x in zip(self.patches, parameters.reshape(2, 2), strict=True)])
-
-    def parameters(self, scaled: Array) -> Array:
-        """The user's parameters of the program's variables."""
-        return np.concatenate([p.parameters(x) for p, x in zip(self.patches, scaled.reshape(2, 2), strict=True)])
 
 
 def _checked_arguments(scene: Any, ipopt: Any) -> dict[str, str | float]:
@@ -190,66 +98,60 @@ class ReferenceSolver:
         self.options = _checked_arguments(scene, ipopt)
         self._scene = scene
         self._packed = packed = scene.packed()
-        self._bodies = scene.bodies
         self._moving = [k for k, body in enumerate(scene.bodies) if not body.fixed]
         self._fixed = [k for k, body in enumerate(scene.bodies) if body.fixed]
-        patches: dict[NurbsSurface, _Patch] = {}
-        self._pairs: list[_Pair] = []
+        patches: dict[NurbsSurface, Patch] = {}
+        self._pairs: list[Pair] = []
         for contact, faces in zip(packed.contacts, packed.faces, strict=True):
             for side in faces:
                 if side.face.surface not in patches:
-                    patches[side.face.surface] = _Patch(side.face.surface, packed.scale)
+                    patches[side.face.surface] = Patch(side.face.surface, packed.scale)
             f, g = (patches[side.face.surface] for side in faces)
             i, j = (scene.bodies.index(body) for body in contact.bodies)
-            self._pairs.append(_Pair(faces, (i, j), (f, g)))
-        self._one_sided = np.array([contact.unilateral for contact in packed.contacts], dtype=bool)
-        self._terms: list[tuple[PointDistance | Posture, int]] = []
-        self._build(scene)
+            self._pairs.append(Pair(faces, (i, j), (f, g)))
+        symbols = [ca.MX.sym("pose", 7) for _ in scene.bodies]
+        poses = Poses(symbols, packed)
+        self._rows = Rows(packed, scene.bodies, scene.constraints, poses)
+        self._terms = Terms(packed, scene.bodies, scene.objectives, poses)
+        self._build(poses)
 
-    def _build(self, scene: Assembly) -> None:
-        poses = [ca.MX.sym("pose", 7) for _ in self._bodies]
+    def _build(self, poses: Poses) -> None:
+        rows, terms, free = self._rows, self._terms, [poses.poses[k] for k in self._moving]
         contacts = [ca.MX.sym("contact", 4) for _ in self._pairs]
-        rows = [ca.dot(poses[k][3:], poses[k][3:]) - 1 for k in self._moving]
-        rotation = _rotation()
-        turns = [rotation(pose[3:]) for pose in poses]
-        rows += [pair.rows(poses, turns, s) for pair, s in zip(self._pairs, contacts, strict=True)]
-        value = ca.MX(0)
-        given: list[ca.MX] = []
-        for sign, term in scene.objectives or ((1.0, Posture()),):
-            weight = sign * term.weight * self._packed.scale**2 / self._packed.unit
-            if isinstance(term, PointDistance):
-                k = scene.bodies.index(term.point.body)
-                given.append(ca.MX.sym("target", 3))
-                point = poses[k][:3] + turns[k] @ (term.point.coordinates / self._packed.scale)
-                value += weight * ca.sumsqr(point - given[-1])
-                self._terms.append((term, k))
-                continue
-            assert isinstance(term, Posture)
-            for k in self._moving:
-                given.append(ca.MX.sym("reference", 7))
-                lever = 0.5 * (self._bodies[k].size or self._packed.scale) / self._packed.scale
-                value += weight * _posture(poses[k], given[-1], lever)
-                self._terms.append((term, k))
-        x = ca.vertcat(*(poses[k] for k in self._moving), *contacts)
-        p = ca.vertcat(*(poses[k] for k in self._fixed), *given)
-        options: dict[str, Any] = {"print_time": False, "show_eval_warnings": False, "ipopt": _IPOPT | self.options}
-        program: dict[str, Any] = {"x": x, "p": p, "f": value, "g": ca.vertcat(*rows)}
+        units = [ca.dot(pose[3:], pose[3:]) - 1 for pose in free]
+        extremal = [pair.rows(poses.poses, poses.turns, s) for pair, s in zip(self._pairs, contacts, strict=True)]
+        bodies, pairs, others = len(free), len(extremal), rows.rows.numel()
+        # Rows of unit quaternions, five a contact, of which the last is the gap, the others, definitions.
+        self._places = bodies + np.concatenate([4 + 5 * np.arange(pairs), 5 * pairs + np.arange(others)])
+        g = ca.vertcat(*units, *extremal, rows.rows, rows.definitions)
+        upper = np.zeros(g.numel())
+        upper[self._places[self._packed.one_sided]] = np.inf
+        # IPOPT refuses more equations than variables, and treats as many in a way of their own.
+        self._split = np.cumsum([7 * bodies, 4 * pairs, rows.x.numel()])
+        spare = ca.MX.sym("spare", max(0, int((upper == 0.0).sum()) + 1 - int(self._split[-1])))
+        x = ca.vertcat(*free, *contacts, rows.x, spare)
+        p = ca.vertcat(*(poses.poses[k] for k in self._fixed), rows.p, terms.p)
+        options: dict[str, Any] = {
+            "print_time": False,
+            "show_eval_warnings": False,
+            "expand": not self._pairs,  # of B-splines there are no scalar instructions
+            "ipopt": _IPOPT | self.options,
+        }
+        program: dict[str, Any] = {"x": x, "p": p, "f": terms.value + 0.5 * ca.sumsqr(spare), "g": g}
         try:
             self._solver = ca.nlpsol("reference", "ipopt", program, options)
         except RuntimeError as error:
             reason = str(error).strip().splitlines()[-1]
             raise InputError(f"ipopt is {self.options!r}; expected options of IPOPT ({reason})") from error
-        self._objective = ca.Function("objective", [x, p], [value, ca.gradient(value, x)])
-        bodies, pairs = len(self._moving), len(self._pairs)
-        # Rows of unit quaternions, then five a contact; the last of these is the gap.
-        self._gap_rows = bodies + 4 + 5 * np.arange(pairs)
-        upper = np.zeros(bodies + 5 * pairs)
-        upper[self._gap_rows[self._one_sided]] = np.inf
-        free = np.full(7 * bodies, np.inf)
+        judged = ca.vertcat(rows.rows, rows.definitions)
+        forces = ca.MX.sym("forces", judged.numel())
+        pulled = ca.gradient(terms.value + ca.dot(forces, judged), x)
+        self._slopes = ca.Function("slopes", [x, p, forces], [terms.value, ca.gradient(terms.value, x), pulled])
         sides = [patch for pair in self._pairs for patch in pair.patches]
+        nothing = np.full(7 * bodies, np.inf), np.full(spare.numel(), np.inf)
         self._bounds = {
-            "lbx": np.concatenate([-free, *(patch.lower for patch in sides)]),
-            "ubx": np.concatenate([free, *(patch.upper for patch in sides)]),
+            "lbx": np.concatenate([-nothing[0], *(patch.lower for patch in sides), rows.lower, -nothing[1]]),
+            "ubx": np.concatenate([nothing[0], *(patch.upper for patch in sides), rows.upper, nothing[1]]),
             "lbg": np.zeros_like(upper),
             "ubg": upper,
         }
@@ -262,8 +164,9 @@ class ReferenceSolver:
         if packed is not self._packed:
             raise InputError("scene was changed after this solver was made; expected a new ReferenceSolver")
         state = self._scene._start(packed, q0, starts)
-        q = state[: packed.contacts_at].reshape(-1, 7)
+        q = state[: packed.contacts_at].reshape(-1, 7).copy()
         parameters = state[packed.contacts_at : packed.angles_at].reshape(-1, 4)
+        near = dict(zip(packed._angles, state[packed.angles_at : packed.multipliers_at : 4].tolist(), strict=True))
         p = self._given(q)
         found = [
             pair.find(q, None if np.isnan(at).any() else at) for pair, at in zip(self._pairs, parameters, strict=True)
@@ -271,70 +174,133 @@ class ReferenceSolver:
         parameters = np.array([pair.parameters for pair in found]).reshape(-1, 4)
         lost = [k for k, pair in enumerate(found) if not is_extremal(pair)]
         if lost:
-            return self._checked(q, parameters, np.zeros(len(parameters)), Status.CONTACT_LOST, p, {"culprit": lost[0]})
-        x0 = self._variables(q, parameters)
-        begin = perf_counter()
-        result = self._solver(x0=x0, p=p, **self._bounds)
-        seconds = perf_counter() - begin
-        stats = self._solver.stats()
-        figures = {"seconds": seconds, "iterations": int(stats["iter_count"]), "history": _history(stats)}
-        x = np.array(result["x"]).ravel()
-        forces = np.array(result["lam_g"]).ravel()[self._gap_rows]
-        status = _STATUSES.get(stats["return_status"], Status.STALLED)
-        if not (np.isfinite(x).all() and np.isfinite(forces).all()):
-            x, forces, status = x0, np.zeros_like(forces), Status.STALLED
-        q = q.copy()
-        split = 7 * len(self._moving)
-        rows = x[:split].reshape(-1, 7)
+            forces = np.zeros(self._bounds["lbg"].size)
+            return self._checked(q, parameters, near, forces, Status.CONTACT_LOST, p, {"culprit": lost[0]})
+        x0, bounds = self._without_redundant_rows(self._variables(self._rows.nudged(q), parameters, near), p)
+        x, forces, status, figures = self._run(x0, bounds, p)
+        if bounds is self._bounds and (status is not Status.SOLVED or np.abs(forces).max(initial=0.0) > _ENDLESS):
+            # Perhaps there are dependent rows that only the end tells of.
+            x0, bounds = self._without_redundant_rows(x, p)
+            if bounds is not self._bounds:
+                again = self._run(x0, bounds, p)
+                if again[2] is Status.SOLVED:
+                    x, forces, status, figures = again
+        poses, contacts, angles, _ = np.split(x, self._split)
+        rows = poses.reshape(-1, 7)
         q[self._moving, :3] = rows[:, :3] * packed.scale + packed.reference
         q[self._moving, 3:] = rows[:, 3:] / np.linalg.norm(rows[:, 3:], axis=1, keepdims=True)
         for k, pair in enumerate(self._pairs):
-            parameters[k] = pair.parameters(x[split + 4 * k : split + 4 * k + 4])
-        return self._checked(q, parameters, forces, status, p, figures)
+            parameters[k] = pair.parameters(contacts[4 * k : 4 * k + 4])
+        return self._checked(q, parameters, near | self._rows.angles(angles), forces, status, p, figures)
 
-    def _variables(self, q: Array, parameters: Array) -> Array:
-        """The program's variables of a configuration and the parameters of the contacts."""
-        rows = [self._scaled(q[k]) for k in self._moving]
+    def _run(self, x0: Array, bounds: dict[str, Array], p: Array) -> tuple[Array, Array, Status, dict[str, Any]]:
+        """IPOPT from x0: variables, multipliers, what it says, and figures."""
+        begin = perf_counter()
+        result = self._solver(x0=x0, p=p, **bounds)
+        seconds = perf_counter() - begin
+        stats = self._solver.stats()
+        status = _STATUSES.get(stats["return_status"], Status.STALLED)
+        figures = {"seconds": seconds, "iterations": int(stats["iter_count"]), "history": _history(stats)}
+        x, forces = (np.array(result[name]).ravel() for name in ("x", "lam_g"))
+        if not (np.isfinite(x).all() and np.isfinite(forces).all()):
+            return x0, np.zeros_like(forces), Status.STALLED, figures
+        return x, forces, status, figures
+
+    def _variables(self, q: Array, parameters: Array, near: Near) -> Array:
+        """The program's variables of a configuration, the parameters of the contacts and the turns of angles."""
+        rows = [self._terms.scaled(q[k]) for k in self._moving]
         rows += [pair.scaled(at) for pair, at in zip(self._pairs, parameters, strict=True)]
-        return np.concatenate(rows)
+        spare = np.zeros(self._bounds["lbx"].size - self._split[-1])
+        return np.concatenate([*rows, self._rows.start(q, near), spare])
 
-    def _scaled(self, row: Array) -> Array:
-        """A pose row as the program has it."""
-        return np.concatenate([(row[:3] - self._packed.reference) / self._packed.scale, row[3:]])
+    def _without_redundant_rows(self, x0: Array, p: Array) -> tuple[Array, dict[str, Array]]:
+        """Start and bounds of the program, such that its equations are independent where they hold.
+
+        Multipliers of dependent rows have no end in IPOPT. Where such rows are found at a point near x0 at which all
+        equations hold, that point is the start and they are dropped; the audit looks at them again.
+        """
+        equal = np.flatnonzero(self._bounds["ubg"] == 0.0)
+        rows = self._solver.get_function("nlp_jac_g")
+
+        def evaluate(x: Array) -> tuple[Array, Array, float]:
+            g, jacobian = (np.array(ca.densify(out)) for out in rows(x, p))
+            return g.ravel()[equal], jacobian[equal], float(np.linalg.norm(g.ravel()[equal]))
+
+        x, (g, jacobian, size) = x0, evaluate(x0)
+        # Levenberg and Marquardt's steps, damped by |g|^2: they converge quadratically whatever the rank.
+        for _ in range(_PROJECTIONS):
+            if not _EXACT < size < np.inf:
+                break
+            damped = jacobian @ jacobian.T + max(min(size**2, 1.0), 1e-14) * np.eye(len(g))
+            x = x - jacobian.T @ np.linalg.solve(damped, g)
+            g, jacobian, size = evaluate(x)
+        if len(g) == 0 or not size <= _HELD:
+            return x0, self._bounds
+        triangle, order = qr(jacobian.T, mode="r", pivoting=True)
+        diagonal = np.abs(np.diag(triangle))
+        rank = int((diagonal > _DEPENDENT * diagonal[0]).sum())
+        if rank == len(g):
+            return x0, self._bounds
+        lower, upper = self._bounds["lbg"].copy(), self._bounds["ubg"].copy()
+        lower[equal[order[rank:]]], upper[equal[order[rank:]]] = -np.inf, np.inf
+        return x, self._bounds | {"lbg": lower, "ubg": upper}
 
     def _given(self, q: Array) -> Array:
-        """The program's parameters: fixed poses, targets and references."""
-        values = [self._scaled(q[k]) for k in self._fixed]
-        for term, k in self._terms:
-            if isinstance(term, PointDistance):
-                values.append((term.target - self._packed.reference) / self._packed.scale)
-            else:
-                values.append(self._scaled((q if term.reference is None else term.reference)[k]))
-        return np.concatenate([*values, np.empty(0)])
+        """The program's parameters: fixed poses, values of rows, targets and references."""
+        fixed = [self._terms.scaled(q[k]) for k in self._fixed]
+        return np.concatenate([*fixed, self._rows.values(), self._terms.values(q)])
 
     def _checked(
-        self, q: Array, parameters: Array, forces: Array, status: Status, p: Array, figures: dict[str, Any]
+        self,
+        q: Array,
+        parameters: Array,
+        near: Near,
+        forces: Array,
+        status: Status,
+        p: Array,
+        figures: dict[str, Any],
     ) -> Solution:
-        """The solution, its status decided by extremal pairs found afresh at q and by the wrenches in them."""
+        """The solution, its status decided by what an audit finds at q."""
         packed, scene = self._packed, self._scene._scene
         assert scene is not None
-        value, slopes = (np.array(out).ravel() for out in self._objective(self._variables(q, parameters), p))
-        gradient = np.zeros((len(self._bodies), 6))
-        gradient[self._moving] = twist_gradients(q[self._moving], slopes[: 7 * len(self._moving)].reshape(-1, 7))
-        found = audit(self._pairs, self._one_sided, q, parameters, forces, gradient, self._moving, packed.scale)
+        bodies, pairs = len(self._moving), len(self._pairs)
+        x = self._variables(q, parameters, near)
+        # Of contacts the audit has the wrenches.
+        of_others = forces[bodies + 5 * pairs :]
+        value, slopes, pulls = (np.array(out).ravel() for out in self._slopes(x, p, of_others))
+        _, _, aside, _ = np.split(pulls, self._split)
+        angles = self._rows.angles(np.split(x, self._split)[2])
+        gradient, balance = (np.zeros((len(q), 6)) for _ in range(2))
+        for twists, of in ((gradient, slopes), (balance, pulls)):
+            with np.errstate(invalid="ignore"):  # of expressions without a value
+                twists[self._moving] = twist_gradients(q[self._moving], of[: 7 * bodies].reshape(-1, 7))
+        found = audit(
+            self._pairs,
+            lambda pose: self._rows.residuals(pose, near),
+            packed.one_sided,
+            q,
+            parameters,
+            forces[self._places],
+            gradient,
+            balance,
+            aside,
+            self._moving,
+            packed.scale,
+        )
         if status is not Status.CONTACT_LOST:
-            if found.held and found.balanced:
+            if found.held and found.balanced and np.isfinite(value[0]):
                 status = Status.SOLVED
             elif status is Status.SOLVED or (found.held and status is Status.INFEASIBLE):
                 status = Status.STALLED
         state = np.zeros(packed.results_at + RESULTS)
         state[: packed.contacts_at] = q.ravel()
         state[packed.contacts_at : packed.angles_at] = found.parameters.ravel()
-        state[packed.multipliers_at : packed.residuals_at] = forces
-        state[packed.residuals_at : packed.results_at] = found.gaps
+        state[packed.angles_at : packed.multipliers_at : 4] = [angles[angle] for angle in packed._angles]
+        state[packed.multipliers_at : packed.residuals_at] = forces[self._places]
+        state[packed.residuals_at : packed.results_at] = np.where(packed.lengths, packed.scale, 1.0) * found.residuals
         results = state[packed.results_at :]
         results[COUNT] = figures.get("iterations", 0)
-        results[OBJECTIVE] = value[0]
+        results[OBJECTIVE] = value[0] if np.isfinite(value[0]) else np.inf
         results[VIOLATION] = found.feasibility
         results[DUAL] = found.stationarity
         results[CULPRIT] = figures.get("culprit", -1)
@@ -345,7 +311,9 @@ class ReferenceSolver:
 
 def _history(stats: Mapping[str, Any]) -> Array:
     """IPOPT's table in the columns of `Iteration`. It has no trust region: the last column is infinite."""
-    table = stats["iterations"]
+    table = stats.get("iterations")
+    if table is None:  # no number at the start
+        return np.empty((0, len(Iteration.COLUMNS)))
     names = ("obj", "inf_pr", "inf_du", "mu", "regularization_size", "alpha_pr")
     columns = [np.asarray(table[name], dtype=np.float64) for name in names]
     return np.column_stack([*columns, np.full_like(columns[0], np.inf)])
@@ -366,7 +334,8 @@ def solve(
 ) -> Solution:
     """Solve an assembly with CasADi and IPOPT, in full space.
 
-    Slower than `Assembly.solve` and independent of it. The program is built at the first solve and kept.
+    Slower than `Assembly.solve` and independent of it. The program is built at the first solve and kept; driven values,
+    limits, offsets, targets and starts may change between solves.
 
     Parameters
     ----------
@@ -382,10 +351,10 @@ def solve(
     Returns
     -------
     Solution
-        As of `Assembly.solve`. SOLVED where extremal pairs found afresh hold the contacts to `FEASIBILITY` (1e-9) of
-        the scene's size, and the Lagrangian's gradient in twists, over one plus that of the objective, is at most
-        `STATIONARITY` (1e-7). INFEASIBLE where IPOPT says so: the pose then has the least sum of violations of
-        IPOPT's rows nearby. `seconds` is the time in IPOPT.
+        As of `Assembly.solve`. SOLVED where extremal pairs and coordinates found afresh hold every row to
+        `FEASIBILITY` (1e-9), lengths over the scene's size, and the Lagrangian's gradient in twists, over one plus that
+        of the objective, is at most `STATIONARITY` (1e-6). INFEASIBLE where IPOPT says so: the pose then has the least
+        sum of violations of IPOPT's rows nearby. `seconds` is the time in IPOPT.
 
     Raises
     ------
@@ -394,6 +363,12 @@ def solve(
 
     Notes
     -----
+    Of rows that follow from others, as in a planar four-bar in space, some are left to the final check: their
+    multipliers are zero, and others carry what `Assembly.solve` spreads over all.
+
+    Without an objective bodies stay close to where the solve starts. `Assembly.solve` gathers scattered bodies first
+    and stays close to where these then are; to compare, say `Posture()`.
+
     At a pole of a surface one parameter moves nothing and rows lose their meaning: a contact there is reached to about
     1e-7 at best, or ends STALLED.
     """

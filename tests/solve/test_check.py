@@ -71,6 +71,10 @@ def test_a_pole_says_nothing_of_crossing():
     assert sides.cross(q, sides.find(q, None)) is False
 
 
+def no_rows(q):
+    return np.empty(0)
+
+
 @pytest.mark.parametrize(
     ("gap", "one_sided", "force", "held", "balanced"),
     [
@@ -88,17 +92,71 @@ def test_an_audit_finds_what_is_wrong(gap, one_sided, force, held, balanced):
     gradient = np.zeros((2, 6))
     gradient[1, 0] = -2.0
     start = sides.find(q, None).parameters[None]
-    found = audit([sides], np.array([one_sided]), q, start, np.array([force]), gradient, [1], 1.0)
+    found = audit(
+        [sides],
+        no_rows,
+        np.array([one_sided]),
+        q,
+        start,
+        np.array([force]),
+        gradient,
+        gradient,
+        np.empty(0),
+        [1],
+        1.0,
+    )
     assert (found.held, found.balanced) == (held, balanced)
-    assert found.gaps[0] == pytest.approx(gap, abs=1e-13)
+    assert found.residuals[0] == pytest.approx(gap, abs=1e-13)
     assert found.feasibility == pytest.approx(max(-gap, 0.0) if one_sided else abs(gap), abs=1e-13)
     assert not found.crossing
 
 
-def test_an_audit_of_no_contacts_looks_at_the_gradient():
+def audit_rows(residuals, one_sided, forces, gradient=0.0, balance=0.0, aside=(), scale=1.0):
+    """An audit of one body without contacts."""
     q = poses(np.random.default_rng(2), 1)
-    nothing = np.empty(0)
-    for slope, balanced in ((0.0, True), (1e-3, False)):
-        found = audit([], nothing.astype(bool), q, nothing, nothing, np.full((1, 6), slope), [0], 1.0)
-        assert found.held and found.balanced is balanced
-        assert found.feasibility == 0.0 and found.parameters.shape == (0, 4)
+    given = [np.array(values, dtype=float) for values in (residuals, forces, aside)]
+    return audit(
+        [],
+        lambda at: given[0] if at is q else np.full(3, np.nan),
+        np.array(one_sided, dtype=bool),
+        q,
+        np.empty((0, 4)),
+        given[1],
+        np.full((1, 6), gradient),
+        np.full((1, 6), balance),
+        given[2],
+        [0],
+        scale,
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "held", "balanced"),
+    [
+        (([], [], []), True, True),
+        (([], [], [], 1e-3, 1e-3), True, False),  # nothing balances the objective
+        (([0.0], [False], [3.0], 1.0, 0.0), True, True),
+        (([0.0], [False], [3.0], 1.0, 1e-3), True, False),
+        (([0.0], [False], [3.0], 1.0, 0.0, [1e-3]), True, False),  # the multiplier of an angle's definition
+        (([2e-9], [False], [0.0]), False, True),
+        (([2e-9, 0.0], [True, True], [0.0, 0.0]), True, True),
+        (([0.0, -2e-9], [True, True], [0.0, 0.0]), False, True),
+        (([0.0], [True], [-3.0]), True, True),
+        (([0.0], [True], [3.0]), True, False),
+        (([0.5], [True], [-3.0]), True, False),
+        (([np.inf], [False], [0.0]), False, True),
+        (([-np.inf], [True], [0.0]), False, True),
+        (([], [], [], np.nan, np.nan), True, False),
+        (([], [], [], np.inf, np.inf), True, False),
+    ],
+)
+def test_an_audit_looks_at_every_row(arguments, held, balanced):
+    found = audit_rows(*arguments)
+    assert (found.held, found.balanced) == (held, balanced)
+    assert not np.isnan(found.stationarity) and found.parameters.shape == (0, 4)
+
+
+def test_violations_of_lengths_are_in_the_user_s_unit():
+    found = audit_rows([0.25, -0.5], [False, True], [0.0, 0.0], scale=8.0)
+    assert found.feasibility == 4.0
+    np.testing.assert_array_equal(found.residuals, [0.25, -0.5])

@@ -6,7 +6,8 @@ import pytest
 
 import assembly as asm
 from assembly.geometry import shapes
-from assembly.solve.reference import ReferenceSolver, spline_function
+from assembly.solve.reference import ReferenceSolver
+from assembly.solve.reference_surfaces import spline_function
 from assembly.solve.solution import Iteration, Status
 from tests.geometry.reference import knot_vector
 
