@@ -146,11 +146,11 @@ def curve_rows(rows, residual, y, active, restoring, forces):
 
 
 @kernel(inner=True)
-def damped_step(table, lagrangian, n, last, shift, matrix, descent, step, scratch):
-    """The step of the factor in `matrix`, its shift raised until no body turns by much more than a radian.
+def damped_step(table, lagrangian, n, last, shift, radius, matrix, descent, step, scratch):
+    """The step of the factor in `matrix`, its shift raised until the step is not much longer than the radius.
 
-    Scaled down instead, a step would lose what its stiff directions gain. Returns the shift, and the step's largest
-    component and turn.
+    Nor may a body turn by much more than a radian. Scaled down instead, a step would lose what its stiff directions
+    gain, those that bring the rows to hold. Not so with contacts: their rows change fast along the step. Returns the shift, and the step's largest component and turn.
     """
     for attempt in range(SHORTENINGS + 1):
         for i in range(n):
@@ -162,7 +162,8 @@ def damped_step(table, lagrangian, n, last, shift, matrix, descent, step, scratc
             longest = max(longest, abs(step[i]))
             if i % 6 >= 3 and i < 6 * table[MOVING]:
                 turn = max(turn, abs(step[i]))
-        if turn <= 1.5 * TURN or attempt == SHORTENINGS:
+        excess = max(turn / TURN, longest / radius)
+        if excess <= 1.5 or attempt == SHORTENINGS or table[CONTACTS] > 0:
             break
         # Newton's method on 1 / |step|, whose slope is |U^-T step|^2.
         for i in range(n):
@@ -173,7 +174,7 @@ def damped_step(table, lagrangian, n, last, shift, matrix, descent, step, scratc
         for i in range(n):
             square += step[i] * step[i]
             slope += scratch[i] * scratch[i]
-        shift = factorize_shifted(lagrangian, n, last, shift + square / slope * (turn / TURN - 1.0), matrix)
+        shift = factorize_shifted(lagrangian, n, last, shift + square / slope * (excess - 1.0), matrix)
     return shift, longest, turn
 
 
@@ -400,7 +401,9 @@ def solve_program(table, pool, settings, state, history, tips):
             if shift < 0.0:
                 status = STALLED
                 break
-        used, longest, turn = damped_step(table, lagrangian, n, last, shift, matrix, descent, step, straight)
+        used, longest, turn = damped_step(
+            table, lagrangian, n, last, shift, radius, matrix, descent, step, straight
+        )
         last_violation = violation
         last_dual = dual
         cut = min(1.0, radius / longest) if longest > 0.0 else 1.0

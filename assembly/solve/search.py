@@ -85,7 +85,7 @@ def search(
                     descent[i] = 0.0
                 for r in range(rows):
                     forces[r] = -(trial[3][r] - (1.0 - alpha) * residual[r]) * active[r]
-                add_transposed(bases, trial[4], rows, forces, descent)
+                add_transposed(bases, here[4], rows, forces, descent)
                 substitute(matrix, n, last, descent)
                 for i in range(n):
                     step[i] += descent[i] / alpha
