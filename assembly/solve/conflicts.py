@@ -14,10 +14,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.constraints.packing import Packed
 from assembly.kinematics.pose import retract
+from assembly.solve.jacobian import NoPairError, rows_of
+from assembly.solve.solution import Scene
 from assembly.solve.subset import Problem, Snapshot
 
-__all__ = ["conflicting_sets"]
+__all__ = ["conflicting_sets", "conflicts_at"]
 
 Array = NDArray[np.float64]
 # A violation below this part of the largest carries nothing.
@@ -44,6 +47,17 @@ def conflicting_sets(snapshot: Snapshot) -> list[tuple[int, ...]]:
         found.append(tuple(core))
         left = [k for k in left if k not in core]
     return found
+
+
+def conflicts_at(scene: Scene, packed: Packed, state: Array) -> list[tuple[str, ...]]:
+    """The same by their names, at the state that a solve left."""
+    try:
+        rows = rows_of(packed, state)
+    except NoPairError:
+        # Then values that were driven since are not told from those of the solve.
+        rows = None
+    found = conflicting_sets(Snapshot(scene, packed, state if rows is None else rows.state, rows, solved=True))
+    return [tuple(scene.constraints[k].name for k in places) for places in sorted(found)]
 
 
 def _attempt(snapshot: Snapshot, which: Sequence[int], starts: Sequence[Array]) -> Array | None:

@@ -98,7 +98,7 @@ class Balanced:
         """Rank of some of the rows."""
         if len(which) == 0:
             return 0
-        values: Array = np.linalg.svd(self.rows[which], compute_uv=False)
+        values = np.asarray(np.linalg.svd(self.rows[which], compute_uv=False), dtype=np.float64)
         return self._cut(values)
 
     def _cut(self, values: Array) -> int:

@@ -109,8 +109,8 @@ def test_gradient_is_the_derivative_of_the_objective(seed):
     packed, state = at(scene, scene.q)
     q = retract(scene.q, rng.normal(size=(7, 6)))
     state[: packed.contacts_at] = q.ravel()
-    gradient, scratch = np.empty(42), np.empty(42)
-    gradient_at(packed.table, packed.pool, state, gradient)
+    gradient, scratch, free = np.empty(42), np.empty(42), np.empty(2, dtype=np.int64)
+    gradient_at(packed.table, packed.pool, state, free, gradient)
     differences = np.zeros(42)
     for column in range(42):
         for sign in (1.0, -1.0):
@@ -118,7 +118,8 @@ def test_gradient_is_the_derivative_of_the_objective(seed):
             step.ravel()[column] = sign * STEP
             step[:, :3] *= packed.scale
             state[: packed.contacts_at] = retract(q, step).ravel()
-            differences[column] += sign * gradient_at(packed.table, packed.pool, state, scratch) / (2.0 * STEP)
+            value = gradient_at(packed.table, packed.pool, state, free, scratch)
+            differences[column] += sign * value / (2.0 * STEP)
     fixed = np.repeat([body.fixed for body in scene.bodies], 6)
     np.testing.assert_allclose(gradient, np.where(fixed, 0.0, differences), rtol=0, atol=1e-8)
 
