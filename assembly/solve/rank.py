@@ -94,13 +94,6 @@ class Balanced:
         motions[:, :, :3] -= np.cross(motions[:, :, 3:], self.centers[None])
         return orthonormal(motions.reshape(len(motions), 6 * len(self.centers)))
 
-    def rank_of(self, which: NDArray[np.int64] | list[int]) -> int:
-        """Rank of some of the rows."""
-        if len(which) == 0:
-            return 0
-        values = np.asarray(np.linalg.svd(self.rows[which], compute_uv=False), dtype=np.float64)
-        return self._cut(values)
-
     def _cut(self, values: Array) -> int:
         """How many of falling singular values count."""
         if not values[0] > self.tolerance:

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 __all__ = ["Iteration", "Scene", "Solution", "Status"]
 
 Array = NDArray[np.float64]
+# Moving bodies whose freedoms are printed: counting takes a second for some 300, and grows with the cube.
+MOST_COUNTED = 200
 
 
 class Status(Enum):
@@ -308,7 +310,7 @@ class Solution:
             text += f"; violated: {named}"
         if self.status is Status.INFEASIBLE:
             named = " and ".join(", ".join(map(repr, names)) for names in self.conflicting_sets)
-            text += f"; conflicting: {named or 'none found, so another start may do'}"
+            text += f"; conflicting: {named or 'none, all hold from another start'}"
         if self._result(IMPROPER) > 0.0:
             text += "; at a contact the surfaces cross beside the point (indefinite relative curvature)"
         return text
@@ -328,13 +330,14 @@ class Solution:
             f"objective {self.objective:.6g}   feasibility {self.feasibility:.1e}   "
             f"stationarity {self.stationarity:.1e}   {self.iterations} iterations   {1e6 * self.seconds:.0f} us",
         ]
-        try:
-            freedoms = self.mobility.dof
-        except InputError:
-            # A contact without a pair has no rows to count.
-            pass
-        else:
-            lines[1] += f"   {freedoms} degree{'' if freedoms == 1 else 's'} of freedom"
+        if sum(not body.fixed for body in self._scene.bodies) <= MOST_COUNTED:
+            try:
+                freedoms = self.mobility.dof
+            except InputError:
+                # A contact without a pair has no rows to count.
+                pass
+            else:
+                lines[1] += f"   {freedoms} degree{'' if freedoms == 1 else 's'} of freedom"
         worst = sorted(self.violations.items(), key=lambda item: -item[1])[:5]
         lines += [f"  {name:<24} violation {value:.1e}" for name, value in worst]
         for body, row in zip(self._scene.bodies, self.q, strict=True):

@@ -207,3 +207,39 @@ def test_an_expression_without_a_value_is_an_infinite_violation():
     solution = scene.solve()
     assert not solution.success and solution.feasibility == np.inf
     assert "root body" in solution.message
+
+
+def test_contacts_that_contradict_are_named():
+    def ball(name, position, **settings):
+        return asm.Body(name, asm.shapes.sphere(1.0), position, **settings)
+
+    bodies = [
+        ball("left", (0, 0, 0), fixed=True),
+        ball("right", (6, 0, 0), fixed=True),
+        ball("between", (2.9, 0.3, 0.4)),
+    ]
+    scene = asm.Assembly([*bodies, ball("above", (3, 3, 0))])
+    between, above = scene.bodies[2:]
+    scene.constrain(
+        asm.Contact(bodies[0], between, "left"),
+        asm.Contact(between, above, "on top", unilateral=True),
+        asm.Contact(bodies[1], between, "right"),
+    )
+    solution = scene.solve()
+    assert solution.status is asm.Status.INFEASIBLE and solution.conflicting_sets == [("left", "right")]
+
+
+def test_a_stuck_solve_says_that_nothing_contradicts():
+    # Scattered bars that got stuck: the linkage closes from elsewhere.
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        scene = bricard()
+        for body in scene.bodies[1:]:
+            e = rng.normal(size=4)
+            body.pose = asm.Pose(rng.uniform(-3, 3, 3), e / np.linalg.norm(e))
+        solution = scene.solve()
+        assert solution.conflicting == []
+        if solution.status is asm.Status.INFEASIBLE:
+            assert "; conflicting: none, all hold from another start" in solution.message
+            return
+    raise AssertionError("none of the starts got stuck")
