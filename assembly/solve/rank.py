@@ -57,7 +57,7 @@ class Balanced:
     @classmethod
     def of(cls, jacobian: Array, residual: float, tolerance: float | None = None) -> Balanced:
         """Balance rows in twists at the bodies' origins that hold to a residual; a tolerance decides if it is given."""
-        blocks = jacobian.reshape(len(jacobian), -1, 6)
+        blocks = jacobian.reshape(len(jacobian), jacobian.shape[1] // 6, 6)
         centers = np.array([_center(blocks[:, b]) for b in range(blocks.shape[1])]).reshape(-1, 3)
         shifted = blocks.copy()
         shifted[:, :, 3:] -= np.cross(centers[None], blocks[:, :, :3])

@@ -218,12 +218,11 @@ def test_contacts_that_contradict_are_named():
         ball("right", (6, 0, 0), fixed=True),
         ball("between", (2.9, 0.3, 0.4)),
     ]
-    scene = asm.Assembly([*bodies, ball("above", (3, 3, 0))])
-    between, above = scene.bodies[2:]
+    scene = asm.Assembly(bodies)
     scene.constrain(
-        asm.Contact(bodies[0], between, "left"),
-        asm.Contact(between, above, "on top", unilateral=True),
-        asm.Contact(bodies[1], between, "right"),
+        asm.Contact(bodies[0], bodies[2], "left"),
+        asm.Parallel(bodies[0], bodies[2], "level"),
+        asm.Contact(bodies[1], bodies[2], "right"),
     )
     solution = scene.solve()
     assert solution.status is asm.Status.INFEASIBLE and solution.conflicting_sets == [("left", "right")]
