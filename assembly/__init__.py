@@ -48,9 +48,11 @@ if TYPE_CHECKING:
     from assembly.proximity.pairs import ContactPair as ContactPair
     from assembly.scene_file import load as load
     from assembly.solve import reference as reference
+    from assembly.solve import statics as statics
     from assembly.solve.mobility import Mobility as Mobility
     from assembly.solve.solution import Solution as Solution
     from assembly.solve.solution import Status as Status
+    from assembly.solve.statics import Wrench as Wrench
     from assembly.solve.tip import dexterity_ellipsoid as dexterity_ellipsoid
     from assembly.solve.tip import dexterity_value as dexterity_value
     from assembly.solve.tip import tip_jacobian as tip_jacobian
@@ -91,6 +93,7 @@ else:
             "Spherical": "assembly.constraints.joints",
             "Status": "assembly.solve.solution",
             "Universal": "assembly.constraints.joints",
+            "Wrench": "assembly.solve.statics",
             "dexterity_ellipsoid": "assembly.solve.tip",
             "dexterity_value": "assembly.solve.tip",
             "errors": "assembly.errors",
@@ -98,6 +101,7 @@ else:
             "proximity": "assembly.proximity",
             "reference": "assembly.solve.reference",
             "shapes": "assembly.geometry.shapes",
+            "statics": "assembly.solve.statics",
             "tip_jacobian": "assembly.solve.tip",
             "view": "assembly.view",
         },

@@ -182,8 +182,10 @@ class Assembly:
         packed = self.packed()
         assert self._scene is not None
         warm = isinstance(q0, Solution)
+        verbose = 0
         if options:
-            settings = Options.of(options).settings(warm)
+            chosen = Options.of(options)
+            settings, verbose = chosen.settings(warm), chosen.verbose
         else:
             settings = _WARM_SETTINGS if warm else _SETTINGS
         state = self._start(packed, q0, starts)
@@ -207,7 +209,34 @@ class Assembly:
             other, rows = self._start(packed, q0, starts), np.empty_like(history)
             if solve_program(*arguments, settings, other, rows, tips) == 0:
                 code, state, history = 0, other, rows
-        return Solution(self._scene, packed, state, _STATUSES[code], perf_counter() - begin, history)
+        solution = Solution(self._scene, packed, state, _STATUSES[code], perf_counter() - begin, history)
+        if verbose:
+            print(solution.iteration_table())
+        return solution
+
+    def solve_all(self, *, starts: int = 16, seed: int = 0, **options: Any) -> list[Solution]:
+        """The distinct solutions found from several starts: the bodies' poses, then random ones.
+
+        Parameters
+        ----------
+        starts : int
+            How many; the first is the bodies' poses. Of the others every moving body is shifted by up to the scene's
+            size along each axis, and turned any way.
+        seed : int
+            Of the random starts: the same seed, the same starts.
+        **options
+            See `Options`.
+
+        Returns
+        -------
+        list of Solution
+            The successful ones, the smallest objective first. Poses within 1e-6 of each other (lengths over the scene's
+            size, radians) are one. A `Posture` without a reference, and the objective of a scene that has none, are
+            measured from the bodies' poses in all of them.
+        """
+        from assembly.studies.multistart import solve_all
+
+        return solve_all(self, starts, seed, options)
 
     def _start(self, packed: Packed, q0: ArrayLike | Solution | None, starts: Mapping[str, ArrayLike] | None) -> Array:
         """State of the loop: configuration, contact parameters (NaN: to be found), multipliers, room for results."""
@@ -280,7 +309,10 @@ class Assembly:
         assert self._scene is not None
         solved = isinstance(q, Solution)
         # A solution keeps the values it was solved with.
-        state = self._own("q", packed, q)._state if isinstance(q, Solution) else self._start(packed, q, None)
+        if isinstance(q, Solution):
+            state = self._own("q", packed, q)._state
+        else:
+            state = self._start(packed, None if q is None else pose_rows("q", q, len(self._bodies)), None)
         return Mobility.at(self._scene, packed, state, solved=solved, drives=bool(drives), tolerance=tolerance)
 
     def save(self, path: str | PathLike[str]) -> None:

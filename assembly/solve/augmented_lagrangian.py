@@ -150,7 +150,8 @@ def damped_step(table, lagrangian, n, last, shift, radius, matrix, descent, step
     """The step of the factor in `matrix`, its shift raised until the step is not much longer than the radius.
 
     Nor may a body turn by much more than a radian. Scaled down instead, a step would lose what its stiff directions
-    gain, those that bring the rows to hold. Not so with contacts: their rows change fast along the step. Returns the shift, and the step's largest component and turn.
+    gain, those that bring the rows to hold. Not so with contacts: their rows change fast along the step. Returns the
+    shift, and the step's largest component and turn.
     """
     for attempt in range(SHORTENINGS + 1):
         for i in range(n):
@@ -401,9 +402,7 @@ def solve_program(table, pool, settings, state, history, tips):
             if shift < 0.0:
                 status = STALLED
                 break
-        used, longest, turn = damped_step(
-            table, lagrangian, n, last, shift, radius, matrix, descent, step, straight
-        )
+        used, longest, turn = damped_step(table, lagrangian, n, last, shift, radius, matrix, descent, step, straight)
         last_violation = violation
         last_dual = dual
         cut = min(1.0, radius / longest) if longest > 0.0 else 1.0

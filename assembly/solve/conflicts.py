@@ -3,32 +3,36 @@
 Where the sum of squared violations is stationary, J^T c = 0: violations carry one another like forces, and those of
 zero carry nothing. What is violated there is a contradictory set already. Its members are left out one by one: what
 stays contradictory without one does not need it (a deletion filter: Chinneck & Dravnieks, Locating minimal infeasible
-constraint sets in linear programs, 1991). Whether a set can hold is asked of the solver, from the pose and from a few
-poses about it; so a set is minimal as far as the solver sees.
+constraint sets in linear programs, 1991). Whether a set can hold is asked of the solver, from the pose, from poses
+about it and from scattered ones; so a set is contradictory, and minimal, as far as the solver sees.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.constraints.packing import Packed
 from assembly.kinematics.pose import retract
+from assembly.solve.jacobian import NoPairError, rows_of
+from assembly.solve.solution import Scene
 from assembly.solve.subset import Problem, Snapshot
 
-__all__ = ["conflicting_sets"]
+__all__ = ["conflicting_sets", "conflicts_at"]
 
 Array = NDArray[np.float64]
 # A violation below this part of the largest carries nothing.
 IDLE = 1e-6
-# How far about the pose starts are, in sizes of the scene and radians; a pose may be a saddle by symmetry.
-STARTS = (0.0, 0.03, 0.3)
+# How far about the pose starts are, in sizes of the scene and radians, since it may be a saddle by symmetry; and how
+# many scattered ones there are, since it may be stuck.
+ABOUT, SCATTERED = (0.0, 0.03, 0.3), 8
 
 
 def conflicting_sets(snapshot: Snapshot) -> list[tuple[int, ...]]:
-    """Disjoint minimal sets of constraints that cannot hold together near a pose, by their places; [] where all can."""
-    starts = [_about(snapshot, reach) for reach in STARTS]
+    """Disjoint minimal sets of constraints that cannot hold together, by their places; [] where all can."""
+    starts = list(_starts(snapshot))
     left = list(range(len(snapshot.scene.constraints)))
     found: list[tuple[int, ...]] = []
     while left:
@@ -44,6 +48,17 @@ def conflicting_sets(snapshot: Snapshot) -> list[tuple[int, ...]]:
         found.append(tuple(core))
         left = [k for k in left if k not in core]
     return found
+
+
+def conflicts_at(scene: Scene, packed: Packed, state: Array) -> list[tuple[str, ...]]:
+    """The same by their names, at the state that a solve left."""
+    try:
+        rows = rows_of(packed, state)
+    except NoPairError:
+        # Then values that were driven since are not told from those of the solve.
+        rows = None
+    found = conflicting_sets(Snapshot(scene, packed, state if rows is None else rows.state, rows, solved=True))
+    return [tuple(scene.constraints[k].name for k in places) for places in sorted(found)]
 
 
 def _attempt(snapshot: Snapshot, which: Sequence[int], starts: Sequence[Array]) -> Array | None:
@@ -66,13 +81,18 @@ def _of_places(problem: Problem, violations: Array, snapshot: Snapshot, which: S
     return np.array([named.get(snapshot.scene.constraints[k].name, 0.0) for k in which])
 
 
-def _about(snapshot: Snapshot, reach: float) -> Array:
-    """The pose, every moving body shifted and turned by about `reach`, the same way in every run."""
+def _starts(snapshot: Snapshot) -> Iterator[Array]:
+    """Poses to try, the pose itself first; the same in every run."""
     rng = np.random.default_rng(0)
-    q = snapshot.q.copy()
-    if reach > 0.0:
-        for k, body in enumerate(snapshot.scene.bodies):
-            if not body.fixed:
-                step = reach * rng.normal(size=6) / np.sqrt(3.0)
-                q[k] = retract(q[k], step * np.repeat([snapshot.scene.scale, 1.0], 3))
-    return q
+    moving = [k for k, body in enumerate(snapshot.scene.bodies) if not body.fixed]
+    sizes = np.repeat([snapshot.scene.scale, 1.0], 3)
+    for reach in ABOUT:
+        q = snapshot.q.copy()
+        q[moving] = retract(q[moving], reach / np.sqrt(3.0) * sizes * rng.normal(size=(len(moving), 6)))
+        yield q
+    for _ in range(SCATTERED):
+        q = snapshot.q.copy()
+        q[moving, :3] += snapshot.scene.scale * rng.uniform(-1.0, 1.0, (len(moving), 3))
+        turns = rng.normal(size=(len(moving), 4))
+        q[moving, 3:] = turns / np.linalg.norm(turns, axis=1, keepdims=True)
+        yield q

@@ -17,11 +17,19 @@ from assembly.constraints.packing import Packed
 from assembly.errors import InputError
 from assembly.solve.row_table import rows_at
 
-__all__ = ["Rows", "rows_of"]
+__all__ = ["NoPairError", "Rows", "moving_columns", "rows_of"]
 
 Array = NDArray[np.float64]
 # Curvature over the scene's size below which a pair's coordinates move nothing.
 FLAT = 1e-6
+
+
+class NoPairError(InputError):
+    """A contact has no extremal pair at a pose; `contact` is its place among the contacts."""
+
+    def __init__(self, contact: int, name: str) -> None:
+        super().__init__(f"q leaves contact {name!r} without an extremal pair; expected a pose where it has one")
+        self.contact = contact
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +69,7 @@ def rows_of(packed: Packed, state: Array) -> Rows:
 
     Raises
     ------
-    InputError
+    NoPairError
         A contact has no extremal pair at this pose.
     """
     m, pairs, n = packed.rows, len(packed.contacts), packed.count
@@ -70,8 +78,7 @@ def rows_of(packed: Packed, state: Array) -> Rows:
     residual, jacobian = np.empty(m + 4 * pairs), np.empty((m + 4 * pairs, 6 * n + 4 * pairs))
     lost = rows_at(packed.table, packed.pool, state, free, residual, jacobian)
     if lost >= 0:
-        name = packed.contacts[lost].name
-        raise InputError(f"q leaves contact {name!r} without an extremal pair; expected a pose where it has one")
+        raise NoPairError(lost, packed.contacts[lost].name)
     which = np.arange(m)
     shares = np.ones(m)
     if (free >= 0).any():

@@ -168,10 +168,10 @@ class Mobility:
     def finite_dof(self) -> int:
         """Degrees of freedom of the poses nearby: the least that was found a small way along the free motions.
 
-        Bodies are moved by 0.02 (sizes of the scene, radians) along every free motion and back and put back onto the
-        constraints by solves, and the rank is taken there; no more than the directions in which they went. So motions
-        from which bodies come back do not count: they exist to first order only. Found when this is first read. Where
-        the rows do not hold it is `dof`.
+        Where rows are dependent, bodies are moved by 0.02 (sizes of the scene, radians) along free motions and put back
+        onto the constraints by solves, and the rank is taken there; no more than the directions in which they went. So
+        motions from which bodies come back do not count: they exist to first order only. Found when this is first
+        read. Where the rows do not hold it is `dof`.
         """
         if self.dof == 0 or not self._worst <= HELD:
             return self.dof

@@ -5,7 +5,7 @@ Bodies are moved along a motion and put back onto the constraints by a solve, wh
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,8 @@ __all__ = ["finite_dof", "path"]
 Array = NDArray[np.float64]
 # How far bodies are moved to count freedoms there, in sizes of the scene and radians.
 REACH = 0.02
+# Mixtures of free motions that are tried, and how far from one bodies may go, in parts of the way.
+MIXTURES, ASTRAY = 2, 0.3
 # Bodies that are put back by more than the rest of this part of the way could not go there.
 ARRIVED = 0.25
 # Toward a singular pose a solve slows down; with violations below this it tells where bodies went all the same.
@@ -50,25 +52,18 @@ def moves(q: Array, other: Array, size: float) -> Array:
     return twists
 
 
-def _at(problem: Problem, solution: Solution, size: float) -> list[Group]:
+def _at(problem: Problem, solution: Solution) -> list[Group]:
     """The groups at a solution of a problem of two-sided rows."""
     rows = rows_of(problem.packed, solution._state)
     return groups_of(solution._scene.bodies, problem.constraints, rows, np.ones(len(rows.owners), dtype=bool))
 
 
-def _directions(groups: Sequence[Group]) -> Iterator[list[Array]]:
-    """Along every free motion and back, all groups at once; then two mixtures, the same in every run."""
-    for k in range(max(group.dof for group in groups)):
-        for sign in (1.0, -1.0):
-            yield [sign * np.eye(group.dof)[k] if k < group.dof else np.zeros(group.dof) for group in groups]
-    rng = np.random.default_rng(0)
-    for _ in range(2):
-        mixture = [rng.normal(size=group.dof) for group in groups]
-        yield [part / np.linalg.norm(part) if part.size else part for part in mixture]
-
-
 def finite_dof(problem: Problem, groups: Sequence[Group], q: Array, size: float) -> int:
     """The least degrees of freedom found near a pose, group by group.
+
+    Where rows are independent the poses that hold them are a smooth surface of that dimension. Else bodies are moved
+    along mixtures of their free motions: if these can go there, and have as many freedoms where they arrive, so can all
+    the others, for a mixture is like any. If not, along every free motion and back.
 
     Parameters
     ----------
@@ -80,34 +75,70 @@ def finite_dof(problem: Problem, groups: Sequence[Group], q: Array, size: float)
     size : float
         The scene's size.
     """
-    least = [group.dof for group in groups]
-    ways: list[list[Array]] = [[] for _ in groups]
-    for parts in _directions(groups):
-        motion = np.zeros((len(q), 6))
-        reach = np.ones(len(groups))
-        for g, (group, part) in enumerate(zip(groups, parts, strict=True)):
+    walks = Walks(problem, [group for group in groups if group.balanced.rank < len(group.rows)], q, size)
+    rng = np.random.default_rng(0)
+    for _ in range(MIXTURES if walks.groups else 0):
+        parts = [rng.normal(size=group.dof) for group in walks.groups]
+        walks.go([part / np.linalg.norm(part) if part.size else part for part in parts])
+    doubtful = [not walks.regular(g) for g in range(len(walks.groups))]
+    for k in range(max((group.dof for group, doubt in zip(walks.groups, doubtful, strict=True) if doubt), default=0)):
+        for sign in (1.0, -1.0):
+            walks.go(
+                [
+                    sign * np.eye(group.dof)[k] if doubt and k < group.dof else np.zeros(group.dof)
+                    for group, doubt in zip(walks.groups, doubtful, strict=True)
+                ]
+            )
+    regular = sum(group.dof for group in groups) - sum(group.dof for group in walks.groups)
+    return regular + sum(walks.least(g) for g in range(len(walks.groups)))
+
+
+class Walks:
+    """Short ways along free motions of groups, and what was found at their ends."""
+
+    def __init__(self, problem: Problem, groups: Sequence[Group], q: Array, size: float) -> None:
+        self.groups = groups
+        self._problem = problem
+        self._q = q
+        self._size = size
+        # For each group: the way that was meant, the way that bodies went, freedoms there.
+        self._ends: list[list[tuple[Array, Array, int]]] = [[] for _ in groups]
+
+    def go(self, parts: Sequence[Array]) -> None:
+        """Move every group along a unit mixture of its free motions, or leave it where it is."""
+        motion = np.zeros((len(self._q), 6))
+        reach = np.ones(len(parts))
+        for g, (group, part) in enumerate(zip(self.groups, parts, strict=True)):
             if part.any():
                 twists = (part @ group.balanced.free).reshape(-1, 6)
                 reach[g] = REACH / np.linalg.norm(twists, axis=1).max()
                 motion[list(group.places)] = reach[g] * twists
-        solution = problem.solve(moved(q, motion, size))
-        violation = problem.violations(solution).max(initial=0.0)
+        solution = self._problem.solve(moved(self._q, motion, self._size))
+        violation = self._problem.violations(solution).max(initial=0.0)
         if not violation <= ROUGH:
-            continue
+            return
         holds = violation <= HELD
-        there = {group.places: group.dof for group in _at(problem, solution, size)} if holds else {}
-        gone = moves(q, solution.q, size)
-        for g, (group, part) in enumerate(zip(groups, parts, strict=True)):
+        there = {group.places: group.dof for group in _at(self._problem, solution)} if holds else {}
+        gone = moves(self._q, solution.q, self._size)
+        for g, (group, part) in enumerate(zip(self.groups, parts, strict=True)):
             if part.any():
                 way = group.balanced.free @ gone[list(group.places)].ravel() / reach[g]
-                ways[g].append(way)
-                if np.linalg.norm(way) >= ARRIVED:
-                    least[g] = min(least[g], there.get(group.places, group.dof))
-    for g, own in enumerate(ways):
-        if own:
-            sizes = np.linalg.svd(np.array(own), compute_uv=False)
-            least[g] = min(least[g], int(np.count_nonzero(sizes > DISTINCT)))
-    return sum(least)
+                self._ends[g].append((part, way, there.get(group.places, group.dof)))
+
+    def regular(self, g: int) -> bool:
+        """Whether a group went everywhere it was meant to go, and has as many freedoms there."""
+        return len(self._ends[g]) > 0 and all(
+            np.linalg.norm(way - part) <= ASTRAY and dof == self.groups[g].dof for part, way, dof in self._ends[g]
+        )
+
+    def least(self, g: int) -> int:
+        """The least freedoms of a group at the end of a way, and no more than directions in which it went."""
+        least = self.groups[g].dof
+        if self._ends[g] and not self.regular(g):
+            least = min([least, *(dof for _, way, dof in self._ends[g] if np.linalg.norm(way) >= ARRIVED)])
+            sizes = np.linalg.svd(np.array([way for _, way, _ in self._ends[g]]), compute_uv=False)
+            least = min(least, int(np.count_nonzero(sizes > DISTINCT)))
+        return least
 
 
 def path(problem: Problem, q: Array, motion: Array, size: float, levels: Array) -> Array:
@@ -144,16 +175,16 @@ def path(problem: Problem, q: Array, motion: Array, size: float, levels: Array) 
                 blocked = True
                 break
             q, solution = trial.q, trial
-            motion = _onward(problem, solution, motion, size)
+            motion = _onward(problem, solution, motion)
         gone = level
         poses[k] = q
     return poses
 
 
-def _onward(problem: Problem, solution: Solution, motion: Array, size: float) -> Array:
+def _onward(problem: Problem, solution: Solution, motion: Array) -> Array:
     """What of a motion is free at the next pose."""
     onward = np.zeros_like(motion)
-    for group in _at(problem, solution, size):
+    for group in _at(problem, solution):
         places = list(group.places)
         free = group.balanced.free
         onward[places] = (free.T @ (free @ motion[places].ravel())).reshape(-1, 6)

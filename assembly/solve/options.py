@@ -41,6 +41,8 @@ class Options:
         Smallest mu.
     radius : float
         First bound of a step: lengths relative to the scene's size, and radians.
+    verbose : int
+        1 prints a table of the iterations after the solve; nothing is printed at 0.
     """
 
     tolerance: float = 2e-13
@@ -49,9 +51,11 @@ class Options:
     penalty: float = 1e-2
     penalty_floor: float = 1e-6
     radius: float = 0.2
+    verbose: int = 0
 
     def __post_init__(self) -> None:
         integer("max_iterations", self.max_iterations, 0, 10**9)
+        integer("verbose", self.verbose, 0, 1)
         for name, high in (("tolerance", 1e-2), ("stationarity", 1e-2), ("penalty", 1e3), ("radius", 1.0)):
             value = number(name, getattr(self, name))
             if not 0.0 < value <= high:

@@ -57,7 +57,7 @@ class Balanced:
     @classmethod
     def of(cls, jacobian: Array, residual: float, tolerance: float | None = None) -> Balanced:
         """Balance rows in twists at the bodies' origins that hold to a residual; a tolerance decides if it is given."""
-        blocks = jacobian.reshape(len(jacobian), -1, 6)
+        blocks = jacobian.reshape(len(jacobian), jacobian.shape[1] // 6, 6)
         centers = np.array([_center(blocks[:, b]) for b in range(blocks.shape[1])]).reshape(-1, 3)
         shifted = blocks.copy()
         shifted[:, :, 3:] -= np.cross(centers[None], blocks[:, :, :3])
@@ -93,13 +93,6 @@ class Balanced:
         motions = self._svd[1][self.rank :].reshape(-1, len(self.centers), 6).copy()
         motions[:, :, :3] -= np.cross(motions[:, :, 3:], self.centers[None])
         return orthonormal(motions.reshape(len(motions), 6 * len(self.centers)))
-
-    def rank_of(self, which: NDArray[np.int64] | list[int]) -> int:
-        """Rank of some of the rows."""
-        if len(which) == 0:
-            return 0
-        values: Array = np.linalg.svd(self.rows[which], compute_uv=False)
-        return self._cut(values)
 
     def _cut(self, values: Array) -> int:
         """How many of falling singular values count."""

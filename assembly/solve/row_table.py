@@ -50,6 +50,7 @@ from assembly.proximity.free_pair import VARIABLES, VECTORS
 from assembly.solve.augmented_lagrangian import FREE_BELOW
 from assembly.solve.contacts import free_folds, start_contacts
 from assembly.solve.rows import envelope, place_rows
+from assembly.solve.search import goal
 
 
 @kernel(inner=True)
@@ -104,24 +105,22 @@ def spread_rows(table, free, count, packed, out):
                 spread_block(packed, table[tape + TAPE_ROW_AT] + v, EXTRA_COLUMN + 6 * (b - 2), body, out)
 
 
-@kernel
-def rows_at(table, pool, state, free, residual, jacobian):
-    """Evaluate all rows at a state. Returns a contact that has no pair there, or -1.
+@kernel(inner=True, allocates=True)
+def point_at(table, pool, state, free):
+    """A point of the loop at a state: whether all its rows are evaluated (-1, or the contact that is lost), how many
+    contacts are at folds, the point, and what pairs and tapes need.
 
-    state : tracked values are overwritten by those found; NaN parameters of a contact are found by a global start
-    free (contacts) : place among the contacts at folds, or -1
-    residual (m + 4 contacts), jacobian (m + 4 contacts, 6 bodies + 4 contacts) : as many rows and columns are written
-    as there are folds
+    Parameters of contacts that are NaN are found by a global start, pairs at folds are freed, as the loop does.
     """
     pairs = table[CONTACTS]
     tracks = table[TRACKED]
     most = table[ROWS] + 4 * pairs
     q = np.empty((table[BODIES], 7))
-    tracked = state[7 * table[BODIES] :][: 4 * tracks].reshape((tracks, 4))
+    tracked = np.empty((tracks, 4))
     start = np.empty((tracks, 4))
     records = np.ones((pairs + table[JOINTS], CONTACT_RECORD))
     packed = np.zeros((most, EXTRA_COLUMN + 6 * table[EXTRA]))
-    point = (q, tracked, records, residual, packed)
+    point = (q, tracked, records, np.zeros(most), packed)
     o = table[TAPE_ROOM]
     room = (np.empty(table[o]), np.empty(table[o + 1]), np.empty(table[o + 2]))
     loose = (
@@ -132,44 +131,72 @@ def rows_at(table, pool, state, free, residual, jacobian):
         np.empty((tracks, 4)),
     )
     scaled_poses(table, pool, state, q)
+    for k in range(tracks):
+        for i in range(4):
+            tracked[k, i] = state[7 * table[BODIES] + 4 * k + i]
     for k in range(pairs):
         free[k] = -1
+    count = 0
     lost = start_contacts(table, pool, q, tracked, free, loose[1])
-    if lost >= 0:
-        return lost
-    # Every contact counts here, also one that pushes nothing.
-    active = np.ones(most)
-    count = free_folds(table, pool, records, tracked, active, free, loose[1], -1.0, lost)
-    while True:
-        for k in range(tracks):
-            for i in range(4):
-                start[k, i] = tracked[k, i]
-        lost = evaluate(table, pool, start, math.inf, loose, room, point)
-        before = count
-        count = free_folds(table, pool, records, tracked, active, free, loose[1], FREE_BELOW, lost)
-        if count == before:
-            break
+    if lost < 0:
+        # Every contact counts here, also one that pushes nothing.
+        active = np.ones(most)
+        count = free_folds(table, pool, records, tracked, active, free, loose[1], -1.0, -1)
+        before = -1
+        while count != before:
+            for k in range(tracks):
+                for i in range(4):
+                    start[k, i] = tracked[k, i]
+            lost = evaluate(table, pool, start, math.inf, loose, room, point)
+            before = count
+            count = free_folds(table, pool, records, tracked, active, free, loose[1], FREE_BELOW, lost)
+    return lost, count, point, loose, room
+
+
+@kernel
+def rows_at(table, pool, state, free, residual, jacobian):
+    """Evaluate all rows at a state. Returns a contact that has no pair there, or -1.
+
+    state : tracked values are overwritten by those found; NaN parameters of a contact are found by a global start
+    free (contacts) : place among the contacts at folds, or -1
+    residual (m + 4 contacts), jacobian (m + 4 contacts, 6 bodies + 4 contacts) : as many rows and columns are written
+    as there are folds
+    """
+    lost, count, point, _loose, _room = point_at(table, pool, state, free)
+    _q, tracked, _records, values, packed = point
+    for k in range(table[TRACKED]):
+        for i in range(4):
+            state[7 * table[BODIES] + 4 * k + i] = tracked[k, i]
+    for r in range(table[ROWS] + 4 * count):
+        residual[r] = values[r]
     if lost < 0:
         spread_rows(table, free, count, packed, jacobian)
     return lost
 
 
 @kernel
-def gradient_at(table, pool, state, gradient):
-    """The objective's gradient in the twists of all bodies (6 bodies), zero for fixed ones. Returns its value."""
-    n = 6 * table[MOVING]
-    q = np.empty((table[BODIES], 7))
-    scaled_poses(table, pool, state, q)
-    o = table[TAPE_ROOM]
-    room = (np.empty(table[o]), np.empty(table[o + 1]), np.empty(table[o + 2]))
-    rows = table[ROWS]
-    bases = np.empty((rows, 3 + table[EXTRA]), np.int64)
-    sides = np.empty(rows, np.int64)
-    last = np.empty(n, np.int64)
-    place_rows(table, np.full(table[CONTACTS], -1), bases, sides)
-    envelope(table, bases, rows, n, last, sides)
+def gradient_at(table, pool, state, free, gradient, tips):
+    """The objective's gradient in the twists of all bodies (6 bodies), zero for fixed ones. Returns its value.
+
+    `tips` is None where no term is a dexterity. Dexterities are left out where a contact has no pair.
+    """
+    lost, count, point, loose, room = point_at(table, pool, state, free)
+    rows = table[ROWS] + 4 * count
+    n = 6 * table[MOVING] + 4 * count
+    shape = (
+        np.empty((rows, 3 + table[EXTRA]), np.int64),
+        np.empty(rows, np.int64),
+        np.empty(n, np.int64),
+        np.empty(rows, np.int64),
+    )
+    place_rows(table, free, shape[0], shape[1])
+    envelope(table, shape[0], rows, n, shape[2], shape[3])
     slopes = np.empty(n)
-    value = objective(table, pool, q, 1, room, last, slopes, np.empty((n, n)))
+    curves = np.empty((n, n))
+    if lost < 0:
+        value = goal(table, pool, shape, rows, loose, room, tips, point, 1, slopes, curves)
+    else:
+        value = objective(table, pool, point[0], 1, room, shape[2], slopes, curves)
     for b in range(table[BODIES]):
         s = table[table[SLOTS] + b]
         for k in range(6):

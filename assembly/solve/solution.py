@@ -11,19 +11,27 @@ from numpy.typing import NDArray
 
 from assembly.constraints.constraint import Constraint
 from assembly.constraints.contact import Contact
+from assembly.constraints.joint import Joint
 from assembly.constraints.packing import Packed
+from assembly.constraints.program import TERM_TABLE, TERMS
+from assembly.constraints.terms import POINT_DISTANCE, POSTURE, POSTURE_PARAMETERS, TERM
 from assembly.errors import InputError
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import Pose
 from assembly.proximity.pairs import ContactPair, extremal_pair
 from assembly.solve.augmented_lagrangian import COUNT, CULPRIT, DUAL, IMPROPER, OBJECTIVE, VIOLATION
+from assembly.solve.measure import measure, standing
 
 if TYPE_CHECKING:
     from assembly.kinematics.body import BodyFace
+    from assembly.solve.mobility import Mobility
+    from assembly.solve.statics import Wrench
 
 __all__ = ["Iteration", "Scene", "Solution", "Status"]
 
 Array = NDArray[np.float64]
+# Moving bodies whose freedoms are printed: counting takes a second for some 300, and grows with the cube.
+MOST_COUNTED = 200
 
 
 class Status(Enum):
@@ -52,6 +60,16 @@ class Scene:
         self.contacts = contacts
         self.faces = faces
         self.scale = scale
+        self._wished: NDArray[np.int64] | None = None
+
+    def wished(self, packed: Packed) -> NDArray[np.int64]:
+        """Where the pool has what the objective asks for and may change between solves: targets and postures."""
+        if self._wished is None:
+            records = packed.table[packed.table[TERM_TABLE] :][: TERM * packed.table[TERMS]].reshape(-1, TERM)
+            sizes = {POINT_DISTANCE: 7, POSTURE: POSTURE_PARAMETERS}
+            places = [np.arange(sizes.get(kind, 0)) + at for kind, _, at, *_ in records.tolist()]
+            self._wished = np.concatenate([*places, np.empty(0, dtype=np.int64)]).astype(np.int64)
+        return self._wished
 
     def index(self, body: Body | str) -> int:
         """Place of a body, given itself or its name."""
@@ -81,12 +99,22 @@ class Solution:
     objective : float
         In the user's units.
     feasibility : float
-        Largest violation of a constraint, in the user's units, evaluated at `q`.
+        Largest violation of a constraint, in the user's units, evaluated at `q`. Of a contact that has no extremal pair
+        there it is the distance of the points in `contacts`. Infinite only where an `Expression` has no finite value,
+        and so is the objective of one.
     stationarity : float
-        Largest component of the Lagrangian's gradient, scaled.
+        Largest component of the Lagrangian's gradient, scaled; of the objective's where a contact was lost.
     violations : dict of name -> float
     multipliers : dict of name -> array
         Of L = objective + sum multiplier . residual, in the user's units; not positive for residual >= 0.
+    wrenches : dict of name -> dict of body's name -> Wrench
+        What each constraint exerts on its bodies: multipliers as forces and torques.
+    values : dict of "joint.freedom" -> float
+        Every freedom of every joint, in the user's units and radians; driven and limited angles go on past whole turns.
+    conflicting : list of name
+        Of an INFEASIBLE solve: constraints that cannot hold together; `conflicting_sets` has the minimal sets.
+    mobility : Mobility
+        Degrees of freedom at `q`, free motions, redundant constraints.
     contacts : dict of name -> ContactPair
     iterations : int
     seconds : float
@@ -105,6 +133,8 @@ class Solution:
         self._rows = history
         self.status = status
         self.seconds = seconds
+        # Flat contacts alone need it again, for the center of their pressure.
+        self._wishes = packed.pool[scene.wished(packed)] if scene.contacts else None
 
     @cached_property
     def q(self) -> Array:
@@ -130,22 +160,37 @@ class Solution:
     @property
     def objective(self) -> float:
         """Value of the objective, in the user's units."""
-        return self._result(OBJECTIVE) * self._packed.unit
+        value = self._result(OBJECTIVE)
+        if np.isfinite(value) or not self._is_lost:
+            return value * self._packed.unit
+        from assembly.solve.lost import goal
+
+        return goal(self)[0]
 
     @property
     def feasibility(self) -> float:
         """Largest violation of a constraint, in the user's units."""
-        return self._result(VIOLATION)
+        return max(self.violations.values(), default=0.0)
 
     @property
     def stationarity(self) -> float:
         """Largest component of the Lagrangian's gradient, scaled."""
-        return self._result(DUAL)
+        value = self._result(DUAL)
+        if np.isfinite(value) or not self._is_lost:
+            return value
+        from assembly.solve.lost import goal
+
+        return goal(self)[1]
+
+    @property
+    def _is_lost(self) -> bool:
+        """Whether the loop could not evaluate its rows at the pose, because a contact had no pair there."""
+        return bool(self._scene.contacts) and self._result(VIOLATION) == np.inf
 
     @property
     def history(self) -> Array:
-        """A row an iteration, columns `Iteration.COLUMNS`."""
-        return self._rows[: self.iterations + 1]
+        """A row an iteration, columns `Iteration.COLUMNS`; none where a contact was lost at the start."""
+        return self._rows[: 0 if self._is_lost and self.iterations == 0 else self.iterations + 1]
 
     @property
     def success(self) -> bool:
@@ -155,6 +200,10 @@ class Solution:
     @cached_property
     def violations(self) -> dict[str, float]:
         """Violation of every constraint, by name: its largest; lengths in the user's unit, angles in radians."""
+        if self._is_lost:
+            from assembly.solve.lost import violations
+
+            return violations(self)
         packed = self._packed
         each = np.where(packed.one_sided, np.maximum(-self._residuals, 0.0), np.abs(self._residuals))
         return {
@@ -174,6 +223,61 @@ class Solution:
         }
 
     @cached_property
+    def wrenches(self) -> dict[str, dict[str, Wrench]]:
+        """What every constraint exerts on each of its bodies, by their names."""
+        from assembly.solve.statics import wrenches
+
+        return wrenches(self)
+
+    @cached_property
+    def values(self) -> dict[str, float]:
+        """Every freedom of every joint, "joint.freedom": lengths in the user's unit, angles in radians."""
+        packed = self._packed
+        near = dict(
+            zip(map(id, packed._angles), self._state[packed.angles_at : packed.multipliers_at : 4], strict=True)
+        )
+        values = {}
+        for joint in self._scene.constraints:
+            for name, freedom in joint.freedoms.items() if isinstance(joint, Joint) else ():
+                coordinate = freedom.coordinate
+                pair = coordinate.frames
+                frames = standing(
+                    coordinate, self.q, (self._scene.index(pair.frame_a.body), self._scene.index(pair.frame_b.body))
+                )
+                values[f"{joint.name}.{name}"] = measure(coordinate, frames, float(near.get(id(coordinate), 0.0)))
+        return values
+
+    @cached_property
+    def mobility(self) -> Mobility:
+        """Degrees of freedom at `q`, free motions, redundant constraints; `Assembly.mobility` has options."""
+        from assembly.solve.mobility import Mobility
+
+        return Mobility.at(self._scene, self._packed, self._state, solved=True)
+
+    @cached_property
+    def conflicting_sets(self) -> list[tuple[str, ...]]:
+        """Disjoint minimal sets of constraints that cannot hold together; [] where the status is not INFEASIBLE.
+
+        Found by solves that leave out one constraint after the other, when this is first read.
+        """
+        if self.status is not Status.INFEASIBLE:
+            return []
+        from assembly.solve.conflicts import conflicts_at
+
+        return conflicts_at(self._scene, self._packed, self._state)
+
+    @property
+    def conflicting(self) -> list[str]:
+        """Names in `conflicting_sets`, sorted, each once."""
+        return sorted({name for names in self.conflicting_sets for name in names})
+
+    def _wished_pool(self) -> Array:
+        """The pool with the objective as it was in this solve."""
+        pool = self._packed.pool.copy()
+        pool[self._scene.wished(self._packed)] = self._wishes
+        return pool
+
+    @cached_property
     def contacts(self) -> dict[str, ContactPair]:
         """The extremal pair of every contact at `q`, found again from the loop's parameters."""
         pairs = {}
@@ -191,7 +295,7 @@ class Solution:
 
     @property
     def message(self) -> str:
-        """The status in a sentence, with the constraint that is violated most."""
+        """The status in a sentence; what is violated, worst first, and what contradicts what."""
         text = self.status.value
         culprit = int(self._result(CULPRIT))
         if self.status is Status.CONTACT_LOST and culprit >= 0:
@@ -204,9 +308,18 @@ class Solution:
         if held_off and not self.success:
             named = ", ".join(f"{name!r} ({self.violations[name]:.3g})" for name in held_off)
             text += f"; violated: {named}"
+        if self.status is Status.INFEASIBLE:
+            named = " and ".join(", ".join(map(repr, names)) for names in self.conflicting_sets)
+            text += f"; conflicting: {named or 'none, all hold from another start'}"
         if self._result(IMPROPER) > 0.0:
             text += "; at a contact the surfaces cross beside the point (indefinite relative curvature)"
         return text
+
+    def iteration_table(self) -> str:
+        """The history as text, a line an iteration."""
+        lines = ["   " + "".join(f"{name:>15}" for name in Iteration.COLUMNS)]
+        lines += [f"{k:>3}" + "".join(f"{value:>15.6e}" for value in row) for k, row in enumerate(self.history)]
+        return "\n".join(lines)
 
     def __repr__(self) -> str:
         return f"Solution({self.status.name}, feasibility={self.feasibility:.1e}, iterations={self.iterations})"
@@ -217,6 +330,14 @@ class Solution:
             f"objective {self.objective:.6g}   feasibility {self.feasibility:.1e}   "
             f"stationarity {self.stationarity:.1e}   {self.iterations} iterations   {1e6 * self.seconds:.0f} us",
         ]
+        if sum(not body.fixed for body in self._scene.bodies) <= MOST_COUNTED:
+            try:
+                freedoms = self.mobility.dof
+            except InputError:
+                # A contact without a pair has no rows to count.
+                pass
+            else:
+                lines[1] += f"   {freedoms} degree{'' if freedoms == 1 else 's'} of freedom"
         worst = sorted(self.violations.items(), key=lambda item: -item[1])[:5]
         lines += [f"  {name:<24} violation {value:.1e}" for name, value in worst]
         for body, row in zip(self._scene.bodies, self.q, strict=True):

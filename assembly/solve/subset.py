@@ -72,8 +72,8 @@ class Problem:
         """The constraints of the problem."""
         return self._scene.constraints
 
-    def solve(self, q: Array, after: Solution | None = None) -> Solution:
-        """The nearest poses that hold the constraints, from poses (n, 7); tracked values go on from a solution's."""
+    def start(self, q: Array, after: Solution | None = None) -> Array:
+        """The state of a solve from poses (n, 7); tracked values go on from a solution's."""
         packed = self.packed
         state = np.zeros(packed.results_at + RESULTS)
         state[: packed.contacts_at] = q.ravel()
@@ -86,8 +86,14 @@ class Problem:
                 tracked[k] = self._near[contact.name]
             for k, angle in enumerate(packed._angles):
                 tracked[len(packed.contacts) + k] = self._near[id(angle)]
+        return state
+
+    def solve(self, q: Array, after: Solution | None = None) -> Solution:
+        """The nearest poses that hold the constraints, from poses (n, 7); tracked values go on from a solution's."""
+        packed = self.packed
+        state = self.start(q, after)
         history = np.empty((1, HISTORY))
-        code = solve_program(packed.table, packed.pool, Options().settings(), state, history)
+        code = solve_program(packed.table, packed.pool, Options().settings(), state, history, packed.tips)
         return Solution(self._scene, packed, state, _STATUSES[code], 0.0, history)
 
     def violations(self, solution: Solution) -> Array:

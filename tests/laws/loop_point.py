@@ -77,7 +77,17 @@ class LoopPoint:
         """Value, gradient (n,) and Hessian (n, n) of the objective."""
         gradient, hessian = np.zeros(self.n), np.zeros((self.n, self.n))
         value = goal(
-            self.table, self.pool, self.shape, self.rows, self.loose, self.room, self.point, order, gradient, hessian
+            self.table,
+            self.pool,
+            self.shape,
+            self.rows,
+            self.loose,
+            self.room,
+            self.packed.tips,
+            self.point,
+            order,
+            gradient,
+            hessian,
         )
         return value, gradient, np.triu(hessian) + np.triu(hessian, 1).T
 

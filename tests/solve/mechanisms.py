@@ -18,7 +18,8 @@ def chain(axes, points, size=1.0, x=None):
 
 
 def planar_four_bar(size=1.0):
-    return chain([(0, 0, 1)] * 4, [(0, 0, 0), (0.5, 0.8, 0), (2.5, 1.5, 0), (3, 0, 0)], size)
+    """A crank that goes around, 0.5 + 3 < 2.46 + 1.58."""
+    return chain([(0, 0, 1)] * 4, [(0, 0, 0), (0.3, 0.4, 0), (2.5, 1.5, 0), (3, 0, 0)], size)
 
 
 def transform(angle, length, twist):

@@ -209,6 +209,20 @@ def test_bodies_that_nothing_ties_together_share_no_motion():
     assert moving[:, 2].sum() == 1 and not (moving[:, 2] & (moving[:, 1] | moving[:, 3])).any()
 
 
+def test_bodies_without_constraints_move_every_way():
+    ground, door, loose = asm.Body("ground", fixed=True), asm.Body("door"), asm.Body("loose", position=(1, 2, 3))
+    scene = asm.Assembly([ground, loose, door])
+    assert scene.mobility().dof == 12 and scene.mobility().redundant == []
+    scene.constrain(asm.Revolute(ground, door, "hinge"))
+    mobility = scene.mobility()
+    check(scene, mobility)
+    assert mobility.dof == mobility.finite_dof == 7
+    # Its own six coordinates, one by one.
+    own = mobility.free_motions[:6, 1] / np.repeat([mobility.size, 1.0], 3)
+    np.testing.assert_allclose(np.abs(own).sum(axis=0), np.ones(6), rtol=0, atol=1e-13)
+    assert "slides along (1, 0, 0)" in str(mobility)
+
+
 def test_one_sided_rows_do_not_count():
     ground, door = asm.Body("ground", fixed=True), asm.Body("door", asm.shapes.sphere(0.5))
     wall = asm.Body("wall", asm.shapes.plane(4, 4), (0, 0, -0.5), fixed=True)
@@ -359,7 +373,7 @@ def test_tolerance_can_be_given():
     [
         (lambda s: s.mobility(drives=1), "drives is 1; expected True or False"),
         (lambda s: s.mobility(tolerance=0.0), "tolerance is 0; expected a positive number"),
-        (lambda s: s.mobility(np.zeros((2, 7))), "q0 has shape"),
+        (lambda s: s.mobility(np.zeros((2, 7))), "q has shape"),
         (lambda s: s.mobility(planar_four_bar().solve()), "q is a solution of another assembly"),
         (lambda s: s.mobility().trajectory(1), "k is 1; expected an integer from 0 to 0"),
         (lambda s: s.mobility().trajectory(0, amplitude=0.0), "amplitude is 0; expected a positive number"),

@@ -1,0 +1,1 @@
+"""Many solves of one scene: several starts, sweeps."""

@@ -1,0 +1,75 @@
+"""Several starts of one scene, and the distinct solutions they lead to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.constraints.packing import Packed
+from assembly.constraints.program import TERM_TABLE, TERMS
+from assembly.constraints.terms import POSTURE, POSTURE_POSITION, TERM, TERM_BODY, TERM_FOLLOWS, TERM_KIND
+from assembly.constraints.terms import TERM_PARAMETERS as PARAMETERS
+from assembly.errors import integer
+from assembly.solve.solution import Solution
+
+if TYPE_CHECKING:
+    from assembly.assembly import Assembly
+
+__all__ = ["solve_all"]
+
+Array = NDArray[np.float64]
+# Poses that differ by less are the same: lengths over the scene's size, radians.
+SAME = 1e-6
+
+
+def solve_all(scene: Assembly, starts: int, seed: int, options: Mapping[str, Any]) -> list[Solution]:
+    """See `Assembly.solve_all`."""
+    count = integer("starts", starts, 1, 10**6)
+    rng = np.random.default_rng(integer("seed", seed, 0, 2**63 - 1))
+    packed = scene.packed()
+    moving = [k for k, body in enumerate(scene.bodies) if not body.fixed]
+    found: list[Solution] = []
+    with _postures_from(packed, scene.q):
+        for start in range(count):
+            q = scene.q
+            if start > 0:
+                q[moving, :3] += packed.scale * rng.uniform(-1.0, 1.0, (len(moving), 3))
+                turns = rng.normal(size=(len(moving), 4))
+                q[moving, 3:] = turns / np.linalg.norm(turns, axis=1, keepdims=True)
+            solution = scene.solve(q, **options)
+            if solution.success and not any(_is_same(solution.q, other.q, packed.scale) for other in found):
+                found.append(solution)
+    # Of equal objectives, which are so up to rounding only where a scene is symmetric, the first found comes first.
+    return sorted(found, key=lambda solution: solution.objective)
+
+
+def _is_same(q: Array, other: Array, size: float) -> bool:
+    """Whether all bodies are at the same place; a quaternion and its negative are the same turn."""
+    if np.abs(q[:, :3] - other[:, :3]).max() > SAME * size:
+        return False
+    # |e - f| is half the angle between them, where it is small.
+    signs = np.where((q[:, 3:] * other[:, 3:]).sum(axis=1, keepdims=True) < 0.0, -1.0, 1.0)
+    return bool(np.linalg.norm(q[:, 3:] - signs * other[:, 3:], axis=1).max() <= 0.5 * SAME)
+
+
+@contextmanager
+def _postures_from(packed: Packed, q: Array) -> Iterator[None]:
+    """Postures that would follow the start of each solve are measured from poses (n, 7) meanwhile."""
+    table, pool = packed.table, packed.pool
+    terms = range(table[TERM_TABLE], table[TERM_TABLE] + TERM * table[TERMS], TERM)
+    following = [at for at in terms if table[at + TERM_KIND] == POSTURE and table[at + TERM_FOLLOWS] == 1]
+    try:
+        for at in following:
+            table[at + TERM_FOLLOWS] = 0
+            place = table[at + PARAMETERS] + POSTURE_POSITION
+            row = q[table[at + TERM_BODY]]
+            pool[place : place + 3] = (row[:3] - packed.reference) / packed.scale
+            pool[place + 3 : place + 7] = row[3:]
+        yield
+    finally:
+        for at in following:
+            table[at + TERM_FOLLOWS] = 1

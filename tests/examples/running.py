@@ -1,0 +1,26 @@
+"""Run an example as a user does, in a folder of its own."""
+
+from __future__ import annotations
+
+from contextlib import redirect_stdout
+from importlib.util import module_from_spec, spec_from_file_location
+from io import StringIO
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+
+
+def run_example(name: str, folder: Path) -> SimpleNamespace:
+    """The example's module, what its main returned, the lines it printed, and the page it wrote."""
+    spec = spec_from_file_location(name, EXAMPLES / f"{name}.py")
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(StringIO()) as printed:
+        patch.chdir(folder)
+        result = module.main()
+    assert [path.name for path in folder.iterdir()] == [f"{name}.html"]
+    page = (folder / f"{name}.html").read_text(encoding="utf-8")
+    return SimpleNamespace(module=module, result=result, lines=printed.getvalue().splitlines(), page=page)

@@ -1,0 +1,97 @@
+"""Several starts: the distinct solutions, each once, in order, the same in every run."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import assembly as asm
+from assembly.errors import InputError
+
+
+def four_bar():
+    """A crank at 1 radian, a coupler and a rocker in the plane: two circles meet in two points."""
+    ground = asm.Body("ground", fixed=True)
+    crank, coupler, rocker = (asm.Body(name) for name in ("crank", "coupler", "rocker"))
+    scene = asm.Assembly([ground, crank, coupler, rocker])
+    scene.constrain(
+        asm.Revolute(ground, crank, "a", angle=1.0),
+        asm.Revolute(crank.frame((1, 0, 0)), coupler, "b"),
+        asm.Revolute(coupler.frame((3, 0, 0)), rocker.frame((2.5, 0, 0)), "c"),
+        asm.Revolute(ground.frame((3.2, 0, 0)), rocker, "d"),
+    )
+    return scene
+
+
+def tips():
+    """Where coupler and rocker meet: the circles about the crank's tip and about the rocker's foot."""
+    a, b = np.array([np.cos(1.0), np.sin(1.0)]), np.array([3.2, 0.0])
+    d = np.linalg.norm(b - a)
+    along = (d * d + 3.0**2 - 2.5**2) / (2.0 * d)
+    across = np.sqrt(9.0 - along**2) * np.array([a[1] - b[1], b[0] - a[0]]) / d
+    return a + along * (b - a) / d + across, a + along * (b - a) / d - across
+
+
+def test_both_ways_to_close_a_four_bar_are_found():
+    scene = four_bar()
+    found = scene.solve_all(starts=20)
+    assert len(found) == 2 and all(solution.success for solution in found)
+    ends = [solution.pose("coupler").apply((3, 0, 0)) for solution in found]
+    for tip in tips():
+        assert min(np.linalg.norm(end - [*tip, 0.0]) for end in ends) < 1e-10
+    # From the same poses measured, the nearer one first.
+    assert found[0].objective < found[1].objective
+    for solution in found:
+        moved = solution.q - scene.q
+        turned = 1.0 - np.abs((solution.q[:, 3:] * scene.q[:, 3:]).sum(axis=1)) ** 2
+        lever = 0.5 * scene.packed().scale
+        expected = (moved[:, :3] ** 2).sum() + 4.0 * lever**2 * turned.sum()
+        assert solution.objective == pytest.approx(expected, rel=1e-9)
+
+
+def test_the_same_seed_finds_the_same():
+    first, again = (four_bar().solve_all(starts=6, seed=3) for _ in range(2))
+    assert len(first) == len(again) > 0
+    for one, other in zip(first, again, strict=True):
+        np.testing.assert_array_equal(one.q, other.q)
+
+
+def test_one_start_is_the_bodies_poses():
+    scene = four_bar()
+    scene.bodies[1].pose = asm.Pose.from_axis_angle((0, 0, 1), 0.9)
+    scene.minimize(asm.PointDistance(scene.bodies[3].point(1, 0, 0), (1, 2, 0)))
+    found = scene.solve_all(starts=1)
+    assert len(found) == 1
+    np.testing.assert_array_equal(found[0].q, scene.solve().q)
+
+
+def test_solutions_are_of_the_scene_and_leave_it_as_it_was():
+    scene = four_bar()
+    before, alone = scene.q, scene.solve()
+    found = scene.solve_all(starts=5, max_iterations=200)
+    np.testing.assert_array_equal(scene.q, before)
+    # A solve follows its start again, and goes on from what was found.
+    np.testing.assert_array_equal(scene.solve().q, alone.q)
+    onward = scene.solve(found[-1])
+    np.testing.assert_allclose(onward.q, found[-1].q, rtol=0, atol=1e-10)
+    assert onward.objective < 1e-18 < found[-1].objective
+
+
+def test_what_cannot_be_has_no_solutions():
+    scene = four_bar()
+    scene.constraints[0].angle = None
+    scene.constrain(asm.Distance(scene.bodies[0], scene.bodies[1].point(1, 0, 0), 2.0, "wrong"))
+    assert scene.solve_all(starts=3) == []
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"starts": 0}, "starts is 0; expected an integer from 1"),
+        ({"seed": -1}, "seed is -1; expected an integer from 0"),
+        ({"tolerence": 1e-9}, "option 'tolerence' is unknown"),
+    ],
+)
+def test_bad_input(options, text):
+    with pytest.raises(InputError, match=text):
+        four_bar().solve_all(**options)
