@@ -103,7 +103,7 @@ class Wrench:
         return cls(given[:3], quaternion_rate_map(row[3:]).T @ given[3:], row)
 
     def __repr__(self) -> str:
-        force, torque = (", ".join(f"{value:.6g}" for value in part) for part in (self.force, self.torque))
+        force, torque = (", ".join(f"{value + 0.0:.6g}" for value in part) for part in (self.force, self.torque))
         return f"Wrench(force=({force}), torque=({torque}))"
 
 
