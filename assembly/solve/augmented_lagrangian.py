@@ -25,6 +25,7 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly.constraints.program import (
+    ANGLE,
     BODIES,
     CONTACT_RECORD,
     CONTACTS,
@@ -36,11 +37,13 @@ from assembly.constraints.program import (
     JOINTS,
     KIND,
     MOVING,
+    PARAMETERS,
     REFERENCE,
     ROW,
     ROW_TABLE,
     ROWS,
     SCALE,
+    SECOND,
     SLOTS,
     TAPE_ROOM,
     TRACKED,
@@ -82,6 +85,8 @@ RESTORATIONS = 3
 WEAK = 1e-3
 # A violation above this, at the stationary point of all violations, tells that the rows cannot hold.
 TOUCHING = 1e-9
+# Multipliers this much stronger than the objective's slope are looked at once more.
+EXCESS = 10.0
 # Bodies are gathered where a start violates a row of a joint by more than this.
 SCATTERED = 0.5
 # Where violations are stationary, this much curvature downward makes a saddle of it; a small move leads off it, in a
@@ -122,6 +127,47 @@ def choose_multipliers(shape, rows, here, shortened, good, active, gradient, scr
 
 
 @kernel(inner=True)
+def strongest(values, count):
+    """The largest of the first so many, without its sign."""
+    most = 0.0
+    for i in range(count):
+        most = max(most, abs(values[i]))
+    return most
+
+
+@kernel(inner=True)
+def least_multipliers(shape, rows, here, active, gradient, scratch, gram, dual, y, better_y):
+    """The shortest multipliers that balance the objective, if they do so as well as y; into y. The dual residual."""
+    bases, one_sided, _last, last_row = shape
+    residual = here[3]
+    jacobian = here[4]
+    least_squares_multipliers(bases, jacobian, rows, one_sided, active, gradient, scratch, last_row, gram, better_y)
+    other = dual_residual(bases, jacobian, rows, one_sided, residual, gradient, better_y, scratch)
+    if other > max(10.0 * dual, 1e-11):
+        return dual
+    for r in range(rows):
+        y[r] = better_y[r]
+    return max(dual, other)
+
+
+@kernel(inner=True)
+def turned(table, pool, tracked):
+    """The largest product of a factor and an angle in a row."""
+    most = 0.0
+    for r in range(table[CONTACTS], table[ROWS]):
+        row = table[ROW_TABLE] + ROW * r
+        if table[row + KIND] != JOINT_ROW:
+            continue
+        o = table[row + PARAMETERS]
+        if table[row + ANGLE] >= 0:
+            most = max(most, max(abs(pool[o + 2]), abs(pool[o] * tracked[table[row + ANGLE], 0])))
+        second = table[row + SECOND]
+        if second >= 0 and table[second + 3] >= 0:
+            most = max(most, abs(pool[o + 1] * tracked[table[second + 3], 0]))
+    return most
+
+
+@kernel(inner=True)
 def weigh_rows(rows, one_sided, residual, y, mu, forces, active):
     """Into active 1 / mu for the rows that count, into forces what they push with: -(y + c / mu)."""
     for r in range(rows):
@@ -134,12 +180,12 @@ def weigh_rows(rows, one_sided, residual, y, mu, forces, active):
 @kernel(inner=True)
 def curve_rows(rows, residual, y, active, restoring, forces):
     """Into forces the multipliers whose rows' curvature goes into the matrix."""
-    strongest = 0.0
+    most = 0.0
     for r in range(rows):
         # Far from feasible, c / mu would drown the curvature of the objective; y is what it tends to.
         forces[r] = (residual[r] if active[r] > 0.0 else 0.0) if restoring else y[r]
-        strongest = max(strongest, abs(forces[r]))
-    if strongest < WEAK:
+        most = max(most, abs(forces[r]))
+    if most < WEAK:
         # Forces on their way to zero: their curvature would only spoil the inertia, and cost the fast end.
         for r in range(rows):
             forces[r] = 0.0
@@ -271,7 +317,8 @@ def solve_program(table, pool, settings, state, history, tips):
     gram = np.empty((most, most))
     gradient, lines, lagrangian, matrix = unknowns(n)
 
-    # What rounding of the user's coordinates alone can violate.
+    reach = max(reach, turned(table, pool, here[1]))
+    # What rounding of the user's coordinates, and of angles over many turns, alone can violate.
     feasible = max(settings[FEASIBILITY], 4e-16 * reach)
     limit = int(settings[ITERATIONS])
     mu = settings[PENALTY]
@@ -305,6 +352,9 @@ def solve_program(table, pool, settings, state, history, tips):
     results[SCATTER] = 1.0 if status == RUNNING and scattered(table, here[3], one_sided) else 0.0
     if settings[GATHER] == 1.0 and results[SCATTER] == 1.0:
         gather(table, pool, bases, table[SLOTS], here)
+        for k in range(pairs):
+            here[1][k, 0] = math.nan
+        start_contacts(table, pool, here[0], here[1], free, loose[1])
         if table[IMPLICIT] == 1:
             recenter(table, pool, here[0])
         for r in range(m):
@@ -356,12 +406,17 @@ def solve_program(table, pool, settings, state, history, tips):
             history[iteration, 4] = shift
             history[iteration, 5] = alpha
             history[iteration, 6] = radius
+        if status != RUNNING:
+            break
         if not math.isfinite(violation) or not math.isfinite(value) or not math.isfinite(dual):
             # Only where the start is so: a step to such a place is not taken.
             status = STALLED
             break
         if violation <= feasible and dual <= settings[STATIONARITY]:
             status = SOLVED
+            if strongest(y, rows) > EXCESS * strongest(gradient, n):
+                # Rows that depend on each other: of all multipliers that balance the objective, the least.
+                dual = least_multipliers(shape, rows, here, active, gradient, descent, gram, dual, y, better_y)
             break
         if iteration >= limit:
             status = ITERATION_LIMIT

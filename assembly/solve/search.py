@@ -66,6 +66,11 @@ def search(
     residual = here[3]
     here_merit = merit(residual, one_sided, rows, y, mu) + base
     noise = 1e-14 * (abs(here_merit) + abs(value) + 1e-300)
+    # Rounding of the poses, of order one, is felt through the objective's slope and the rows' forces.
+    for i in range(n):
+        noise += 4e-16 * abs(gradient[i])
+    for r in range(rows):
+        noise += 4e-16 * (abs(y[r]) + abs(residual[r]) / mu)
     alpha = 1.0
     bends = 0
     lost = -1
