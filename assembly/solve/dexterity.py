@@ -1,21 +1,17 @@
 """Dexterity: what the tip of a mechanism can do with its inputs, as a term of the objective with an exact gradient.
 
-Rows of joints and contacts (drives and limits left out) and of the inputs make A; rates v of all unknowns for unit
-rates of the inputs solve A v = e, and J = T v is the Jacobian of the tip, whose velocity T v is. With singular values
-s_i of J,
+Rows A of joints and contacts (drives and limits left out) and rows B of the inputs: rates V of all unknowns, a column
+an input, make B V = 1 and change the rows as little as can be (`rates.py`). J = T V is the Jacobian of the tip, whose
+velocity T v is. Of J a measure w is taken (`singular_values.py`), with W = dw / dJ. With
 
-    manipulability      product of s_i: sqrt(det J J^T), or sqrt(det J^T J) of a narrow J (paper 001, eq. 1)
-    inverse condition   s_min / s_max
-    isotropy            (product of s_i^2)^(1/r) / (mean of s_i^2)
-    smallest            s_min
-    force               1 / |J^T u|: the force along u that inputs of unit norm hold
+    A^T A V + B^T Z = 0,   B V = 1,   A^T A P + B^T Y = T^T,   B P = 0,
 
-For a measure w with W = dw / dJ, and L = A^+T T^T W, one for every input,
+where J = Y^T as well, p = P w_i and y = Y w_i for column i of W,
 
-    dw = W . (dT v) - sum_i L_i . (dA v_i),
+    dw = sum_i  w_i . (dT v_i) - (A p) . (dA v_i) - y . (dB v_i) - (A v_i) . (dA p) - z_i . (dB p).
 
-where dA v_i takes the second derivatives of the rows: X_b X_a = H_ab + (gradient of rotation) . (a x b) / 2.
-A small multiple of the identity under A leaves motions at rest that move no tip.
+The last two vanish where the rows hold. dA v takes the second derivatives H of the rows along twists, as
+X_b X_a = H_ab + (gradient of rotation) . (a x b) / 2; of the second part only T^T w_i is left in the sum.
 """
 
 from __future__ import annotations
@@ -31,7 +27,6 @@ from assembly.constraints.program import (
     CONTACTS,
     DRIVE,
     JOINTS,
-    MOVING,
     ONE_SIDED,
     ROW,
     ROW_TABLE,
@@ -42,165 +37,27 @@ from assembly.constraints.program import (
     evaluate,
 )
 from assembly.constraints.terms import DEXTERITY, TERM, TERM_BODY, TERM_KIND, TERM_PARAMETERS, TERM_TAPE, load
-from assembly.geometry.vec import cross, matvec
+from assembly.geometry.vec import add, cross, matvec, scale
 from assembly.kinematics.motion import rotation
-from assembly.solve.rows import add_row, carry, move, slot
+from assembly.solve.rates import rate_system, settle
+from assembly.solve.rows import carry, move, slot, times
+from assembly.solve.singular_values import measure_jacobian
 
 # The record of a term in the table: measure, task, number of inputs; then for each: kind, component, joint, angle,
 # bodies f and g.
 MEASURE, TASK, INPUTS, INPUT_LIST, INPUT = 0, 1, 2, 3, 6
-MANIPULABILITY, INVERSE_CONDITION, ISOTROPY, SMALLEST, FORCE = 0, 1, 2, 3, 4
 POSITION, ROTATION, POSE = 0, 1, 2
 # Its parameters in the pool: weight, the tip on its body, factors of lengths and of turns, direction (6), then a factor
 # for every input.
 WEIGHT, ARM, LINEAR, ANGULAR, DIRECTION, FACTORS = 0, 1, 4, 5, 6, 12
-# Weight of the identity under A, whose rows are of order one; and what counts as a rate that nothing determines.
-REST, UNDETERMINED = 1e-7, 1e-6
+# Outcomes of `tip_map`.
+DETERMINED, DEPENDENT, OPEN = 0, 1, 2
+# What rows may change by unit rates of the inputs, and how much of the tip's motion may be left open.
+UNDETERMINED = 1e-6
+# Rows that change by less than this are as good as kept.
+KEPT = 1e-12
 # Step of the differences of the gradient that make the Hessian, which only speeds the loop.
 STEP = 1e-6
-SWEEPS = 30
-
-
-@kernel(inner=True)
-def orthogonalize(b, d, beta):
-    """Householder's factorization of b (p, n), p >= n: R above the diagonal and in d, reflectors below, in place."""
-    p, n = b.shape
-    for c in range(n):
-        norm = 0.0
-        for r in range(c, p):
-            norm += b[r, c] * b[r, c]
-        norm = math.sqrt(norm)
-        pivot = b[c, c]
-        alpha = -norm if pivot > 0.0 else norm
-        d[c] = alpha
-        b[c, c] = pivot - alpha
-        beta[c] = 1.0 / (norm * (norm + abs(pivot))) if norm > 0.0 else 0.0
-        for j in range(c + 1, n):
-            s = 0.0
-            for r in range(c, p):
-                s += b[r, c] * b[r, j]
-            s *= beta[c]
-            for r in range(c, p):
-                b[r, j] -= s * b[r, c]
-
-
-@kernel(inner=True)
-def reflect(b, beta, c, x):
-    """Reflector c applied to x (p,)."""
-    s = 0.0
-    for r in range(c, b.shape[0]):
-        s += b[r, c] * x[r]
-    s *= beta[c]
-    for r in range(c, b.shape[0]):
-        x[r] -= s * b[r, c]
-
-
-@kernel(inner=True)
-def least_squares(b, d, beta, x):
-    """x (p,), a right side, becomes the solution in its first n places."""
-    n = b.shape[1]
-    for c in range(n):
-        reflect(b, beta, c, x)
-    for c in range(n - 1, -1, -1):
-        s = x[c]
-        for j in range(c + 1, n):
-            s -= b[c, j] * x[j]
-        x[c] = s / d[c]
-
-
-@kernel(inner=True)
-def dual_squares(b, d, beta, x):
-    """x (p,), with a right side in its first n places, becomes the shortest y with A^T y equal to it."""
-    n = b.shape[1]
-    for c in range(n):
-        s = x[c]
-        for j in range(c):
-            s -= b[j, c] * x[j]
-        x[c] = s / d[c]
-    for r in range(n, b.shape[0]):
-        x[r] = 0.0
-    for c in range(n - 1, -1, -1):
-        reflect(b, beta, c, x)
-
-
-@kernel(inner=True)
-def singular_values(u, v, s):
-    """One-sided Jacobi: u (a, b) becomes left vectors, v (b, b) right ones, s (b,) their values, in no order."""
-    a, b = u.shape
-    for i in range(b):
-        for j in range(b):
-            v[i, j] = 1.0 if i == j else 0.0
-    for _sweep in range(SWEEPS):
-        turned = False
-        for i in range(b):
-            for j in range(i + 1, b):
-                p = 0.0
-                q = 0.0
-                r = 0.0
-                for k in range(a):
-                    p += u[k, i] * u[k, i]
-                    q += u[k, j] * u[k, j]
-                    r += u[k, i] * u[k, j]
-                if abs(r) <= 1e-15 * math.sqrt(p * q) or r == 0.0:
-                    continue
-                turned = True
-                zeta = (q - p) / (2.0 * r)
-                t = (1.0 if zeta >= 0.0 else -1.0) / (abs(zeta) + math.sqrt(1.0 + zeta * zeta))
-                c = 1.0 / math.sqrt(1.0 + t * t)
-                for k in range(a):
-                    x = u[k, i]
-                    u[k, i] = c * (x - t * u[k, j])
-                    u[k, j] = c * (t * x + u[k, j])
-                for k in range(b):
-                    x = v[k, i]
-                    v[k, i] = c * (x - t * v[k, j])
-                    v[k, j] = c * (t * x + v[k, j])
-        if not turned:
-            break
-    for i in range(b):
-        norm = 0.0
-        for k in range(a):
-            norm += u[k, i] * u[k, i]
-        s[i] = math.sqrt(norm)
-        for k in range(a):
-            u[k, i] = u[k, i] / s[i] if s[i] > 0.0 else 0.0
-
-
-@kernel(inner=True)
-def measure_values(measure, s, slope):
-    """A measure of singular values s, and its derivatives by them."""
-    b = s.size
-    low = 0
-    high = 0
-    for i in range(b):
-        slope[i] = 0.0
-        low = i if s[i] < s[low] else low
-        high = i if s[i] > s[high] else high
-    if measure == SMALLEST:
-        slope[low] = 1.0
-        return s[low]
-    if measure == INVERSE_CONDITION:
-        if not s[high] > 0.0:
-            return 0.0
-        value = s[low] / s[high]
-        slope[low] += 1.0 / s[high]
-        slope[high] -= value / s[high]
-        return value
-    product = 1.0
-    mean = 0.0
-    for i in range(b):
-        product *= s[i]
-        mean += s[i] * s[i] / b
-        slope[i] = 1.0
-        for j in range(b):
-            if j != i:
-                slope[i] *= s[j]
-    if measure == MANIPULABILITY:
-        return product
-    value = product ** (2.0 / b) / mean if mean > 0.0 else 0.0
-    for i in range(b):
-        slope[i] = 2.0 / b * value * ((1.0 / s[i] if s[i] > 0.0 else 0.0) - s[i] / mean) if mean > 0.0 else 0.0
-    return value
 
 
 @kernel(inner=True)
@@ -261,11 +118,26 @@ def add_tip_force(pool, o, task, p, w, column, s, out):
             out[s + 3 + i] += pool[o + ANGULAR] * w[first + i, column]
 
 
+@kernel(inner=True)
+def add_tip_bend(pool, o, task, p, w, column, v, s, gradient):
+    """gradient += w . (dT v), less half of what turns do not commute by."""
+    f = (0.0, 0.0, 0.0)
+    moment = (0.0, 0.0, 0.0)
+    if task != ROTATION:
+        f = scale(pool[o + LINEAR], (w[0, column], w[1, column], w[2, column]))
+    if task != POSITION:
+        first = 0 if task == ROTATION else 3
+        moment = scale(pool[o + ANGULAR], (w[first, column], w[first + 1, column], w[first + 2, column]))
+    spin = (v[s + 3], v[s + 4], v[s + 5])
+    bent = cross(p, cross(f, spin))
+    turn = cross(add(moment, cross(p, f)), spin)
+    for k in range(3):
+        gradient[s + 3 + k] += bent[k] - 0.5 * turn[k]
+
+
 @kernel(inner=True, allocates=True)
-def rate_system(table, record, bases, rows, n, point):
-    """A with a little identity under it, factorized: (b, d, beta), the rows used, and their number."""
-    _q, tracked, records, _residual, jacobian = point
-    inputs = table[record + INPUTS]
+def used_rows(table, rows):
+    """The rows that hold the mechanism together: neither drives nor one-sided; with those of free pairs."""
     used = np.empty(rows, np.int64)
     count = 0
     for r in range(rows):
@@ -273,215 +145,169 @@ def rate_system(table, record, bases, rows, n, point):
         if r >= table[ROWS] or (table[row + ONE_SIDED] == 0 and table[row + DRIVE] == 0):
             used[count] = r
             count += 1
-    b = np.zeros((count + inputs + n, n))
-    for l in range(count):
-        add_row(bases, jacobian, used[l], 1.0, b[l])
-    for i in range(inputs):
-        input_row(table, record + INPUT_LIST + INPUT * i, records, tracked, b, count + i)
-    for i in range(n):
-        b[count + inputs + i, i] = REST
-    d = np.empty(n)
-    beta = np.empty(n)
-    orthogonalize(b, d, beta)
-    return b, d, beta, used, count
+    return used[:count]
 
 
 @kernel(inner=True, allocates=True)
-def tip_rates(table, pool, record, o, body, system, q, rates, jacobian):
-    """Rates of all unknowns for unit rates of the inputs, and the tip's Jacobian in the user's units.
+def row_rates(bases, jacobian, used, v):
+    """A v for every row of v."""
+    out = np.empty((v.shape[0], used.size))
+    for i in range(v.shape[0]):
+        for l in range(used.size):
+            out[i, l] = times(bases, jacobian, used[l], v[i])
+    return out
 
-    Returns the largest rate that misses what it should be: inputs that depend on each other.
+
+@kernel(inner=True)
+def largest(values):
+    """The largest absolute value; infinite if one is no number."""
+    worst = 0.0
+    for value in values.flat:
+        if not abs(value) <= worst:
+            worst = abs(value) if abs(value) > worst else math.inf
+    return worst
+
+
+@kernel(inner=True, allocates=True)
+def tip_map(table, pool, term, bases, rows, n, point, order):
+    """The tip's Jacobian in the user's units, at a point whose rows are evaluated.
+
+    Returns whether it is determined, the Jacobian, the rows used, what inputs do (rates V, forces Z, A V) and what the
+    tip needs (P, Y, A P), vectors in rows. What the tip needs, and so whether its motion is open, is found from order 1
+    on.
     """
-    b, d, beta, _used, count = system
-    n = b.shape[1]
+    q, tracked, records, residual, jacobian = point
+    record = table[term + TERM_TAPE]
+    o = table[term + TERM_PARAMETERS]
+    body = table[term + TERM_BODY]
+    k = table[record + INPUTS]
     task = table[record + TASK]
-    p = matvec(rotation(q, body), load(pool, o + ARM))
+    m = task_rows(task)
     s = slot(table, body)
-    x = np.empty(b.shape[0])
-    worst = 0.0
-    for i in range(table[record + INPUTS]):
-        for r in range(x.size):
-            x[r] = 0.0
-        x[count + i] = 1.0
-        for c in range(n):
-            reflect(b, beta, c, x)
-        for r in range(n, x.size):
-            worst = max(worst, abs(x[r]))
-        for c in range(n - 1, -1, -1):
-            value = x[c]
-            for j in range(c + 1, n):
-                value -= b[c, j] * rates[i, j]
-            rates[i, c] = value / d[c]
-        tip_velocity(pool, o, task, p, rates[i], s, jacobian, i)
-        for r in range(task_rows(task)):
-            jacobian[r, i] *= pool[o + FACTORS + i]
-    return worst
-
-
-@kernel(inner=True, allocates=True)
-def tip_slack(table, pool, record, o, body, system, q):
-    """The largest part of the tip's motion that neither the rows nor the inputs determine."""
-    b, d, beta, _used, _count = system
-    p, n = b.shape
-    task = table[record + TASK]
     arm = matvec(rotation(q, body), load(pool, o + ARM))
-    s = slot(table, body)
-    unit = np.zeros((6, 1))
-    x = np.empty(p)
-    worst = 0.0
-    for i in range(task_rows(task)):
-        for r in range(n):
-            x[r] = 0.0
-        unit[i, 0] = 1.0
-        add_tip_force(pool, o, task, arm, unit, 0, s, x)
-        unit[i, 0] = 0.0
-        size = 0.0
-        for r in range(n):
-            size = max(size, abs(x[r]))
-        dual_squares(b, d, beta, x)
-        for r in range(p - n, p):
-            worst = max(worst, abs(REST * x[r]) / size if size > 0.0 else 0.0)
-    return worst
+    used = used_rows(table, rows)
+    b = np.zeros((k, n))
+    for i in range(k):
+        input_row(table, record + INPUT_LIST + INPUT * i, records, tracked, b, i)
+    tip = np.zeros((m, k))
+    v = np.zeros((k, n))
+    z = np.zeros((k, k))
+    p = np.zeros((m, n))
+    y = np.zeros((m, k))
+    changes = np.zeros((k, used.size))
+    exists, system = rate_system(bases, jacobian, used, b)
+    outcome = DETERMINED if exists else DEPENDENT
+    if exists:
+        g = np.zeros(n)
+        h = np.zeros(k)
+        missed = 0.0
+        for i in range(k):
+            h[i] = 1.0
+            missed = max(missed, settle(system, bases, jacobian, used, b, g, h, v[i], z[i]))
+            h[i] = 0.0
+            tip_velocity(pool, o, task, arm, v[i], s, tip, i)
+            for r in range(m):
+                tip[r, i] *= pool[o + FACTORS + i]
+        unit = np.zeros((m, 1))
+        for r in range(m if order > 0 else 0):
+            for i in range(n):
+                g[i] = 0.0
+            unit[r, 0] = 1.0
+            add_tip_force(pool, o, task, arm, unit, 0, s, g)
+            unit[r, 0] = 0.0
+            left = settle(system, bases, jacobian, used, b, g, h, p[r], y[r])
+            if not left <= UNDETERMINED * largest(g):
+                outcome = OPEN
+        # Redundant rows contradict each other where they do not hold: singular values grow as the root of residuals.
+        violation = 0.0
+        for l in range(used.size):
+            violation = max(violation, abs(residual[used[l]]))
+        changes = row_rates(bases, jacobian, used, v)
+        missed = max(missed, largest(changes))
+        if not missed <= max(UNDETERMINED, 10.0 * math.sqrt(violation)):
+            outcome = DEPENDENT
+    return outcome, tip, used, (v, z, changes), (p, y, row_rates(bases, jacobian, used, p))
 
 
-@kernel(inner=True, allocates=True)
-def measure_jacobian(table, pool, record, o, jacobian, slopes):
-    """A measure of the tip's Jacobian; its derivatives by the entries into `slopes`."""
-    m, k = jacobian.shape
-    measure = table[record + MEASURE]
-    if measure == FORCE:
-        square = 0.0
-        for i in range(k):
-            t = 0.0
-            for r in range(m):
-                t += pool[o + DIRECTION + r] * jacobian[r, i]
-            for r in range(m):
-                slopes[r, i] = pool[o + DIRECTION + r] * t
-            square += t * t
-        value = 1.0 / math.sqrt(square) if square > 0.0 else math.inf
-        for r in range(m):
-            for i in range(k):
-                slopes[r, i] *= -value / square if square > 0.0 else 0.0
-        return value
-    wide = k > m
-    a = k if wide else m
-    b = m if wide else k
-    u = np.empty((a, b))
-    v = np.empty((b, b))
-    for i in range(a):
-        for j in range(b):
-            u[i, j] = jacobian[j, i] if wide else jacobian[i, j]
-    s = np.empty(b)
-    slope = np.empty(b)
-    singular_values(u, v, s)
-    value = measure_values(measure, s, slope)
-    for r in range(m):
-        for i in range(k):
-            slopes[r, i] = 0.0
-            for l in range(b):
-                slopes[r, i] += slope[l] * (v[r, l] * u[i, l] if wide else u[r, l] * v[i, l])
-    return value
+@kernel(inner=True)
+def bend(table, pool, record, shape, loose, room, point, forces, inputs, rates, hessian, gradient):
+    """gradient -= H v, H the second derivative of forces . rows + inputs . (values of the inputs)."""
+    n = rates.size
+    for r in range(n):
+        for c in range(r, n):
+            hessian[r, c] = 0.0
+    add_row_terms(table, pool, loose, room, shape[0], point, forces, shape[1], hessian)
+    for j in range(inputs.size):
+        at = record + INPUT_LIST + INPUT * j
+        add_coordinate_hessian(
+            table[at],
+            table[at + 1],
+            point[2],
+            table[CONTACTS] + table[at + 2],
+            inputs[j],
+            hessian,
+            slot(table, table[at + 4]),
+            slot(table, table[at + 5]),
+        )
+    for r in range(n):
+        for c in range(r, n):
+            gradient[r] -= hessian[r, c] * rates[c]
+            if c > r:
+                gradient[c] -= hessian[r, c] * rates[r]
 
 
 @kernel(inner=True, allocates=True)
 def dexterity(table, pool, term, shape, rows, loose, room, point, order, gradient):
     """Value of the term at a point whose rows are evaluated; from order 1 on its gradient is added."""
     bases = shape[0]
-    q = point[0]
     n = gradient.size
     record = table[term + TERM_TAPE]
     o = table[term + TERM_PARAMETERS]
-    body = table[term + TERM_BODY]
-    inputs = table[record + INPUTS]
     task = table[record + TASK]
     weight = pool[o + WEIGHT]
-    system = rate_system(table, record, bases, rows, n, point)
-    rates = np.empty((inputs, n))
-    jacobian = np.empty((task_rows(task), inputs))
-    slopes = np.empty((task_rows(task), inputs))
-    worst = tip_rates(table, pool, record, o, body, system, q, rates, jacobian)
-    value = measure_jacobian(table, pool, record, o, jacobian, slopes)
-    if not worst <= UNDETERMINED or not math.isfinite(value):
+    outcome, jacobian, used, (v, z, changes), (p, y, loads) = tip_map(table, pool, term, bases, rows, n, point, order)
+    if outcome != DETERMINED:
+        return math.inf
+    slopes = np.empty(jacobian.shape)
+    value = measure_jacobian(table[record + MEASURE], pool, o + DIRECTION, jacobian, slopes)
+    if not math.isfinite(value):
         return math.inf
     if order == 0:
         return weight * value
-    b, d, beta, used, count = system
+    body = table[term + TERM_BODY]
     s = slot(table, body)
-    p = matvec(rotation(q, body), load(pool, o + ARM))
-    x = np.empty(b.shape[0])
-    y = np.empty(rows)
-    none = np.zeros(rows)
+    arm = matvec(rotation(point[0], body), load(pool, o + ARM))
+    m, k = jacobian.shape
+    # Room for one combination at a time: p, y, A p as forces on all rows.
+    pull = np.empty(n)
+    turn = np.empty(k)
+    forces = np.zeros(rows)
+    none = (bases, np.zeros(rows))
     hessian = np.empty((n, n))
-    push = np.empty(n)
-    for i in range(inputs):
-        factor = weight * pool[o + FACTORS + i]
-        for r in range(n):
-            x[r] = 0.0
-            push[r] = 0.0
-            for c in range(r, n):
-                hessian[r, c] = 0.0
-        for r in range(slopes.shape[0]):
-            slopes[r, i] *= factor
-        add_tip_force(pool, o, task, p, slopes, i, s, x)
-        dual_squares(b, d, beta, x)
-        for r in range(n):
-            if not abs(REST * x[count + inputs + r]) <= UNDETERMINED * abs(factor):
-                return math.inf
-        for r in range(rows):
-            y[r] = 0.0
-        for l in range(count):
-            y[used[l]] = x[l]
-            add_row(bases, point[4], used[l], x[l], push)
-        add_row_terms(table, pool, loose, room, bases, point, y, none, hessian)
-        for j in range(inputs):
-            at = record + INPUT_LIST + INPUT * j
-            add_coordinate_hessian(
-                table[at],
-                table[at + 1],
-                point[2],
-                table[CONTACTS] + table[at + 2],
-                x[count + j],
-                hessian,
-                slot(table, table[at + 4]),
-                slot(table, table[at + 5]),
-            )
-            add_input_push(table, at, point, x[count + j], push)
-        v = rates[i]
-        for r in range(n):
-            total = 0.0
+    for i in range(k):
+        for c in range(n):
+            pull[c] = 0.0
+        for j in range(k):
+            turn[j] = 0.0
+        for l in range(used.size):
+            forces[used[l]] = 0.0
+        for r in range(m):
+            w = slopes[r, i] * weight * pool[o + FACTORS + i]
+            slopes[r, i] = w
             for c in range(n):
-                total += (hessian[r, c] if c >= r else hessian[c, r]) * v[c]
-            gradient[r] -= total
-        for body_slot in range(table[MOVING]):
-            w = 6 * body_slot + 3
-            turn = cross((push[w], push[w + 1], push[w + 2]), (v[w], v[w + 1], v[w + 2]))
-            for k in range(3):
-                gradient[w + k] -= 0.5 * turn[k]
-        if s >= 0 and task != ROTATION:
-            linear = pool[o + LINEAR]
-            force = (linear * slopes[0, i], linear * slopes[1, i], linear * slopes[2, i])
-            turn = cross(p, cross(force, (v[s + 3], v[s + 4], v[s + 5])))
-            for k in range(3):
-                gradient[s + 3 + k] += turn[k]
+                pull[c] += w * p[r, c]
+            for j in range(k):
+                turn[j] += w * y[r, j]
+            for l in range(used.size):
+                forces[used[l]] += w * loads[r, l]
+        bend(table, pool, record, none, loose, room, point, forces, turn, v[i], hessian, gradient)
+        if largest(changes[i]) > KEPT:
+            for l in range(used.size):
+                forces[used[l]] = changes[i, l]
+            bend(table, pool, record, none, loose, room, point, forces, z[i], pull, hessian, gradient)
+        if s >= 0:
+            add_tip_bend(pool, o, task, arm, slopes, i, v[i], s, gradient)
     return weight * value
-
-
-@kernel(inner=True)
-def add_input_push(table, at, point, factor, push):
-    """push += factor times the gradient of an input's coordinate."""
-    angle = table[at + 3]
-    near = point[1][angle, 0] if angle >= 0 else 0.0
-    k = table[CONTACTS] + table[at + 2]
-    _value, n, arm_f, arm_g, h = coordinate(table[at], table[at + 1], point[2], k, near)
-    for side in range(2):
-        s = slot(table, table[at + 4 + side])
-        if s < 0:
-            continue
-        sign = -factor if side == 0 else factor
-        turn = cross(arm_f if side == 0 else arm_g, n)
-        for i in range(3):
-            push[s + i] += sign * n[i]
-            push[s + 3 + i] += sign * (turn[i] + h[i])
 
 
 @kernel(inner=True, allocates=True)

@@ -20,8 +20,8 @@ from assembly.constraints.packing import Packed
 from assembly.errors import InputError, positive
 from assembly.kinematics.body import Body, Frame, Point
 from assembly.kinematics.ellipsoid import Ellipsoid
-from assembly.kinematics.pose import rotation_matrix
-from assembly.solve.dexterity import UNDETERMINED
+from assembly.kinematics.pose import pose_rows, rotation_matrix
+from assembly.solve.dexterity import DETERMINED
 from assembly.solve.solution import Solution
 from assembly.solve.tip_rates import tip_at
 from assembly.solve.undetermined import complaint
@@ -157,17 +157,18 @@ def _evaluated(scene: Assembly, objective: Dexterity, q: ArrayLike | Solution | 
                 known = ", ".join(repr(other.name) for other in scene.bodies)
                 raise InputError(f"{what} is on body {body.name!r}; expected bodies of this assembly: {known}")
     packed = scene.packed()
-    # A solution keeps what it was solved with.
-    state = scene._own("q", packed, q)._state if isinstance(q, Solution) else scene._start(packed, q, None)
+    if isinstance(q, Solution):
+        state = scene._own("q", packed, q)._state
+    else:
+        state = scene._start(packed, None if q is None else pose_rows("q", q, len(scene.bodies)), None)
     table, pool, term = _with_term(packed, objective)
     jacobian = np.empty((task.rows, len(task.inputs)))
-    lost, missed, slack, value = tip_at(
-        table, pool, term, state, np.empty(len(packed.contacts), dtype=np.int64), jacobian
-    )
+    free = np.empty(len(packed.contacts), dtype=np.int64)
+    lost, outcome, value = tip_at(table, pool, term, state, free, jacobian)
     if lost >= 0:
         name = packed.contacts[lost].name
         raise InputError(f"q leaves contact {name!r} without an extremal pair; expected a pose where it has one")
-    if not (missed <= UNDETERMINED and slack <= UNDETERMINED and np.isfinite(jacobian).all()):
+    if outcome != DETERMINED or not np.isfinite(jacobian).all():
         raise InputError(complaint(scene, packed, state, task))
     return jacobian, float(value), state[: packed.contacts_at].reshape(-1, 7)
 
