@@ -216,7 +216,7 @@ CASES = {
     "q0 far from unit": (lambda: solve(q_of([3, 0, 0, 2, 0, 0, 0])), r"q0\[1, 3:\] is \[2.0, .* a unit quaternion"),
     "q0 of another": (solve_from_a_stranger, "q0 is a solution of another assembly, or .*; expected its own"),
     "q0 of before": (solve_from_before_a_change, "q0 is a solution of .* this one before a change; expected its own"),
-    "starts unknown": (lambda: solve(starts={"b-a": [0] * 4}), "starts names 'b-a'; expected one of 'a-b'"),
+    "starts unknown": (lambda: solve(starts={"b-a": [0] * 4}), "starts names 'b-a'; expected a contact: 'a-b'"),
     "starts shape": (lambda: solve(starts={"a-b": [0] * 3}), r"starts\['a-b'\] has shape \(3,\); expected \(4,\)"),
     "starts nan": (lambda: solve(starts={"a-b": [0, 0, 0, NAN]}), r"starts\['a-b'\]\[3\] is nan; expected finite"),
     "starts outside": (
@@ -248,7 +248,7 @@ TYPES = {
     "point": (lambda: asm.PointDistance((0, 0, 0), (1, 2, 3)), r"point is \(0, 0, 0\); expected a point of a body"),
     "body": (lambda: asm.Assembly(["a"]), "body is 'a'; expected a Body"),
     "constraint": (lambda: touching().constrain("a-b"), "constraint is 'a-b'; expected a Contact"),
-    "objective": (lambda: touching().minimize(3.0), "objective is 3.0; expected PointDistance or Posture"),
+    "objective": (lambda: touching().minimize(3.0), "objective is 3.0; expected an objective such as PointDistance or Posture"),
     "pose": (lambda: setattr(pair()[0], "pose", (0, 0, 0)), r"pose is \(0, 0, 0\); expected a Pose"),
 }
 

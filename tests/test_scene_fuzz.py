@@ -50,7 +50,7 @@ def small_document():
     scene.minimize(
         asm.PointDistance(b.point(0, 0, 0), (1, 2, 3)), asm.FrameDistance(b, asm.Pose()), asm.Expression(f, [c])
     )
-    scene.maximize(asm.Posture([[0, 0, 0, 1, 0, 0, 0]] * 3))
+    scene.maximize(asm.Posture([[0, 0, 0, 1, 0, 0, 0]] * 3), asm.Dexterity(c, [hinge, slider]))
     with TemporaryDirectory() as folder:
         path = Path(folder) / "scene.json"
         scene.save(path)

@@ -86,7 +86,12 @@ def every_constraint():
         asm.PointDistance(point, (0.1, 0.2, 0.3)),
         asm.Expression(mixed(2), [crank, wheel], "bent", weight=0.1),
     )
-    scene.maximize(asm.Posture(weight=1e-3), asm.Expression(mixed(1), [wheel], scale=2.0))
+    scene.maximize(
+        asm.Posture(weight=1e-3),
+        asm.Expression(mixed(1), [wheel], scale=2.0),
+        asm.Dexterity(point, [hinge, shaft.freedom("slide")], "isotropy"),
+        asm.Dexterity(there, [hinge], "force_transmission", direction=(0, 0, 1, THIRD, 0, 0), length=0.3, weight=0.1),
+    )
     return scene
 
 
@@ -408,7 +413,7 @@ def test_what_is_wrong_is_named_by_its_path(key, case, document, load_document, 
 def test_expressions_of_several_values_are_no_terms(document, load_document):
     changed = copy.deepcopy(document)
     changed["objective"].append({"sign": 1, **changed["constraints"][CURVE]})
-    with pytest.raises(InputError, match=r"objective\[6\]: objective '.*' has 2 values; expected one"):
+    with pytest.raises(InputError, match=r"objective\[8\]: objective '.*' has 2 values; expected one"):
         load_document(changed)
 
 

@@ -151,7 +151,8 @@ class Dexterity(Objective):
             norm = float(np.linalg.norm(u))
             if not norm > 0.0:
                 raise InputError(f"direction is {u.tolist()}; expected a direction other than zero")
-            self._direction = u / norm
+            # A unit vector is left as it is, so that reading a written one changes no bit.
+            self._direction = u if abs(norm - 1.0) <= 1e-15 else u / norm
 
     @property
     def tip_task(self) -> TipTask:

@@ -34,6 +34,7 @@ Fields of a term of the objective by its type:
 
     point_distance  weight, body, point [3], target [3]
     frame_distance  weight, frame, target {position [3], quaternion [w, x, y, z]}, length
+    dexterity       weight, tip (a frame), inputs [{joint, freedom}], measure, task, length, direction [3 or 6] or null
     posture         weight, reference [n][7] or null
     expression      name, bodies [names], function [lines], unilateral, scale, weight
 

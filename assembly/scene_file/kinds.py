@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from assembly.constraints.constraint import Freedom
 from assembly.constraints.contact import Contact
 from assembly.constraints.couplings import Gear, RackPinion
+from assembly.constraints.dexterity import Dexterity
 from assembly.constraints.expression import Expression
 from assembly.constraints.joints import (
     Cylindrical,
@@ -30,7 +31,7 @@ from assembly.constraints.placements import Angle, Distance, PointOnLine, PointO
 from assembly.errors import InputError
 from assembly.geometry.face import Face
 from assembly.geometry.surface import NurbsSurface
-from assembly.kinematics.body import Body, BodyFace, Frame
+from assembly.kinematics.body import Body, BodyFace, Frame, Point
 from assembly.kinematics.pose import Pose
 from assembly.scene_file.fields import at, bad, each, flag, members, number, or_null, table, text, vector, whole
 from assembly.scene_file.records import Field, Listed, OneOf, Parts, Plain, Record
@@ -246,6 +247,12 @@ CONSTRAINTS = OneOf(
         "expression": EXPRESSION,
     }
 )
+def _tip_frame(dexterity: Dexterity) -> Frame:
+    """The tip as a frame; its task tells which of its velocities count."""
+    tip = dexterity.tip_task.tip
+    return tip.body.frame(at=tip.coordinates) if isinstance(tip, Point) else tip
+
+
 OBJECTIVES = OneOf(
     {
         "point_distance": Record(
@@ -263,6 +270,16 @@ OBJECTIVES = OneOf(
             Posture,
             WEIGHT,
             Field("reference", Plain(or_null(table(2)), lambda rows: None if rows is None else rows.tolist())),
+        ),
+        "dexterity": Record(
+            Dexterity,
+            WEIGHT,
+            Field("tip", FRAME, _tip_frame),
+            Field("inputs", Listed(FREEDOM), "tip_task.inputs"),
+            Field("measure", Plain(text)),
+            Field("task", Plain(text), "tip_task.task"),
+            Field("length", NUMBER, "tip_task.length"),
+            Field("direction", Plain(or_null(table(1)), lambda u: None if u is None else u.tolist())),
         ),
         "expression": EXPRESSION,
     }
