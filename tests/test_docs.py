@@ -10,12 +10,16 @@ from pathlib import Path
 import pytest
 
 import assembly as asm
+from assembly.constraints import joints as joints_of_frames
+from assembly.constraints import placements as joints_of_points
+from assembly.constraints.dexterity import MEASURES
 from assembly.proximity.pairs import PairStatus
 from assembly.solve.options import Options
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 CONCEPTS = (ROOT / "docs" / "concepts.md").read_text()
+MECHANISMS = (ROOT / "docs" / "mechanisms.md").read_text()
 README = (ROOT / "README.md").read_text()
 
 
@@ -80,6 +84,21 @@ def test_statuses_and_their_remedies():
 def test_options_and_their_defaults():
     table = [(name, float(default)) for name, default, _ in rows(CONCEPTS, "option", "default")]
     assert table == [(option.name, option.default) for option in fields(Options)]
+
+
+def test_joints_with_their_rows_and_freedoms():
+    settings = {"Screw": {"pitch": 1.0}, "Distance": {"value": 1.0}, "Angle": {"value": 1.0}}
+    joints = {cls for module in (joints_of_frames, joints_of_points) for cls in module.__all__}
+    table = rows(MECHANISMS, "joint", "rows", "freedoms")
+    assert {row[0] for row in table} == joints and len(table) == len(joints)
+    for name, count, freedoms, _ in table:
+        joint = getattr(asm, name)(asm.Body("a"), asm.Body("b"), **settings.get(name, {}))
+        assert len(joint.equations) == int(count), name
+        assert freedoms.replace("`", "").split(", ") == (list(joint.freedoms) or [""]), name
+
+
+def test_measures_of_dexterity():
+    assert tuple(row[0] for row in rows(MECHANISMS, "measure")) == MEASURES
 
 
 def test_readme_shows_the_example():
