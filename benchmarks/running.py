@@ -1,4 +1,4 @@
-"""One benchmark in an interpreter of its own, so that none warms or breaks another."""
+"""One benchmark in an interpreter of its own, so that none warms or breaks another; and the examples, to measure."""
 
 from __future__ import annotations
 
@@ -6,10 +6,23 @@ import traceback
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from importlib import import_module
+from importlib.util import module_from_spec, spec_from_file_location
 from multiprocessing import get_context
+from pathlib import Path
 from typing import Any
 
-__all__ = ["run_apart"]
+__all__ = ["example", "run_apart"]
+
+EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
+
+
+def example(name: str) -> Any:
+    """The module of an example."""
+    spec = spec_from_file_location(name, EXAMPLES / f"{name}.py")
+    assert spec is not None and spec.loader is not None
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
 def run_apart(module: str, quick: bool) -> dict[str, Any]:

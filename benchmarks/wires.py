@@ -5,8 +5,6 @@ from __future__ import annotations
 import statistics
 from collections.abc import Callable
 from functools import partial
-from importlib.util import module_from_spec, spec_from_file_location
-from pathlib import Path
 from time import perf_counter
 from typing import Any
 
@@ -18,6 +16,7 @@ from assembly.constraints.objectives import PointDistance
 from assembly.proximity.pairs import PairStatus
 from assembly.solve.reference import ReferenceSolver
 from benchmarks.figures import figure
+from benchmarks.running import example
 from benchmarks.scenes import Wires, crossing, linked_wires
 
 ABOUT = """\
@@ -37,7 +36,6 @@ IPOPT = "IPOPT"
 CONTRACT = "the tolerance, 1e-12 of the scene's size"
 # Updates it makes of each case; ours are many more, to have a median of microseconds.
 IPOPT_TICKS = 4
-CLIPS = Path(__file__).resolve().parent.parent / "examples" / "paper_clips.py"
 
 
 class Tally:
@@ -186,19 +184,8 @@ def _turned(step: float, count: int) -> Array:
     return np.asarray(step * way / np.linalg.norm(way, axis=1, keepdims=True))
 
 
-def paper_clips() -> asm.Assembly:
-    """The scene of the example."""
-    spec = spec_from_file_location("paper_clips", CLIPS)
-    assert spec is not None and spec.loader is not None
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    scene = module.paper_clips()
-    assert isinstance(scene, asm.Assembly)
-    return scene
-
-
 def _clips(quick: bool) -> list[dict[str, Any]]:
-    scene = paper_clips()
+    scene: asm.Assembly = example("paper_clips").paper_clips()
     ((_, objective),) = scene.objectives
     assert isinstance(objective, PointDistance)
     first = scene.solve()
