@@ -248,7 +248,7 @@ TYPES = {
     "point": (lambda: asm.PointDistance((0, 0, 0), (1, 2, 3)), r"point is \(0, 0, 0\); expected a point of a body"),
     "body": (lambda: asm.Assembly(["a"]), "body is 'a'; expected a Body"),
     "constraint": (lambda: touching().constrain("a-b"), "constraint is 'a-b'; expected a Contact"),
-    "objective": (lambda: touching().minimize(3.0), "objective is 3.0; expected an objective such as PointDistance or Posture"),
+    "objective": (lambda: touching().minimize(3.0), "objective is 3.0; expected an objective such as PointDistance"),
     "pose": (lambda: setattr(pair()[0], "pose", (0, 0, 0)), r"pose is \(0, 0, 0\); expected a Pose"),
 }
 

@@ -238,6 +238,9 @@ def evaluate(table, pool, start, patience, loose, room, point):
     for r in range(pairs):
         if not contact_row(table, pool, r, start, patience, loose, point):
             return r
+    for k in range(pairs, table[TRACKED]):
+        # Of an angle that no row has, only an input of a dexterity, this is all that is known.
+        tracked[k, 0] = start[k, 0]
     for k in range(table[JOINTS]):
         joint = table[JOINT_TABLE] + JOINT_RECORD * k
         place_frames(pool, table[joint + 2], q, table[joint], table[joint + 1], records, pairs + k)

@@ -247,6 +247,8 @@ CONSTRAINTS = OneOf(
         "expression": EXPRESSION,
     }
 )
+
+
 def _tip_frame(dexterity: Dexterity) -> Frame:
     """The tip as a frame; its task tells which of its velocities count."""
     tip = dexterity.tip_task.tip

@@ -25,7 +25,6 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly.constraints.program import (
-    ANGLE,
     BODIES,
     CONTACT_RECORD,
     CONTACTS,
@@ -33,17 +32,11 @@ from assembly.constraints.program import (
     EXTRA_COLUMN,
     FOLD,
     IMPLICIT,
-    JOINT_ROW,
     JOINTS,
-    KIND,
     MOVING,
-    PARAMETERS,
     REFERENCE,
-    ROW,
-    ROW_TABLE,
     ROWS,
     SCALE,
-    SECOND,
     SLOTS,
     TAPE_ROOM,
     TRACKED,
@@ -53,21 +46,21 @@ from assembly.constraints.program import (
 from assembly.constraints.terms import objective, recenter
 from assembly.proximity.free_pair import VARIABLES, VECTORS
 from assembly.solve.contacts import free_folds, start_contacts
-from assembly.solve.gather import gather
-from assembly.solve.linear import factorize_shifted, forward, substitute
+from assembly.solve.gather import gather, scattered
+from assembly.solve.linear import factorize_shifted
+from assembly.solve.multipliers import choose_multipliers, curve_rows, least_multipliers, strongest, weigh_rows
 from assembly.solve.report import judge, write_pose, write_rows
 from assembly.solve.rows import (
     add_transposed,
     carry,
-    dual_residual,
     envelope,
-    least_squares_multipliers,
     move,
     place_rows,
     times,
+    turned,
     violation_of,
 )
-from assembly.solve.search import SHORTEST, goal, search
+from assembly.solve.search import SHORTEST, damped_step, goal, search
 
 # Outcomes; `solution.Status` gives each a sentence. RUNNING is none of them.
 SOLVED, INFEASIBLE, STALLED, ITERATION_LIMIT, CONTACT_LOST, RUNNING = 0, 1, 2, 3, 4, 5
@@ -81,148 +74,13 @@ FREE_BELOW = 0.02
 # Every so many steps the largest violation must have halved, or the loop sees whether the rows can hold; so many times.
 PATIENCE = 25
 RESTORATIONS = 3
-# Multipliers below this count for nothing against the objective's curvature, which is of order one.
-WEAK = 1e-3
 # A violation above this, at the stationary point of all violations, tells that the rows cannot hold.
 TOUCHING = 1e-9
 # Multipliers this much stronger than the objective's slope are looked at once more.
 EXCESS = 10.0
-# Bodies are gathered where a start violates a row of a joint by more than this.
-SCATTERED = 0.5
 # Where violations are stationary, this much curvature downward makes a saddle of it; a small move leads off it, in a
 # direction that nothing but a scene made for it has as a symmetry. So often at most.
 SADDLE, KICK, KICKS = 1e-5, 1e-3, 3
-# A body turns by this much at most in a step, and this often a step is shortened by a larger shift.
-TURN = 1.0
-SHORTENINGS = 4
-
-
-@kernel(inner=True)
-def choose_multipliers(shape, rows, here, shortened, good, active, gradient, scratch, gram, y, better_y):
-    """The better of y, of what the last step proposed, and after a shortened step of least squares; into y.
-
-    Returns the dual residual.
-    """
-    bases, one_sided, _last, last_row = shape
-    residual = here[3]
-    jacobian = here[4]
-    dual = dual_residual(bases, jacobian, rows, one_sided, residual, gradient, better_y, scratch)
-    # Where they are as good as they should be, the old ones need no look.
-    other = math.inf
-    if dual > good:
-        other = dual_residual(bases, jacobian, rows, one_sided, residual, gradient, y, scratch)
-    if dual <= other:
-        for r in range(rows):
-            y[r] = better_y[r]
-    else:
-        dual = other
-    if shortened:
-        least_squares_multipliers(bases, jacobian, rows, one_sided, active, gradient, scratch, last_row, gram, better_y)
-        other = dual_residual(bases, jacobian, rows, one_sided, residual, gradient, better_y, scratch)
-        if other < dual:
-            dual = other
-            for r in range(rows):
-                y[r] = better_y[r]
-    return dual
-
-
-@kernel(inner=True)
-def strongest(values, count):
-    """The largest of the first so many, without its sign."""
-    most = 0.0
-    for i in range(count):
-        most = max(most, abs(values[i]))
-    return most
-
-
-@kernel(inner=True)
-def least_multipliers(shape, rows, here, active, gradient, scratch, gram, dual, y, better_y):
-    """The shortest multipliers that balance the objective, if they do so as well as y; into y. The dual residual."""
-    bases, one_sided, _last, last_row = shape
-    residual = here[3]
-    jacobian = here[4]
-    least_squares_multipliers(bases, jacobian, rows, one_sided, active, gradient, scratch, last_row, gram, better_y)
-    other = dual_residual(bases, jacobian, rows, one_sided, residual, gradient, better_y, scratch)
-    if other > max(10.0 * dual, 1e-11):
-        return dual
-    for r in range(rows):
-        y[r] = better_y[r]
-    return max(dual, other)
-
-
-@kernel(inner=True)
-def turned(table, pool, tracked):
-    """The largest product of a factor and an angle in a row."""
-    most = 0.0
-    for r in range(table[CONTACTS], table[ROWS]):
-        row = table[ROW_TABLE] + ROW * r
-        if table[row + KIND] != JOINT_ROW:
-            continue
-        o = table[row + PARAMETERS]
-        if table[row + ANGLE] >= 0:
-            most = max(most, max(abs(pool[o + 2]), abs(pool[o] * tracked[table[row + ANGLE], 0])))
-        second = table[row + SECOND]
-        if second >= 0 and table[second + 3] >= 0:
-            most = max(most, abs(pool[o + 1] * tracked[table[second + 3], 0]))
-    return most
-
-
-@kernel(inner=True)
-def weigh_rows(rows, one_sided, residual, y, mu, forces, active):
-    """Into active 1 / mu for the rows that count, into forces what they push with: -(y + c / mu)."""
-    for r in range(rows):
-        t = y[r] + residual[r] / mu
-        idle = one_sided[r] == 1 and t >= 0.0
-        forces[r] = 0.0 if idle else -t
-        active[r] = 0.0 if idle else 1.0 / mu
-
-
-@kernel(inner=True)
-def curve_rows(rows, residual, y, active, restoring, forces):
-    """Into forces the multipliers whose rows' curvature goes into the matrix."""
-    most = 0.0
-    for r in range(rows):
-        # Far from feasible, c / mu would drown the curvature of the objective; y is what it tends to.
-        forces[r] = (residual[r] if active[r] > 0.0 else 0.0) if restoring else y[r]
-        most = max(most, abs(forces[r]))
-    if most < WEAK:
-        # Forces on their way to zero: their curvature would only spoil the inertia, and cost the fast end.
-        for r in range(rows):
-            forces[r] = 0.0
-
-
-@kernel(inner=True)
-def damped_step(table, lagrangian, n, last, shift, radius, matrix, descent, step, scratch):
-    """The step of the factor in `matrix`, its shift raised until the step is not much longer than the radius.
-
-    Nor may a body turn by much more than a radian. Scaled down instead, a step would lose what its stiff directions
-    gain, those that bring the rows to hold. Not so with contacts: their rows change fast along the step. Returns the
-    shift, and the step's largest component and turn.
-    """
-    for attempt in range(SHORTENINGS + 1):
-        for i in range(n):
-            step[i] = descent[i]
-        substitute(matrix, n, last, step)
-        longest = 0.0
-        turn = 0.0
-        for i in range(n):
-            longest = max(longest, abs(step[i]))
-            if i % 6 >= 3 and i < 6 * table[MOVING]:
-                turn = max(turn, abs(step[i]))
-        excess = max(turn / TURN, longest / radius)
-        if excess <= 1.5 or attempt == SHORTENINGS or table[CONTACTS] > 0:
-            break
-        # Newton's method on 1 / |step|, whose slope is |U^-T step|^2.
-        for i in range(n):
-            scratch[i] = step[i]
-        forward(matrix, n, last, scratch)
-        square = 0.0
-        slope = 0.0
-        for i in range(n):
-            square += step[i] * step[i]
-            slope += scratch[i] * scratch[i]
-        shift = factorize_shifted(lagrangian, n, last, shift + square / slope * (excess - 1.0), matrix)
-    return shift, longest, turn
 
 
 @kernel(inline=True, allocates=True)
@@ -231,17 +89,6 @@ def unknowns(n):
     vectors = np.empty((4, n))
     matrices = np.empty((2, n, n))
     return vectors[0], (vectors[1], vectors[2], vectors[3]), matrices[0], matrices[1]
-
-
-@kernel(inner=True)
-def scattered(table, residual, one_sided):
-    """Whether a row of a joint is far from holding."""
-    for r in range(table[CONTACTS], table[ROWS]):
-        if table[table[ROW_TABLE] + ROW * r + KIND] == JOINT_ROW:
-            c = min(residual[r], 0.0) if one_sided[r] == 1 else residual[r]
-            if abs(c) > SCATTERED:
-                return True
-    return False
 
 
 @kernel

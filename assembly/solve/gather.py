@@ -19,21 +19,37 @@ from assembly.constraints.program import (
     GATHER_TABLE,
     JOINT,
     JOINT_RECORD,
+    JOINT_ROW,
     JOINT_TABLE,
+    KIND,
     ONE_SIDED,
     ROW,
     ROW_TABLE,
+    ROWS,
     SECOND,
     joint_row,
 )
 from assembly.kinematics.motion import retract
 from assembly.solve.linear import factorize, substitute
 
+# Bodies are gathered where a start violates a row of a joint by more than this.
+SCATTERED = 0.5
 STEPS = 50
 # Half the sum of squares of a body's rows that is as good as zero.
 ENOUGH = 1e-26
 # The damping at first, and where no step is found any more.
 DAMPING, STUCK = 1e-4, 1e6
+
+
+@kernel(inner=True)
+def scattered(table, residual, one_sided):
+    """Whether a row of a joint is far from holding."""
+    for r in range(table[CONTACTS], table[ROWS]):
+        if table[table[ROW_TABLE] + ROW * r + KIND] == JOINT_ROW:
+            c = min(residual[r], 0.0) if one_sided[r] == 1 else residual[r]
+            if abs(c) > SCATTERED:
+                return True
+    return False
 
 
 @kernel(inner=True)

@@ -10,6 +10,7 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly.constraints.program import (
+    ANGLE,
     BODIES,
     BODY_F,
     BODY_G,
@@ -21,6 +22,7 @@ from assembly.constraints.program import (
     KIND,
     MOVING,
     ONE_SIDED,
+    PARAMETERS,
     ROW,
     ROW_TABLE,
     ROWS,
@@ -44,7 +46,6 @@ from assembly.constraints.terms import TAPE_TERM, TERM, TERM_KIND, TERM_TABLE, T
 from assembly.kinematics.motion import retract
 from assembly.proximity.extremal import into_domain
 from assembly.proximity.velocity import RATES, ZED
-from assembly.solve.linear import factorize, substitute
 
 
 @kernel(inline=True)
@@ -265,40 +266,20 @@ def carry(table, pool, bases, free, lengths, tracked, records, d, alpha, out):
 
 
 @kernel(inner=True)
-def dual_residual(bases, jacobian, rows, one_sided, residual, gradient, y, scratch):
-    """Largest component of grad f + J^T y, and of complementarity."""
-    for i in range(gradient.size):
-        scratch[i] = gradient[i]
-    add_transposed(bases, jacobian, rows, y, scratch)
-    worst = 0.0
-    for i in range(gradient.size):
-        if not abs(scratch[i]) <= worst:
-            worst = abs(scratch[i])
-    for r in range(rows):
-        if one_sided[r] == 1:
-            worst = max(worst, min(abs(y[r]), abs(residual[r])))
-    return worst
-
-
-@kernel(inner=True)
-def least_squares_multipliers(bases, jacobian, rows, one_sided, active, gradient, scratch, last_row, gram, y):
-    """The multipliers of the active rows that leave the smallest grad f + J^T y."""
-    for i in range(gradient.size):
-        scratch[i] = 0.0
-    for r in range(rows):
-        if active[r] > 0.0:
-            add_row(bases, jacobian, r, 1.0, scratch)
-        for s in range(r, last_row[r] + 1):
-            gram[r, s] = times(bases, jacobian, s, scratch) if active[s] > 0.0 else 0.0
-        gram[r, r] += 1e-10 if active[r] > 0.0 else 1.0
-        y[r] = -times(bases, jacobian, r, gradient) if active[r] > 0.0 else 0.0
-        if active[r] > 0.0:
-            clear_row(bases, r, scratch)
-    if factorize(gram, rows, last_row):
-        substitute(gram, rows, last_row, y)
-    for r in range(rows):
-        if one_sided[r] == 1:
-            y[r] = min(y[r], 0.0)
+def turned(table, pool, tracked):
+    """The largest product of a factor and an angle in a row."""
+    most = 0.0
+    for r in range(table[CONTACTS], table[ROWS]):
+        row = table[ROW_TABLE] + ROW * r
+        if table[row + KIND] != JOINT_ROW:
+            continue
+        o = table[row + PARAMETERS]
+        if table[row + ANGLE] >= 0:
+            most = max(most, max(abs(pool[o + 2]), abs(pool[o] * tracked[table[row + ANGLE], 0])))
+        second = table[row + SECOND]
+        if second >= 0 and table[second + 3] >= 0:
+            most = max(most, abs(pool[o + 1] * tracked[table[second + 3], 0]))
+    return most
 
 
 @kernel(inner=True)

@@ -1,4 +1,4 @@
-"""The line search on the augmented Lagrangian.
+"""The step and the line search on the augmented Lagrangian.
 
 A step that the rows' curvature spoils is bent back onto the rows, with the factorization at hand, before it is
 shortened.
@@ -7,15 +7,52 @@ shortened.
 from __future__ import annotations
 
 from assembly._kernel import kernel
-from assembly.constraints.program import evaluate
+from assembly.constraints.program import CONTACTS, MOVING, evaluate
 from assembly.constraints.terms import objective
 from assembly.proximity.extremal import BEND
 from assembly.solve.dexterity import add_dexterities
-from assembly.solve.linear import substitute
+from assembly.solve.linear import factorize_shifted, forward, substitute
 from assembly.solve.rows import add_transposed, carry, merit, move
 
 # A step shorter than this decides nothing.
 SHORTEST = 1e-6
+# A body turns by this much at most in a step, and this often a step is shortened by a larger shift.
+TURN = 1.0
+SHORTENINGS = 4
+
+
+@kernel(inner=True)
+def damped_step(table, lagrangian, n, last, shift, radius, matrix, descent, step, scratch):
+    """The step of the factor in `matrix`, its shift raised until the step is not much longer than the radius.
+
+    Nor may a body turn by much more than a radian. Scaled down instead, a step would lose what its stiff directions
+    gain, those that bring the rows to hold. Not so with contacts: their rows change fast along the step. Returns the
+    shift, and the step's largest component and turn.
+    """
+    for attempt in range(SHORTENINGS + 1):
+        for i in range(n):
+            step[i] = descent[i]
+        substitute(matrix, n, last, step)
+        longest = 0.0
+        turn = 0.0
+        for i in range(n):
+            longest = max(longest, abs(step[i]))
+            if i % 6 >= 3 and i < 6 * table[MOVING]:
+                turn = max(turn, abs(step[i]))
+        excess = max(turn / TURN, longest / radius)
+        if excess <= 1.5 or attempt == SHORTENINGS or table[CONTACTS] > 0:
+            break
+        # Newton's method on 1 / |step|, whose slope is |U^-T step|^2.
+        for i in range(n):
+            scratch[i] = step[i]
+        forward(matrix, n, last, scratch)
+        square = 0.0
+        slope = 0.0
+        for i in range(n):
+            square += step[i] * step[i]
+            slope += scratch[i] * scratch[i]
+        shift = factorize_shifted(lagrangian, n, last, shift + square / slope * (excess - 1.0), matrix)
+    return shift, longest, turn
 
 
 @kernel(inner=True)
