@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.constraints.constraint import Constraint, structure_changes
 from assembly.constraints.expression import Expression
 from assembly.constraints.objectives import Objective
-from assembly.constraints.packing import Packed, pack
+from assembly.constraints.packing import Packed, pack, structure_of
 from assembly.errors import InputError, vector
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import pose_rows
@@ -145,7 +145,13 @@ class Assembly:
 
     def packed(self) -> Packed:
         """The scene as the compiled loop reads it; made at first use."""
-        if self._packed is None or self._packed.stamp != structure_changes():
+        if self._packed is not None and self._packed.stamp != structure_changes():
+            # A row came or went somewhere; perhaps in another scene.
+            if self._packed.structure == structure_of(self._constraints):
+                self._packed.stamp = structure_changes()
+            else:
+                self._packed = None
+        if self._packed is None:
             if all(body.fixed for body in self._bodies):
                 raise InputError(f"bodies are {[body.name for body in self._bodies]}, none moving; expected one")
             packed = pack(self._bodies, self._constraints, self._objectives)

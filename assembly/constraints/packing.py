@@ -27,7 +27,7 @@ from assembly.geometry.spline import SURFACE_RECORD
 from assembly.kinematics.body import Body, BodyFace
 from assembly.proximity.pairs import OFFSETS, PairStatus, extremal_pair
 
-__all__ = ["Packed", "pack"]
+__all__ = ["Packed", "pack", "structure_of"]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
@@ -64,6 +64,7 @@ class Packed:
     ) -> None:
         self.count = len(bodies)
         self.stamp = structure_changes()
+        self.structure = structure_of(constraints)
         self._places = {id(body): k for k, body in enumerate(bodies)}
         self.scale = _scene_size(bodies, constraints, objectives)
         self.reference = bodies[0].pose.position.copy()
@@ -370,6 +371,16 @@ class Packed:
             pool[at + 2] = (target[2] - z) / scale
         for frame_distance, at in self._turns:
             pool[at : at + 4] = frame_distance.body_quaternion
+
+
+def structure_of(constraints: Sequence[Constraint]) -> tuple[tuple[object, ...], ...]:
+    """Which rows constraints have, whatever their values."""
+    return tuple(
+        (id(item), id(equation.terms[0][1]), equation.terms[0][0], equation.source and equation.source[1])
+        for item in constraints
+        if isinstance(item, (Joint, Coupling))
+        for equation in item.equations
+    )
 
 
 def _scene_size(

@@ -205,7 +205,7 @@ def place_tape(table, pool, tape, q, room):
 
 @kernel(inner=True)
 def tape_rows(table, pool, tape, q, room, residual, jacobian):
-    """All rows of a tape; a value that is not finite is an infinite violation."""
+    """All rows of a tape; a value or a slope that is not finite is an infinite violation."""
     inputs, outputs, work = room
     place_tape(table, pool, tape, q, inputs)
     run_tape(table, pool, table[tape + TAPE_FIRST], inputs, work, outputs)
@@ -224,6 +224,8 @@ def tape_rows(table, pool, tape, q, room, residual, jacobian):
             for i in range(3):
                 jacobian[r, column + i] = outputs[at + i] * each * size
                 jacobian[r, column + 3 + i] = outputs[at + 3 + i] * each
+                if not (math.isfinite(outputs[at + i]) and math.isfinite(outputs[at + 3 + i])):
+                    residual[r] = math.inf
 
 
 @kernel(inner=True)

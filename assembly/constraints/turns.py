@@ -1,7 +1,8 @@
 """Which turn an angle is on when a solve starts: angles go on past a whole turn, poses do not tell how often.
 
-A driven angle starts on the turn of its value. A coupled one keeps, in a warm start, the turn it has; otherwise it is
-on the turn that its coupling asks for, where the other side is known. What is left is looked for within its limits.
+A driven angle starts on the turn of its value, one that is coupled to a driven freedom on the turn that the coupling
+asks for. Other coupled angles keep, in a warm start, the turn they have; otherwise they too are on the turn of their
+coupling, where the other side is known. What is left is looked for within its limits.
 """
 
 from __future__ import annotations
@@ -46,6 +47,19 @@ class Turns:
         self._driven = [(k, drive) for k, drive in enumerate(self._drives) if drive is not None]
         coupled = {id(coordinate) for equation in self._couplings for _, coordinate in equation.terms}
         self._coupled = [id(angle) in coupled for angle in angles]
+        # Driven coordinates, slides too, and all that couplings move with them.
+        self._targets = {
+            id(equation.terms[0][1]): equation
+            for equation, _ in equations
+            if len(equation.terms) == 1 and not equation.one_sided and equation.source is not None
+        }
+        led = set(self._targets)
+        for _ in self._couplings:
+            for equation in self._couplings:
+                sides = {id(coordinate) for _, coordinate in equation.terms}
+                if sides & led:
+                    led |= sides
+        self._led = [id(angle) in led for angle in angles]
 
     @property
     def coupled(self) -> bool:
@@ -64,11 +78,11 @@ class Turns:
         """
         known = [True] * len(near)
         for k, drive in enumerate(self._drives):
-            if drive is not None and not (warm and self._coupled[k]):
+            if drive is not None:
                 near[k] = pool[drive]
-            elif not warm:
+            elif not warm or self._led[k]:
                 known[k] = not self._coupled[k]
-                near[k] = self._within_limits(k)
+                near[k] = self._within_limits(k) if not warm else near[k]
         while not all(known):
             if not any(self._follow(equation, near, known, evaluate) for equation in self._couplings):
                 # Nothing tells: it is where its limits are.
@@ -87,7 +101,11 @@ class Turns:
             k = self._places.get(id(this))
             j = self._places.get(id(other))
             if k is not None and not known[k] and (j is None or known[j]):
-                value = evaluate(other, 0.0 if j is None else float(near[j]))
+                target = self._targets.get(id(other))
+                if target is not None:
+                    value = target.current()
+                else:
+                    value = evaluate(other, 0.0 if j is None else float(near[j]))
                 near[k] = (equation.current() - other_factor * value) / factor
                 known[k] = True
                 return True

@@ -305,6 +305,9 @@ def solve_program(table, pool, settings, state, history, tips):
                 status = STALLED
                 break
         used, longest, turn = damped_step(table, lagrangian, n, last, shift, radius, matrix, descent, step, straight)
+        if used < 0.0:
+            status = STALLED
+            break
         last_violation = violation
         last_dual = dual
         cut = min(1.0, radius / longest) if longest > 0.0 else 1.0

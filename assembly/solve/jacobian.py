@@ -71,6 +71,8 @@ def rows_of(packed: Packed, state: Array) -> Rows:
     ------
     NoPairError
         A contact has no extremal pair at this pose.
+    InputError
+        An expression has no finite value or slope there.
     """
     m, pairs, n = packed.rows, len(packed.contacts), packed.count
     state = state.copy()
@@ -79,6 +81,12 @@ def rows_of(packed: Packed, state: Array) -> Rows:
     lost = rows_at(packed.table, packed.pool, state, free, residual, jacobian)
     if lost >= 0:
         raise NoPairError(lost, packed.contacts[lost].name)
+    finite = np.isfinite(residual[:m]) & np.isfinite(jacobian[:m, : 6 * n]).all(axis=1)
+    if not finite.all():
+        owner = int(packed.owners[np.flatnonzero(~finite)[0]])
+        raise InputError(
+            f"constraint {owner + 1} of the scene has no finite value or slope at this pose; expected both"
+        )
     which = np.arange(m)
     shares = np.ones(m)
     if (free >= 0).any():

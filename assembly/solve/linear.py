@@ -85,6 +85,8 @@ def factorize_shifted(lagrangian, n, last, shift, matrix):
     scale = 1.0
     for i in range(n):
         scale = max(scale, abs(lagrangian[i, i]))
+    if not math.isfinite(scale):
+        return -1.0
     while shift <= 1e8 * scale:
         for i in range(n):
             for j in range(i, last[i] + 1):

@@ -52,6 +52,8 @@ def damped_step(table, lagrangian, n, last, shift, radius, matrix, descent, step
             square += step[i] * step[i]
             slope += scratch[i] * scratch[i]
         shift = factorize_shifted(lagrangian, n, last, shift + square / slope * (excess - 1.0), matrix)
+        if shift < 0.0:
+            break
     return shift, longest, turn
 
 

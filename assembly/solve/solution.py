@@ -139,7 +139,7 @@ class Solution:
     @cached_property
     def q(self) -> Array:
         """Configuration, (n, 7)."""
-        return self._state[: self._packed.contacts_at].reshape(-1, 7)
+        return self._state[: self._packed.contacts_at].reshape(-1, 7).copy()
 
     @property
     def _parameters(self) -> Array:
