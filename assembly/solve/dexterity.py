@@ -198,6 +198,11 @@ def tip_map(table, pool, term, bases, rows, n, point, order):
     exists, system = rate_system(bases, jacobian, used, b)
     outcome = DETERMINED if exists else DEPENDENT
     if exists:
+        # Where rows do not hold, redundant ones contradict each other and idle motions move the tip a little: singular
+        # values are off by up to the root of the residuals.
+        leeway = UNDETERMINED
+        for l in range(used.size):
+            leeway = max(leeway, 10.0 * math.sqrt(abs(residual[used[l]])))
         g = np.zeros(n)
         h = np.zeros(k)
         missed = 0.0
@@ -216,15 +221,10 @@ def tip_map(table, pool, term, bases, rows, n, point, order):
             add_tip_force(pool, o, task, arm, unit, 0, s, g)
             unit[r, 0] = 0.0
             left = settle(system, bases, jacobian, used, b, g, h, p[r], y[r])
-            if not left <= UNDETERMINED * largest(g):
+            if not left <= leeway * largest(g):
                 outcome = OPEN
-        # Redundant rows contradict each other where they do not hold: singular values grow as the root of residuals.
-        violation = 0.0
-        for l in range(used.size):
-            violation = max(violation, abs(residual[used[l]]))
         changes = row_rates(bases, jacobian, used, v)
-        missed = max(missed, largest(changes))
-        if not missed <= max(UNDETERMINED, 10.0 * math.sqrt(violation)):
+        if not max(missed, largest(changes)) <= leeway:
             outcome = DEPENDENT
     return outcome, tip, used, (v, z, changes), (p, y, row_rates(bases, jacobian, used, p))
 

@@ -102,7 +102,10 @@ def rate_system(bases, jacobian, used, b):
 
 @kernel(inner=True, allocates=True)
 def settle(system, bases, jacobian, used, b, g, h, v, z):
-    """Solve for v (n,) and z (k,). Returns the largest part of g and h that is left."""
+    """Solve for v (n,) and z (k,). Returns the largest part of g and h that is left.
+
+    What no pass takes off g pushes motions that nothing determines; their part of v is left out.
+    """
     matrix, last, s, gram, ends = system
     k, n = b.shape
     rest = g.copy()
@@ -117,7 +120,9 @@ def settle(system, bases, jacobian, used, b, g, h, v, z):
     for j in range(k):
         z[j] = 0.0
         size = max(size, abs(h[j]))
-    for _pass in range(PASSES):
+    start = size
+    passes = 0
+    while True:
         for i in range(n):
             x[i] = rest[i]
         if not idle:
@@ -142,6 +147,7 @@ def settle(system, bases, jacobian, used, b, g, h, v, z):
             v[i] += x[i]
             longest = max(longest, abs(v[i]))
             change = max(change, abs(x[i]))
+        passes += 1
         before = size
         if change <= ENOUGH * longest:
             # What the next pass would change is its square.
@@ -160,6 +166,10 @@ def settle(system, bases, jacobian, used, b, g, h, v, z):
             size = max(size, abs(rest[i]))
         for j in range(k):
             size = max(size, abs(missing[j]))
-        if not size < 0.1 * before:
+        if not size < 0.1 * before or passes == PASSES:
             break
+    if size > ENOUGH * start:
+        substitute(matrix, n, last, rest)
+        for i in range(n):
+            v[i] -= passes * rest[i]
     return size

@@ -56,7 +56,7 @@ def tip_jacobian(
     inputs : sequence of Joint or Freedom
         Joints with one freedom, or freedoms, `joint.freedom(name)`.
     q : (n, 7) or Solution, optional
-        A row a body, or a solution of this scene; the bodies' own poses by default.
+        A row a body, or a solution for these bodies; the bodies' own poses by default.
     task : "position", "rotation" or "pose", optional
         Which rows: the tip's linear velocity, its body's angular velocity, or both, linear first. Position for a point,
         pose for a frame or a body by default.
@@ -157,10 +157,7 @@ def _evaluated(scene: Assembly, objective: Dexterity, q: ArrayLike | Solution | 
                 known = ", ".join(repr(other.name) for other in scene.bodies)
                 raise InputError(f"{what} is on body {body.name!r}; expected bodies of this assembly: {known}")
     packed = scene.packed()
-    if isinstance(q, Solution):
-        state = scene._own("q", packed, q)._state
-    else:
-        state = scene._start(packed, None if q is None else pose_rows("q", q, len(scene.bodies)), None)
+    state = _state(scene, packed, q)
     table, pool, term = _with_term(packed, objective)
     jacobian = np.empty((task.rows, len(task.inputs)))
     free = np.empty(len(packed.contacts), dtype=np.int64)
@@ -171,6 +168,24 @@ def _evaluated(scene: Assembly, objective: Dexterity, q: ArrayLike | Solution | 
     if outcome != DETERMINED or not np.isfinite(jacobian).all():
         raise InputError(complaint(scene, packed, state, task))
     return jacobian, float(value), state[: packed.contacts_at].reshape(-1, 7)
+
+
+def _state(scene: Assembly, packed: Packed, q: ArrayLike | Solution | None) -> Array:
+    """Where the bodies are, and where the pairs of contacts are looked for."""
+    if not isinstance(q, Solution):
+        return scene._start(packed, None if q is None else pose_rows("q", q, len(scene.bodies)), None)
+    if q._packed is packed:
+        return q._state
+    if q._scene.bodies != scene.bodies:
+        raise InputError("q is a solution of another assembly; expected one with these bodies")
+    # A value that was driven and is free now makes another program of the same scene.
+    state = scene._start(packed, q.q, None)
+    known = zip(q._scene.contacts, q._scene.faces, q._parameters, strict=True)
+    for contact, faces, parameters in known:
+        for k, (other, other_faces) in enumerate(zip(packed.contacts, packed.faces, strict=True)):
+            if contact is other and faces == other_faces:
+                state[packed.contacts_at + 4 * k : packed.contacts_at + 4 * k + 4] = parameters
+    return state
 
 
 def _with_term(packed: Packed, objective: Dexterity) -> tuple[NDArray[np.int64], Array, int]:

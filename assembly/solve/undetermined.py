@@ -63,7 +63,7 @@ def complaint(scene: Assembly, packed: Packed, state: Array, task: TipTask) -> s
         if np.abs(_gradient(packed, freedom.coordinate, poses)[columns] @ open_).max(initial=0.0) > STILL
     ]
     missing = f"; {_listed(turned)} may still change" if turned else ""
-    return f"inputs is [{listed}]; expected inputs that determine the motion of {task.tip!r}{missing}"
+    return f"inputs is [{listed}]; expected inputs that determine how the tip on {task.tip.body.name!r} moves{missing}"
 
 
 def _listed(freedoms: list[Freedom] | tuple[Freedom, ...]) -> str:
