@@ -13,11 +13,12 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.constraints.constraint import Constraint, structure_changes
 from assembly.constraints.expression import Expression
 from assembly.constraints.objectives import Objective
-from assembly.constraints.packing import Packed, pack, structure_of
+from assembly.constraints.packing import Packed, lone_surfaces, pack, structure_of
 from assembly.errors import InputError, vector
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import pose_rows
 from assembly.proximity.pairs import inside
+from assembly.proximity.solid_contact import TRACK
 from assembly.solve.augmented_lagrangian import GATHER, HISTORY, ITERATIONS, RESULTS, SCATTER, solve_program
 from assembly.solve.options import Options
 from assembly.solve.solution import Scene, Solution, Status
@@ -50,7 +51,7 @@ class Assembly:
     weights' ratios aside, and starts may change between solves without packing again.
     """
 
-    _loaded: ClassVar[set[int | None]] = set()  # which kernels this process has
+    _loaded: ClassVar[set[tuple[int | None, int | None]]] = set()  # which kernels this process has
 
     def __init__(self, bodies: Iterable[Body] = ()) -> None:
         self._bodies: list[Body] = []
@@ -156,7 +157,7 @@ class Assembly:
                 raise InputError(f"bodies are {[body.name for body in self._bodies]}, none moving; expected one")
             packed = pack(self._bodies, self._constraints, self._objectives)
             self._scene = Scene(
-                self.bodies, self.constraints, tuple(packed.contacts), tuple(packed.faces), packed.scale
+                self.bodies, self.constraints, tuple(packed.contacts), tuple(packed.sides), packed.scale
             )
             self._packed = packed
         return self._packed
@@ -197,23 +198,23 @@ class Assembly:
         state = self._start(packed, q0, starts)
         history = np.empty((min(int(settings[ITERATIONS]), MOST_HISTORY) + 1, HISTORY))
         arguments = (packed.table, packed.pool)
-        tips = packed.tips
-        if tips not in Assembly._loaded:
+        kinds = (packed.tips, packed.solids)
+        if kinds not in Assembly._loaded:
             # Loading the kernel, or compiling it, is no part of a solve's time.
-            solve_program(*arguments, _LOADING, state.copy(), history, tips)
-            Assembly._loaded.add(tips)
+            solve_program(*arguments, _LOADING, state.copy(), history, *kinds)
+            Assembly._loaded.add(kinds)
         gathers = not warm and not self._objectives
         if gathers:
             settings = settings.copy()
             settings[GATHER] = 1.0
         begin = perf_counter()
-        code = solve_program(*arguments, settings, state, history, tips)
+        code = solve_program(*arguments, settings, state, history, *kinds)
         if code != 0 and not gathers and state[packed.results_at + SCATTER] == 1.0:
             # What the start itself did not lead to may be reached from gathered bodies.
             settings = settings.copy()
             settings[GATHER] = 1.0
             other, rows = self._start(packed, q0, starts), np.empty_like(history)
-            if solve_program(*arguments, settings, other, rows, tips) == 0:
+            if solve_program(*arguments, settings, other, rows, *kinds) == 0:
                 code, state, history = 0, other, rows
         solution = Solution(self._scene, packed, state, _STATUSES[code], perf_counter() - begin, history)
         if verbose:
@@ -277,10 +278,13 @@ class Assembly:
                 known = ", ".join(map(repr, names)) or "none, the assembly has no contacts"
                 raise InputError(f"starts names {name!r}; expected a contact: {known}")
             k = names.index(name)
-            surfaces = (packed.faces[k][0].face.surface, packed.faces[k][1].face.surface)
-            at = packed.contacts_at + 4 * k
+            at = packed.contacts_at + TRACK * k
             what = f"starts[{name!r}]"
+            surfaces = lone_surfaces(packed.sides[k])
+            if surfaces is None:
+                raise InputError(f"{what} is of solids with several faces; expected a contact of two faces")
             state[at : at + 4] = inside(what, vector(what, value, 4), surfaces)
+            state[at + 4 : at + TRACK] = 0.0
 
     def mobility(
         self, q: ArrayLike | Solution | None = None, *, drives: bool = True, tolerance: float | None = None

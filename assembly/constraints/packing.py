@@ -23,9 +23,13 @@ from assembly.constraints.primitives import coordinate as coordinate_value
 from assembly.constraints.turns import Turns
 from assembly.errors import InputError
 from assembly.geometry.face import Face
+from assembly.geometry.surface import NurbsSurface
 from assembly.geometry.spline import SURFACE_RECORD
 from assembly.kinematics.body import Body, BodyFace
-from assembly.proximity.pairs import OFFSETS, PairStatus, extremal_pair
+from assembly.proximity.pairs import OFFSETS
+from assembly.proximity.solid_contact import TRACK
+from assembly.proximity.shell_packing import pack_shell
+from assembly.proximity.topology import solid_of
 
 __all__ = ["Packed", "pack", "structure_of"]
 
@@ -44,8 +48,8 @@ class Packed:
         The scene's size: the largest diagonal of a body's box.
     unit : float
         What one of the loop's objective counts in the user's units.
-    faces : list of (BodyFace, BodyFace)
-        The faces of every contact.
+    sides : list of (Body or BodyFace, Body or BodyFace)
+        The sides of every contact; of a body whose only face has no boundary that face.
     spans : list of slice
         The rows of every constraint.
     owners : (m,) int
@@ -69,7 +73,7 @@ class Packed:
         self.scale = _scene_size(bodies, constraints, objectives)
         self.reference = bodies[0].pose.position.copy()
         self.contacts = [constraint for constraint in constraints if isinstance(constraint, Contact)]
-        self.faces = [_choose_faces(contact) for contact in self.contacts]
+        self.sides = [(_lone(contact.a), _lone(contact.b)) for contact in self.contacts]
         self._targets: list[tuple[PointDistance | FrameDistance, int]] = []
         self._turns: list[tuple[FrameDistance, int]] = []
         self._values: list[tuple[Equation, int, float]] = []
@@ -85,6 +89,8 @@ class Packed:
         self._header[program.IMPLICIT] = int(implicit)
         # What the loop is compiled for: None without a dexterity.
         self.tips = 1 if self._header[program.DEXTERITIES] else None
+        # And None where every contact is of two lone faces without boundary.
+        self.solids = 1 if self.shells else None
         self.table = np.concatenate(self._table)
         self.pool = np.concatenate(self._pool)
         self._sources = [item for item in self._values if item[0].source is not None]
@@ -93,8 +99,8 @@ class Packed:
         self.tracked = len(self.contacts) + len(self._angles)
         # Where the parts of a state begin: tracked values, multipliers, residuals, results.
         self.contacts_at = 7 * self.count
-        self.angles_at = self.contacts_at + 4 * len(self.contacts)
-        self.multipliers_at = self.contacts_at + 4 * self.tracked
+        self.angles_at = self.contacts_at + TRACK * len(self.contacts)
+        self.multipliers_at = self.contacts_at + TRACK * self.tracked
         self.residuals_at = self.multipliers_at + self.rows
         self.results_at = self.residuals_at + self.rows
 
@@ -127,10 +133,15 @@ class Packed:
         owners: list[int] = []
         numbers = {id(constraint): k for k, constraint in enumerate(constraints)}
         records: dict[tuple[int, bool], int] = {}
-        for contact, (face_f, face_g) in zip(self.contacts, self.faces, strict=True):
-            surfaces = [self._surface(records, side.face) for side in (face_f, face_g)]
+        self.shells: dict[tuple[Face, ...], int] = {}
+        for contact, sides in zip(self.contacts, self.sides, strict=True):
             places = [self._places[id(body)] for body in contact.bodies]
-            rows.append([program.CONTACT_ROW, *places, int(contact.unilateral), 0, 1, *surfaces])
+            fields = [program.CONTACT_ROW, *places, int(contact.unilateral), 0, 1]
+            if all(isinstance(side, BodyFace) and not side.face.boundary for side in sides):
+                fields += [self._surface(records, _side_faces(side)[0]) for side in sides] + [-1, -1]
+            else:
+                fields += [-1, -1] + [self._shell(_side_faces(side)) for side in sides]
+            rows.append(fields)
             owners.append(numbers[id(contact)])
         # Rows in the order of their bodies: then the envelope of J J^T is narrow, too.
         others = [item for item in constraints if isinstance(item, (Joint, Coupling))]
@@ -171,7 +182,7 @@ class Packed:
         header[program.BODIES] = len(bodies)
         header[program.MOVING] = int(slots.max()) + 1
         header[program.CONTACTS] = len(self.contacts)
-        header[program.TRACKED] = len(self.contacts) + len(self._angles)
+        header[TRACKED] = len(self.contacts) + len(self._angles)
         header[program.JOINTS] = len(self._frames)
         header[program.ROWS] = len(rows)
         header[program.EXTRA] = extra
@@ -281,6 +292,14 @@ class Packed:
             records[key], _ = self._add(record, pool)
         return records[key]
 
+    def _shell(self, faces: tuple[Face, ...]) -> int:
+        """Offset of the shell of a solid; faces that several bodies share are packed once."""
+        if faces not in self.shells:
+            table, pool, shell = pack_shell(solid_of(faces), self.scale, self._table_size, self._pool_size)
+            self._add(table, pool)
+            self.shells[faces] = shell
+        return self.shells[faces]
+
     def _terms(self, weight: float, objective: Objective, bodies: Sequence[Body]) -> list[list[int]]:
         if isinstance(objective, (Dexterity, Expression)):
             weight /= self.unit  # their values are in the user's units
@@ -341,7 +360,7 @@ class Packed:
         """Write the turns that angles start on into a state."""
         if not self._angles:
             return
-        near = state[self.angles_at : self.multipliers_at : 4]
+        near = state[self.angles_at : self.multipliers_at : TRACK]
         if warm and not self._turned.coupled:
             self._turned.follow_drives(self.pool, near)
             return
@@ -412,22 +431,23 @@ def _spread(points: Sequence[Array]) -> float:
     return float(np.linalg.norm(np.ptp(points, axis=0))) if points else 0.0
 
 
-def _choose_faces(contact: Contact) -> tuple[BodyFace, BodyFace]:
-    """The faces of a contact: as said, else the nearest extremal pair of faces at the bodies' poses."""
-    sides = [[side] if isinstance(side, BodyFace) else list(side.faces) for side in (contact.a, contact.b)]
-    if len(sides[0]) == len(sides[1]) == 1:
-        return sides[0][0], sides[1][0]
-    best: tuple[float, float, BodyFace, BodyFace] | None = None
-    for f in sides[0]:
-        for g in sides[1]:
-            pair = extremal_pair(f, contact.body_a.q, g, contact.body_b.q)
-            # An extremum inside both faces comes before one held at an edge.
-            inside = 0.0 if pair.status in (PairStatus.CONVERGED, PairStatus.SINGULAR) else 1.0
-            rank = (inside, abs(pair.gap))
-            if best is None or rank < best[:2]:
-                best = (*rank, f, g)
-    assert best is not None
-    return best[2], best[3]
+def _side_faces(side: Body | BodyFace) -> tuple[Face, ...]:
+    """The faces that take part on a side of a contact."""
+    return (side.face,) if isinstance(side, BodyFace) else tuple(part.face for part in side.faces)
+
+
+def lone_surfaces(sides: tuple[Body | BodyFace, Body | BodyFace]) -> tuple[NurbsSurface, NurbsSurface] | None:
+    """The two surfaces of a contact, if each of its sides has one face."""
+    f, g = (_side_faces(side) for side in sides)
+    return (f[0].surface, g[0].surface) if len(f) == len(g) == 1 else None
+
+
+def _lone(side: Body | BodyFace) -> Body | BodyFace:
+    """The face of a side that has one without boundary: its pairs need no edges. Else the side itself."""
+    faces = _side_faces(side)
+    if len(faces) > 1 or faces[0].boundary:
+        return side
+    return side if isinstance(side, BodyFace) else side.faces[0]
 
 
 def pack(

@@ -4,7 +4,8 @@ All lengths in a program are divided by the scene's length scale. Table: a heade
 every body (-1: fixed), then a record a row (contacts first), a joint, a tape and an objective term. The loop works on
 
     configuration  (n, 7)       poses, scaled, positions relative to a reference
-    tracked        (k, 4)       parameters of every contact's pair, then (first column) unwrapped angles of joints
+    tracked        (k, 9)       of every contact parameters, features (`proximity/shell.py`) and normal of its pair, then
+                                (first column) unwrapped angles of joints
     records        (k + j, R)   what the derivatives of gaps need (see `track_contact`), then frames of joints
     residual       (m,)         rows: contacts, joints, tapes; behind them four for every free pair
     jacobian       (m, 16 + e)  in the twists of a row's two bodies (12), a free pair's coordinates (4), further bodies
@@ -17,6 +18,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from assembly._kernel import kernel
 from assembly.constraints.primitives import add_coordinate_hessian, coordinate, place_frames, write_gradient
 from assembly.constraints.tape import run_tape
@@ -24,7 +27,9 @@ from assembly.geometry.vec import dot, sub
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.extremal import CLOSE, CONVERGED, LEFT_PATCH, SINGULAR, solve_pair
 from assembly.proximity.free_pair import VARIABLES, free_hessian, free_rows
+from assembly.proximity.solid_contact import FEATURE_F, TRACK, search_solids, track_solids
 from assembly.proximity.start import global_start
+from assembly.proximity.switching import feature_at
 from assembly.proximity.velocity import GAP, RECORD, add_gap_terms, gradient_row, store_record
 
 # Header of the table: counts, then where its parts begin; whether nobody asked for the
@@ -37,8 +42,8 @@ IMPLICIT, DEXTERITIES, HEADER = 16, 17, 18
 ROW = 14
 KIND, BODY_F, BODY_G, ONE_SIDED, DRIVE, IS_LENGTH = 0, 1, 2, 3, 4, 5
 CONTACT_ROW, JOINT_ROW, TAPE_ROW = 0, 1, 2
-# Of a contact: its surfaces.
-SURFACE_F, SURFACE_G = 6, 7
+# Of a contact: its surfaces, or else (-1: none) its shells.
+SURFACE_F, SURFACE_G, SHELL_F, SHELL_G = 6, 7, 8, 9
 # Of a joint: kind and component of the coordinate, the joint that has its frames, where its angle is tracked (-1: it is
 # none), where its factor, the second factor and the value are in the pool, and a second coordinate with its bodies.
 COORDINATE, COMPONENT, JOINT, ANGLE, PARAMETERS, SECOND = 6, 7, 8, 9, 10, 11
@@ -97,18 +102,60 @@ def restart_contact(table, pool, row, q, records, k):
 
 
 @kernel(inner=True)
-def contact_row(table, pool, r, start, patience, loose, point):
+def solids_row(table, pool, r, start, patience, point):
+    """Row r, of a contact of solids. Returns whether its pair was found.
+
+    Where the pair that is tracked is lost, the closest one there is takes over, if the row is one-sided or a step may
+    end anywhere: the loop shortens steps as long as it can.
+    """
+    q, tracked, records, residual, jacobian = point
+    row = table[ROW_TABLE] + ROW * r
+    i = table[row + BODY_F]
+    j = table[row + BODY_G]
+    shell_f = table[row + SHELL_F]
+    shell_g = table[row + SHELL_G]
+    found, proper, fold = track_solids(table, pool, shell_f, shell_g, i, j, q, start, patience, records, tracked, r)
+    if not found and (table[row + ONE_SIDED] == 1 or patience == math.inf):
+        found = search_solids(table, pool, shell_f, shell_g, i, j, q, tracked, r)
+        if found:
+            found, proper, fold = track_solids(
+                table, pool, shell_f, shell_g, i, j, q, tracked, math.inf, records, tracked, r
+            )
+    if found:
+        records[r, PROPER] = proper
+        records[r, FOLD] = fold
+        residual[r] = records[r, GAP]
+        gradient_row(records, r, jacobian, r)
+    return found
+
+
+@kernel(inline=True)
+def surface_of(table, row, side, tracked, r):
+    """The surface that takes part in row r: that of a lone face, or of the face of a solid that is tracked now."""
+    shell = table[row + SHELL_F + side]
+    if shell < 0:
+        return table[row + SURFACE_F + side]
+    return feature_at(table, shell, np.int64(tracked[r, FEATURE_F + side]))
+
+
+@kernel(inner=True)
+def contact_row(table, pool, r, start, patience, loose, point, solids):
     """Row r, of contact r. Returns whether its pair was found.
 
     A tracked contact is carried from `start` to its extremal pair, by steps that turn no normal by more than
     `patience`. A free one (free[r] >= 0, its place among the free ones) is evaluated at `start` itself, and its four
     rows of tangency follow the rows of the program. A one-sided row that loses its pair takes the
-    nearest one there is.
+    nearest one there is. `solids` is None where all contacts are of lone faces without boundary.
     """
     q, tracked, records, residual, jacobian = point
     free = loose[0]
     lengths = loose[1]
     row = table[ROW_TABLE] + ROW * r
+    if solids is not None:
+        if free[r] < 0 and table[row + SHELL_F] >= 0:
+            return solids_row(table, pool, r, start, patience, point)
+        for i in range(FEATURE_F, TRACK):
+            tracked[r, i] = start[r, i]
     x = (start[r, 0], start[r, 1], start[r, 2], start[r, 3])
     if free[r] < 0:
         status, x, distance = track_contact(table, pool, row, q, x, patience, records, r)
@@ -135,8 +182,8 @@ def contact_row(table, pool, r, start, patience, loose, point):
         free_rows(
             table,
             pool,
-            table[row + SURFACE_F],
-            table[row + SURFACE_G],
+            table[row + SURFACE_F] if solids is None else surface_of(table, row, 0, tracked, r),
+            table[row + SURFACE_G] if solids is None else surface_of(table, row, 1, tracked, r),
             table[row + BODY_F],
             table[row + BODY_G],
             q,
@@ -233,12 +280,12 @@ def evaluate(table, pool, start, patience, loose, room, point):
     """Evaluate all rows at the point's poses. Returns the contact whose pair was lost, or -1.
 
     `start` are the tracked values to begin from. `point` is (poses, tracked values, records, residual, Jacobian); all
-    but the poses are written. `loose` is what free pairs need: (places, lengths, room, ...).
+    but the poses are written. `loose` is what pairs need: (places of the free ones, lengths, room, ..., solids).
     """
     q, tracked, records, residual, jacobian = point
     pairs = table[CONTACTS]
     for r in range(pairs):
-        if not contact_row(table, pool, r, start, patience, loose, point):
+        if not contact_row(table, pool, r, start, patience, loose, point, loose[5]):
             return r
     for k in range(pairs, table[TRACKED]):
         # Of an angle that no row has, only an input of a dexterity, this is all that is known.
@@ -278,7 +325,7 @@ def add_gram(bases, jacobian, r, weight, hessian):
 def add_free_terms(table, pool, r, loose, point, y, weights, hessian):
     """As `add_row_terms`, for the row of a free pair and its rows of tangency."""
     q, tracked, _records, _residual, jacobian = point
-    free, lengths, vectors, block, _guess = loose
+    free, lengths, vectors, block, _guess, solids = loose
     row = table[ROW_TABLE] + ROW * r
     f = 6 * table[table[SLOTS] + table[row + BODY_F]]
     g = 6 * table[table[SLOTS] + table[row + BODY_G]]
@@ -287,8 +334,8 @@ def add_free_terms(table, pool, r, loose, point, y, weights, hessian):
     free_hessian(
         table,
         pool,
-        table[row + SURFACE_F],
-        table[row + SURFACE_G],
+        table[row + SURFACE_F] if solids is None else surface_of(table, row, 0, tracked, r),
+        table[row + SURFACE_G] if solids is None else surface_of(table, row, 1, tracked, r),
         table[row + BODY_F],
         table[row + BODY_G],
         q,

@@ -45,6 +45,7 @@ from assembly.constraints.program import (
 )
 from assembly.constraints.terms import objective, recenter
 from assembly.proximity.free_pair import VARIABLES, VECTORS
+from assembly.proximity.solid_contact import TRACK
 from assembly.solve.contacts import free_folds, start_contacts
 from assembly.solve.gather import gather, scattered
 from assembly.solve.linear import factorize_shifted
@@ -92,10 +93,11 @@ def unknowns(n):
 
 
 @kernel
-def solve_program(table, pool, settings, state, history, tips):
+def solve_program(table, pool, settings, state, history, tips, solids):
     """Solve in place. State: q (n, 7) | tracked (k, 4) | multipliers (m) | residuals (m) | results.
 
-    `tips` is None where no term of the objective is a dexterity.
+    `tips` is None where no term of the objective is a dexterity, `solids` where all contacts are of lone faces without
+    boundary.
     """
     bodies = table[BODIES]
     pairs = table[CONTACTS]
@@ -103,7 +105,7 @@ def solve_program(table, pool, settings, state, history, tips):
     m = table[ROWS]
     size = pool[SCALE]
     o_tracked = 7 * bodies
-    o_y = o_tracked + 4 * tracks
+    o_y = o_tracked + TRACK * tracks
     results = state[o_y + 2 * m :]
     # Rows and variables grow by four for every free pair.
     rows = m
@@ -112,7 +114,7 @@ def solve_program(table, pool, settings, state, history, tips):
     # One block of memory a kind, because each costs its allocation. A point of the search: poses, tracked values,
     # records, residual, Jacobian.
     poses = np.empty((2, bodies, 7))
-    tracked = np.empty((3, tracks, 4))
+    tracked = np.empty((3, tracks, TRACK))
     records = np.empty((2, pairs + table[JOINTS], CONTACT_RECORD))
     by_row = np.zeros((6, most))
     jacobians = np.empty((2, most, EXTRA_COLUMN + 6 * table[EXTRA]))
@@ -133,8 +135,8 @@ def solve_program(table, pool, settings, state, history, tips):
             trial[0][b, k] = value
     recenter(table, pool, here[0])
     for k in range(tracks):
-        for i in range(4):
-            here[1][k, i] = state[o_tracked + 4 * k + i]
+        for i in range(TRACK):
+            here[1][k, i] = state[o_tracked + TRACK * k + i]
     for k in range(pairs):
         for i in range(CONTACT_RECORD):
             here[2][k, i] = 1.0
@@ -156,6 +158,7 @@ def solve_program(table, pool, settings, state, history, tips):
         np.empty((VECTORS if pairs > 0 else 0, 3, VARIABLES)),
         np.empty((VARIABLES if pairs > 0 else 0, VARIABLES)),
         tracked[2],
+        solids,
     )
     place_rows(table, free, bases, one_sided)
     envelope(table, bases, rows, n, last, last_row)
@@ -188,8 +191,8 @@ def solve_program(table, pool, settings, state, history, tips):
     status = RUNNING
     results[CULPRIT] = -1.0
 
-    lost = start_contacts(table, pool, here[0], here[1], free, loose[1])
-    count = free_folds(table, pool, here[2], here[1], active, free, loose[1], -1.0, -1)
+    lost = start_contacts(table, pool, here[0], here[1], free, loose[1], solids)
+    count = free_folds(table, pool, here[2], here[1], active, free, loose[1], -1.0, -1, solids)
     if lost < 0 and count == 0:
         lost = evaluate(table, pool, here[1], math.inf, loose, room, here)
     if lost >= 0:
@@ -201,7 +204,7 @@ def solve_program(table, pool, settings, state, history, tips):
         gather(table, pool, bases, table[SLOTS], here)
         for k in range(pairs):
             here[1][k, 0] = math.nan
-        start_contacts(table, pool, here[0], here[1], free, loose[1])
+        start_contacts(table, pool, here[0], here[1], free, loose[1], solids)
         if table[IMPLICIT] == 1:
             recenter(table, pool, here[0])
         for r in range(m):
@@ -216,7 +219,7 @@ def solve_program(table, pool, settings, state, history, tips):
     while status == RUNNING:
         weigh_rows(rows, one_sided, here[3], y, mu, forces, active)
         if pairs > 0:
-            count = free_folds(table, pool, here[2], here[1], active, free, loose[1], below, lost)
+            count = free_folds(table, pool, here[2], here[1], active, free, loose[1], below, lost, solids)
         if m + 4 * count != rows:
             for r in range(rows, most):
                 # New rows of tangency say nothing yet: least squares leave them out.
@@ -327,7 +330,7 @@ def solve_program(table, pool, settings, state, history, tips):
                     for i in range(n):
                         step[i] = KICK * math.sin(kicks + i) if i < 6 * table[MOVING] else 0.0
                     move(table, here[0], step, 1.0, trial[0])
-                    carry(table, pool, bases, free, loose[1], here[1], here[2], step, 1.0, loose[4])
+                    carry(table, pool, bases, loose, here[1], here[2], step, 1.0)
                     if evaluate(table, pool, loose[4], math.inf, loose, room, trial) < 0:
                         here, trial = trial, here
                         iteration += 1

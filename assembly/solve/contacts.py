@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from assembly._kernel import kernel
 from assembly.constraints.program import (
     BODY_F,
@@ -13,20 +15,53 @@ from assembly.constraints.program import (
     ONE_SIDED,
     ROW,
     ROW_TABLE,
+    SHELL_F,
+    SHELL_G,
     SURFACE_F,
     SURFACE_G,
+    surface_of,
 )
+from assembly.geometry.trim import trim_side
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.extremal import CONVERGED, SINGULAR, pair_frame
 from assembly.proximity.free_pair import coordinate_lengths
+from assembly.proximity.shell import FACE, FACE_RECORD, FACE_TABLE, FACE_TRIM
+from assembly.proximity.solid_contact import FEATURE_F, FEATURE_G, search_solids
 from assembly.proximity.start import global_start
+from assembly.proximity.switching import feature_kind
 
 
 @kernel(inner=True)
-def free_pair(table, pool, row, k, contacts, free, lengths):
-    """Make the coordinates of contact k unknowns; False at a pole, where polar coordinates cannot be."""
+def on_faces(table, row, contacts, k):
+    """Whether both features of contact k are faces."""
+    kind_f = feature_kind(table, table[row + SHELL_F], contacts[k, FEATURE_F])
+    kind_g = feature_kind(table, table[row + SHELL_G], contacts[k, FEATURE_G])
+    return kind_f == FACE and kind_g == FACE
+
+
+@kernel(inner=True)
+def within_faces(table, pool, row, contacts, k):
+    """Whether the points of contact k lie within the boundaries of its faces."""
+    for side in range(2):
+        shell = table[row + SHELL_F + side]
+        trim = table[table[shell + FACE_TABLE] + FACE_RECORD * np.int64(contacts[k, FEATURE_F + side]) + FACE_TRIM]
+        if trim >= 0 and trim_side(table, pool, trim, contacts[k, 2 * side], contacts[k, 2 * side + 1]) < 0:
+            return False
+    return True
+
+
+@kernel(inner=True)
+def free_pair(table, pool, row, k, contacts, free, lengths, solids):
+    """Make the coordinates of contact k unknowns; False where they cannot be: at a pole, and of edges and vertices."""
     x = (contacts[k, 0], contacts[k, 1], contacts[k, 2], contacts[k, 3])
-    coordinate_lengths(table, pool, table[row + SURFACE_F], table[row + SURFACE_G], x, lengths, k)
+    if solids is None:
+        coordinate_lengths(table, pool, table[row + SURFACE_F], table[row + SURFACE_G], x, lengths, k)
+    else:
+        if table[row + SHELL_F] >= 0 and not on_faces(table, row, contacts, k):
+            return False
+        f = surface_of(table, row, 0, contacts, k)
+        g = surface_of(table, row, 1, contacts, k)
+        coordinate_lengths(table, pool, f, g, x, lengths, k)
     if min(min(lengths[k, 0], lengths[k, 1]), min(lengths[k, 2], lengths[k, 3])) < 1e-6:
         return False
     free[k] = 0
@@ -34,7 +69,7 @@ def free_pair(table, pool, row, k, contacts, free, lengths):
 
 
 @kernel(inner=True)
-def start_contacts(table, pool, q, contacts, free, lengths):
+def start_contacts(table, pool, q, contacts, free, lengths, solids):
     """Global starts for the contacts whose parameters are NaN. Returns a contact that found none, or -1.
 
     Where a pair does not exist yet (a face tilted against another), its coordinates become unknowns at once.
@@ -45,16 +80,22 @@ def start_contacts(table, pool, q, contacts, free, lengths):
             continue
         i = table[row + BODY_F]
         j = table[row + BODY_G]
+        if solids is not None:
+            if table[row + SHELL_F] >= 0:
+                if not search_solids(table, pool, table[row + SHELL_F], table[row + SHELL_G], i, j, q, contacts, k):
+                    return k
+                continue
         turn, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
         status, x, _gap = global_start(table, pool, table[row + SURFACE_F], table[row + SURFACE_G], turn, shift, 1.0)
         contacts[k, 0], contacts[k, 1], contacts[k, 2], contacts[k, 3] = x
-        if status != CONVERGED and status != SINGULAR and not free_pair(table, pool, row, k, contacts, free, lengths):
-            return k
+        if status != CONVERGED and status != SINGULAR:
+            if not free_pair(table, pool, row, k, contacts, free, lengths, solids):
+                return k
     return -1
 
 
 @kernel(inner=True)
-def free_folds(table, pool, records, contacts, active, free, lengths, below, lost):
+def free_folds(table, pool, records, contacts, active, free, lengths, below, lost, solids):
     """Mark the pairs near a fold, and the lost one, as free. Returns how many are free now.
 
     An idle one-sided row asks nothing of its pair.
@@ -64,7 +105,7 @@ def free_folds(table, pool, records, contacts, active, free, lengths, below, los
         row = table[ROW_TABLE] + ROW * k
         idle = table[row + ONE_SIDED] == 1 and active[k] == 0.0
         if free[k] < 0 and not idle and (abs(records[k, FOLD]) < below or k == lost):
-            free_pair(table, pool, row, k, contacts, free, lengths)
+            free_pair(table, pool, row, k, contacts, free, lengths, solids)
         if free[k] >= 0:
             free[k] = count
             count += 1
@@ -72,7 +113,7 @@ def free_folds(table, pool, records, contacts, active, free, lengths, below, los
 
 
 @kernel(inner=True)
-def free_pairs_hold(table, pool, q, contacts, free, tolerance):
+def free_pairs_hold(table, pool, q, contacts, free, tolerance, solids):
     """Whether every free pair is extremal by the frames of tracked pairs, which know poles.
 
     Its own rows do not tell at a pole or an apex: there a tangent vanishes, and its row with it.
@@ -85,7 +126,14 @@ def free_pairs_hold(table, pool, q, contacts, free, tolerance):
         j = table[row + BODY_G]
         turn, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
         x = (contacts[k, 0], contacts[k, 1], contacts[k, 2], contacts[k, 3])
-        frame = pair_frame(table, pool, table[row + SURFACE_F], table[row + SURFACE_G], turn, shift, x)
+        if solids is None:
+            frame = pair_frame(table, pool, table[row + SURFACE_F], table[row + SURFACE_G], turn, shift, x)
+        else:
+            if table[row + SHELL_F] >= 0 and not within_faces(table, pool, row, contacts, k):
+                return False
+            f = surface_of(table, row, 0, contacts, k)
+            g = surface_of(table, row, 1, contacts, k)
+            frame = pair_frame(table, pool, f, g, turn, shift, x)
         residual = frame[9]
         tilt = max(abs(residual[2]), abs(residual[3]))
         if not frame[11] or not tilt <= 1e-9 or not max(abs(residual[0]), abs(residual[1])) <= tolerance:

@@ -28,6 +28,8 @@ from scipy.linalg import qr
 from assembly.constraints.packing import Packed
 from assembly.errors import InputError
 from assembly.geometry.surface import NurbsSurface
+from assembly.kinematics.body import Body, BodyFace
+from assembly.proximity.solid_contact import FEATURE_F, TRACK
 from assembly.solve.augmented_lagrangian import COUNT, CULPRIT, DUAL, IMPROPER, OBJECTIVE, RESULTS, VIOLATION
 from assembly.solve.check import audit, is_extremal, twist_gradients
 from assembly.solve.measure import Near
@@ -102,7 +104,8 @@ class ReferenceSolver:
         self._fixed = [k for k, body in enumerate(scene.bodies) if body.fixed]
         patches: dict[NurbsSurface, Patch] = {}
         self._pairs: list[Pair] = []
-        for contact, faces in zip(packed.contacts, packed.faces, strict=True):
+        for contact, sides in zip(packed.contacts, packed.sides, strict=True):
+            faces = _lone_faces(contact.name, sides)
             for side in faces:
                 if side.face.surface not in patches:
                     patches[side.face.surface] = Patch(side.face.surface, packed.scale)
@@ -165,8 +168,8 @@ class ReferenceSolver:
             raise InputError("scene was changed after this solver was made; expected a new ReferenceSolver")
         state = self._scene._start(packed, q0, starts)
         q = state[: packed.contacts_at].reshape(-1, 7).copy()
-        parameters = state[packed.contacts_at : packed.angles_at].reshape(-1, 4)
-        near = dict(zip(packed._angles, state[packed.angles_at : packed.multipliers_at : 4].tolist(), strict=True))
+        parameters = state[packed.contacts_at : packed.angles_at].reshape(-1, TRACK)[:, :4]
+        near = dict(zip(packed._angles, state[packed.angles_at : packed.multipliers_at : TRACK].tolist(), strict=True))
         p = self._given(q)
         found = [
             pair.find(q, None if np.isnan(at).any() else at) for pair, at in zip(self._pairs, parameters, strict=True)
@@ -294,8 +297,9 @@ class ReferenceSolver:
                 status = Status.STALLED
         state = np.zeros(packed.results_at + RESULTS)
         state[: packed.contacts_at] = q.ravel()
-        state[packed.contacts_at : packed.angles_at] = found.parameters.ravel()
-        state[packed.angles_at : packed.multipliers_at : 4] = [angles[angle] for angle in packed._angles]
+        tracked = state[packed.contacts_at : packed.angles_at].reshape(-1, TRACK)
+        tracked[:, :4], tracked[:, FEATURE_F:] = found.parameters, 0.0
+        state[packed.angles_at : packed.multipliers_at : TRACK] = [angles[angle] for angle in packed._angles]
         state[packed.multipliers_at : packed.residuals_at] = forces[self._places]
         state[packed.residuals_at : packed.results_at] = np.where(packed.lengths, packed.scale, 1.0) * found.residuals
         results = state[packed.results_at :]

@@ -20,6 +20,7 @@ from assembly.constraints.program import (
     evaluate,
 )
 from assembly.proximity.extremal import BEND
+from assembly.proximity.solid_contact import TRACK
 from assembly.solve.contacts import free_pairs_hold
 from assembly.solve.rows import violation_of
 
@@ -56,7 +57,7 @@ def judge(table, pool, state, loose, room, shape, rows, here, trial, bound):
     for r in range(rows):
         here[3][r] = trial[3][r]
     violation = violation_of(trial[3], shape[1], rows)
-    return violation <= bound and free_pairs_hold(table, pool, q, here[1], loose[0], 1e-9), violation
+    return violation <= bound and free_pairs_hold(table, pool, q, here[1], loose[0], 1e-9, loose[5]), violation
 
 
 @kernel(inner=True)
@@ -66,9 +67,9 @@ def write_rows(table, here, y, free, size, state):
     m = table[ROWS]
     o = 7 * table[BODIES]
     for k in range(table[TRACKED]):
-        for i in range(4):
-            state[o + 4 * k + i] = tracked[k, i]
-    o += 4 * table[TRACKED]
+        for i in range(TRACK):
+            state[o + TRACK * k + i] = tracked[k, i]
+    o += TRACK * table[TRACKED]
     crossing = 0.0
     for r in range(m):
         state[o + r] = y[r]

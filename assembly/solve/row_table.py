@@ -47,6 +47,7 @@ from assembly.constraints.program import (
 )
 from assembly.constraints.terms import objective
 from assembly.proximity.free_pair import VARIABLES, VECTORS
+from assembly.proximity.solid_contact import TRACK
 from assembly.solve.augmented_lagrangian import FREE_BELOW
 from assembly.solve.contacts import free_folds, start_contacts
 from assembly.solve.rows import envelope, place_rows
@@ -106,7 +107,7 @@ def spread_rows(table, free, count, packed, out):
 
 
 @kernel(inner=True, allocates=True)
-def point_at(table, pool, state, free):
+def point_at(table, pool, state, free, solids):
     """A point of the loop at a state: whether all its rows are evaluated (-1, or the contact that is lost), how many
     contacts are at folds, the point, and what pairs and tapes need.
 
@@ -116,8 +117,8 @@ def point_at(table, pool, state, free):
     tracks = table[TRACKED]
     most = table[ROWS] + 4 * pairs
     q = np.empty((table[BODIES], 7))
-    tracked = np.empty((tracks, 4))
-    start = np.empty((tracks, 4))
+    tracked = np.empty((tracks, TRACK))
+    start = np.empty((tracks, TRACK))
     records = np.ones((pairs + table[JOINTS], CONTACT_RECORD))
     packed = np.zeros((most, EXTRA_COLUMN + 6 * table[EXTRA]))
     point = (q, tracked, records, np.zeros(most), packed)
@@ -128,33 +129,34 @@ def point_at(table, pool, state, free):
         np.empty((pairs, 4)),
         np.empty((VECTORS if pairs > 0 else 0, 3, VARIABLES)),
         np.empty((VARIABLES if pairs > 0 else 0, VARIABLES)),
-        np.empty((tracks, 4)),
+        np.empty((tracks, TRACK)),
+        solids,
     )
     scaled_poses(table, pool, state, q)
     for k in range(tracks):
-        for i in range(4):
-            tracked[k, i] = state[7 * table[BODIES] + 4 * k + i]
+        for i in range(TRACK):
+            tracked[k, i] = state[7 * table[BODIES] + TRACK * k + i]
     for k in range(pairs):
         free[k] = -1
     count = 0
-    lost = start_contacts(table, pool, q, tracked, free, loose[1])
+    lost = start_contacts(table, pool, q, tracked, free, loose[1], solids)
     if lost < 0:
         # Every contact counts here, also one that pushes nothing.
         active = np.ones(most)
-        count = free_folds(table, pool, records, tracked, active, free, loose[1], -1.0, -1)
+        count = free_folds(table, pool, records, tracked, active, free, loose[1], -1.0, -1, solids)
         before = -1
         while count != before:
             for k in range(tracks):
-                for i in range(4):
+                for i in range(TRACK):
                     start[k, i] = tracked[k, i]
             lost = evaluate(table, pool, start, math.inf, loose, room, point)
             before = count
-            count = free_folds(table, pool, records, tracked, active, free, loose[1], FREE_BELOW, lost)
+            count = free_folds(table, pool, records, tracked, active, free, loose[1], FREE_BELOW, lost, solids)
     return lost, count, point, loose, room
 
 
 @kernel
-def rows_at(table, pool, state, free, residual, jacobian):
+def rows_at(table, pool, state, free, residual, jacobian, solids):
     """Evaluate all rows at a state. Returns a contact that has no pair there, or -1.
 
     state : tracked values are overwritten by those found; NaN parameters of a contact are found by a global start
@@ -162,11 +164,11 @@ def rows_at(table, pool, state, free, residual, jacobian):
     residual (m + 4 contacts), jacobian (m + 4 contacts, 6 bodies + 4 contacts) : as many rows and columns are written
     as there are folds
     """
-    lost, count, point, _loose, _room = point_at(table, pool, state, free)
+    lost, count, point, _loose, _room = point_at(table, pool, state, free, solids)
     _q, tracked, _records, values, packed = point
     for k in range(table[TRACKED]):
-        for i in range(4):
-            state[7 * table[BODIES] + 4 * k + i] = tracked[k, i]
+        for i in range(TRACK):
+            state[7 * table[BODIES] + TRACK * k + i] = tracked[k, i]
     for r in range(table[ROWS] + 4 * count):
         residual[r] = values[r]
     if lost < 0:
@@ -175,12 +177,12 @@ def rows_at(table, pool, state, free, residual, jacobian):
 
 
 @kernel
-def gradient_at(table, pool, state, free, gradient, tips):
+def gradient_at(table, pool, state, free, gradient, tips, solids):
     """The objective's gradient in the twists of all bodies (6 bodies), zero for fixed ones. Returns its value.
 
     `tips` is None where no term is a dexterity. Dexterities are left out where a contact has no pair.
     """
-    lost, count, point, loose, room = point_at(table, pool, state, free)
+    lost, count, point, loose, room = point_at(table, pool, state, free, solids)
     rows = table[ROWS] + 4 * count
     n = 6 * table[MOVING] + 4 * count
     shape = (

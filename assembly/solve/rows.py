@@ -30,8 +30,8 @@ from assembly.constraints.program import (
     SECOND_BODY_F,
     SECOND_BODY_G,
     SLOTS,
+    SHELL_F,
     SURFACE_F,
-    SURFACE_G,
     TAPE_BODIES,
     TAPE_LIST,
     TAPE_RECORD,
@@ -45,6 +45,7 @@ from assembly.constraints.program import (
 from assembly.constraints.terms import TAPE_TERM, TERM, TERM_KIND, TERM_TABLE, TERM_TAPE
 from assembly.kinematics.motion import retract
 from assembly.proximity.extremal import into_domain
+from assembly.proximity.solid_contact import FEATURE_F, TRACK
 from assembly.proximity.velocity import RATES, ZED
 
 
@@ -231,11 +232,14 @@ def move(table, q, d, alpha, out):
 
 
 @kernel(inner=True)
-def carry(table, pool, bases, free, lengths, tracked, records, d, alpha, out):
+def carry(table, pool, bases, loose, tracked, records, d, alpha):
     """Contact coordinates along alpha d: by the contact velocity, or, for a free pair, by its own unknowns.
 
-    Angles start from where they are: a step turns no body by more than a radian.
+    Angles start from where they are: a step turns no body by more than a radian. The guess goes into `loose`.
     """
+    lengths = loose[1]
+    out = loose[4]
+    solids = loose[5]
     for k in range(table[CONTACTS], table[TRACKED]):
         out[k, 0] = tracked[k, 0]
     for k in range(table[CONTACTS]):
@@ -258,11 +262,23 @@ def carry(table, pool, bases, free, lengths, tracked, records, d, alpha, out):
                 s *= alpha
                 for i in range(4):
                     out[k, i] += records[k, RATES + 4 * i + j] * s
-        # The prediction may run over the end of a patch; Newton starts inside.
-        for side in range(2):
-            surface = table[row + (SURFACE_F if side == 0 else SURFACE_G)]
-            i = 2 * side
-            out[k, i], out[k, i + 1], _clamped = into_domain(table, pool, surface, out[k, i], out[k, i + 1])
+        keep_inside(table, pool, row, tracked, k, out, solids)
+
+
+@kernel(inner=True)
+def keep_inside(table, pool, row, tracked, k, out, solids):
+    """A prediction may run over the end of a patch; Newton starts inside."""
+    if solids is not None:
+        for i in range(FEATURE_F, TRACK):
+            out[k, i] = tracked[k, i]
+        if table[row + SHELL_F] >= 0:
+            # What becomes of edges is up to switching.
+            return
+    for side in range(2):
+        i = 2 * side
+        out[k, i], out[k, i + 1], _clamped = into_domain(
+            table, pool, table[row + SURFACE_F + side], out[k, i], out[k, i + 1]
+        )
 
 
 @kernel(inner=True)

@@ -115,7 +115,7 @@ def search(
     lost = -1
     while alpha * longest > 1e-9 * SHORTEST or alpha == 1.0:
         move(table, here[0], step, alpha, trial[0])
-        carry(table, pool, bases, loose[0], loose[1], here[1], here[2], step, alpha, loose[4])
+        carry(table, pool, bases, loose, here[1], here[2], step, alpha)
         lost = evaluate(table, pool, loose[4], BEND, loose, room, trial)
         if lost < 0:
             there = merit(trial[3], one_sided, rows, y, mu)

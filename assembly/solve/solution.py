@@ -18,7 +18,8 @@ from assembly.constraints.terms import POINT_DISTANCE, POSTURE, POSTURE_PARAMETE
 from assembly.errors import InputError
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import Pose
-from assembly.proximity.pairs import ContactPair, extremal_pair
+from assembly.proximity.pairs import ContactPair
+from assembly.proximity.solid_contact import TRACK
 from assembly.solve.augmented_lagrangian import COUNT, CULPRIT, DUAL, IMPROPER, OBJECTIVE, VIOLATION
 from assembly.solve.measure import measure, standing
 
@@ -52,13 +53,13 @@ class Scene:
         bodies: tuple[Body, ...],
         constraints: tuple[Constraint, ...],
         contacts: tuple[Contact, ...],
-        faces: tuple[tuple[BodyFace, BodyFace], ...],
+        sides: tuple[tuple[Body | BodyFace, Body | BodyFace], ...],
         scale: float,
     ) -> None:
         self.bodies = bodies
         self.constraints = constraints
         self.contacts = contacts
-        self.faces = faces
+        self.sides = sides
         self.scale = scale
         self._wished: NDArray[np.int64] | None = None
 
@@ -143,7 +144,7 @@ class Solution:
 
     @property
     def _parameters(self) -> Array:
-        return self._state[self._packed.contacts_at : self._packed.angles_at].reshape(-1, 4)
+        return self._state[self._packed.contacts_at : self._packed.angles_at].reshape(-1, TRACK)
 
     @property
     def _residuals(self) -> Array:
@@ -234,7 +235,7 @@ class Solution:
         """Every freedom of every joint, "joint.freedom": lengths in the user's unit, angles in radians."""
         packed = self._packed
         near = dict(
-            zip(map(id, packed._angles), self._state[packed.angles_at : packed.multipliers_at : 4], strict=True)
+            zip(map(id, packed._angles), self._state[packed.angles_at : packed.multipliers_at : TRACK], strict=True)
         )
         values = {}
         for joint in self._scene.constraints:
@@ -280,13 +281,9 @@ class Solution:
     @cached_property
     def contacts(self) -> dict[str, ContactPair]:
         """The extremal pair of every contact at `q`, found again from the loop's parameters."""
-        pairs = {}
-        for k, contact in enumerate(self._scene.contacts):
-            f, g = self._scene.faces[k]
-            q_f, q_g = (self.q[self._scene.index(body)] for body in contact.bodies)
-            start = None if np.isnan(self._parameters[k]).any() else self._parameters[k]
-            pairs[contact.name] = extremal_pair(f, q_f, g, q_g, start)
-        return pairs
+        from assembly.solve.contact_pairs import contact_pairs
+
+        return contact_pairs(self)
 
     def pose(self, body: Body | str) -> Pose:
         """Pose of a body, given itself or its name."""

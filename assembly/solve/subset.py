@@ -16,6 +16,7 @@ from assembly.constraints.contact import Contact
 from assembly.constraints.couplings import Coupling
 from assembly.constraints.expression import Expression
 from assembly.constraints.packing import Packed, pack
+from assembly.proximity.solid_contact import TRACK
 from assembly.solve.augmented_lagrangian import HISTORY, RESULTS, solve_program
 from assembly.solve.jacobian import Rows
 from assembly.solve.options import Options
@@ -63,7 +64,7 @@ class Problem:
         self.packed = pack(scene.bodies, constraints, ())
         self._size = scene.scale
         self._scene = Scene(
-            scene.bodies, tuple(constraints), tuple(self.packed.contacts), tuple(self.packed.faces), self.packed.scale
+            scene.bodies, tuple(constraints), tuple(self.packed.contacts), tuple(self.packed.sides), self.packed.scale
         )
         self._near = near
 
@@ -78,9 +79,9 @@ class Problem:
         state = np.zeros(packed.results_at + RESULTS)
         state[: packed.contacts_at] = q.ravel()
         packed.refresh()
-        tracked = state[packed.contacts_at : packed.multipliers_at].reshape(-1, 4)
+        tracked = state[packed.contacts_at : packed.multipliers_at].reshape(-1, TRACK)
         if after is not None:
-            tracked[:] = after._state[packed.contacts_at : packed.multipliers_at].reshape(-1, 4)
+            tracked[:] = after._state[packed.contacts_at : packed.multipliers_at].reshape(-1, TRACK)
         else:
             for k, contact in enumerate(packed.contacts):
                 tracked[k] = self._near[contact.name]
@@ -93,7 +94,7 @@ class Problem:
         packed = self.packed
         state = self.start(q, after)
         history = np.empty((1, HISTORY))
-        code = solve_program(packed.table, packed.pool, Options().settings(), state, history, packed.tips)
+        code = solve_program(packed.table, packed.pool, Options().settings(), state, history, packed.tips, packed.solids)
         return Solution(self._scene, packed, state, _STATUSES[code], 0.0, history)
 
     def violations(self, solution: Solution) -> Array:
@@ -128,7 +129,7 @@ class Snapshot:
     def __init__(self, scene: Scene, packed: Packed, state: Array, rows: Rows | None, solved: bool) -> None:
         self.scene = scene
         self.q = state[: packed.contacts_at].reshape(-1, 7)
-        tracked = state[packed.contacts_at : packed.multipliers_at].reshape(-1, 4)
+        tracked = state[packed.contacts_at : packed.multipliers_at].reshape(-1, TRACK)
         self._near: dict[str | int, Array] = {contact.name: tracked[k] for k, contact in enumerate(packed.contacts)}
         self._near |= {id(angle): tracked[len(packed.contacts) + k] for k, angle in enumerate(packed._angles)}
         self._equations: dict[int, list[Equation]] = {}
@@ -143,7 +144,7 @@ class Snapshot:
             source = None if equation.source is None else (_Value(value), "value")
             kept = Equation(equation.terms, source, equation.one_sided, equation.is_drive)
             self._equations.setdefault(int(packed.owners[r]), []).append(kept)
-        self._faces = {contact.name: packed.faces[k] for k, contact in enumerate(packed.contacts)}
+        self._sides = {contact.name: packed.sides[k] for k, contact in enumerate(packed.contacts)}
 
     def problem(self, which: Iterable[int] | None = None, one_sided: bool = True, drives: bool = True) -> Problem:
         """The problem of some of the constraints, by their places; of all by default.
@@ -165,7 +166,7 @@ class Snapshot:
         if isinstance(constraint, Contact):
             if constraint.unilateral and not one_sided:
                 return None
-            return Contact(*self._faces[constraint.name], constraint.name, constraint.unilateral)
+            return Contact(*self._sides[constraint.name], constraint.name, constraint.unilateral)
         if isinstance(constraint, Expression):
             return None if constraint.unilateral and not one_sided else constraint
         kept = tuple(

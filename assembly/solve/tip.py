@@ -180,11 +180,12 @@ def _state(scene: Assembly, packed: Packed, q: ArrayLike | Solution | None) -> A
         raise InputError("q is a solution of another assembly; expected one with these bodies")
     # A value that was driven and is free now makes another program of the same scene.
     state = scene._start(packed, q.q, None)
-    known = zip(q._scene.contacts, q._scene.faces, q._parameters, strict=True)
-    for contact, faces, parameters in known:
-        for k, (other, other_faces) in enumerate(zip(packed.contacts, packed.faces, strict=True)):
-            if contact is other and faces == other_faces:
-                state[packed.contacts_at + 4 * k : packed.contacts_at + 4 * k + 4] = parameters
+    known = zip(q._scene.contacts, q._scene.sides, q._parameters, strict=True)
+    for contact, sides, parameters in known:
+        for k, (other, other_sides) in enumerate(zip(packed.contacts, packed.sides, strict=True)):
+            if contact is other and sides == other_sides:
+                at = packed.contacts_at + TRACK * k
+                state[at : at + TRACK] = parameters
     return state
 
 

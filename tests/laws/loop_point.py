@@ -9,6 +9,7 @@ import numpy as np
 
 from assembly.constraints import program as P
 from assembly.proximity.free_pair import VARIABLES, VECTORS
+from assembly.proximity.solid_contact import TRACK
 from assembly.solve.contacts import start_contacts
 from assembly.solve.rows import envelope, place_rows
 from assembly.solve.search import goal
@@ -28,7 +29,7 @@ class LoopPoint:
         pairs, tracks = int(table[P.CONTACTS]), int(table[P.TRACKED])
         self.point = (
             scaled,
-            np.zeros((tracks, 4)),
+            np.zeros((tracks, TRACK)),
             np.ones((pairs + int(table[P.JOINTS]), P.CONTACT_RECORD)),
             np.empty(self.rows),
             np.zeros((self.rows, P.EXTRA_COLUMN + 6 * int(table[P.EXTRA]))),
@@ -41,7 +42,7 @@ class LoopPoint:
         )
         free = np.full(pairs, -1, dtype=np.int64)
         room = (np.empty((VECTORS, 3, VARIABLES)), np.empty((VARIABLES, VARIABLES)))
-        self.loose = (free, np.empty((pairs, 4)), *room, np.empty((tracks, 4)))
+        self.loose = (free, np.empty((pairs, 4)), *room, np.empty((tracks, TRACK)), packed.solids)
         at = table[P.TAPE_ROOM]
         self.room = tuple(np.empty(size) for size in table[at : at + 3])
         place_rows(table, free, self.shape[0], self.shape[1])
@@ -50,8 +51,8 @@ class LoopPoint:
             state = np.zeros(packed.results_at)
             state[packed.contacts_at : packed.angles_at] = np.nan
             packed.start_angles(np.array(q, dtype=float), state, False)
-            tracked = state[packed.contacts_at : packed.multipliers_at].reshape(-1, 4)
-            assert start_contacts(table, self.pool, scaled, tracked, free, self.loose[1]) < 0
+            tracked = state[packed.contacts_at : packed.multipliers_at].reshape(-1, TRACK)
+            assert start_contacts(table, self.pool, scaled, tracked, free, self.loose[1], packed.solids) < 0
         lost = P.evaluate(table, self.pool, np.array(tracked), np.inf, self.loose, self.room, self.point)
         assert lost < 0
 

@@ -1,0 +1,67 @@
+"""The pairs of a solution's contacts, found again from what the loop tracked."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from assembly.constraints.program import ROW, ROW_TABLE, SHELL_F, SHELL_G
+from assembly.kinematics.body import Body, BodyFace
+from assembly.proximity.pairs import ContactPair, PairStatus, extremal_pair
+from assembly.proximity.solid_contact import FEATURE_F, FEATURE_G, solid_pair
+from assembly.proximity.topology import solid_of
+
+if TYPE_CHECKING:
+    from assembly.solve.solution import Solution
+
+__all__ = ["contact_pairs"]
+
+_STATUSES = tuple(PairStatus)
+
+
+def contact_pairs(solution: Solution) -> dict[str, ContactPair]:
+    """The pair of every contact by its name, at the poses of a solution."""
+    scene = solution._scene
+    pairs = {}
+    for k, contact in enumerate(scene.contacts):
+        f, g = scene.sides[k]
+        places = [scene.index(body) for body in contact.bodies]
+        if solution._packed.table[solution._packed.table[ROW_TABLE] + ROW * k + SHELL_F] >= 0:
+            pairs[contact.name] = _solids(solution, k, places)
+        else:
+            assert isinstance(f, BodyFace) and isinstance(g, BodyFace)
+            start = solution._parameters[k, :4]
+            q_f, q_g = solution.q[places]
+            pairs[contact.name] = extremal_pair(f, q_f, g, q_g, None if np.isnan(start).any() else start)
+    return pairs
+
+
+def _solids(solution: Solution, k: int, places: list[int]) -> ContactPair:
+    """The pair of features of contact k, between bodies in the given places."""
+    packed = solution._packed
+    row = packed.table[ROW_TABLE] + ROW * k
+    q = solution.q[places]
+    q[:, :3] = (q[:, :3] - packed.reference) / packed.scale
+    tracked = solution._parameters[k : k + 1].copy()
+    out = np.empty(10)
+    shells = packed.table[row + SHELL_F], packed.table[row + SHELL_G]
+    status = solid_pair(packed.table, packed.pool, *shells, q, tracked, out)
+    names = tuple(
+        _feature_name(side, int(tracked[0, column]))
+        for side, column in zip(solution._scene.sides[k], (FEATURE_F, FEATURE_G), strict=True)
+    )
+    return ContactPair(
+        parameters=tracked[0, :4],
+        points=out[:6].reshape(2, 3) * packed.scale + packed.reference,
+        normal=out[6:9],
+        gap=float(out[9]) * packed.scale,
+        status=_STATUSES[status],
+        features=(names[0], names[1]),
+    )
+
+
+def _feature_name(side: Body | BodyFace, number: int) -> str:
+    """What a feature of a side is called."""
+    faces = (side.face,) if isinstance(side, BodyFace) else tuple(part.face for part in side.faces)
+    return solid_of(faces).name(number)
