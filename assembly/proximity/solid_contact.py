@@ -64,9 +64,9 @@ def track_solids(table, pool, shell_f, shell_g, i, j, q, start, patience, record
     )
     if status != CONVERGED and status != SINGULAR:
         return False, 0.0, 0.0
-    proper, fold = feature_record(turn, shift, frame, records, r)
+    feature_record(turn, shift, frame, records, r)
     write_tracked(x, feature_f, feature_g, frame[0], tracked, r)
-    return True, proper, fold
+    return True, 1.0 if frame[14] else 0.0, frame[15]
 
 
 @kernel(inner=True)

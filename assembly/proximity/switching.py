@@ -19,7 +19,7 @@ import math
 from assembly._kernel import kernel
 from assembly.geometry.spline import CURVE_BREAKS, CURVE_CLOSED, CURVE_RECORD, CURVE_SPANS, curve_lanes, surface_point, xyz
 from assembly.geometry.trim import TRIM_CURVES, TRIM_FIRST, trim_nearest, trim_side
-from assembly.geometry.vec import blend, cross, dot, matvec_t, neg, scale, sub
+from assembly.geometry.vec import blend, cross, dot, matvec, matvec_t, neg, scale, sub
 from assembly.proximity.extremal import CONVERGED, LEFT_PATCH, NOT_CONVERGED, SINGULAR, into_domain
 from assembly.proximity.feature_pair import solve_features
 from assembly.proximity.shell import (
@@ -135,31 +135,42 @@ def lean_into(table, pool, surface, curve, t, n):
 
 @kernel(inner=True)
 def from_edge(table, pool, shell, code, t, n):
-    """The face that takes over from an edge where the normal leans over it: code and (u, v); or the edge itself."""
-    faces = table[shell + FACES]
-    edge = table[shell + EDGE_TABLE] + EDGE_RECORD * (code - faces)
+    """The face over which the normal leans most at a point of an edge: how much, code and (u, v) of the point on it."""
+    edge = table[shell + EDGE_TABLE] + EDGE_RECORD * (code - table[shell + FACES])
+    face = table[edge + EDGE_FACE_A]
     surface = table[edge + EDGE_SURFACE]
     curve = table[edge + EDGE_CURVE]
     lean = lean_into(table, pool, surface, curve, t, n)
-    best = LEAN
-    if lean > best:
-        best = lean
-        u, v, _p, _along, _normal = on_surface(table, pool, surface, curve, t)
-        code = table[edge + EDGE_FACE_A]
-        found = (u, v)
-    else:
-        found = (t, 0.0)
     if table[edge + EDGE_FACE_B] >= 0:
         _u, _v, p, _along, _normal = on_surface(table, pool, surface, curve, t)
         s = other_parameter(table, pool, edge, t, p)
-        lean = lean_into(table, pool, table[edge + EDGE_SURFACE_B], table[edge + EDGE_CURVE_B], s, n)
-        if lean > best:
-            u, v, _p, _along, _normal = on_surface(
-                table, pool, table[edge + EDGE_SURFACE_B], table[edge + EDGE_CURVE_B], s
-            )
-            code = table[edge + EDGE_FACE_B]
-            found = (u, v)
-    return code, found
+        other = lean_into(table, pool, table[edge + EDGE_SURFACE_B], table[edge + EDGE_CURVE_B], s, n)
+        if other > lean:
+            lean = other
+            face = table[edge + EDGE_FACE_B]
+            surface = table[edge + EDGE_SURFACE_B]
+            curve = table[edge + EDGE_CURVE_B]
+            t = s
+    u, v, _p, _along, _normal = on_surface(table, pool, surface, curve, t)
+    return lean, face, (u, v)
+
+
+@kernel(inner=True)
+def between_edges(table, pool, shell_f, shell_g, rotation, code_f, code_g, t_f, t_g):
+    """The normal of two edges that leans least over their faces: it tells the outside where edges touch."""
+    edge_f = table[shell_f + EDGE_TABLE] + EDGE_RECORD * (code_f - table[shell_f + FACES])
+    edge_g = table[shell_g + EDGE_TABLE] + EDGE_RECORD * (code_g - table[shell_g + FACES])
+    along_f = on_surface(table, pool, table[edge_f + EDGE_SURFACE], table[edge_f + EDGE_CURVE], t_f)[3]
+    along_g = on_surface(table, pool, table[edge_g + EDGE_SURFACE], table[edge_g + EDGE_CURVE], t_g)[3]
+    n = unit(cross(along_f, matvec(rotation, along_g)))
+    m = matvec_t(rotation, n)
+    there = max(
+        from_edge(table, pool, shell_f, code_f, t_f, n)[0], from_edge(table, pool, shell_g, code_g, t_g, neg(m))[0]
+    )
+    back = max(
+        from_edge(table, pool, shell_f, code_f, t_f, neg(n))[0], from_edge(table, pool, shell_g, code_g, t_g, m)[0]
+    )
+    return n if there <= back else neg(n)
 
 
 @kernel(inline=True)
@@ -249,8 +260,8 @@ def checked(table, pool, shell, code, a, b, held, n):
                 return vertices + table[edge + EDGE_END], (0.0, 0.0), True
         if held:
             return code, (a, b), False
-        other, found = from_edge(table, pool, shell, code, a, n)
-        return other, found, other != code
+        lean, face, found = from_edge(table, pool, shell, code, a, n)
+        return (face, found, True) if lean > LEAN else (code, (a, b), False)
     other, found = from_vertex(table, pool, shell, code, n)
     return other, found, other != code
 
@@ -271,6 +282,8 @@ def track_features(table, pool, shell_f, shell_g, rotation, shift, code_f, code_
     while True:
         kind_f = feature_kind(table, shell_f, code_f)
         kind_g = feature_kind(table, shell_g, code_g)
+        if kind_f == EDGE and kind_g == EDGE and dot(n, n) < 0.25:
+            n = between_edges(table, pool, shell_f, shell_g, rotation, code_f, code_g, x[0], x[2])
         status, x, frame = solve_features(
             table,
             pool,

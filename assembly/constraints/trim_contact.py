@@ -1,0 +1,133 @@
+"""TrimContact: where on a face a contact may be."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal, get_args
+
+from assembly.constraints.constraint import Constraint
+from assembly.constraints.contact import Contact
+from assembly.errors import InputError
+from assembly.geometry.curve import NurbsCurve
+from assembly.geometry.face import Face
+from assembly.geometry.loop import Loop
+from assembly.kinematics.body import Body, BodyFace
+
+__all__ = ["Form", "Keep", "TrimContact"]
+
+Keep = Literal["on", "inside", "outside"]
+Form = Literal["signed", "parametric", "cartesian", "between"]
+
+
+class TrimContact(Constraint):
+    """A contact stays on a loop, or on one side of it.
+
+    The contact is then one of the two surfaces, without their boundaries: where it may be is said here.
+
+    Parameters
+    ----------
+    contact : Contact
+        Of two single faces, in the same scene.
+    loop : Loop, NurbsCurve or several curves
+        Closed, in the (u, v) of one of the two faces: `face.outer`, one of `face.holes`, or any other.
+    keep : "on", "inside" or "outside"
+        On the loop, or on the side that it encloses or does not; the loop itself belongs to both sides.
+    form : "signed", "parametric", "cartesian" or "between"
+        The rows. "signed": the signed distance of the contact from the loop in (u, v), times the mean stretch of the
+        surface over the loop, one row. The others are those of paper 001, section 3.4, with c the point of the
+        loop's own extremum against the other surface: u_f - c (2 rows), f(u_f) - f(c) (3) and g(u_g) - f(c)
+        (3). At a solution they depend on one another, which the loop of the solve bears; one-sided ones are
+        idle on the right side.
+    side : "a" or "b", optional
+        Which of the contact's faces the loop is on; by default the one that has it, else "a".
+    name : str, optional
+        "trim" and the contact's name by default.
+
+    Raises
+    ------
+    InputError, TypeError
+        No contact, a side with several faces, a loop that is open or crosses itself, unknown words.
+    """
+
+    def __init__(
+        self,
+        contact: Contact,
+        loop: Loop | NurbsCurve | Sequence[NurbsCurve],
+        keep: Keep = "on",
+        form: Form = "signed",
+        *,
+        side: Literal["a", "b"] | None = None,
+        name: str | None = None,
+    ) -> None:
+        if not isinstance(contact, Contact):
+            raise TypeError(f"contact is {contact!r}; expected a Contact")
+        for word, value, known in (("keep", keep, get_args(Keep)), ("form", form, get_args(Form))):
+            if value not in known:
+                raise InputError(f"{word} is {value!r}; expected one of {', '.join(map(repr, known))}")
+        if side not in (None, "a", "b"):
+            raise InputError(f"side is {side!r}; expected 'a', 'b' or None")
+        self._faces = (_single_face("a", contact.a), _single_face("b", contact.b))
+        self._contact = contact
+        self._loop = loop if isinstance(loop, Loop) else Loop(loop)
+        self._side = (0 if side == "a" else 1) if side is not None else self._owner()
+        # A face of its own checks the loop against the surface.
+        self._region = Face(self._faces[self._side].surface, self._loop)
+        self._keep: Keep = keep
+        self._form: Form = form
+        super().__init__(contact.bodies, f"trim {contact.name}" if name is None else name)
+
+    def _owner(self) -> int:
+        """The side whose face has the loop."""
+        for side, face in enumerate(self._faces):
+            if self._loop is face.outer or any(self._loop is hole for hole in face.holes):
+                return side
+        return 0
+
+    @property
+    def contact(self) -> Contact:
+        """The contact that is kept."""
+        return self._contact
+
+    @property
+    def loop(self) -> Loop:
+        """The loop."""
+        return self._loop
+
+    @property
+    def keep(self) -> Keep:
+        """Where the contact is kept."""
+        return self._keep
+
+    @property
+    def form(self) -> Form:
+        """Which rows say so."""
+        return self._form
+
+    @property
+    def side(self) -> int:
+        """0 where the loop is on the face of side a, 1 where on that of side b."""
+        return self._side
+
+    @property
+    def region(self) -> Face:
+        """The surface with the loop as its boundary."""
+        return self._region
+
+    @property
+    def unilateral(self) -> bool:
+        """Whether the contact may leave the loop."""
+        return self._keep != "on"
+
+    def __repr__(self) -> str:
+        return f"TrimContact({self._contact.name!r}, keep={self._keep!r}, form={self._form!r}, name={self.name!r})"
+
+
+def _single_face(label: str, side: Body | BodyFace) -> Face:
+    """The only face of a side of a contact."""
+    if isinstance(side, BodyFace):
+        return side.face
+    if len(side.faces) != 1:
+        raise InputError(
+            f"contact has body {side.name!r} with {len(side.faces)} faces as side {label}; expected one of its faces"
+        )
+    return side.faces[0].face
