@@ -1,4 +1,4 @@
-"""Pairs of features, made by placing g on f, and the kernels of `feature_pair.py` behind one door for tests."""
+"""Pairs of features, made by placing g on f, and packed for the kernels."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from assembly._kernel import kernel
 from assembly.geometry.curve import NurbsCurve
 from assembly.geometry.face import Face
 from assembly.geometry.spline import (
@@ -19,17 +18,13 @@ from assembly.geometry.spline import (
     CURVE_RECORD,
     SURFACE_RECORD,
 )
-from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.extremal import CONVERGED, LEFT_PATCH, NOT_CONVERGED, SINGULAR
-from assembly.proximity.feature_pair import feature_record, solve_features
+from assembly.proximity.feature_query import PAIR, feature_derivatives, find_features
 from assembly.proximity.shell import EDGE, EDGE_CURVE, EDGE_END, EDGE_RECORD, EDGE_START, EDGE_SURFACE, FACE, VERTEX
-from assembly.proximity.velocity import RATES, RECORD, ZED, add_gap_terms, gradient_row
 from tests.laws.scenes import dome, inside, quadratic, quaternion_of, random_quaternion
 from tests.laws.witness import rotated
 
 STATUS = {CONVERGED: "CONVERGED", SINGULAR: "SINGULAR", LEFT_PATCH: "LEFT_PATCH", NOT_CONVERGED: "NOT_CONVERGED"}
-# What `run` writes after the four parameters.
-POINT_F, POINT_G, NORMAL_AT, BETA, REGULAR, ISOLATED, PROPER, FOLD, RESIDUAL, OUT = 4, 7, 10, 13, 14, 15, 16, 17, 18, 22
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,75 +99,24 @@ class Packed:
                 table += edge
         self.table, self.pool = np.array(table, np.int64), np.array(pool, float)
         self.at = tuple(at)
-        self.records = np.zeros((1, RECORD))
 
     def solve(self, q, x, n=(0.0, 0.0, 0.0), size=4.0, turn=np.inf):
-        """Status, and what `run` writes."""
-        out = np.empty(OUT)
-        status = run(
-            self.table,
-            self.pool,
-            self.kinds[0],
-            self.at[0],
-            self.kinds[1],
-            self.at[1],
-            np.asarray(q, float).reshape(2, 7),
-            tuple(map(float, x)),
-            tuple(map(float, n)),
-            float(size),
-            float(turn),
-            self.records,
-            out,
-        )
+        """Status name, and what `find_features` writes."""
+        out = np.empty(PAIR)
+        q = np.asarray(q, float).reshape(2, 7)
+        features = (self.kinds[0], self.at[0], self.kinds[1], self.at[1])
+        x, n = tuple(map(float, x)), tuple(map(float, n))
+        status = find_features(self.table, self.pool, *features, q, x, n, float(size), float(turn), out)
         return STATUS[status], out
 
-    def gradient(self):
-        """The gap's gradient over the twists (12,), of the pair solved last."""
-        row = np.empty((1, 12))
-        one_gradient(self.records, row)
-        return row[0].copy()
-
-    def hessian(self):
-        """The upper triangle made full (12, 12)."""
-        row, out = np.zeros((1, 12)), np.zeros((12, 12))
-        one_hessian(self.records, row, out)
-        return np.triu(out) + np.triu(out, 1).T
-
-    def rates(self):
-        """Rates of (u_f, v_f, u_g, v_g) over the twists (4, 12)."""
-        r = self.records[0]
-        return r[RATES : RATES + 16].reshape(4, 4) @ r[ZED : ZED + 48].reshape(4, 12)
-
-
-@kernel
-def run(table, pool, kind_f, f, kind_g, g, q, x, n, size, turn, records, out):
-    turn_f = rotation(q, 0)
-    relative, shift = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
-    status, y, frame = solve_features(table, pool, kind_f, f, kind_g, g, relative, shift, x, n, size, turn)
-    feature_record(turn_f, shift, frame, records, 0)
-    for k in range(4):
-        out[k] = y[k]
-        out[18 + k] = frame[11][k]
-    for k in range(3):
-        out[4 + k] = frame[3][k]
-        out[7 + k] = frame[4][k]
-        out[10 + k] = frame[0][k]
-    out[13] = frame[5]
-    out[14] = 1.0 if frame[12] else 0.0
-    out[15] = 1.0 if frame[13] else 0.0
-    out[16] = 1.0 if frame[14] else 0.0
-    out[17] = frame[15]
-    return status
-
-
-@kernel
-def one_gradient(records, row):
-    gradient_row(records, 0, row, 0)
-
-
-@kernel
-def one_hessian(records, row, out):
-    add_gap_terms(records, 0, row, 0, 1.0, 0.0, out, 0, 6)
+    def derivatives(self, q, x, n=(0.0, 0.0, 0.0), size=4.0):
+        """Rates of the parameters (4, 14), the gap's gradient (14,), its Hessian (12, 12), and the pair's residual."""
+        first, hessian = np.empty((5, 14)), np.empty((12, 12))
+        q = np.asarray(q, float).reshape(2, 7)
+        features = (self.kinds[0], self.at[0], self.kinds[1], self.at[1])
+        x, n = tuple(map(float, x)), tuple(map(float, n))
+        error, _isolated = feature_derivatives(self.table, self.pool, *features, q, x, n, float(size), first, hessian)
+        return first[:4], first[4], hessian, error
 
 
 def plane_curve(rng, surface, at):
@@ -227,7 +171,7 @@ def axes(n, spin):
 
 
 def place(rng, f, x_f, g, x_g, gap, scale=True):
-    """Poses (14,) that make (x_f, x_g) extremal with this gap, and the normal in the axes of f."""
+    """Poses (14,) that make (x_f, x_g) extremal with this gap, and the normal in world axes."""
     p, n = f.outward(rng, x_f)
     r, m = g.outward(rng, x_g)
     q_f = np.concatenate([rng.uniform(-3.0, 3.0, 3), random_quaternion(rng)])
@@ -236,4 +180,4 @@ def place(rng, f, x_f, g, x_g, gap, scale=True):
     matrix = world @ axes(n, 0.0) @ axes(-m, rng.uniform(0.0, 6.3)).T
     at = world @ (p + gap * n) + q_f[:3]
     e = quaternion_of(matrix) * (np.linalg.norm(random_quaternion(rng)) if scale else 1.0)
-    return np.concatenate([q_f, at - matrix @ r, e]), n
+    return np.concatenate([q_f, at - matrix @ r, e]), world @ n
