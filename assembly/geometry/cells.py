@@ -19,6 +19,8 @@ __all__ = ["COUNT", "split", "surface_cells"]
 
 Array = NDArray[np.float64]
 COUNT = 128
+# Cells are listed so that this many in a row are neighbors: they are looked at together first.
+GROUP = 8
 # A round halves every cell whose sphere is larger than this part of the largest: halves are seldom larger,
 # so that rounds of many cells give what halving one at a time gives.
 _ROUND = 0.7
@@ -48,8 +50,29 @@ def _measures(points: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
     return center, radius, long_u >= long_v
 
 
+def _neighborly(center: Array) -> NDArray[np.int64]:
+    """An order in which cells that follow one another lie close together.
+
+    Ranges are halved at the median along the direction in which their centers spread most, a level at a time, down to
+    `GROUP` of them.
+    """
+    count = len(center)
+    levels = max(0, int(np.ceil(np.log2(count / GROUP))))
+    # Padded to equal ranges by copies of the last cell, which are dropped in the end.
+    order = np.minimum(np.arange(GROUP << levels), count - 1)
+    for level in range(levels):
+        order = order.reshape(1 << level, -1)
+        points = center[order]
+        axis = np.ptp(points, axis=1).argmax(axis=1)
+        along = np.take_along_axis(points, axis[:, None, None], axis=2)[:, :, 0]
+        order = np.take_along_axis(order, np.argsort(along, axis=1, kind="stable"), axis=1)
+    order = order.ravel()
+    first = np.unique(order, return_index=True)[1]
+    return order[np.sort(first)]
+
+
 def split(surface: NurbsSurface, count: int = COUNT) -> tuple[Array, Array, Array]:
-    """Boxes in (u, v) that tile the domain, with spheres around the surface over them.
+    """Boxes in (u, v) that tile the domain, with spheres around the surface over them, neighbors near in the list.
 
     Parameters
     ----------
@@ -94,15 +117,18 @@ def split(surface: NurbsSurface, count: int = COUNT) -> tuple[Array, Array, Arra
         center = np.concatenate([center[kept], measured[0]])
         radius = np.concatenate([radius[kept], measured[1]])
         along_u = np.concatenate([along_u[kept], measured[2]])
-    return box, center, radius
+    order = _neighborly(center)
+    return box[order], center[order], radius[order]
 
 
 def surface_cells(surface: NurbsSurface) -> Array:
-    """The cells of `split` as kernels read them: (cells, 9); more of them for a surface of many spans.
+    """The cells of `split` as kernels read them: (cells, CELL_SIZE); more of them for a surface of many spans.
 
-    A row is u and v of the middle of a cell, the surface point there, the center of its sphere, its radius.
+    A row is u and v of the middle of a cell, the surface point there, the center of its sphere, its radius, and half
+    the widths of its box in u and in v.
     """
     spans = surface._pieces.shape[0] * surface._pieces.shape[1]
     box, center, radius = split(surface, min(max(COUNT, 8 * spans), 3 * COUNT))
     u, v = 0.5 * (box[:, 0] + box[:, 1]), 0.5 * (box[:, 2] + box[:, 3])
-    return np.column_stack([u, v, surface.evaluate(u, v), center, radius])
+    half_u, half_v = 0.5 * (box[:, 1] - box[:, 0]), 0.5 * (box[:, 3] - box[:, 2])
+    return np.column_stack([u, v, surface.evaluate(u, v), center, radius, half_u, half_v])

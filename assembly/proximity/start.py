@@ -35,7 +35,7 @@ from assembly.proximity.extremal import (
     solve_pair,
 )
 
-CELL_SIZE = 9  # doubles a cell: u, v, point, sphere's center, radius
+CELL_SIZE = 11  # doubles a cell: u, v, point, sphere's center, radius, half widths in u and v
 # How many of the nearest and of the best aligned samples are tried.
 NEAREST = 16
 ALIGNED = 8

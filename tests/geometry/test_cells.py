@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from assembly.geometry import shapes
-from assembly.geometry.cells import COUNT, split, surface_cells
+from assembly.geometry.cells import COUNT, GROUP, split, surface_cells
 from assembly.geometry.surface import NurbsSurface
+from assembly.proximity.start import CELL_SIZE
 from tests.geometry.test_surface import random_surface
 
 SURFACES = {
@@ -61,18 +62,28 @@ def test_more_cells_are_smaller_and_of_a_size(name):
     assert radius.max() < 8.0 * np.median(radius)
 
 
+@pytest.mark.parametrize("name", ["sphere", "torus", "clip", "mixed"])
+def test_cells_that_follow_one_another_are_neighbors(name):
+    _, centers, radii = split(SURFACES[name], 256)
+    groups = centers.reshape(-1, GROUP, 3)
+    spread = np.linalg.norm(groups - groups.mean(axis=1, keepdims=True), axis=2).max(axis=1)
+    # Eight of 256 on a surface reach as far as a few cells do, not across it.
+    assert np.median(spread) < 5.0 * np.median(radii)
+
+
 def test_rows_are_what_kernels_read():
     surface = SURFACES["torus"]
     rows = surface_cells(surface)
     boxes, centers, radii = split(surface)
-    assert rows.shape == (COUNT, 9)
+    assert rows.shape == (COUNT, CELL_SIZE)
     np.testing.assert_array_equal(rows[:, 0], boxes[:, :2].mean(axis=1))
     np.testing.assert_array_equal(rows[:, 1], boxes[:, 2:].mean(axis=1))
     np.testing.assert_array_equal(rows[:, 2:5], surface.evaluate(rows[:, 0], rows[:, 1]))
     np.testing.assert_array_equal(rows[:, 5:8], centers)
     np.testing.assert_array_equal(rows[:, 8], radii)
+    np.testing.assert_array_equal(rows[:, 9:], 0.5 * (boxes[:, 1::2] - boxes[:, ::2]))
     record, pool = surface.packed()
-    np.testing.assert_array_equal(pool[-rows.size :].reshape(-1, 9), rows)
+    np.testing.assert_array_equal(pool[-rows.size :].reshape(rows.shape), rows)
 
 
 def test_a_surface_of_many_spans_has_one_cell_a_span():

@@ -287,7 +287,7 @@ def test_packed_is_cached_and_padded_to_bicubic_up_to_degree_three():
         assert np.array_equal(pool[record[spline.BREAKS_V] :][: at_v.size], at_v)
         tables = 4 * (p + 1) * (q + 1) * (at_u.size - 1) * (at_v.size - 1)
         assert record[spline.CELLS] == record[spline.COEFFICIENTS] + tables
-        assert pool.size == record[spline.CELLS] + 9 * record[spline.CELL_COUNT]
+        assert pool.size == record[spline.CELLS] + 11 * record[spline.CELL_COUNT]
         # At the middle of a span the power table is its first coefficient.
         first = pool[record[spline.COEFFICIENTS] :][:4]
         middle = surface.evaluate(0.5 * (at_u[0] + at_u[1]), 0.5 * (at_v[0] + at_v[1]))
