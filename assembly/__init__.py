@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from assembly.constraints.placements import Distance as Distance
     from assembly.constraints.placements import PointOnLine as PointOnLine
     from assembly.constraints.placements import PointOnPlane as PointOnPlane
+    from assembly.constraints.trim_contact import TrimContact as TrimContact
     from assembly.geometry import shapes as shapes
     from assembly.geometry.curve import NurbsCurve as NurbsCurve
     from assembly.geometry.face import Face as Face
@@ -92,6 +93,7 @@ else:
             "Solution": "assembly.solve.solution",
             "Spherical": "assembly.constraints.joints",
             "Status": "assembly.solve.solution",
+            "TrimContact": "assembly.constraints.trim_contact",
             "Universal": "assembly.constraints.joints",
             "Wrench": "assembly.solve.statics",
             "dexterity_ellipsoid": "assembly.solve.tip",

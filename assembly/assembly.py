@@ -14,6 +14,7 @@ from assembly.constraints.constraint import Constraint, structure_changes
 from assembly.constraints.expression import Expression
 from assembly.constraints.objectives import Objective
 from assembly.constraints.packing import Packed, lone_surfaces, pack, structure_of
+from assembly.constraints.trim_contact import TrimContact
 from assembly.errors import InputError, vector
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import pose_rows
@@ -105,11 +106,16 @@ class Assembly:
         for constraint in constraints:
             if not isinstance(constraint, Constraint):
                 raise TypeError(
-                    f"constraint is {constraint!r}; expected a Contact, a joint, a coupling or an Expression"
+                    f"constraint is {constraint!r}; expected a Contact, a TrimContact, a joint, a coupling or an Expression"
                 )
             self._check_bodies(constraint.name, constraint.bodies)
             if any(other.name == constraint.name for other in self._constraints):
                 raise InputError(f"constraint name {constraint.name!r} is taken; expected distinct names, say name=...")
+            if isinstance(constraint, TrimContact) and not any(other is constraint.contact for other in self._constraints):
+                raise InputError(
+                    f"constraint {constraint.name!r} keeps contact {constraint.contact.name!r}, which is not in the "
+                    "assembly; expected its contact to be constrained before it"
+                )
             if all(body.fixed for body in constraint.bodies):
                 raise InputError(f"constraint {constraint.name!r} is between two fixed bodies; expected one that moves")
             self._constraints.append(constraint)

@@ -20,6 +20,7 @@ from assembly.constraints.objectives import FrameDistance, Objective, PointDista
 from assembly.constraints.primitives import AZIMUTH, TURN, place_frames
 from assembly.constraints.primitives import RECORD as JOINT_FRAMES
 from assembly.constraints.primitives import coordinate as coordinate_value
+from assembly.constraints.trim_contact import TrimContact
 from assembly.constraints.turns import Turns
 from assembly.errors import InputError
 from assembly.geometry.face import Face
@@ -56,6 +57,8 @@ class Packed:
         The constraint of every row.
     drives : (m,) bool
         Whether a driven value or a limit asks for the row.
+    pairs : (m,) int
+        The contact whose pair a row is of, or -1.
     one_sided, lengths : (m,) bool
         Whether a row is >= 0; whether it is a length.
     """
@@ -90,7 +93,7 @@ class Packed:
         # What the loop is compiled for: None without a dexterity.
         self.tips = 1 if self._header[program.DEXTERITIES] else None
         # And None where every contact is of two lone faces without boundary.
-        self.solids = 1 if self.shells else None
+        self.solids = 1 if self.shells or self._header[program.TRIMS] else None
         self.table = np.concatenate(self._table)
         self.pool = np.concatenate(self._pool)
         self._sources = [item for item in self._values if item[0].source is not None]
@@ -134,15 +137,22 @@ class Packed:
         numbers = {id(constraint): k for k, constraint in enumerate(constraints)}
         records: dict[tuple[int, bool], int] = {}
         self.shells: dict[tuple[Face, ...], int] = {}
+        # Of a contact with trims the surfaces take part without their own boundaries.
+        trimmed = {item.contact.name for item in constraints if isinstance(item, TrimContact)}
         for contact, sides in zip(self.contacts, self.sides, strict=True):
             places = [self._places[id(body)] for body in contact.bodies]
             fields = [program.CONTACT_ROW, *places, int(contact.unilateral), 0, 1]
-            if all(isinstance(side, BodyFace) and not side.face.boundary for side in sides):
+            if contact.name in trimmed or all(isinstance(s, BodyFace) and not s.face.boundary for s in sides):
                 fields += [self._surface(records, _side_faces(side)[0]) for side in sides] + [-1, -1]
             else:
                 fields += [-1, -1] + [self._shell(_side_faces(side)) for side in sides]
             rows.append(fields)
             owners.append(numbers[id(contact)])
+        for trim in constraints:
+            if isinstance(trim, TrimContact):
+                rows.append(self._trim(trim))
+                owners.append(numbers[id(trim)])
+        header[program.TRIMS] = len(rows) - len(self.contacts)
         # Rows in the order of their bodies: then the envelope of J J^T is narrow, too.
         others = [item for item in constraints if isinstance(item, (Joint, Coupling))]
         others.sort(key=lambda item: max(slots[self._places[id(body)]] for body in item.bodies))
@@ -194,6 +204,10 @@ class Packed:
         self.one_sided = table[:, program.ONE_SIDED] == 1
         self.drives = table[:, program.DRIVE] == 1
         self.lengths = table[:, program.IS_LENGTH] == 1
+        kinds = table[:, program.KIND]
+        self.pairs = np.where(kinds == program.CONTACT_ROW, np.arange(len(rows)), -1)
+        trims = np.flatnonzero(kinds == program.TRIM_ROW)
+        self.pairs[trims] = [rows[r][program.TRIM_PAIR] for r in trims]
         self.spans = [np.flatnonzero(self.owners == k) for k in range(len(constraints))]
 
     def _gathering(self, bodies: Sequence[Body], rows: list[list[int]]) -> int:
@@ -299,6 +313,16 @@ class Packed:
             self._add(table, pool)
             self.shells[faces] = shell
         return self.shells[faces]
+
+    def _trim(self, trim: TrimContact) -> list[int]:
+        """The record of a trim's row."""
+        table, pool = trim.region.packed_trim(self._table_size, self._pool_size)
+        loop, _ = self._add(table, pool)
+        factor = trim.stretch / self.scale
+        _, at = self._add(pool=[-factor if trim.keep == "outside" else factor])
+        pair = next(k for k, contact in enumerate(self.contacts) if contact.name == trim.contact.name)
+        places = [self._places[id(body)] for body in trim.bodies]
+        return [program.TRIM_ROW, *places, int(trim.unilateral), 0, 1, pair, trim.side, loop, at]
 
     def _terms(self, weight: float, objective: Objective, bodies: Sequence[Body]) -> list[list[int]]:
         if isinstance(objective, (Dexterity, Expression)):

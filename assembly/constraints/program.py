@@ -30,20 +30,25 @@ from assembly.proximity.free_pair import VARIABLES, free_hessian, free_rows
 from assembly.proximity.solid_contact import FEATURE_F, TRACK, search_solids, track_solids
 from assembly.proximity.start import global_start
 from assembly.proximity.switching import feature_at
-from assembly.proximity.velocity import GAP, RECORD, add_gap_terms, gradient_row, store_record
+from assembly.proximity.trim_distance import trim_distance
+from assembly.proximity.velocity import GAP, RATES, RECORD, ZED, add_gap_terms, gradient_row, store_record
 
 # Header of the table: counts, then where its parts begin; whether nobody asked for the
 # objective, and how many of its terms are dexterities.
 BODIES, MOVING, CONTACTS, TRACKED, JOINTS, ROWS, TAPES, TERMS, EXTRA = 0, 1, 2, 3, 4, 5, 6, 7, 8
 SLOTS, ROW_TABLE, JOINT_TABLE, TAPE_TABLE, TERM_TABLE, TAPE_ROOM, GATHER_TABLE = 9, 10, 11, 12, 13, 14, 15
-IMPLICIT, DEXTERITIES, HEADER = 16, 17, 18
+IMPLICIT, DEXTERITIES = 16, 17
+# Rows of trims follow those of contacts.
+TRIMS, HEADER = 18, 19
 # A row: kind, its two bodies (-1: none), whether it is one-sided (residual >= 0), whether it prescribes a freedom, and
 # whether its residual is a length. Row k is that of contact k.
 ROW = 14
 KIND, BODY_F, BODY_G, ONE_SIDED, DRIVE, IS_LENGTH = 0, 1, 2, 3, 4, 5
-CONTACT_ROW, JOINT_ROW, TAPE_ROW = 0, 1, 2
+CONTACT_ROW, JOINT_ROW, TAPE_ROW, TRIM_ROW = 0, 1, 2, 3
 # Of a contact: its surfaces, or else (-1: none) its shells.
 SURFACE_F, SURFACE_G, SHELL_F, SHELL_G = 6, 7, 8, 9
+# Of a trim: its contact, on which of its sides, the loop, and where the factor is in the pool.
+TRIM_PAIR, TRIM_SIDE, TRIM_LOOP, TRIM_FACTOR = 6, 7, 8, 9
 # Of a joint: kind and component of the coordinate, the joint that has its frames, where its angle is tracked (-1: it is
 # none), where its factor, the second factor and the value are in the pool, and a second coordinate with its bodies.
 COORDINATE, COMPONENT, JOINT, ANGLE, PARAMETERS, SECOND = 6, 7, 8, 9, 10, 11
@@ -200,6 +205,52 @@ def contact_row(table, pool, r, start, patience, loose, point, solids):
 
 
 @kernel(inner=True)
+def trim_row(table, pool, r, loose, point):
+    """Row r, of a trim: signed distance of its contact's coordinates to a loop, s_q = n.u_q."""
+    _q, tracked, records, residual, jacobian = point
+    free, lengths, _vectors, _block, _guess, _solids = loose
+    row = table[ROW_TABLE] + ROW * r
+    k = table[row + TRIM_PAIR]
+    o = 2 * table[row + TRIM_SIDE]
+    factor = pool[table[row + TRIM_FACTOR]]
+    s, n, _bend = trim_distance(table, pool, table[row + TRIM_LOOP], tracked[k, o], tracked[k, o + 1])
+    residual[r] = factor * s
+    for j in range(12):
+        jacobian[r, j] = 0.0
+    for j in range(4):
+        jacobian[r, FREE_COLUMN + j] = 0.0
+    for i in range(2):
+        if free[k] >= 0:
+            jacobian[r, FREE_COLUMN + o + i] = factor * n[i] / lengths[k, o + i]
+            continue
+        for l in range(4):
+            rate = factor * n[i] * records[k, RATES + 4 * (o + i) + l]
+            for j in range(12):
+                jacobian[r, j] += rate * records[k, ZED + 12 * l + j]
+
+
+@kernel(inner=True)
+def add_trim_terms(table, pool, r, loose, point, y, weight, hessian):
+    """As `add_row_terms`, for the row of a trim whose contact is free."""
+    tracked = point[1]
+    jacobian = point[4]
+    free, lengths, _vectors, _block, _guess, _solids = loose
+    row = table[ROW_TABLE] + ROW * r
+    k = table[row + TRIM_PAIR]
+    o = 2 * table[row + TRIM_SIDE]
+    _s, n, bend = trim_distance(table, pool, table[row + TRIM_LOOP], tracked[k, o], tracked[k, o + 1])
+    bend *= y * pool[table[row + TRIM_FACTOR]]
+    at = 6 * table[MOVING] + 4 * free[k] + o
+    for i in range(2):
+        for j in range(i, 2):
+            flat = (1.0 if i == j else 0.0) - n[i] * n[j]
+            hessian[at + i, at + j] += (
+                weight * jacobian[r, FREE_COLUMN + o + i] * jacobian[r, FREE_COLUMN + o + j]
+                + bend * flat / (lengths[k, o + i] * lengths[k, o + j])
+            )
+
+
+@kernel(inner=True)
 def coordinate_row(pool, kind, component, k, angle, factor, start, tracked, records, jacobian, r, column):
     """Factor times a coordinate, its gradient into row r from `column` on; its angle is tracked."""
     near = start[angle, 0] if angle >= 0 else 0.0
@@ -287,6 +338,8 @@ def evaluate(table, pool, start, patience, loose, room, point):
     for r in range(pairs):
         if not contact_row(table, pool, r, start, patience, loose, point, loose[5]):
             return r
+    for r in range(pairs, pairs + table[TRIMS]):
+        trim_row(table, pool, r, loose, point)
     for k in range(pairs, table[TRACKED]):
         # Of an angle that no row has, only an input of a dexterity, this is all that is known.
         tracked[k, 0] = start[k, 0]
@@ -396,7 +449,12 @@ def add_row_terms(table, pool, loose, room, bases, point, y, weights, hessian):
             add_free_terms(table, pool, r, loose, point, y, weights, hessian)
         elif y[r] != 0.0 or weights[r] != 0.0:
             add_gap_terms(records, r, jacobian, r, y[r], weights[r], hessian, bases[r, 0], bases[r, 1])
-    for r in range(pairs, table[ROWS]):
+    for r in range(pairs, pairs + table[TRIMS]):
+        if loose[0][table[table[ROW_TABLE] + ROW * r + TRIM_PAIR]] >= 0:
+            add_trim_terms(table, pool, r, loose, point, y[r], weights[r], hessian)
+        elif weights[r] != 0.0:
+            add_gram(bases, jacobian, r, weights[r], hessian)
+    for r in range(pairs + table[TRIMS], table[ROWS]):
         if weights[r] != 0.0:
             add_gram(bases, jacobian, r, weights[r], hessian)
         row = table[ROW_TABLE] + ROW * r

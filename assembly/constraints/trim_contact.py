@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Literal, get_args
+
+import numpy as np
 
 from assembly.constraints.constraint import Constraint
 from assembly.constraints.contact import Contact
@@ -112,6 +115,18 @@ class TrimContact(Constraint):
     def region(self) -> Face:
         """The surface with the loop as its boundary."""
         return self._region
+
+    @cached_property
+    def stretch(self) -> float:
+        """Length in space of a unit step across the loop in (u, v): the mean over the loop."""
+        steps = []
+        for curve in self._region.boundary:
+            at = np.linspace(*curve.domain, 17)[1:-1]
+            place, rate = curve.evaluate(at, 1)
+            _, su, sv = self._region.surface.evaluate(place[:, 0], place[:, 1], 1)
+            across = (rate[:, :1] * sv - rate[:, 1:] * su) / np.linalg.norm(rate, axis=1, keepdims=True)
+            steps.append(np.linalg.norm(across, axis=1))
+        return float(np.concatenate(steps).mean())
 
     @property
     def unilateral(self) -> bool:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.errors import InputError, vector
-from assembly.geometry.face import Face
+from assembly.geometry.face import Face, checked_color
 from assembly.geometry.surface import NurbsSurface
 from assembly.kinematics.pose import Pose, direction
 
@@ -70,6 +70,8 @@ class Body:
         Where the body stands, body to world; the quaternion is (w, x, y, z), unit to within a percent.
     fixed : bool
         A fixed body does not move in a solve and costs no unknowns.
+    color : (red, green, blue), optional
+        0 to 1 each, for pictures and files; settable.
 
     Raises
     ------
@@ -84,6 +86,7 @@ class Body:
         position: ArrayLike = (0.0, 0.0, 0.0),
         quaternion: ArrayLike = (1.0, 0.0, 0.0, 0.0),
         fixed: bool = False,
+        color: Sequence[float] | None = None,
     ) -> None:
         if not isinstance(name, str) or not name.strip():
             raise InputError(f"name is {name!r}; expected a nonempty string")
@@ -93,6 +96,7 @@ class Body:
         self._fixed = bool(fixed)
         self._pose = Pose(position, quaternion)  # type: ignore[arg-type]  # checked and converted there
         self._faces = self._named(shape)
+        self.color = color
 
     @property
     def name(self) -> str:
@@ -119,6 +123,15 @@ class Body:
         if not isinstance(value, Pose):
             raise TypeError(f"pose is {value!r}; expected a Pose")
         self._pose = value
+
+    @property
+    def color(self) -> tuple[float, float, float] | None:
+        """Red, green and blue, or None for one that is chosen by whoever draws the body."""
+        return self._color
+
+    @color.setter
+    def color(self, value: Sequence[float] | None) -> None:
+        self._color = checked_color(value)
 
     def _named(self, shape: Shape | None) -> tuple[BodyFace, ...]:
         if shape is None:

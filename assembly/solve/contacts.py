@@ -19,6 +19,8 @@ from assembly.constraints.program import (
     SHELL_G,
     SURFACE_F,
     SURFACE_G,
+    TRIM_PAIR,
+    TRIMS,
     surface_of,
 )
 from assembly.geometry.trim import trim_side
@@ -101,6 +103,12 @@ def free_folds(table, pool, records, contacts, active, free, lengths, below, los
     An idle one-sided row asks nothing of its pair.
     """
     count = 0
+    for r in range(table[CONTACTS], table[CONTACTS] + table[TRIMS]):
+        # The second derivative of a trim that counts is known in the coordinates alone.
+        row = table[ROW_TABLE] + ROW * r
+        k = table[row + TRIM_PAIR]
+        if free[k] < 0 and not (table[row + ONE_SIDED] == 1 and active[r] == 0.0):
+            free_pair(table, pool, table[ROW_TABLE] + ROW * k, k, contacts, free, lengths, solids)
     for k in range(table[CONTACTS]):
         row = table[ROW_TABLE] + ROW * k
         idle = table[row + ONE_SIDED] == 1 and active[k] == 0.0

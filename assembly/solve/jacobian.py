@@ -90,7 +90,7 @@ def rows_of(packed: Packed, state: Array) -> Rows:
     which = np.arange(m)
     shares = np.ones(m)
     if (free >= 0).any():
-        which, shares, residual, jacobian = _reduced(m, n, free, residual, jacobian)
+        which, shares, residual, jacobian = _reduced(m, n, _places(packed, free), residual, jacobian)
     return Rows(
         residual[: len(which)],
         jacobian[: len(which), : 6 * n],
@@ -103,8 +103,16 @@ def rows_of(packed: Packed, state: Array) -> Rows:
     )
 
 
+def _places(packed: Packed, free: NDArray[np.int64]) -> NDArray[np.int64]:
+    """For every row of the program: where its pair is among the free ones, or -1."""
+    places = np.full(packed.rows, -1, dtype=np.int64)
+    paired = packed.pairs >= 0
+    places[paired] = free[packed.pairs[paired]]
+    return places
+
+
 def _reduced(
-    m: int, n: int, free: NDArray[np.int64], residual: Array, jacobian: Array
+    m: int, n: int, places: NDArray[np.int64], residual: Array, jacobian: Array
 ) -> tuple[NDArray[np.int64], Array, Array, Array]:
     """Program rows, shares, residuals and Jacobian after the coordinates of pairs at folds are eliminated."""
     which: list[int] = []
@@ -112,7 +120,7 @@ def _reduced(
     residuals: list[Array] = []
     blocks: list[Array] = []
     for r in range(m):
-        place = free[r] if r < len(free) else -1
+        place = places[r]
         if place < 0:
             which.append(r)
             shares.append(1.0)

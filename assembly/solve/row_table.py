@@ -43,6 +43,8 @@ from assembly.constraints.program import (
     TAPE_VALUES,
     TAPES,
     TRACKED,
+    TRIM_PAIR,
+    TRIMS,
     evaluate,
 )
 from assembly.constraints.terms import objective
@@ -98,6 +100,11 @@ def spread_rows(table, free, count, packed, out):
                 out[k, at + i] = packed[k, FREE_COLUMN + i]
                 for j in range(4):
                     out[e + i, at + j] = packed[e + i, FREE_COLUMN + j]
+    for r in range(table[CONTACTS], table[CONTACTS] + table[TRIMS]):
+        k = table[table[ROW_TABLE] + ROW * r + TRIM_PAIR]
+        if free[k] >= 0:
+            for j in range(4):
+                out[r, 6 * table[BODIES] + 4 * free[k] + j] = packed[r, FREE_COLUMN + j]
     for t in range(table[TAPES]):
         tape = table[TAPE_TABLE] + TAPE_RECORD * t
         for v in range(table[tape + TAPE_VALUES]):

@@ -41,6 +41,8 @@ from assembly.constraints.program import (
     TAPES,
     TERMS,
     TRACKED,
+    TRIM_PAIR,
+    TRIMS,
 )
 from assembly.constraints.terms import TAPE_TERM, TERM, TERM_KIND, TERM_TABLE, TERM_TAPE
 from assembly.kinematics.motion import retract
@@ -77,6 +79,8 @@ def place_rows(table, free, bases, one_sided):
                 one_sided[e] = 0
                 for j in range(bases.shape[1]):
                     bases[e, j] = bases[r, j]
+    for r in range(table[CONTACTS], table[CONTACTS] + table[TRIMS]):
+        bases[r, 2] = bases[table[table[ROW_TABLE] + ROW * r + TRIM_PAIR], 2]
     for t in range(table[TAPES]):
         tape = table[TAPE_TABLE] + TAPE_RECORD * t
         for v in range(table[tape + TAPE_VALUES]):

@@ -16,6 +16,7 @@ from assembly.constraints.contact import Contact
 from assembly.constraints.couplings import Coupling
 from assembly.constraints.expression import Expression
 from assembly.constraints.packing import Packed, pack
+from assembly.constraints.trim_contact import TrimContact
 from assembly.proximity.solid_contact import TRACK
 from assembly.solve.augmented_lagrangian import HISTORY, RESULTS, solve_program
 from assembly.solve.jacobian import Rows
@@ -135,7 +136,7 @@ class Snapshot:
         self._equations: dict[int, list[Equation]] = {}
         stored = state[packed.residuals_at : packed.results_at]
         now = {} if rows is None or not solved else dict(zip(rows.program_rows.tolist(), rows.residual, strict=True))
-        for r, (equation, at, unit) in enumerate(packed._values, len(packed.contacts)):
+        for r, (equation, at, unit) in enumerate(packed._values, int((packed.pairs >= 0).sum())):
             value = float(packed.pool[at]) * unit
             # The row was coordinate - value; the coordinate is the same still.
             change = float(now[r] * unit - stored[r]) if r in now else 0.0
@@ -158,8 +159,11 @@ class Snapshot:
             With driven values.
         """
         places = range(len(self.scene.constraints)) if which is None else which
-        parts = [self._part(k, one_sided, drives) for k in places]
-        return Problem(self.scene, [part for part in parts if part is not None], self._near)
+        parts = [part for part in (self._part(k, one_sided, drives) for k in places) if part is not None]
+        # A trim means nothing without its contact.
+        contacts = {part.name for part in parts if isinstance(part, Contact)}
+        kept = [part for part in parts if not isinstance(part, TrimContact) or part.contact.name in contacts]
+        return Problem(self.scene, kept, self._near)
 
     def _part(self, place: int, one_sided: bool, drives: bool) -> Constraint | None:
         constraint = self.scene.constraints[place]
@@ -167,6 +171,8 @@ class Snapshot:
             if constraint.unilateral and not one_sided:
                 return None
             return Contact(*self._sides[constraint.name], constraint.name, constraint.unilateral)
+        if isinstance(constraint, TrimContact):
+            return None if constraint.unilateral and not one_sided else constraint
         if isinstance(constraint, Expression):
             return None if constraint.unilateral and not one_sided else constraint
         kept = tuple(
