@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["AssemblyError", "InputError", "integer", "number", "positive", "real_array", "vector"]
+__all__ = ["AssemblyError", "InputError", "checked_color", "integer", "number", "positive", "real_array", "vector"]
 
 
 class AssemblyError(Exception):
@@ -108,3 +108,15 @@ def integer(name: str, value: Any, low: int, high: int) -> int:
     if not low <= result <= high:
         raise InputError(f"{name} is {result}; expected an integer from {low} to {high}")
     return result
+
+
+def checked_color(value: Sequence[float] | None) -> tuple[float, float, float] | None:
+    """Red, green and blue from 0 to 1, or None."""
+    if value is None:
+        return None
+    if isinstance(value, str):
+        raise InputError(f"color is {value!r}; expected three numbers from 0 to 1, red, green and blue")
+    red, green, blue = vector("color", value, 3).tolist()
+    if min(red, green, blue) < 0.0 or max(red, green, blue) > 1.0:
+        raise InputError(f"color is {value!r}; expected three numbers from 0 to 1, red, green and blue")
+    return red, green, blue

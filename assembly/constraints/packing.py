@@ -1,4 +1,4 @@
-"""A scene turned into the table and the pool that the compiled loop works on (`constraints/program.py`)."""
+"""A scene turned into the table and the pool that the compiled loop works on (`constraints/layout.py`)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from math import prod, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.constraints import program, tape, terms
+from assembly.constraints import layout, tape, terms
 from assembly.constraints.constraint import Constraint, Coordinate, Equation, FramePair, structure_changes
 from assembly.constraints.contact import Contact
 from assembly.constraints.couplings import Coupling
@@ -20,15 +20,17 @@ from assembly.constraints.objectives import FrameDistance, Objective, PointDista
 from assembly.constraints.primitives import AZIMUTH, TURN, place_frames
 from assembly.constraints.primitives import RECORD as JOINT_FRAMES
 from assembly.constraints.primitives import coordinate as coordinate_value
-from assembly.constraints.trim_contact import TrimContact
+from assembly.constraints.trim_contact import FORMS, TrimContact
 from assembly.constraints.turns import Turns
 from assembly.errors import InputError
 from assembly.geometry.face import Face
 from assembly.geometry.surface import NurbsSurface
-from assembly.geometry.spline import SURFACE_RECORD
+from assembly.geometry.trim import TRIM_FIRST
+from assembly.geometry.spline import CURVE_RECORD, SURFACE_RECORD
 from assembly.kinematics.body import Body, BodyFace
 from assembly.proximity.pairs import OFFSETS
 from assembly.proximity.solid_contact import TRACK
+from assembly.proximity.shell import EDGE_CURVE, EDGE_END, EDGE_RECORD, EDGE_START, EDGE_SURFACE
 from assembly.proximity.shell_packing import pack_shell
 from assembly.proximity.topology import solid_of
 
@@ -44,7 +46,7 @@ class Packed:
     Attributes
     ----------
     table, pool : arrays
-        See `constraints/program.py`. Lengths in the pool are divided by `scale`.
+        See `constraints/layout.py`. Lengths in the pool are divided by `scale`.
     scale : float
         The scene's size: the largest diagonal of a body's box.
     unit : float
@@ -86,19 +88,19 @@ class Packed:
         self._table: list[Table] = []
         self._pool: list[Array] = []
         self._table_size = self._pool_size = 0
-        self._header = np.zeros(program.HEADER, dtype=np.int64)
+        self._header = np.zeros(layout.HEADER, dtype=np.int64)
         implicit = not objectives
         self._build(bodies, constraints, objectives or [(1.0, Posture())])
-        self._header[program.IMPLICIT] = int(implicit)
+        self._header[layout.IMPLICIT] = int(implicit)
         # What the loop is compiled for: None without a dexterity.
-        self.tips = 1 if self._header[program.DEXTERITIES] else None
+        self.tips = 1 if self._header[layout.DEXTERITIES] else None
         # And None where every contact is of two lone faces without boundary.
-        self.solids = 1 if self.shells or self._header[program.TRIMS] else None
+        self.solids = 1 if self.shells or self._header[layout.TRIMS] else None
         self.table = np.concatenate(self._table)
         self.pool = np.concatenate(self._pool)
         self._sources = [item for item in self._values if item[0].source is not None]
         self._turned = Turns(self._angles, [(equation, at) for equation, at, _ in self._values])
-        self.rows = int(self._header[program.ROWS])
+        self.rows = int(self._header[layout.ROWS])
         self.tracked = len(self.contacts) + len(self._angles)
         # Where the parts of a state begin: tracked values, multipliers, residuals, results.
         self.contacts_at = 7 * self.count
@@ -124,14 +126,14 @@ class Packed:
     ) -> None:
         header = self._header
         self.unit = max((term.weight * self._natural_unit(term) for _, term in objectives), default=1.0)
-        pool = np.zeros(program.POOL_HEADER)
-        pool[program.SCALE] = self.scale
-        pool[program.REFERENCE : program.REFERENCE + 3] = self.reference
-        pool[program.UNIT] = self.unit
+        pool = np.zeros(layout.POOL_HEADER)
+        pool[layout.SCALE] = self.scale
+        pool[layout.REFERENCE : layout.REFERENCE + 3] = self.reference
+        pool[layout.UNIT] = self.unit
         self._add(header, pool)
         groups = [[self._places[id(body)] for body in item.bodies] for item in constraints]
         slots = number_bodies([body.fixed for body in bodies], groups)
-        header[program.SLOTS], _ = self._add(slots)
+        header[layout.SLOTS], _ = self._add(slots)
         rows: list[list[int]] = []
         owners: list[int] = []
         numbers = {id(constraint): k for k, constraint in enumerate(constraints)}
@@ -141,7 +143,7 @@ class Packed:
         trimmed = {item.contact.name for item in constraints if isinstance(item, TrimContact)}
         for contact, sides in zip(self.contacts, self.sides, strict=True):
             places = [self._places[id(body)] for body in contact.bodies]
-            fields = [program.CONTACT_ROW, *places, int(contact.unilateral), 0, 1]
+            fields = [layout.CONTACT_ROW, *places, int(contact.unilateral), 0, 1]
             if contact.name in trimmed or all(isinstance(s, BodyFace) and not s.face.boundary for s in sides):
                 fields += [self._surface(records, _side_faces(side)[0]) for side in sides] + [-1, -1]
             else:
@@ -150,9 +152,10 @@ class Packed:
             owners.append(numbers[id(contact)])
         for trim in constraints:
             if isinstance(trim, TrimContact):
-                rows.append(self._trim(trim))
-                owners.append(numbers[id(trim)])
-        header[program.TRIMS] = len(rows) - len(self.contacts)
+                new = self._trim(trim, rows)
+                rows += new
+                owners += [numbers[id(trim)]] * len(new)
+        header[layout.TRIMS] = len(rows) - len(self.contacts)
         # Rows in the order of their bodies: then the envelope of J J^T is narrow, too.
         others = [item for item in constraints if isinstance(item, (Joint, Coupling))]
         others.sort(key=lambda item: max(slots[self._places[id(body)]] for body in item.bodies))
@@ -169,55 +172,55 @@ class Packed:
                 places = [self._places[id(body)] for body in item.bodies]
                 tapes.append(self._tape(item, len(rows)))
                 rows += [
-                    [program.TAPE_ROW, *[*places, -1][:2], side, 0, 0, len(tapes) - 1, value]
+                    [layout.TAPE_ROW, *[*places, -1][:2], side, 0, 0, len(tapes) - 1, value]
                     for value in range(item.count)
                 ]
                 owners += [numbers[id(item)]] * item.count
                 extra = max(extra, len(places) - 2)
-        header[program.TAPE_TABLE], _ = self._add([field for tape in tapes for field in tape])
-        header[program.TAPES] = len(tapes)
-        header[program.ROW_TABLE], _ = self._add(
-            [field for row in rows for field in row + [0] * (program.ROW - len(row))]
+        header[layout.TAPE_TABLE], _ = self._add([field for tape in tapes for field in tape])
+        header[layout.TAPES] = len(tapes)
+        header[layout.ROW_TABLE], _ = self._add(
+            [field for row in rows for field in row + [0] * (layout.ROW - len(row))]
         )
-        header[program.GATHER_TABLE] = self._gathering(bodies, rows)
+        header[layout.GATHER_TABLE] = self._gathering(bodies, rows)
         terms_: list[list[int]] = []
         for sign, objective in objectives:
             terms_.extend(self._terms(sign * objective.weight, objective, bodies))
-        header[program.TERM_TABLE], _ = self._add(
+        header[layout.TERM_TABLE], _ = self._add(
             [field for term in terms_ for field in term + [0] * (terms.TERM - len(term))]
         )
         # Terms have joints with frames, too.
-        header[program.JOINT_TABLE] = self._joints()
-        header[program.TAPE_ROOM], _ = self._add(self._room)
-        header[program.BODIES] = len(bodies)
-        header[program.MOVING] = int(slots.max()) + 1
-        header[program.CONTACTS] = len(self.contacts)
+        header[layout.JOINT_TABLE] = self._joints()
+        header[layout.TAPE_ROOM], _ = self._add(self._room)
+        header[layout.BODIES] = len(bodies)
+        header[layout.MOVING] = int(slots.max()) + 1
+        header[layout.CONTACTS] = len(self.contacts)
         header[TRACKED] = len(self.contacts) + len(self._angles)
-        header[program.JOINTS] = len(self._frames)
-        header[program.ROWS] = len(rows)
-        header[program.EXTRA] = extra
-        header[program.TERMS] = len(terms_)
-        header[program.DEXTERITIES] = sum(term[0] == terms.DEXTERITY for term in terms_)
+        header[layout.JOINTS] = len(self._frames)
+        header[layout.ROWS] = len(rows)
+        header[layout.EXTRA] = extra
+        header[layout.TERMS] = len(terms_)
+        header[layout.DEXTERITIES] = sum(term[0] == terms.DEXTERITY for term in terms_)
         self._table[0] = header
         table = np.array([row[:6] for row in rows], dtype=np.int64).reshape(-1, 6)
         self.owners = np.array(owners, dtype=np.int64)
-        self.one_sided = table[:, program.ONE_SIDED] == 1
-        self.drives = table[:, program.DRIVE] == 1
-        self.lengths = table[:, program.IS_LENGTH] == 1
-        kinds = table[:, program.KIND]
-        self.pairs = np.where(kinds == program.CONTACT_ROW, np.arange(len(rows)), -1)
-        trims = np.flatnonzero(kinds == program.TRIM_ROW)
-        self.pairs[trims] = [rows[r][program.TRIM_PAIR] for r in trims]
+        self.one_sided = table[:, layout.ONE_SIDED] == 1
+        self.drives = table[:, layout.DRIVE] == 1
+        self.lengths = table[:, layout.IS_LENGTH] == 1
+        kinds = table[:, layout.KIND]
+        self.pairs = np.where(kinds == layout.CONTACT_ROW, np.arange(len(rows)), -1)
+        trims = np.flatnonzero(kinds == layout.TRIM_ROW)
+        self.pairs[trims] = [rows[r][layout.TRIM_PAIR] for r in trims]
         self.spans = [np.flatnonzero(self.owners == k) for k in range(len(constraints))]
 
     def _gathering(self, bodies: Sequence[Body], rows: list[list[int]]) -> int:
         """Pack the order in which scattered bodies are put together; where it begins."""
         groups = []
         for row in rows:
-            places = row[1:3] if row[0] == program.JOINT_ROW else []
-            if places and row[program.SECOND] >= 0:
-                second = np.concatenate(self._table)[row[program.SECOND] :]
-                places = [*places, *second[program.SECOND_BODY_F : program.SECOND_RECORD].tolist()]
+            places = row[1:3] if row[0] == layout.JOINT_ROW else []
+            if places and row[layout.SECOND] >= 0:
+                second = np.concatenate(self._table)[row[layout.SECOND] :]
+                places = [*places, *second[layout.SECOND_BODY_F : layout.SECOND_RECORD].tolist()]
             groups.append(list(dict.fromkeys(places)))
         order = gathering_order([body.fixed for body in bodies], groups)
         fields = [field for body, held in order for field in (body, len(held), *held)]
@@ -267,7 +270,7 @@ class Packed:
         _, at = self._add(pool=pool)
         self._values.append((equation, at + 2, unit))
         flags = [int(equation.one_sided), int(equation.is_drive), int(not first.is_angle)]
-        return [program.JOINT_ROW, *bodies, *flags, *fields, at, second]
+        return [layout.JOINT_ROW, *bodies, *flags, *fields, at, second]
 
     def _tape(self, expression: Expression, row: int) -> list[int]:
         """Pack the instructions of an expression; its record."""
@@ -314,15 +317,34 @@ class Packed:
             self.shells[faces] = shell
         return self.shells[faces]
 
-    def _trim(self, trim: TrimContact) -> list[int]:
-        """The record of a trim's row."""
+    def _trim(self, trim: TrimContact, rows: list[list[int]]) -> list[list[int]]:
+        """The records of a trim's rows."""
         table, pool = trim.region.packed_trim(self._table_size, self._pool_size)
         loop, _ = self._add(table, pool)
         factor = trim.stretch / self.scale
         _, at = self._add(pool=[-factor if trim.keep == "outside" else factor])
         pair = next(k for k, contact in enumerate(self.contacts) if contact.name == trim.contact.name)
         places = [self._places[id(body)] for body in trim.bodies]
-        return [program.TRIM_ROW, *places, int(trim.unilateral), 0, 1, pair, trim.side, loop, at]
+        form = FORMS.index(trim.form)
+        count = (1, 2, 3, 3)[form]
+        # A form of several rows is one-sided as a whole: its rows vanish on the right side.
+        side = int(trim.unilateral)
+        edges = -1 if form == 0 else self._loop_edges(trim, loop, rows[pair][layout.SURFACE_F + trim.side])
+        self._header[layout.VECTOR_TRIMS] |= int(form > 0)
+        fields = [layout.TRIM_ROW, *places, side if form == 0 else 0, 0, 1, pair, trim.side, loop, at, form]
+        return [[*fields, count, edges, side] for _ in range(count)]
+
+    def _loop_edges(self, trim: TrimContact, loop: int, surface: int) -> int:
+        """Records of the curves of a trim's loop as edges on its surface; where they begin."""
+        fields: list[int] = []
+        first = int(np.concatenate(self._table)[loop + TRIM_FIRST])
+        for k, curve in enumerate(trim.region.boundary):
+            record = np.full(EDGE_RECORD, -1, dtype=np.int64)
+            record[EDGE_SURFACE], record[EDGE_CURVE] = surface, first + CURVE_RECORD * k
+            if not curve.closed:
+                record[EDGE_START], record[EDGE_END] = 0, 0
+            fields += record.tolist()
+        return self._add(fields)[0]
 
     def _terms(self, weight: float, objective: Objective, bodies: Sequence[Body]) -> list[list[int]]:
         if isinstance(objective, (Dexterity, Expression)):
@@ -394,7 +416,7 @@ class Packed:
 
         def evaluate(coordinate: Coordinate, near: float) -> float:
             number = self._frames[id(coordinate.frames)][0]
-            i, j, at = self.table[self._header[program.JOINT_TABLE] + program.JOINT_RECORD * number :][:3]
+            i, j, at = self.table[self._header[layout.JOINT_TABLE] + layout.JOINT_RECORD * number :][:3]
             place_frames(self.pool, at, scaled, i, j, records, 0)
             value = float(coordinate_value(coordinate.kind, coordinate.component, records, 0, near)[0])
             return value if coordinate.is_angle else value * self.scale

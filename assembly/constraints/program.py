@@ -1,17 +1,7 @@
-"""A scene packed into one table of integers and one pool of doubles, and its rows evaluated.
+"""The rows of a packed scene evaluated, with their first and second derivatives; `layout.py` says what stands where.
 
-All lengths in a program are divided by the scene's length scale. Table: a header, the slot of
-every body (-1: fixed), then a record a row (contacts first), a joint, a tape and an objective term. The loop works on
-
-    configuration  (n, 7)       poses, scaled, positions relative to a reference
-    tracked        (k, 9)       of every contact parameters, features (`proximity/shell.py`) and normal of its pair, then
-                                (first column) unwrapped angles of joints
-    records        (k + j, R)   what the derivatives of gaps need (see `track_contact`), then frames of joints
-    residual       (m,)         rows: contacts, joints, tapes; behind them four for every free pair
-    jacobian       (m, 16 + e)  in the twists of a row's two bodies (12), a free pair's coordinates (4), further bodies
-
-A row of a joint is c_1 coordinate_1 + c_2 coordinate_2 - value (`primitives.py`); rows of a tape are the values of a
-user's expression (`tape.py`).
+A row of a joint is c_1 coordinate_1 + c_2 coordinate_2 - value (`primitives.py`), a row of a trim the signed distance
+of a contact to a loop (`proximity/trim_distance.py`); rows of a tape are the values of a user's expression (`tape.py`).
 """
 
 from __future__ import annotations
@@ -21,8 +11,53 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly.constraints.layout import (
+    BODY_F,
+    BODY_G,
+    CONTACTS,
+    CONTACT_RECORD,
+    COORDINATE,
+    EXTRA_COLUMN,
+    FOLD,
+    FREE_COLUMN,
+    JOINTS,
+    JOINT_RECORD,
+    JOINT_ROW,
+    JOINT_TABLE,
+    KIND,
+    MOVING,
+    ONE_SIDED,
+    PARAMETERS,
+    PROPER,
+    REFERENCE,
+    ROW,
+    ROWS,
+    ROW_TABLE,
+    SCALE,
+    SECOND,
+    SHELL_F,
+    SHELL_G,
+    SLOTS,
+    SURFACE_F,
+    SURFACE_G,
+    TAPES,
+    TAPE_BODIES,
+    TAPE_FIRST,
+    TAPE_LIST,
+    TAPE_RECORD,
+    TAPE_ROW_AT,
+    TAPE_SCALE,
+    TAPE_SECOND,
+    TAPE_TABLE,
+    TAPE_VALUES,
+    TRACKED,
+    TRIMS,
+    TRIM_FORM,
+    TRIM_PAIR,
+)
 from assembly.constraints.primitives import add_coordinate_hessian, coordinate, place_frames, write_gradient
 from assembly.constraints.tape import run_tape
+from assembly.constraints.trim_rows import SIGNED, add_trim_terms, trim_rows
 from assembly.geometry.vec import dot, sub
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.extremal import CLOSE, CONVERGED, LEFT_PATCH, SINGULAR, solve_pair
@@ -30,46 +65,7 @@ from assembly.proximity.free_pair import VARIABLES, free_hessian, free_rows
 from assembly.proximity.solid_contact import FEATURE_F, TRACK, search_solids, track_solids
 from assembly.proximity.start import global_start
 from assembly.proximity.switching import feature_at
-from assembly.proximity.trim_distance import trim_distance
-from assembly.proximity.velocity import GAP, RATES, RECORD, ZED, add_gap_terms, gradient_row, store_record
-
-# Header of the table: counts, then where its parts begin; whether nobody asked for the
-# objective, and how many of its terms are dexterities.
-BODIES, MOVING, CONTACTS, TRACKED, JOINTS, ROWS, TAPES, TERMS, EXTRA = 0, 1, 2, 3, 4, 5, 6, 7, 8
-SLOTS, ROW_TABLE, JOINT_TABLE, TAPE_TABLE, TERM_TABLE, TAPE_ROOM, GATHER_TABLE = 9, 10, 11, 12, 13, 14, 15
-IMPLICIT, DEXTERITIES = 16, 17
-# Rows of trims follow those of contacts.
-TRIMS, HEADER = 18, 19
-# A row: kind, its two bodies (-1: none), whether it is one-sided (residual >= 0), whether it prescribes a freedom, and
-# whether its residual is a length. Row k is that of contact k.
-ROW = 14
-KIND, BODY_F, BODY_G, ONE_SIDED, DRIVE, IS_LENGTH = 0, 1, 2, 3, 4, 5
-CONTACT_ROW, JOINT_ROW, TAPE_ROW, TRIM_ROW = 0, 1, 2, 3
-# Of a contact: its surfaces, or else (-1: none) its shells.
-SURFACE_F, SURFACE_G, SHELL_F, SHELL_G = 6, 7, 8, 9
-# Of a trim: its contact, on which of its sides, the loop, and where the factor is in the pool.
-TRIM_PAIR, TRIM_SIDE, TRIM_LOOP, TRIM_FACTOR = 6, 7, 8, 9
-# Of a joint: kind and component of the coordinate, the joint that has its frames, where its angle is tracked (-1: it is
-# none), where its factor, the second factor and the value are in the pool, and a second coordinate with its bodies.
-COORDINATE, COMPONENT, JOINT, ANGLE, PARAMETERS, SECOND = 6, 7, 8, 9, 10, 11
-# A second coordinate: kind, component, joint, angle, bodies.
-SECOND_BODY_F, SECOND_BODY_G, SECOND_RECORD = 4, 5, 6
-# Of a tape: which, and which of its values.
-TAPE, TAPE_VALUE = 6, 7
-# A joint: its bodies and where its frames are in the pool.
-JOINT_RECORD = 3
-# A tape: instructions for values and Jacobian, and for the Hessian; its values, its bodies, where the list of these is,
-# its first row, where the size of one unit is in the pool.
-TAPE_RECORD = 8
-TAPE_FIRST, TAPE_SECOND, TAPE_VALUES, TAPE_BODIES, TAPE_LIST, TAPE_ROW_AT, TAPE_SCALE = 0, 1, 2, 3, 4, 5, 6
-# Columns of the Jacobian: twists of f and g, a free pair's coordinates, further bodies.
-FREE_COLUMN, EXTRA_COLUMN = 12, 16
-# Behind a contact's record: whether the surfaces do not cross at it, and how far it is from a fold (det H / |H|^2).
-PROPER, FOLD, CONTACT_RECORD = RECORD, RECORD + 1, RECORD + 2
-# Header of the pool.
-# length scale, reference point (1 to 3), unit of the objective: what its scaled value counts in the user's units.
-SCALE, REFERENCE, UNIT, POOL_HEADER = 0, 1, 4, 8
-
+from assembly.proximity.velocity import GAP, add_gap_terms, gradient_row, store_record
 
 @kernel(inner=True)
 def track_contact(table, pool, row, q, start, patience, records, k):
@@ -205,52 +201,6 @@ def contact_row(table, pool, r, start, patience, loose, point, solids):
 
 
 @kernel(inner=True)
-def trim_row(table, pool, r, loose, point):
-    """Row r, of a trim: signed distance of its contact's coordinates to a loop, s_q = n.u_q."""
-    _q, tracked, records, residual, jacobian = point
-    free, lengths, _vectors, _block, _guess, _solids = loose
-    row = table[ROW_TABLE] + ROW * r
-    k = table[row + TRIM_PAIR]
-    o = 2 * table[row + TRIM_SIDE]
-    factor = pool[table[row + TRIM_FACTOR]]
-    s, n, _bend = trim_distance(table, pool, table[row + TRIM_LOOP], tracked[k, o], tracked[k, o + 1])
-    residual[r] = factor * s
-    for j in range(12):
-        jacobian[r, j] = 0.0
-    for j in range(4):
-        jacobian[r, FREE_COLUMN + j] = 0.0
-    for i in range(2):
-        if free[k] >= 0:
-            jacobian[r, FREE_COLUMN + o + i] = factor * n[i] / lengths[k, o + i]
-            continue
-        for l in range(4):
-            rate = factor * n[i] * records[k, RATES + 4 * (o + i) + l]
-            for j in range(12):
-                jacobian[r, j] += rate * records[k, ZED + 12 * l + j]
-
-
-@kernel(inner=True)
-def add_trim_terms(table, pool, r, loose, point, y, weight, hessian):
-    """As `add_row_terms`, for the row of a trim whose contact is free."""
-    tracked = point[1]
-    jacobian = point[4]
-    free, lengths, _vectors, _block, _guess, _solids = loose
-    row = table[ROW_TABLE] + ROW * r
-    k = table[row + TRIM_PAIR]
-    o = 2 * table[row + TRIM_SIDE]
-    _s, n, bend = trim_distance(table, pool, table[row + TRIM_LOOP], tracked[k, o], tracked[k, o + 1])
-    bend *= y * pool[table[row + TRIM_FACTOR]]
-    at = 6 * table[MOVING] + 4 * free[k] + o
-    for i in range(2):
-        for j in range(i, 2):
-            flat = (1.0 if i == j else 0.0) - n[i] * n[j]
-            hessian[at + i, at + j] += (
-                weight * jacobian[r, FREE_COLUMN + o + i] * jacobian[r, FREE_COLUMN + o + j]
-                + bend * flat / (lengths[k, o + i] * lengths[k, o + j])
-            )
-
-
-@kernel(inner=True)
 def coordinate_row(pool, kind, component, k, angle, factor, start, tracked, records, jacobian, r, column):
     """Factor times a coordinate, its gradient into row r from `column` on; its angle is tracked."""
     near = start[angle, 0] if angle >= 0 else 0.0
@@ -327,6 +277,13 @@ def tape_rows(table, pool, tape, q, room, residual, jacobian):
 
 
 @kernel(inner=True)
+def more_rows(table, pool, loose, point, solids):
+    """Rows of trims; `solids` is None where there are none, and nothing of them is compiled."""
+    if solids is not None:
+        trim_rows(table, pool, loose, point)
+
+
+@kernel(inner=True)
 def evaluate(table, pool, start, patience, loose, room, point):
     """Evaluate all rows at the point's poses. Returns the contact whose pair was lost, or -1.
 
@@ -338,8 +295,8 @@ def evaluate(table, pool, start, patience, loose, room, point):
     for r in range(pairs):
         if not contact_row(table, pool, r, start, patience, loose, point, loose[5]):
             return r
-    for r in range(pairs, pairs + table[TRIMS]):
-        trim_row(table, pool, r, loose, point)
+    if table[TRIMS] > 0:
+        more_rows(table, pool, loose, point, loose[5])
     for k in range(pairs, table[TRACKED]):
         # Of an angle that no row has, only an input of a dexterity, this is all that is known.
         tracked[k, 0] = start[k, 0]
@@ -450,7 +407,8 @@ def add_row_terms(table, pool, loose, room, bases, point, y, weights, hessian):
         elif y[r] != 0.0 or weights[r] != 0.0:
             add_gap_terms(records, r, jacobian, r, y[r], weights[r], hessian, bases[r, 0], bases[r, 1])
     for r in range(pairs, pairs + table[TRIMS]):
-        if loose[0][table[table[ROW_TABLE] + ROW * r + TRIM_PAIR]] >= 0:
+        row = table[ROW_TABLE] + ROW * r
+        if table[row + TRIM_FORM] == SIGNED and loose[0][table[row + TRIM_PAIR]] >= 0:
             add_trim_terms(table, pool, r, loose, point, y[r], weights[r], hessian)
         elif weights[r] != 0.0:
             add_gram(bases, jacobian, r, weights[r], hessian)

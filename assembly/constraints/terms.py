@@ -10,7 +10,8 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly.constraints.program import SCALE, SLOTS, TERM_TABLE, TERMS, place_tape
+from assembly.constraints.layout import SCALE, SLOTS, TERM_TABLE, TERMS
+from assembly.constraints.program import place_tape
 from assembly.constraints.tape import run_tape
 from assembly.geometry.vec import add, cross, dot, matvec, quaternion_product, sub
 from assembly.kinematics.motion import position, rotation

@@ -16,10 +16,12 @@ from assembly.geometry.face import Face
 from assembly.geometry.loop import Loop
 from assembly.kinematics.body import Body, BodyFace
 
-__all__ = ["Form", "Keep", "TrimContact"]
+__all__ = ["FORMS", "Form", "Keep", "TrimContact"]
 
 Keep = Literal["on", "inside", "outside"]
 Form = Literal["signed", "parametric", "cartesian", "between"]
+# In the order of the numbers that kernels know (`trim_rows.py`).
+FORMS: tuple[Form, ...] = get_args(Form)
 
 
 class TrimContact(Constraint):
@@ -64,7 +66,7 @@ class TrimContact(Constraint):
     ) -> None:
         if not isinstance(contact, Contact):
             raise TypeError(f"contact is {contact!r}; expected a Contact")
-        for word, value, known in (("keep", keep, get_args(Keep)), ("form", form, get_args(Form))):
+        for word, value, known in (("keep", keep, get_args(Keep)), ("form", form, FORMS)):
             if value not in known:
                 raise InputError(f"{word} is {value!r}; expected one of {', '.join(map(repr, known))}")
         if side not in (None, "a", "b"):

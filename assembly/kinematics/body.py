@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.errors import InputError, vector
-from assembly.geometry.face import Face, checked_color
+from assembly.errors import InputError, checked_color, vector
+from assembly.geometry.face import Face
 from assembly.geometry.surface import NurbsSurface
 from assembly.kinematics.pose import Pose, direction
 

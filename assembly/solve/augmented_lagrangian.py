@@ -24,7 +24,7 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
-from assembly.constraints.program import (
+from assembly.constraints.layout import (
     BODIES,
     CONTACT_RECORD,
     CONTACTS,
@@ -40,9 +40,9 @@ from assembly.constraints.program import (
     SLOTS,
     TAPE_ROOM,
     TRACKED,
-    add_row_terms,
-    evaluate,
+    VECTOR_TRIMS,
 )
+from assembly.constraints.program import add_row_terms, evaluate
 from assembly.constraints.terms import objective, recenter
 from assembly.proximity.free_pair import VARIABLES, VECTORS
 from assembly.proximity.solid_contact import TRACK
@@ -115,7 +115,7 @@ def solve_program(table, pool, settings, state, history, tips, solids):
     # records, residual, Jacobian.
     poses = np.empty((2, bodies, 7))
     tracked = np.empty((3, tracks, TRACK))
-    records = np.empty((2, pairs + table[JOINTS], CONTACT_RECORD))
+    records = np.empty((2, pairs + table[JOINTS] + table[VECTOR_TRIMS], CONTACT_RECORD))
     by_row = np.zeros((6, most))
     jacobians = np.empty((2, most, EXTRA_COLUMN + 6 * table[EXTRA]))
     here = (poses[0], tracked[0], records[0], by_row[0], jacobians[0])

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from assembly.constraints.program import ROW, ROW_TABLE, SHELL_F, SHELL_G
+from assembly.constraints.layout import ROW, ROW_TABLE, SHELL_F, SHELL_G
 from assembly.kinematics.body import Body, BodyFace
 from assembly.proximity.pairs import ContactPair, PairStatus, extremal_pair
 from assembly.proximity.solid_contact import FEATURE_F, FEATURE_G, solid_pair

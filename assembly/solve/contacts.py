@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
-from assembly.constraints.program import (
+from assembly.constraints.layout import (
     BODY_F,
     BODY_G,
     CONTACTS,
@@ -19,10 +19,12 @@ from assembly.constraints.program import (
     SHELL_G,
     SURFACE_F,
     SURFACE_G,
+    TRIM_FORM,
     TRIM_PAIR,
     TRIMS,
-    surface_of,
 )
+from assembly.constraints.program import surface_of
+from assembly.constraints.trim_rows import SIGNED
 from assembly.geometry.trim import trim_side
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.extremal import CONVERGED, SINGULAR, pair_frame
@@ -107,7 +109,8 @@ def free_folds(table, pool, records, contacts, active, free, lengths, below, los
         # The second derivative of a trim that counts is known in the coordinates alone.
         row = table[ROW_TABLE] + ROW * r
         k = table[row + TRIM_PAIR]
-        if free[k] < 0 and not (table[row + ONE_SIDED] == 1 and active[r] == 0.0):
+        counts = table[row + TRIM_FORM] == SIGNED
+        if free[k] < 0 and counts and not (table[row + ONE_SIDED] == 1 and active[r] == 0.0):
             free_pair(table, pool, table[ROW_TABLE] + ROW * k, k, contacts, free, lengths, solids)
     for k in range(table[CONTACTS]):
         row = table[ROW_TABLE] + ROW * k

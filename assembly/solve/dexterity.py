@@ -22,7 +22,7 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly.constraints.primitives import add_coordinate_hessian, coordinate
-from assembly.constraints.program import (
+from assembly.constraints.layout import (
     CONTACT_RECORD,
     CONTACTS,
     DRIVE,
@@ -33,9 +33,8 @@ from assembly.constraints.program import (
     ROWS,
     TERM_TABLE,
     TERMS,
-    add_row_terms,
-    evaluate,
 )
+from assembly.constraints.program import add_row_terms, evaluate
 from assembly.constraints.terms import DEXTERITY, TERM, TERM_BODY, TERM_KIND, TERM_PARAMETERS, TERM_TAPE, load
 from assembly.geometry.vec import add, cross, matvec, scale
 from assembly.kinematics.motion import rotation

@@ -13,7 +13,7 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly.constraints.primitives import place_frames
-from assembly.constraints.program import (
+from assembly.constraints.layout import (
     CONTACTS,
     EXTRA_COLUMN,
     GATHER_TABLE,
@@ -27,8 +27,8 @@ from assembly.constraints.program import (
     ROW_TABLE,
     ROWS,
     SECOND,
-    joint_row,
 )
+from assembly.constraints.program import joint_row
 from assembly.kinematics.motion import retract
 from assembly.solve.linear import factorize, substitute
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly.constraints.program import (
+from assembly.constraints.layout import (
     BODIES,
     CONTACTS,
     IS_LENGTH,
@@ -17,8 +17,8 @@ from assembly.constraints.program import (
     SCALE,
     SLOTS,
     TRACKED,
-    evaluate,
 )
+from assembly.constraints.program import evaluate
 from assembly.proximity.extremal import BEND
 from assembly.proximity.solid_contact import TRACK
 from assembly.solve.contacts import free_pairs_hold

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
-from assembly.constraints.program import (
+from assembly.constraints.layout import (
     BODIES,
     BODY_F,
     BODY_G,
@@ -43,10 +43,11 @@ from assembly.constraints.program import (
     TAPE_VALUES,
     TAPES,
     TRACKED,
+    VECTOR_TRIMS,
     TRIM_PAIR,
     TRIMS,
-    evaluate,
 )
+from assembly.constraints.program import evaluate
 from assembly.constraints.terms import objective
 from assembly.proximity.free_pair import VARIABLES, VECTORS
 from assembly.proximity.solid_contact import TRACK
@@ -126,7 +127,7 @@ def point_at(table, pool, state, free, solids):
     q = np.empty((table[BODIES], 7))
     tracked = np.empty((tracks, TRACK))
     start = np.empty((tracks, TRACK))
-    records = np.ones((pairs + table[JOINTS], CONTACT_RECORD))
+    records = np.ones((pairs + table[JOINTS] + table[VECTOR_TRIMS], CONTACT_RECORD))
     packed = np.zeros((most, EXTRA_COLUMN + 6 * table[EXTRA]))
     point = (q, tracked, records, np.zeros(most), packed)
     o = table[TAPE_ROOM]

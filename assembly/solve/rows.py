@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from assembly._kernel import kernel
-from assembly.constraints.program import (
+from assembly.constraints.layout import (
     ANGLE,
     BODIES,
     BODY_F,

@@ -7,7 +7,8 @@ shortened.
 from __future__ import annotations
 
 from assembly._kernel import kernel
-from assembly.constraints.program import CONTACTS, MOVING, evaluate
+from assembly.constraints.layout import CONTACTS, MOVING
+from assembly.constraints.program import evaluate
 from assembly.constraints.terms import objective
 from assembly.proximity.extremal import BEND
 from assembly.solve.dexterity import add_dexterities

@@ -13,7 +13,7 @@ from assembly.constraints.constraint import Constraint
 from assembly.constraints.contact import Contact
 from assembly.constraints.joint import Joint
 from assembly.constraints.packing import Packed
-from assembly.constraints.program import TERM_TABLE, TERMS
+from assembly.constraints.layout import TERM_TABLE, TERMS
 from assembly.constraints.terms import POINT_DISTANCE, POSTURE, POSTURE_PARAMETERS, TERM
 from assembly.errors import InputError
 from assembly.kinematics.body import Body

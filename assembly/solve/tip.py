@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.constraints import program, terms
+from assembly.constraints import layout, terms
 from assembly.constraints.constraint import Freedom
 from assembly.constraints.dexterity import MEASURES, TASKS, Dexterity, Task
 from assembly.constraints.joint import Joint
@@ -193,7 +193,7 @@ def _with_term(packed: Packed, objective: Dexterity) -> tuple[NDArray[np.int64],
     """Table and pool with a term at their end that is not part of the objective, and where it is."""
     task, places, scale = objective.tip_task, packed._places, packed.scale
     table, pool = packed.table, packed.pool
-    joints, first = int(table[program.JOINTS]), int(table[program.JOINT_TABLE])
+    joints, first = int(table[layout.JOINTS]), int(table[layout.JOINT_TABLE])
     frames: list[int] = []
     numbers: list[Array] = []
     fields = [MEASURES.index(objective.measure), TASKS.index(task.task), len(task.inputs)]
@@ -209,10 +209,10 @@ def _with_term(packed: Packed, objective: Dexterity) -> tuple[NDArray[np.int64],
     turn = task.length if task.task == "pose" else 1.0
     parameters = np.concatenate([[1.0], task.origin / scale, [scale, turn], direction, units])
     record = np.zeros(terms.TERM, dtype=np.int64)
-    own = table[first : first + program.JOINT_RECORD * joints]
+    own = table[first : first + layout.JOINT_RECORD * joints]
     extended = np.concatenate([table, own, frames, fields, record]).astype(np.int64)
-    extended[program.JOINT_TABLE] = table.size
-    extended[program.JOINTS] = joints + len(task.inputs)
+    extended[layout.JOINT_TABLE] = table.size
+    extended[layout.JOINTS] = joints + len(task.inputs)
     term = extended.size - terms.TERM
     extended[term + terms.TERM_KIND] = terms.DEXTERITY
     extended[term + terms.TERM_BODY] = places[id(task.tip.body)]

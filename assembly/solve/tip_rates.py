@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from assembly._kernel import kernel
-from assembly.constraints.program import EXTRA, MOVING, ROWS
+from assembly.constraints.layout import EXTRA, MOVING, ROWS
 from assembly.constraints.terms import TERM_PARAMETERS, TERM_TAPE
 from assembly.solve.dexterity import DEPENDENT, DIRECTION, MEASURE, tip_map
 from assembly.solve.row_table import point_at

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.constraints.packing import Packed
-from assembly.constraints.program import TERM_TABLE, TERMS
+from assembly.constraints.layout import TERM_TABLE, TERMS
 from assembly.constraints.terms import POSTURE, POSTURE_POSITION, TERM, TERM_BODY, TERM_FOLLOWS, TERM_KIND
 from assembly.constraints.terms import TERM_PARAMETERS as PARAMETERS
 from assembly.errors import integer

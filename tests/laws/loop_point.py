@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from assembly.constraints import program as P
+from assembly.constraints import layout, program
 from assembly.proximity.free_pair import VARIABLES, VECTORS
 from assembly.proximity.solid_contact import TRACK
 from assembly.solve.contacts import start_contacts
@@ -23,19 +23,19 @@ class LoopPoint:
         packed.refresh()
         self.packed, self.table, self.pool = packed, packed.table, packed.pool
         table = packed.table
-        self.rows, self.n = int(table[P.ROWS]), 6 * int(table[P.MOVING])
+        self.rows, self.n = int(table[layout.ROWS]), 6 * int(table[layout.MOVING])
         scaled = np.array(q, dtype=float)
         scaled[:, :3] = (scaled[:, :3] - packed.reference) / packed.scale
-        pairs, tracks = int(table[P.CONTACTS]), int(table[P.TRACKED])
+        pairs, tracks = int(table[layout.CONTACTS]), int(table[layout.TRACKED])
         self.point = (
             scaled,
             np.zeros((tracks, TRACK)),
-            np.ones((pairs + int(table[P.JOINTS]), P.CONTACT_RECORD)),
+            np.ones((pairs + int(table[layout.JOINTS] + table[layout.VECTOR_TRIMS]), layout.CONTACT_RECORD)),
             np.empty(self.rows),
-            np.zeros((self.rows, P.EXTRA_COLUMN + 6 * int(table[P.EXTRA]))),
+            np.zeros((self.rows, layout.EXTRA_COLUMN + 6 * int(table[layout.EXTRA]))),
         )
         self.shape = (
-            np.empty((self.rows, 3 + int(table[P.EXTRA])), dtype=np.int64),
+            np.empty((self.rows, 3 + int(table[layout.EXTRA])), dtype=np.int64),
             np.empty(max(self.rows, 1), dtype=np.int64),
             np.empty(self.n, dtype=np.int64),
             np.empty(max(self.rows, 1), dtype=np.int64),
@@ -43,7 +43,7 @@ class LoopPoint:
         free = np.full(pairs, -1, dtype=np.int64)
         room = (np.empty((VECTORS, 3, VARIABLES)), np.empty((VARIABLES, VARIABLES)))
         self.loose = (free, np.empty((pairs, 4)), *room, np.empty((tracks, TRACK)), packed.solids)
-        at = table[P.TAPE_ROOM]
+        at = table[layout.TAPE_ROOM]
         self.room = tuple(np.empty(size) for size in table[at : at + 3])
         place_rows(table, free, self.shape[0], self.shape[1])
         envelope(table, self.shape[0], self.rows, self.n, self.shape[2], self.shape[3])
@@ -53,7 +53,7 @@ class LoopPoint:
             packed.start_angles(np.array(q, dtype=float), state, False)
             tracked = state[packed.contacts_at : packed.multipliers_at].reshape(-1, TRACK)
             assert start_contacts(table, self.pool, scaled, tracked, free, self.loose[1], packed.solids) < 0
-        lost = P.evaluate(table, self.pool, np.array(tracked), np.inf, self.loose, self.room, self.point)
+        lost = program.evaluate(table, self.pool, np.array(tracked), np.inf, self.loose, self.room, self.point)
         assert lost < 0
 
     @property
@@ -70,7 +70,7 @@ class LoopPoint:
         for r in range(self.rows):
             for b, at in enumerate(self.shape[0][r]):
                 if at >= 0:
-                    column = 6 * b if b < 2 else P.EXTRA_COLUMN + 6 * (b - 3)
+                    column = 6 * b if b < 2 else layout.EXTRA_COLUMN + 6 * (b - 3)
                     out[r, at : at + 6] += self.point[4][r, column : column + 6]
         return out
 
@@ -95,7 +95,7 @@ class LoopPoint:
     def row_terms(self, y):
         """Second derivative of y . rows, (n, n)."""
         hessian = np.zeros((self.n, self.n))
-        P.add_row_terms(
+        program.add_row_terms(
             self.table,
             self.pool,
             self.loose,
@@ -114,7 +114,7 @@ def moved(scene, q, step):
     from assembly.kinematics.pose import retract
 
     packed = scene.packed()
-    slots = packed.table[packed.table[P.SLOTS] :][: len(q)]
+    slots = packed.table[packed.table[layout.SLOTS] :][: len(q)]
     out = np.array(q, dtype=float)
     for k, slot in enumerate(slots):
         if slot >= 0:

@@ -10,7 +10,7 @@ import pytest
 from scipy.optimize import brentq
 
 import assembly as asm
-from assembly.constraints import program as P
+from assembly.constraints import layout
 from assembly.constraints.dexterity import MEASURES
 from assembly.kinematics.pose import rotation_matrix
 from assembly.solve.dexterity import dexterity
@@ -42,7 +42,7 @@ def term_at(scene, q, tracked, order=1):
     # Once more from the pair that is found: after a last small step its curvatures are those before the step.
     point = LoopPoint(scene, q, LoopPoint(scene, q, tracked).tracked)
     gradient = np.zeros(point.n)
-    term = point.table[P.TERM_TABLE]
+    term = point.table[layout.TERM_TABLE]
     places = (point.table, point.pool, term, point.shape, point.rows, point.loose, point.room, point.point)
     return dexterity(*places, order, gradient), gradient
 

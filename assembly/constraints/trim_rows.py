@@ -1,0 +1,248 @@
+"""Rows of trims: where on its face a contact stands to a loop.
+
+"signed": s, the signed distance in (u, v) (`proximity/trim_distance.py`), s_q = n.u_q. The forms of paper 001, section
+3.4, take the point c(t) of the loop's own extremum against the other surface, whose rate t_q is that of a surface and
+a curve (appendix A, corrected):
+
+    "parametric"  u - c            u_q - c' t_q
+    "cartesian"   f(u) - f(c)      f_u u_q - f_u c' t_q
+    "between"     g(u_g) - f(c)    g_q - f_u c' t_q,
+
+in the axes of the face's body, where f(u) and f(c) have no rates of their own. At a solution they depend on one
+another (the loop's extremum is then the contact's), and of their second derivatives nothing is kept. One-sided ones
+are zero on the right side of the loop.
+"""
+
+from __future__ import annotations
+
+import math
+
+from assembly._kernel import kernel
+from assembly.constraints.layout import (
+    BODY_F,
+    BODY_G,
+    CONTACTS,
+    FREE_COLUMN,
+    JOINTS,
+    MOVING,
+    ROW,
+    ROW_TABLE,
+    SURFACE_F,
+    SURFACE_G,
+    TRIM_COUNT,
+    TRIM_EDGES,
+    TRIM_FACTOR,
+    TRIM_FORM,
+    TRIM_LOOP,
+    TRIM_ONE_SIDED,
+    TRIM_PAIR,
+    TRIM_SIDE,
+    TRIMS,
+)
+from assembly.geometry.spline import curve_point, surface_point
+from assembly.geometry.trim import TRIM_CURVES, trim_nearest
+from assembly.geometry.vec import add, cross, dot, matvec, sub
+from assembly.kinematics.motion import position, relative_pose, rotation
+from assembly.proximity.extremal import CONVERGED, SINGULAR
+from assembly.proximity.feature_pair import feature_record, solve_features
+from assembly.proximity.shell import EDGE, EDGE_CURVE, EDGE_RECORD, FACE
+from assembly.proximity.switching import on_surface
+from assembly.proximity.trim_distance import trim_distance
+from assembly.proximity.velocity import RATES, ZED
+
+SIGNED, PARAMETRIC, CARTESIAN, BETWEEN = 0, 1, 2, 3
+
+
+@kernel(inner=True)
+def clear(jacobian, r):
+    """Zeros for the twists and the coordinates of row r."""
+    for j in range(FREE_COLUMN + 4):
+        jacobian[r, j] = 0.0
+
+
+@kernel(inner=True)
+def add_coordinate(loose, records, k, i, factor, jacobian, r):
+    """Row r += factor times the derivative of coordinate i of contact k: itself an unknown, or by the contact velocity."""
+    free = loose[0]
+    lengths = loose[1]
+    if free[k] >= 0:
+        jacobian[r, FREE_COLUMN + i] += factor / lengths[k, i]
+    else:
+        add_rate(records, k, i, factor, jacobian, r)
+
+
+@kernel(inner=True)
+def add_rate(records, k, i, factor, jacobian, r):
+    """Row r += factor times the rate of coordinate i of record k over the twists."""
+    for l in range(4):
+        rate = factor * records[k, RATES + 4 * i + l]
+        for j in range(12):
+            jacobian[r, j] += rate * records[k, ZED + 12 * l + j]
+
+
+@kernel(inner=True)
+def signed_row(table, pool, r, loose, point):
+    """Row r, of a trim in the signed form."""
+    _q, tracked, records, residual, jacobian = point
+    row = table[ROW_TABLE] + ROW * r
+    k = table[row + TRIM_PAIR]
+    o = 2 * table[row + TRIM_SIDE]
+    factor = pool[table[row + TRIM_FACTOR]]
+    s, n, _bend = trim_distance(table, pool, table[row + TRIM_LOOP], tracked[k, o], tracked[k, o + 1])
+    residual[r] = factor * s
+    clear(jacobian, r)
+    add_coordinate(loose, records, k, o, factor * n[0], jacobian, r)
+    add_coordinate(loose, records, k, o + 1, factor * n[1], jacobian, r)
+
+
+@kernel(inner=True)
+def loop_extremum(table, pool, row, x, o, turn, relative, shift, records, scratch):
+    """The loop's point that is extremal against the other surface: found near the contact x, its record in `scratch`.
+
+    Returns the curve, its parameter, whether it moves (it does not at a corner), and the signed distance of x.
+    """
+    loop = table[row + TRIM_LOOP]
+    s, number, t, _cu, _cv, _nu, _nv = trim_nearest(table, pool, loop, 0, table[loop + TRIM_CURVES], x[o], x[o + 1])
+    edge = table[row + TRIM_EDGES] + EDGE_RECORD * number
+    other = other_surface(table, row)
+    none = (0.0, 0.0, 0.0)
+    if o == 0:
+        start = (t, 0.0, x[2], x[3])
+        status, y, frame = solve_features(
+            table, pool, EDGE, edge, FACE, other, relative, shift, start, none, 1.0, math.inf
+        )
+        found = y[0]
+    else:
+        start = (x[0], x[1], t, 0.0)
+        status, y, frame = solve_features(
+            table, pool, FACE, other, EDGE, edge, relative, shift, start, none, 1.0, math.inf
+        )
+        found = y[2]
+    moves = status == CONVERGED or status == SINGULAR
+    if moves:
+        t = found
+        feature_record(turn, shift, frame, records, scratch)
+    return table[edge + EDGE_CURVE], t, moves, s
+
+
+@kernel(inline=True)
+def own_surface(table, row):
+    """The surface that has the loop of a trim."""
+    pair = table[ROW_TABLE] + ROW * table[row + TRIM_PAIR]
+    return table[pair + SURFACE_F + table[row + TRIM_SIDE]]
+
+
+@kernel(inline=True)
+def other_surface(table, row):
+    """The surface that touches the one with the loop."""
+    pair = table[ROW_TABLE] + ROW * table[row + TRIM_PAIR]
+    return table[pair + SURFACE_G - table[row + TRIM_SIDE]]
+
+
+@kernel(inner=True)
+def material_rates(axis, arm_f, arm_g, sign, jacobian, r):
+    """Row r += sign times axis . (velocity of body g less that of body f) at a point with these arms."""
+    turn_f = cross(arm_f, axis)
+    turn_g = cross(arm_g, axis)
+    for l in range(3):
+        jacobian[r, l] -= sign * axis[l]
+        jacobian[r, 3 + l] -= sign * turn_f[l]
+        jacobian[r, 6 + l] += sign * axis[l]
+        jacobian[r, 9 + l] += sign * turn_g[l]
+
+
+@kernel(inner=True)
+def vector_rows(table, pool, first, loose, point):
+    """The rows of a trim from `first` on, in one of the paper's forms."""
+    q, tracked, records, residual, jacobian = point
+    row = table[ROW_TABLE] + ROW * first
+    k = table[row + TRIM_PAIR]
+    side = table[row + TRIM_SIDE]
+    form = table[row + TRIM_FORM]
+    o = 2 * side
+    i = table[row + BODY_F]
+    j = table[row + BODY_G]
+    x = (tracked[k, 0], tracked[k, 1], tracked[k, 2], tracked[k, 3])
+    turn_f = rotation(q, i)
+    turn_g = rotation(q, j)
+    relative, shift = relative_pose(q, i, turn_f, j, turn_g)
+    scratch = table[CONTACTS] + table[JOINTS]
+    curve, t, moves, s = loop_extremum(table, pool, row, x, o, turn_f, relative, shift, records, scratch)
+    factor = pool[table[row + TRIM_FACTOR]]
+    idle = table[row + TRIM_ONE_SIDED] == 1 and factor * s >= 0.0
+    factor = abs(factor)
+    turn = turn_f if side == 0 else turn_g
+    surface = own_surface(table, row)
+    at, rate, _bend = curve_point(table, pool, curve, t)
+    _u, _v, c, along, _normal = on_surface(table, pool, surface, curve, t)
+    p, pu, pv, _uu, _uv, _vv = surface_point(table, pool, surface, x[o], x[o + 1])
+    there, du, dv, _uu, _uv, _vv = surface_point(table, pool, other_surface(table, row), x[2 - o], x[3 - o])
+    away = turn_g if side == 0 else turn_f
+    origin = position(q, j if side == 0 else i)
+    point_w = add(matvec(away, there), origin)
+    arm_f = sub(point_w, position(q, i))
+    arm_g = sub(point_w, position(q, j))
+    du = matvec(away, du)
+    dv = matvec(away, dv)
+    for l in range(table[row + TRIM_COUNT]):
+        r = first + l
+        clear(jacobian, r)
+        residual[r] = 0.0
+        if idle:
+            continue
+        if form == PARAMETRIC:
+            residual[r] = factor * (x[o + l] - at[l])
+            slope = factor * rate[l]
+            add_coordinate(loose, records, k, o + l, factor, jacobian, r)
+        elif form == CARTESIAN:
+            residual[r] = p[l] - c[l]
+            slope = along[l]
+            add_coordinate(loose, records, k, o, pu[l], jacobian, r)
+            add_coordinate(loose, records, k, o + 1, pv[l], jacobian, r)
+        else:
+            axis = (turn[l], turn[3 + l], turn[6 + l])
+            arm = arm_f if side == 0 else arm_g
+            residual[r] = dot(axis, arm) - c[l]
+            slope = along[l]
+            material_rates(axis, arm_f, arm_g, 1.0 - 2.0 * side, jacobian, r)
+            add_coordinate(loose, records, k, 2 - o, dot(axis, du), jacobian, r)
+            add_coordinate(loose, records, k, 3 - o, dot(axis, dv), jacobian, r)
+        if moves:
+            add_rate(records, scratch, o, -slope, jacobian, r)
+
+
+@kernel(inner=True)
+def trim_rows(table, pool, loose, point):
+    """All rows of trims."""
+    r = table[CONTACTS]
+    while r < table[CONTACTS] + table[TRIMS]:
+        row = table[ROW_TABLE] + ROW * r
+        if table[row + TRIM_FORM] == SIGNED:
+            signed_row(table, pool, r, loose, point)
+        else:
+            vector_rows(table, pool, r, loose, point)
+        r += table[row + TRIM_COUNT]
+
+
+@kernel(inner=True)
+def add_trim_terms(table, pool, r, loose, point, y, weight, hessian):
+    """Upper triangle of hessian += y (second derivative) + weight (gradient gradient^T), for a row whose contact is free.
+
+    The row is in the signed form.
+    """
+    tracked = point[1]
+    jacobian = point[4]
+    free, lengths, _vectors, _block, _guess, _solids = loose
+    row = table[ROW_TABLE] + ROW * r
+    k = table[row + TRIM_PAIR]
+    o = 2 * table[row + TRIM_SIDE]
+    _s, n, bend = trim_distance(table, pool, table[row + TRIM_LOOP], tracked[k, o], tracked[k, o + 1])
+    bend *= y * pool[table[row + TRIM_FACTOR]]
+    at = 6 * table[MOVING] + 4 * free[k] + o
+    for i in range(2):
+        for j in range(i, 2):
+            flat = (1.0 if i == j else 0.0) - n[i] * n[j]
+            hessian[at + i, at + j] += (
+                weight * jacobian[r, FREE_COLUMN + o + i] * jacobian[r, FREE_COLUMN + o + j]
+                + bend * flat / (lengths[k, o + i] * lengths[k, o + j])
+            )
