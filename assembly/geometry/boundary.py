@@ -1,0 +1,252 @@
+"""The boundary of a face: its loops turned the right way, without seams and without edges that are one point."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.errors import InputError
+from assembly.geometry.curve import NurbsCurve
+from assembly.geometry.loop import Loop, curve_ends
+from assembly.geometry.surface import NurbsSurface
+from assembly.geometry.trim_table import TrimTable, build
+
+__all__ = ["Boundary", "LoopLike", "make_boundary"]
+
+Array = NDArray[np.float64]
+LoopLike = NurbsCurve | Iterable[NurbsCurve] | Loop
+# How far beyond the domain, or off a pole edge or a seam, a curve may be, as a part of the domain.
+SLACK = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Boundary:
+    """Loops as given (turned), all boundary curves, which of them make a chain, pole edges, and the table."""
+
+    outer: Loop | None
+    holes: tuple[Loop, ...]
+    curves: tuple[NurbsCurve, ...]
+    chains: tuple[range, ...]
+    table: TrimTable
+
+
+def segment(start: Array, end: Array) -> NurbsCurve:
+    """A line in the plane with speed one."""
+    length = float(np.linalg.norm(np.subtract(end, start)))
+    return NurbsCurve(np.array([start, end]), [0.0, 0.0, length, length], 1)
+
+
+def periods(surface: NurbsSurface) -> tuple[float, float]:
+    """Periods of u and v, 0 where the surface is not closed."""
+    (a, b), (c, d) = surface.domain
+    closed_u, closed_v = surface.closed
+    return (b - a if closed_u else 0.0, d - c if closed_v else 0.0)
+
+
+def _pole_edges(surface: NurbsSurface) -> list[tuple[int, float]]:
+    """Axis and value of the edges of the domain that are one point."""
+    ends = [(axis, surface.domain[axis][side]) for axis in range(2) for side in range(2)]
+    return [end for k, end in enumerate(ends) if surface._pole_bits >> k & 1]
+
+
+def _natural(surface: NurbsSurface) -> tuple[list[list[NurbsCurve]], list[NurbsCurve]]:
+    """Chains of the edges of the domain, counterclockwise, and the pole edges."""
+    (a, b), (c, d) = surface.domain
+    corners = np.array([[a, c], [b, c], [b, d], [a, d]])
+    closed = surface.closed
+    poles = surface._pole_bits
+    chains: list[list[NurbsCurve]] = []
+    silent = []
+    last = -2
+    for k, (axis, bit) in enumerate(((1, 4), (0, 2), (1, 8), (0, 1))):
+        if closed[axis]:
+            continue
+        edge = segment(corners[k], corners[(k + 1) % 4])
+        if poles & bit:
+            silent.append(edge)
+            continue
+        if last == k - 1:
+            chains[-1].append(edge)
+        else:
+            chains.append([edge])
+        last = k
+    # The left edge runs into the bottom one.
+    if len(chains) > 1 and last == 3 and not closed[1] and not poles & 4:
+        chains[0] = chains.pop() + chains[0]
+    return chains, silent
+
+
+def _on_line(curve: NurbsCurve, axis: int, value: float, slack: float) -> bool:
+    return bool(np.abs(curve.control_points[:, axis] - value).max() <= slack)
+
+
+def _are_seam(a: NurbsCurve, b: NurbsCurve, period: Array, slack: Array) -> bool:
+    """Whether b runs back along a, one period away."""
+    ends_a, ends_b = curve_ends(a), curve_ends(b)[::-1]
+    jump = ends_b - ends_a
+    whole = np.where(period > 0.0, np.round(jump / np.where(period > 0.0, period, 1.0)) * period, 0.0)
+    if not whole.any() or (np.abs(jump - whole) > slack).any():
+        return False
+    # Straight lines along the edge of the domain, or the same curve point by point.
+    axis = int(np.argmax(np.abs(whole[0])))
+    if _on_line(a, axis, ends_a[0, axis], slack[axis]) and _on_line(b, axis, ends_b[0, axis], slack[axis]):
+        return True
+    part = np.linspace(0.0, 1.0, 9)
+    points = a.evaluate(a.domain[0] + part * (a.domain[1] - a.domain[0]))
+    others = b.evaluate(b.domain[1] - part * (b.domain[1] - b.domain[0]))
+    return bool((np.abs(others - points - whole[0]) <= slack).all())
+
+
+def _without_seams(loop: Loop, surface: NurbsSurface) -> tuple[list[tuple[list[NurbsCurve], Array]], list[NurbsCurve]]:
+    """Chains of a loop (with the way from their start to their end if that is whole periods), and pole edges."""
+    curves = list(loop.curves)
+    slack = SLACK * np.ptp(np.array(surface.domain), axis=1)
+    period = np.array(periods(surface))
+    silent: list[NurbsCurve] = []
+    keep = np.ones(len(curves), dtype=bool)
+    for axis, value in _pole_edges(surface):
+        for k, curve in enumerate(curves):
+            if keep[k] and _on_line(curve, axis, value, slack[axis]):
+                keep[k] = False
+                ends = curve_ends(curve)
+                ends[:, axis] = value
+                silent.append(segment(*ends))
+    if period.any():
+        for k, curve in enumerate(curves):
+            for other in range(k + 1, len(curves)):
+                if keep[k] and keep[other] and _are_seam(curve, curves[other], period, slack):
+                    keep[k] = keep[other] = False
+    if keep.all():
+        return [(curves, loop.turn)], silent
+    # Runs of what is left, then linked where one ends at the start of another.
+    count = len(curves)
+    runs: list[list[NurbsCurve]] = []
+    for k in range(count):
+        if keep[k]:
+            if runs and keep[k - 1] and k > 0:
+                runs[-1].append(curves[k])
+            else:
+                runs.append([curves[k]])
+    if len(runs) > 1 and keep[0] and keep[-1]:
+        runs[0] = runs.pop() + runs[0]
+    whole = np.where(period > 0.0, period, 1.0)
+    reach = max(loop.tolerance, SLACK) * loop.size
+
+    def apart(a: list[NurbsCurve], b: list[NurbsCurve]) -> Array:
+        jump = curve_ends(a[-1])[1] - curve_ends(b[0])[0]
+        return np.asarray(jump - np.where(period > 0.0, np.round(jump / whole) * period, 0.0))
+
+    chains = []
+    while runs:
+        chain = runs.pop(0)
+        while np.abs(apart(chain, chain)).max() > reach:
+            follows = [k for k, run in enumerate(runs) if np.abs(apart(chain, run)).max() <= reach]
+            if not follows:
+                break
+            chain = chain + runs.pop(follows[0])
+        # Joined once more: by whole periods, and exactly at the new corners.
+        if np.abs(apart(chain, chain)).max() <= reach:
+            joined = Loop(chain, tolerance=2.0 * reach / loop.size, period=periods(surface))
+            chains.append((list(joined.curves), joined.turn))
+        else:
+            chains.append((chain, np.full(2, np.nan)))
+    return chains, silent
+
+
+def _as_loop(given: LoopLike, name: str, surface: NurbsSurface) -> Loop:
+    """A loop with the surface's periods, inside the domain of its open directions."""
+    if isinstance(given, Loop):
+        loop = Loop(given.curves, tolerance=given.tolerance, period=periods(surface), name=name)
+    else:
+        if not isinstance(given, (NurbsCurve, Iterable)):
+            raise TypeError(f"{name} is {given!r}; expected a Loop, a NurbsCurve or several")
+        loop = Loop(given, period=periods(surface), name=name)
+    clamped = []
+    for k, curve in enumerate(loop.curves):
+        points = curve.control_points
+        for axis in range(2):
+            if surface.closed[axis]:
+                continue
+            low, high = surface.domain[axis]
+            slack = SLACK * (high - low)
+            least, most = points[:, axis].min(), points[:, axis].max()
+            if least < low or most > high:
+                least, most = _extent(curve, axis)
+            if least < low - slack or most > high + slack:
+                raise InputError(
+                    f"{name} leaves the domain: curve {k} has {'uv'[axis]} from {least:g} to {most:g}; "
+                    f"expected {'uv'[axis]} in [{low:g}, {high:g}]"
+                )
+            near = (np.abs(points[:, axis] - low) <= slack) | (np.abs(points[:, axis] - high) <= slack)
+            if near.any():
+                # Onto the edge that was meant, so that a pole edge or a natural edge is met exactly.
+                points = points.copy()
+                points[:, axis] = np.where(
+                    near, np.where(points[:, axis] < 0.5 * (low + high), low, high), points[:, axis]
+                )
+        same = points is curve.control_points
+        clamped.append(curve if same else NurbsCurve(points, curve.knots, curve.degree, curve.weights, name=curve.name))
+    loop.curves = tuple(clamped)
+    return loop
+
+
+def _extent(curve: NurbsCurve, axis: int) -> tuple[float, float]:
+    """Least and largest coordinate of a curve itself, by refined samples."""
+    at = curve.breaks()
+    t = np.unique(np.concatenate([np.linspace(a, b, 65) for a, b in zip(at[:-1], at[1:], strict=True)]))
+    result = []
+    for sign in (1.0, -1.0):
+        grid = t
+        for _ in range(6):
+            values = sign * curve.evaluate(grid)[:, axis]
+            k = int(np.argmin(values))
+            grid = np.linspace(grid[max(k - 1, 0)], grid[min(k + 1, grid.size - 1)], 65)
+        result.append(sign * float((sign * curve.evaluate(grid)[:, axis]).min()))
+    return result[0], result[1]
+
+
+def make_boundary(surface: NurbsSurface, outer: LoopLike | None, holes: Sequence[LoopLike]) -> Boundary:
+    """Check loops and turn them; see `Face`."""
+    chains: list[tuple[list[NurbsCurve], Array]] = []
+    names: list[str] = []
+    silent: list[NurbsCurve] = []
+    period = periods(surface)
+    if outer is None:
+        edges, silent = _natural(surface)
+        for chain in edges:
+            jump = curve_ends(chain[-1])[1] - curve_ends(chain[0])[0]
+            closes = [x == 0.0 or abs(x) == p for x, p in zip(jump, period, strict=True)]
+            chains.append((chain, jump if all(closes) else np.full(2, np.nan)))
+            names.append("the edge of the domain")
+        outer_loop = None
+    else:
+        outer_loop = _as_loop(outer, "outer", surface)
+        if not outer_loop.turn.any() and outer_loop.area < 0.0:
+            outer_loop = outer_loop.reversed()
+        chains, silent = _without_seams(outer_loop, surface)
+        names = ["outer"] * len(chains)
+    hole_loops = []
+    for k, hole in enumerate(holes):
+        loop = _as_loop(hole, f"holes[{k}]", surface)
+        if not loop.turn.any() and loop.area > 0.0:
+            loop = loop.reversed()
+        hole_loops.append(loop)
+        more, points = _without_seams(loop, surface)
+        chains += more
+        silent += points
+        names += [f"holes[{k}]"] * len(more)
+    curves = tuple(curve for chain, _ in chains for curve in chain)
+    stops = np.cumsum([0] + [len(chain) for chain, _ in chains]).tolist()
+    ranges = tuple(range(a, b) for a, b in zip(stops[:-1], stops[1:], strict=True))
+    closing = [bool(np.isfinite(turn).all()) for _, turn in chains]
+    table = build(curves, ranges, closing, silent, surface.domain, period)
+    for k, name in enumerate(names):
+        if table.left[k] != 1.0 or table.right[k] != 0.0:
+            raise InputError(
+                f"{name} does not bound the face: its left side has winding {table.left[k]:g} and its right "
+                f"{table.right[k]:g}; expected holes inside the outer loop, and none inside another"
+            )
+    return Boundary(outer_loop, tuple(hole_loops), curves, ranges, table)

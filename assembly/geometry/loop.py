@@ -1,0 +1,175 @@
+"""Loop: a closed chain of plane curves in the parameters (u, v) of a surface.
+
+On a surface that is closed in u or v a loop lives in the unrolled plane: its coordinates may run beyond the domain,
+and it may come back one period away from where it began, as once around a cylinder.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.errors import InputError, number
+from assembly.geometry.curve import NurbsCurve
+
+__all__ = ["Loop"]
+
+Array = NDArray[np.float64]
+# Curves that end this part of the loop's size from where the next one begins are joined.
+TOLERANCE = 1e-9
+
+
+def curve_ends(curve: NurbsCurve) -> Array:
+    """First and last point of a curve, (2, d)."""
+    pieces = curve.bezier_pieces()
+    ends = np.array([pieces[0, 0], pieces[-1, -1]])
+    return np.asarray(ends[:, :-1] / ends[:, -1:])
+
+
+def _clamped(curve: NurbsCurve) -> NurbsCurve:
+    """The same curve with its first and last control point at its ends."""
+    p, knots = curve.degree, curve.knots
+    if knots[0] == knots[p] and knots[-1] == knots[-p - 1]:
+        return curve
+    return curve.elevate(p)
+
+
+def _with_ends(curve: NurbsCurve, start: Array, end: Array) -> NurbsCurve:
+    """A curve whose ends are moved a little."""
+    points = curve.control_points
+    if (points[0] == start).all() and (points[-1] == end).all():
+        return curve
+    points = points.copy()
+    points[0], points[-1] = start, end
+    return NurbsCurve(points, curve.knots, curve.degree, curve.weights, name=curve.name)
+
+
+def moved(curve: NurbsCurve, shift: Array) -> NurbsCurve:
+    """A plane curve moved by a vector."""
+    if not shift.any():
+        return curve
+    return NurbsCurve(curve.control_points + shift, curve.knots, curve.degree, curve.weights, name=curve.name)
+
+
+class Loop:
+    """A closed chain of curves in (u, v), head to tail.
+
+    Parameters
+    ----------
+    curves : NurbsCurve or several
+        Plane curves; each begins where the one before it ends.
+    tolerance : float
+        Gaps up to this part of the loop's size are closed, by moving both ends to their middle.
+    period : (float, float), optional
+        Periods of u and v, 0 where the surface is not closed; curves are then moved by whole periods to where
+        the one before them ends. A face gives the periods of its surface.
+
+    Attributes
+    ----------
+    curves : tuple of NurbsCurve
+        Joined exactly.
+    turn : (2,) array
+        From the loop's start to its end: zero, or a period in u or in v for a loop around the surface.
+
+    Raises
+    ------
+    InputError
+        A curve that is not plane, or a gap between two curves, with its size.
+    """
+
+    def __init__(
+        self,
+        curves: NurbsCurve | Iterable[NurbsCurve],
+        *,
+        tolerance: float = TOLERANCE,
+        period: Sequence[float] | None = None,
+        name: str = "loop",
+    ) -> None:
+        parts = [curves] if isinstance(curves, NurbsCurve) else list(curves)
+        if not parts:
+            raise InputError(f"{name} is empty; expected at least one curve")
+        for k, curve in enumerate(parts):
+            if not isinstance(curve, NurbsCurve):
+                raise TypeError(f"{name}[{k}] is {curve!r}; expected a NurbsCurve")
+            if curve.control_points.shape[1] != 2:
+                raise InputError(f"{name}[{k}] is a curve in space; expected a plane curve in (u, v)")
+        self.tolerance = number("tolerance", tolerance)
+        self.period = (0.0, 0.0) if period is None else (float(period[0]), float(period[1]))
+        boxes = np.array([curve.bounding_box() for curve in parts])
+        self.size = float(np.linalg.norm(np.ptp(boxes.reshape(-1, 2), axis=0)))
+        if not self.size > 0.0:
+            raise InputError(f"{name} is a single point; expected a loop")
+        self._join([_clamped(curve) for curve in parts], period is not None, name)
+
+    def _join(self, parts: list[NurbsCurve], known: bool, name: str) -> None:
+        allowed = self.tolerance * self.size
+        ends = np.array([curve_ends(curve) for curve in parts])
+        periods = np.array(self.period)
+        whole = np.where(periods > 0.0, periods, 1.0)
+        for k in range(1, len(parts)):
+            gap = ends[k, 0] - ends[k - 1, 1]
+            shift = np.where(periods > 0.0, -np.round(gap / whole) * periods, 0.0)
+            if shift.any():
+                parts[k] = moved(parts[k], shift)
+                ends[k] += shift
+            length = float(np.linalg.norm(gap + shift))
+            if length > allowed:
+                raise InputError(
+                    f"{name} is open: a gap of {length:.3g} between curves {k - 1} and {k}; "
+                    f"expected curves that meet within {allowed:.3g}"
+                )
+        turn = ends[-1, 1] - ends[0, 0]
+        snapped = np.where(periods > 0.0, np.round(turn / whole) * periods, 0.0)
+        if known and np.abs(snapped / whole).sum() > 1.0:
+            raise InputError(f"{name} turns {(snapped / whole).tolist()} times around; expected at most once")
+        if not known:
+            # Only a face knows its periods: what may be one is left to it.
+            snapped = np.where(np.abs(turn) > allowed, turn, 0.0)
+            if np.count_nonzero(snapped) == 2:
+                snapped = np.zeros(2)
+        length = float(np.linalg.norm(turn - snapped))
+        if length > allowed:
+            raise InputError(
+                f"{name} is open: a gap of {length:.3g} between its end and its start; "
+                f"expected curves that meet within {allowed:.3g}"
+            )
+        # Corner k is where curve k begins.
+        before = np.roll(ends[:, 1], 1, axis=0)
+        before[0] -= snapped
+        exact = ends[:, 0] == before
+        corners = np.where(exact, before, 0.5 * (before + ends[:, 0]))
+        after = np.roll(corners, -1, axis=0)
+        after[-1] += snapped
+        self.curves = tuple(_with_ends(*each) for each in zip(parts, corners, after, strict=True))
+        self.turn = snapped
+
+    def __repr__(self) -> str:
+        around = f", turning by {self.turn.tolist()}" if self.turn.any() else ""
+        return f"Loop({len(self.curves)} curves{around})"
+
+    @property
+    def area(self) -> float:
+        """Signed area, positive counterclockwise; of a loop that turns, of no meaning."""
+        total = 0.0
+        x, weights = np.polynomial.legendre.leggauss(8)
+        for curve in self.curves:
+            if curve.degree == 1 and len(curve.control_points) == 2:
+                (a, b), (c, d) = curve.control_points
+                total += 0.5 * (a * d - b * c)
+                continue
+            at = curve.breaks()
+            t = 0.5 * (at[:-1, None] + at[1:, None] + np.diff(at)[:, None] * x)
+            points, slopes = curve.evaluate(t, 1)
+            cross = points[..., 0] * slopes[..., 1] - points[..., 1] * slopes[..., 0]
+            total += 0.25 * float((cross * weights * np.diff(at)[:, None]).sum())
+        return total
+
+    def reversed(self) -> Loop:
+        """The same loop run the other way round."""
+        turned = object.__new__(Loop)
+        turned.tolerance, turned.period, turned.size = self.tolerance, self.period, self.size
+        turned.curves = tuple(curve.reversed() for curve in self.curves[::-1])
+        turned.turn = -self.turn
+        return turned

@@ -1,0 +1,531 @@
+"""Which side of its boundary a point of a face is on, and where the boundary is nearest.
+
+The boundary has been cut into pieces that run one way in u and in v (`geometry/monotone.py`) and moved into one
+cell of the periods. Material is to the left of every piece. Below a point (u, v) the signed number of pieces,
+
+    w(u, v) = w(u, bottom) + sum of sign(u') over the pieces that pass between (u, bottom) and (u, v),
+
+is 1 where there is material (the table is made so), 0 where there is none. A piece has to be solved for the point
+only inside its box. Everywhere else two comparisons decide.
+
+Nearest points are found by branch and bound. With F(t) = |C(t) - (u, v)|^2 / 2 around the middle m of an interval
+of half width h, and a bound L on |F'''|,
+
+    F(t) >= F(m) + F'(m) (t - m) + (F''(m) - L h / 3) (t - m)^2 / 2,
+
+and |C(t) - C(m) - C'(m) (t - m)| <= max |C''| h^2 / 2; an interval with F'' > L h is convex and left to Newton.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from assembly._kernel import kernel, lane, load_lanes
+
+# Fields of a trim record: boundary curves and where their records begin, pieces (all, then those of the boundary
+# alone), table and pool offsets of the pieces, table offset of the first piece of every curve, pool offset of the
+# frame, number and pool offset of the steps of w along the bottom.
+TRIM_CURVES, TRIM_FIRST, TRIM_ALL, TRIM_PIECES = 0, 1, 2, 3
+TRIM_PIECE_TABLE, TRIM_PIECE_POOL, TRIM_CURVE_PIECES, TRIM_FRAME, TRIM_STEPS, TRIM_STEP_POOL = 4, 5, 6, 7, 8, 9
+TRIM_RECORD = 10
+# The frame: cell or domain, periods (0: open), nearness that is "on", w at the bottom left, the size.
+LOW_U, LOW_V, HIGH_U, HIGH_V, PERIOD_U, PERIOD_V, ON, BOTTOM, SIZE, FRAME = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9
+# Integers of a piece: its curve, where its coefficients are, its degree, neighbors (-1: none), signs of u' and v',
+# and the coordinate that changes faster (0: u, 1: v).
+PIECE_CURVE, PIECE_COEFFICIENTS, PIECE_DEGREE, PIECE_BEFORE, PIECE_AFTER = 0, 1, 2, 3, 4
+PIECE_SIGN_U, PIECE_SIGN_V, PIECE_MAJOR, PIECE_INTS = 5, 6, 7, 8
+# Doubles of a piece: its box, its parameters, what moves its curve into the cell, the middle of its span, bounds on
+# |C'|, |C''|, |C'''|, and its ends.
+BOX, PIECE_T0, PIECE_T1, SHIFT_U, SHIFT_V, MIDDLE, BOUND_1, BOUND_2, BOUND_3, START, END = (
+    0,
+    4,
+    5,
+    6,
+    7,
+    8,
+    9,
+    10,
+    11,
+    12,
+    14,
+)
+PIECE_DOUBLES = 16
+# Intervals that a query may look at on one piece before its bounds are taken as they are.
+_BUDGET = 4000
+
+
+@kernel(inline=True)
+def _line(pool, o, degree, s):
+    """u, v, u', v' of a rational piece."""
+    p = load_lanes(pool, o + 4 * degree)
+    d = 0.0 * p
+    for k in range(degree - 1, -1, -1):
+        d = p + s * d
+        p = load_lanes(pool, o + 4 * k) + s * p
+    i = 1.0 / lane(p, 3)
+    a = i * p
+    b = i * (d - lane(d, 3) * a)
+    return lane(a, 0), lane(a, 1), lane(b, 0), lane(b, 1)
+
+
+@kernel(inline=True)
+def _bend(pool, o, degree, s):
+    """u, v, u', v', u'', v'' of a rational piece."""
+    p = load_lanes(pool, o + 4 * degree)
+    d = 0.0 * p
+    h = 0.0 * p
+    for k in range(degree - 1, -1, -1):
+        h = d + s * h
+        d = p + s * d
+        p = load_lanes(pool, o + 4 * k) + s * p
+    i = 1.0 / lane(p, 3)
+    a = i * p
+    b = i * (d - lane(d, 3) * a)
+    c = i * (2.0 * h - (2.0 * lane(d, 3)) * b - (2.0 * lane(h, 3)) * a)
+    return lane(a, 0), lane(a, 1), lane(b, 0), lane(b, 1), lane(c, 0), lane(c, 1)
+
+
+@kernel(inner=True)
+def _where(pool, o, degree, middle, t0, t1, axis, target, start, end):
+    """The parameter at which a piece that runs one way has a coordinate, and its point and direction there."""
+    rising = end > start
+    low = t0
+    high = t1
+    t = t0 + (t1 - t0) * (target - start) / (end - start)
+    x, y, dx, dy = _line(pool, o, degree, t - middle)
+    for _ in range(80):
+        value = x - target if axis == 0 else y - target
+        slope = dx if axis == 0 else dy
+        if value == 0.0:
+            break
+        if (value > 0.0) == rising:
+            high = t
+        else:
+            low = t
+        step = t - value / slope if slope != 0.0 else low
+        if not low < step < high:
+            step = 0.5 * (low + high)
+        if abs(step - t) <= 3e-16 * abs(step):
+            break
+        t = step
+        x, y, dx, dy = _line(pool, o, degree, t - middle)
+    return t, x, y, dx, dy
+
+
+@kernel(inline=True)
+def _into_cell(x, low, high, period):
+    """A coordinate moved by whole periods into its cell."""
+    if period == 0.0 or low <= x < high:
+        return x
+    moved = x - period * np.floor((x - low) / period)
+    if moved < low:
+        return low
+    return moved if moved < high else low
+
+
+@kernel(inline=True)
+def _steps(pool, first, count, start, u):
+    """w along the bottom."""
+    w = start
+    for k in range(count):
+        if u >= pool[first + 2 * k]:
+            w = pool[first + 2 * k + 1]
+    return w
+
+
+@kernel(inner=True)
+def _below(table, pool, o, i, u, v, tolerance):
+    """What a piece adds to w at a point, and whether the point is on it."""
+    if v > pool[i + 3] + tolerance:
+        return table[o + PIECE_SIGN_U] if pool[i] <= u < pool[i + 1] else 0, False
+    if v < pool[i + 2] - tolerance:
+        return 0, False
+    shift_u = pool[i + SHIFT_U]
+    shift_v = pool[i + SHIFT_V]
+    sign_u = table[o + PIECE_SIGN_U]
+    sign_v = table[o + PIECE_SIGN_V]
+    within = pool[i] <= u < pool[i + 1]
+    major = table[o + PIECE_MAJOR]
+    x = u
+    # The ends first: beyond them the curve is not the piece's.
+    near = (u - pool[i + START]) ** 2 + (v - pool[i + START + 1]) ** 2
+    near = min(near, (u - pool[i + END]) ** 2 + (v - pool[i + END + 1]) ** 2)
+    if near <= tolerance * tolerance:
+        return 0, True
+    if major == 0:
+        x = u
+        start = pool[i + START]
+        end = pool[i + END]
+        shift = shift_u
+        inside = pool[i] <= u <= pool[i + 1]
+    else:
+        x = v
+        start = pool[i + START + 1]
+        end = pool[i + END + 1]
+        shift = shift_v
+        inside = pool[i + 2] <= v <= pool[i + 3]
+    if not inside:
+        return sign_u if within and v > pool[i + 3] else 0, False
+    at, cu, cv, du, dv = _where(
+        pool,
+        table[o + PIECE_COEFFICIENTS],
+        table[o + PIECE_DEGREE],
+        pool[i + MIDDLE],
+        pool[i + PIECE_T0],
+        pool[i + PIECE_T1],
+        major,
+        x - shift,
+        start - shift,
+        end - shift,
+    )
+    off_u = u - shift_u - cu
+    off_v = v - shift_v - cv
+    speed = np.sqrt(du * du + dv * dv)
+    if abs(du * off_v - dv * off_u) <= tolerance * speed:
+        return 0, True
+    if not within:
+        return 0, False
+    above = off_v > 0.0 if major == 0 else (off_u < 0.0) == (sign_u * sign_v > 0)
+    return sign_u if above else 0, False
+
+
+@kernel(inner=True)
+def winding(table, pool, trim, u, v):
+    """w at a point, and whether the point is on the boundary."""
+    frame = table[trim + TRIM_FRAME]
+    tolerance = pool[frame + ON]
+    x = _into_cell(u, pool[frame + LOW_U], pool[frame + HIGH_U], pool[frame + PERIOD_U])
+    y = _into_cell(v, pool[frame + LOW_V], pool[frame + HIGH_V], pool[frame + PERIOD_V])
+    # A pole edge is no boundary: its points belong to the face, with those just inside.
+    z = x
+    if pool[frame + PERIOD_U] == 0.0 and x >= pool[frame + HIGH_U]:
+        z = pool[frame + HIGH_U] - 1e-15 * (pool[frame + HIGH_U] - pool[frame + LOW_U])
+    w = _steps(pool, table[trim + TRIM_STEP_POOL], table[trim + TRIM_STEPS], pool[frame + BOTTOM], x)
+    o = table[trim + TRIM_PIECE_TABLE]
+    i = table[trim + TRIM_PIECE_POOL]
+    for _ in range(table[trim + TRIM_PIECES]):
+        if pool[i] - tolerance <= x <= pool[i + 1] + tolerance:
+            part, on = _below(table, pool, o, i, x, y, tolerance)
+            if on:
+                return w, True
+            w += part
+        o += PIECE_INTS
+        i += PIECE_DOUBLES
+    for _ in range(table[trim + TRIM_PIECES], table[trim + TRIM_ALL]):
+        sign = table[o + PIECE_SIGN_U]
+        if pool[i] <= z < pool[i + 1] and (y > pool[i + 2] or (y == pool[i + 2] and sign > 0)):
+            w += sign
+        o += PIECE_INTS
+        i += PIECE_DOUBLES
+    return w, False
+
+
+@kernel(inner=True)
+def trim_side(table, pool, trim, u, v):
+    """1 inside, 0 on the boundary (within 1e-12 of its size), -1 outside."""
+    w, on = winding(table, pool, trim, u, v)
+    if on:
+        return 0
+    frame = table[trim + TRIM_FRAME]
+    slack = 1e-14 * (pool[frame + HIGH_U] - pool[frame + LOW_U])
+    if pool[frame + PERIOD_U] == 0.0 and not pool[frame + LOW_U] - slack <= u <= pool[frame + HIGH_U] + slack:
+        return -1
+    slack = 1e-14 * (pool[frame + HIGH_V] - pool[frame + LOW_V])
+    if pool[frame + PERIOD_V] == 0.0 and not pool[frame + LOW_V] - slack <= v <= pool[frame + HIGH_V] + slack:
+        return -1
+    return 1 if w == 1.0 else -1
+
+
+@kernel(inner=True)
+def _newton(pool, o, degree, middle, a, b, t, qx, qy):
+    """The nearest point of an interval on which the distance is convex; half its square and its parameter."""
+    low = a
+    high = b
+    f = 0.0
+    for _ in range(60):
+        x, y, dx, dy, ddx, ddy = _bend(pool, o, degree, t - middle)
+        ex = x - qx
+        ey = y - qy
+        f = 0.5 * (ex * ex + ey * ey)
+        g = ex * dx + ey * dy
+        if g == 0.0:
+            break
+        if g > 0.0:
+            high = t
+            if t == a:
+                break
+        else:
+            low = t
+            if t == b:
+                break
+        curvature = dx * dx + dy * dy + ex * ddx + ey * ddy
+        step = t - g / curvature if curvature > 0.0 else 0.5 * (low + high)
+        if step <= a:
+            step = a
+        elif step >= b:
+            step = b
+        elif not low < step < high:
+            step = 0.5 * (low + high)
+        if abs(step - t) <= 2e-16 * max(abs(t), b - a):
+            break
+        t = step
+    return f, t
+
+
+@kernel(inner=True)
+def nearest_on_piece(pool, o, degree, middle, t0, t1, m1, m2, m3, qx, qy, best, slack):
+    """Half the squared distance and the parameter of the nearest point of a piece, where it beats `best`.
+
+    The second value is `t0 - 1` where it does not.
+    """
+    found = t0 - 1.0
+    level = 0
+    index = 0
+    h = t1 - t0
+    for _ in range(_BUDGET):
+        half = 0.5 * h
+        m = t0 + (index + 0.5) * h
+        x, y, dx, dy, ddx, ddy = _bend(pool, o, degree, m - middle)
+        ex = x - qx
+        ey = y - qy
+        f = 0.5 * (ex * ex + ey * ey)
+        if f < best:
+            best = f
+            found = m
+        g = ex * dx + ey * dy
+        speed = dx * dx + dy * dy
+        curvature = speed + ex * ddx + ey * ddy
+        third = 3.0 * m1 * m2 + (np.sqrt(2.0 * f) + m1 * half) * m3
+        bent = curvature - third * half / 3.0
+        reach = half
+        if bent > 0.0:
+            reach = min(half, abs(g) / bent)
+        low = f - abs(g) * reach + 0.5 * bent * reach * reach
+        if low < best:
+            # A tangent and how far the piece may be from it.
+            along = -half if g * half > speed * half * half else (half if -g * half > speed * half * half else 0.0)
+            if along == 0.0 and speed > 0.0:
+                along = -g / speed
+            apart = np.sqrt((ex + along * dx) ** 2 + (ey + along * dy) ** 2) - 0.5 * m2 * half * half
+            if apart > 0.0:
+                low = max(low, 0.5 * apart * apart)
+        if low < best - slack:
+            if curvature > third * half:
+                at_low = t0 + index * h
+                f, t = _newton(pool, o, degree, middle, at_low, min(at_low + h, t1), m, qx, qy)
+                if f < best:
+                    best = f
+                    found = t
+            elif level < 50:
+                level += 1
+                index *= 2
+                h = half
+                continue
+        index += 1
+        while level > 0 and index % 2 == 0:
+            index //= 2
+            level -= 1
+            h *= 2.0
+        if level == 0:
+            break
+    return best, found
+
+
+@kernel(inline=True)
+def _gap(x, low, high):
+    """How far a coordinate is from an interval."""
+    return max(low - x, x - high, 0.0)
+
+
+@kernel(inner=True)
+def _end_direction(table, pool, o, i, at_end):
+    """Unit direction of a piece at one of its ends, from the chord where its speed vanishes there."""
+    t = pool[i + PIECE_T1] if at_end else pool[i + PIECE_T0]
+    x, y, dx, dy = _line(pool, table[o + PIECE_COEFFICIENTS], table[o + PIECE_DEGREE], t - pool[i + MIDDLE])
+    length = np.sqrt(dx * dx + dy * dy)
+    if length <= 1e-9 * pool[i + BOUND_1]:
+        near = t + 1e-4 * (pool[i + PIECE_T0] - pool[i + PIECE_T1]) * (1.0 if at_end else -1.0)
+        a, b, dx, dy = _line(pool, table[o + PIECE_COEFFICIENTS], table[o + PIECE_DEGREE], near - pool[i + MIDDLE])
+        dx = x - a if at_end else a - x
+        dy = y - b if at_end else b - y
+        length = np.sqrt(dx * dx + dy * dy)
+    return dx / length, dy / length
+
+
+@kernel(inner=True)
+def trim_nearest(table, pool, trim, first, count, u, v):
+    """Signed distance to boundary curves, index and parameter of the foot, the foot, and its normal to material.
+
+    The distance is positive on the material side of the curves `first` to `first + count - 1`.
+    """
+    frame = table[trim + TRIM_FRAME]
+    period_u = pool[frame + PERIOD_U]
+    period_v = pool[frame + PERIOD_V]
+    qx = _into_cell(u, pool[frame + LOW_U], pool[frame + HIGH_U], period_u)
+    qy = _into_cell(v, pool[frame + LOW_V], pool[frame + HIGH_V], period_v)
+    begin = table[table[trim + TRIM_CURVE_PIECES] + first]
+    stop = table[table[trim + TRIM_CURVE_PIECES] + first + count]
+    ints = table[trim + TRIM_PIECE_TABLE]
+    doubles = table[trim + TRIM_PIECE_POOL]
+    slack = 1e-15 * pool[frame + SIZE] ** 2
+    copies_u = 1 if period_u != 0.0 else 0
+    copies_v = 1 if period_v != 0.0 else 0
+    best = np.inf
+    piece = begin
+    t = pool[doubles + PIECE_DOUBLES * begin + PIECE_T0]
+    move_u = 0.0
+    move_v = 0.0
+    # Ends of pieces first: near ones spare the search of most others.
+    for a in range(-copies_u, copies_u + 1):
+        for b in range(-copies_v, copies_v + 1):
+            x = qx - a * period_u
+            y = qy - b * period_v
+            i = doubles + PIECE_DOUBLES * begin
+            for k in range(begin, stop):
+                f = 0.5 * ((x - pool[i + START]) ** 2 + (y - pool[i + START + 1]) ** 2)
+                if f < best:
+                    best = f
+                    piece = k
+                    t = pool[i + PIECE_T0]
+                    move_u = a * period_u
+                    move_v = b * period_v
+                f = 0.5 * ((x - pool[i + END]) ** 2 + (y - pool[i + END + 1]) ** 2)
+                if f < best:
+                    best = f
+                    piece = k
+                    t = pool[i + PIECE_T1]
+                    move_u = a * period_u
+                    move_v = b * period_v
+                i += PIECE_DOUBLES
+    for a in range(-copies_u, copies_u + 1):
+        for b in range(-copies_v, copies_v + 1):
+            x = qx - a * period_u
+            y = qy - b * period_v
+            o = ints + PIECE_INTS * begin
+            i = doubles + PIECE_DOUBLES * begin
+            for k in range(begin, stop):
+                gap_u = _gap(x, pool[i], pool[i + 1])
+                gap_v = _gap(y, pool[i + 2], pool[i + 3])
+                if 0.5 * (gap_u * gap_u + gap_v * gap_v) < best:
+                    best, at = nearest_on_piece(
+                        pool,
+                        table[o + PIECE_COEFFICIENTS],
+                        table[o + PIECE_DEGREE],
+                        pool[i + MIDDLE],
+                        pool[i + PIECE_T0],
+                        pool[i + PIECE_T1],
+                        pool[i + BOUND_1],
+                        pool[i + BOUND_2],
+                        pool[i + BOUND_3],
+                        x - pool[i + SHIFT_U],
+                        y - pool[i + SHIFT_V],
+                        best,
+                        slack,
+                    )
+                    if at >= pool[i + PIECE_T0]:
+                        piece = k
+                        t = at
+                        move_u = a * period_u
+                        move_v = b * period_v
+                o += PIECE_INTS
+                i += PIECE_DOUBLES
+    return _foot(table, pool, trim, begin, stop, piece, t, u, v, qx - move_u, qy - move_v)
+
+
+@kernel(inner=True)
+def _foot(table, pool, trim, begin, stop, piece, t, u, v, qx, qy):
+    """What `trim_nearest` returns, from the piece and the parameter of the foot; (qx, qy) is (u, v) in the cell."""
+    o = table[trim + TRIM_PIECE_TABLE] + PIECE_INTS * piece
+    i = table[trim + TRIM_PIECE_POOL] + PIECE_DOUBLES * piece
+    size = pool[table[trim + TRIM_FRAME] + SIZE]
+    x, y, dx, dy = _line(pool, table[o + PIECE_COEFFICIENTS], table[o + PIECE_DEGREE], t - pool[i + MIDDLE])
+    ox = qx - x - pool[i + SHIFT_U]
+    oy = qy - y - pool[i + SHIFT_V]
+    distance = np.sqrt(ox * ox + oy * oy)
+    at_start = t <= pool[i + PIECE_T0]
+    at_end = t >= pool[i + PIECE_T1]
+    other = -1
+    if at_start or at_end:
+        dx, dy = _end_direction(table, pool, o, i, at_end)
+        other = table[o + PIECE_AFTER] if at_end else table[o + PIECE_BEFORE]
+    else:
+        length = np.sqrt(dx * dx + dy * dy)
+        if length > 0.0:
+            dx /= length
+            dy /= length
+    sign = 1.0 if dx * oy - dy * ox >= 0.0 else -1.0
+    smooth = not (at_start or at_end)
+    if begin <= other < stop:
+        ax, ay = _end_direction(
+            table,
+            pool,
+            table[trim + TRIM_PIECE_TABLE] + PIECE_INTS * other,
+            table[trim + TRIM_PIECE_POOL] + PIECE_DOUBLES * other,
+            not at_end,
+        )
+        # Positive for a corner that is convex: only points outside have it nearest.
+        turn = dx * ay - dy * ax if at_end else ax * dy - ay * dx
+        same_way = dx * ax + dy * ay > 0.0
+        if same_way and abs(turn) <= 1e-9:
+            smooth = True
+        elif same_way or abs(turn) > 1e-9:
+            sign = -1.0 if turn > 0.0 else 1.0
+        else:
+            w, _on = winding(table, pool, trim, u, v)
+            sign = 1.0 if w == 1.0 else -1.0
+        dx += ax
+        dy += ay
+        length = np.sqrt(dx * dx + dy * dy)
+        if length > 1e-9:
+            dx /= length
+            dy /= length
+    curve = table[o + PIECE_CURVE]
+    if smooth:
+        # Across the curve, not along the tiny and noisy way to the foot.
+        return dx * oy - dy * ox, curve, t, u - ox, v - oy, -dy, dx
+    if distance > 1e-13 * size:
+        s = sign * distance
+        return s, curve, t, u - ox, v - oy, ox / s, oy / s
+    return sign * distance, curve, t, u - ox, v - oy, -dy, dx
+
+
+@kernel
+def locate_points(table, pool, trim, u, v, side):
+    """`trim_side` at flat points."""
+    for k in range(u.size):
+        side[k] = trim_side(table, pool, trim, u[k], v[k])
+
+
+@kernel
+def windings(table, pool, trim, u, v, out):
+    """w at flat points, before the table knows what w at the bottom is."""
+    for k in range(u.size):
+        out[k], _on = winding(table, pool, trim, u[k], v[k])
+
+
+@kernel
+def nearest_points(table, pool, trim, first, count, u, v, out):
+    """`trim_nearest` at flat points, a row of seven each."""
+    for k in range(u.size):
+        s, curve, t, cu, cv, nu, nv = trim_nearest(table, pool, trim, first, count, u[k], v[k])
+        out[k, 0] = s
+        out[k, 1] = curve
+        out[k, 2] = t
+        out[k, 3] = cu
+        out[k, 4] = cv
+        out[k, 5] = nu
+        out[k, 6] = nv
+
+
+@kernel
+def ends_of_pieces(pool, coefficients, degrees, middles, t, out):
+    """Points of pieces at parameters."""
+    for k in range(t.size):
+        out[k, 0], out[k, 1], _du, _dv = _line(pool, coefficients[k], degrees[k], t[k] - middles[k])
+
+
+@kernel
+def cut_of_piece(pool, coefficients, degree, middle, t0, t1, axis, target, start, end):
+    """The parameter at which a piece has a coordinate, and its point there."""
+    t, x, y, _dx, _dy = _where(pool, coefficients, degree, middle, t0, t1, axis, target, start, end)
+    return t, x, y

@@ -1,0 +1,10 @@
+"""STEP files (ISO 10303-21: AP203, AP214, AP242) read as bodies and written from solved scenes, through OCCT.
+
+OCCT comes with the extra `step` and is imported when a file is read or written.
+"""
+
+from __future__ import annotations
+
+from assembly.step.reader import StepError, StepWarning, read_step
+
+__all__ = ["StepError", "StepWarning", "read_step"]

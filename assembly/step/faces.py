@@ -1,0 +1,133 @@
+"""Faces of OCCT as trimmed NURBS faces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.errors import InputError
+from assembly.geometry.face import Face
+from assembly.geometry.loop import Loop
+from assembly.geometry.surface import NurbsSurface
+from assembly.step.occt import occt, parts
+from assembly.step.profiles import Unreadable
+from assembly.step.surfaces import Patch, patch
+from assembly.step.trims import Edge, chained, edge_curve
+
+__all__ = ["Read", "read_face"]
+
+Array = NDArray[np.float64]
+# OCCT stands for "unbounded" with numbers beyond this one.
+_FAR = 1e50
+
+
+@dataclass(frozen=True)
+class Read:
+    """A face, and what was not exact about it [mm]: of its surface, and of the ends of its edges."""
+
+    face: Face
+    deviation: float
+    gap: float
+
+
+def _is_boundary(edge: Any) -> bool:
+    o = occt()
+    return edge.Orientation() in (o.TopAbs_FORWARD, o.TopAbs_REVERSED)
+
+
+def _ordered(wire: Any, face: Any) -> list[Any]:
+    """Edges of a wire, each beginning where the one before ends."""
+    o = occt()
+    count = sum(_is_boundary(edge) for edge in parts(wire, o.TopAbs_EDGE))
+    for candidate in (wire, None):
+        if candidate is None:
+            # Edges that are not stored in order, or whose vertices are not shared.
+            fix = o.ShapeFix_Wire(wire, face, 1e-6)
+            fix.FixReorder()
+            candidate = fix.Wire()
+        walk = o.BRepTools_WireExplorer(candidate, face)
+        edges = []
+        while walk.More():
+            edges.append(o.as_edge(walk.Current()))
+            walk.Next()
+        if len(edges) == count:
+            return edges
+    raise Unreadable(f"a loop of {count} edges breaks off after {len(edges)}")
+
+
+def _is_seam(edge: Any, face: Any) -> bool:
+    return bool(occt().BRep_Tool.IsClosed_s(edge, face))
+
+
+def _loop(wire: Any, face: Any, where: Patch, edges: Any) -> tuple[list[Edge], float] | None:
+    """The boundary curves of a wire; None where nothing is left of it but seams and poles."""
+    o = occt()
+    row = _ordered(wire, face)
+    seams = [edge for edge in row if _is_seam(edge, face)]
+    bare = all(o.BRep_Tool.Degenerated_s(edge) or _is_seam(edge, face) for edge in row)
+    if not row or (bare and len(seams) % 2 == 0):
+        return None
+    return chained([edge_curve(edge, face, where, f"edge {edges.FindIndex(edge)}") for edge in row], where)
+
+
+def _scaled(where: Patch, scale: float) -> tuple[NurbsSurface, Array]:
+    """The surface in another unit, and the factors of u and v that go with it."""
+    factors = np.array([scale if along.is_length else 1.0 for along in (where.u, where.v)])
+    surface = where.surface
+    if scale == 1.0:
+        return surface, factors
+    knots = [factor * row for factor, row in zip(factors, surface.knots, strict=True)]
+    return NurbsSurface(scale * surface.control_points, knots, surface.degree, surface.weights), factors
+
+
+def read_face(face: Any, edges: Any, name: str | None, scale: float = 1.0) -> Read:
+    """A face of OCCT, its surface and its loops.
+
+    Parameters
+    ----------
+    face
+        TopoDS_Face.
+    edges
+        Map of the solid's edges, which numbers them.
+    name : str, optional
+    scale : float
+        Our unit of length in a millimeter.
+
+    Raises
+    ------
+    Unreadable
+        Saying why.
+    """
+    o = occt()
+    forward = o.as_face(face.Oriented(o.TopAbs_FORWARD))
+    surface = o.BRep_Tool.Surface_s(forward)
+    if surface is None:
+        raise Unreadable("it has no surface")
+    box = o.BRepTools.UVBounds_s(forward)
+    if not all(isfinite(x) and abs(x) < _FAR for x in box):
+        raise Unreadable("it has no boundary, and its surface no end")
+    try:
+        where = patch(surface, box)
+        made_surface, factors = _scaled(where, scale)
+        outermost = o.BRepTools.OuterWire_s(forward)
+        outer, holes = None, []
+        gap, deviation = 0.0, where.deviation
+        for wire in parts(forward, o.TopAbs_WIRE):
+            made = _loop(o.as_wire(wire), forward, where, edges)
+            if made is None:
+                continue
+            gap = max(gap, made[1])
+            deviation = max(deviation, max(edge.deviation for edge in made[0]))
+            loop = Loop([edge.nurbs(factors) for edge in made[0]])
+            if wire.IsSame(outermost):
+                outer = loop
+            else:
+                holes.append(loop)
+        reverse = face.Orientation() == o.TopAbs_REVERSED
+        return Read(Face(made_surface, outer, holes, name=name, reversed=reverse), deviation, gap)
+    except InputError as error:
+        raise Unreadable(str(error)) from error

@@ -1,0 +1,104 @@
+"""The names of OCCT that this package uses, whichever of its versions is installed; imported at first use."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+from importlib import import_module
+from types import SimpleNamespace
+from typing import Any
+
+__all__ = ["occt", "parts", "quiet"]
+
+_MODULES = (
+    "BRep",
+    "BRepBuilderAPI",
+    "BRepLib",
+    "BRepTools",
+    "Geom",
+    "Geom2d",
+    "GeomAbs",
+    "GeomConvert",
+    "IFSelect",
+    "Interface",
+    "Message",
+    "Quantity",
+    "STEPCAFControl",
+    "STEPControl",
+    "ShapeFix",
+    "TCollection",
+    "TDF",
+    "TDataStd",
+    "TDocStd",
+    "TopAbs",
+    "TopExp",
+    "TopLoc",
+    "TopoDS",
+    "XCAFApp",
+    "XCAFDoc",
+    "gp",
+)
+# Our name, and what it is called in OCCT 8 (all in one module) and in OCCT 7.
+_CONTAINERS = {
+    "Points": ("Array1_gp_Pnt", "TColgp", "TColgp_Array1OfPnt"),
+    "Points2d": ("Array1_gp_Pnt2d", "TColgp", "TColgp_Array1OfPnt2d"),
+    "PointNet": ("Array2_gp_Pnt", "TColgp", "TColgp_Array2OfPnt"),
+    "Reals": ("Array1_double", "TColStd", "TColStd_Array1OfReal"),
+    "RealNet": ("Array2_double", "TColStd", "TColStd_Array2OfReal"),
+    "Integers": ("Array1_int", "TColStd", "TColStd_Array1OfInteger"),
+    "Labels": ("Sequence_TDF_Label", "TDF", "TDF_LabelSequence"),
+    "ShapeMap": ("IndexedMap_TopoDS_Shape_TopTools_ShapeMapHasher", "TopTools", "TopTools_IndexedMapOfShape"),
+}
+
+
+@cache
+def occt() -> Any:
+    """OCCT's classes and values as attributes of one object.
+
+    Raises
+    ------
+    ImportError
+        OCCT is not installed; the message says how to get it.
+    """
+    try:
+        import_module("OCP")
+    except ImportError as error:
+        raise ImportError('STEP files are read and written by OCCT: pip install "assembly[step]"') from error
+    names: dict[str, Any] = {}
+    for module in _MODULES:
+        names.update(vars(import_module(f"OCP.{module}")))
+    try:
+        containers: Any = import_module("OCP.collections")
+    except ImportError:
+        containers = None
+    for name, (eight, module, seven) in _CONTAINERS.items():
+        names[name] = getattr(containers, eight) if containers else getattr(import_module(f"OCP.{module}"), seven)
+    # Both versions know the casts; they differ in the suffix that marks a static function.
+    for kind in ("Edge", "Face", "Shell", "Solid", "Wire"):
+        names[f"as_{kind.lower()}"] = getattr(names["TopoDS"], f"{kind}_s", None) or getattr(names["TopoDS"], kind)
+    return SimpleNamespace(**names)
+
+
+@contextmanager
+def quiet() -> Iterator[None]:
+    """Keep OCCT from printing its statistics."""
+    printers = occt().Message.DefaultMessenger_s().ChangePrinters()
+    kept = [printers.Value(k) for k in range(1, printers.Length() + 1)]
+    printers.Clear()
+    try:
+        yield
+    finally:
+        for printer in kept:
+            printers.Append(printer)
+
+
+def parts(shape: Any, kind: Any) -> list[Any]:
+    """The parts of a kind (`TopAbs_FACE` ...) of a shape, in the order in which they stand in it."""
+    o = occt()
+    found = []
+    explorer = o.TopExp_Explorer(shape, kind)
+    while explorer.More():
+        found.append(explorer.Current())
+        explorer.Next()
+    return found

@@ -1,0 +1,296 @@
+"""Curves of OCCT as rational splines, and the maps from OCCT's parameters to ours.
+
+OCCT runs along circles by the angle, for which there is no rational form. On an arc of half-angle h about its middle,
+written as the rational quadratic with the weights 1, cos h, 1 (Piegl & Tiller, The NURBS Book, section 7.3), the
+parameter s in [-1, 1] and the angle a from the middle are related by
+
+    tan(a / 2) = s tan(h / 2)
+
+because both sides are projective parameters of the arc with equal values at its two ends and in its middle. Full
+circles and longer arcs are joined of equal arcs of at most a quarter turn, which makes the map once continuously
+differentiable.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import ceil, cos, pi, tan
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.errors import AssemblyError
+from assembly.geometry import bezier
+from assembly.step.occt import occt
+
+__all__ = ["Direction", "Spline", "Straight", "Turning", "Unreadable", "approximated", "arc", "profile", "spline"]
+
+Array = NDArray[np.float64]
+# Part of the extent by which surfaces reach beyond their face, so that trims lie inside their domain.
+SLACK = 1.0 / 32.0
+# Angles that differ by less are one.
+_SAME_ANGLE = 1e-6
+# Degree and number of halvings of curves that are interpolated.
+_DEGREE, _HALVINGS = 7, 14
+
+
+class Unreadable(AssemblyError):
+    """Why a face cannot be read."""
+
+
+@dataclass(frozen=True)
+class Spline:
+    """Homogeneous control points (n, ..., d + 1), knots and degree of one direction."""
+
+    points: Array
+    knots: Array
+    degree: int
+
+    @property
+    def cartesian(self) -> tuple[Array, Array]:
+        """Control points and weights."""
+        return self.points[..., :-1] / self.points[..., -1:], self.points[..., -1]
+
+
+def spline(points: Array, knots: Array, degree: int, weights: Array | None = None) -> Spline:
+    """A spline of control points (n, d)."""
+    w = np.ones(len(points)) if weights is None else weights
+    return Spline(np.concatenate([points * w[:, None], w[:, None]], axis=1), knots, degree)
+
+
+@dataclass(frozen=True)
+class Straight:
+    """A parameter that is kept: a length, which changes with the unit, or a parameter of a spline."""
+
+    is_length: bool
+
+    def __call__(self, x: Array) -> Array:
+        """Our parameter."""
+        return x
+
+    def joints(self, low: float, high: float) -> Array:
+        """Where the map is not smooth between two parameters of OCCT: nowhere."""
+        return np.empty(0)
+
+
+@dataclass(frozen=True)
+class Turning:
+    """An angle on [low, high], mapped to the parameter of `spans` equal rational arcs, `radius` long a radian."""
+
+    low: float
+    high: float
+    spans: int
+    radius: float
+    is_length = True
+
+    @classmethod
+    def over(cls, low: float, high: float, radius: float) -> Turning:
+        """Angles of [low, high], or the whole turn from `low` where that is nearly all."""
+        slack = SLACK * (high - low)
+        if high - low + 2.0 * slack >= 2.0 * pi - _SAME_ANGLE:
+            eighth = round(low / (0.25 * pi)) * 0.25 * pi
+            start = eighth if abs(low - eighth) < _SAME_ANGLE else low
+            return cls(start, start + 2.0 * pi, 4, radius)
+        return cls.between(low - slack, high + slack, radius)
+
+    @classmethod
+    def between(cls, low: float, high: float, radius: float) -> Turning:
+        """Angles of [low, high] and no more."""
+        return cls(low, high, max(1, ceil((high - low) / (0.5 * pi) - _SAME_ANGLE)), radius)
+
+    @property
+    def step(self) -> float:
+        """Angle of one arc."""
+        return (self.high - self.low) / self.spans
+
+    def joint(self, k: Array) -> Array:
+        """Parameters of the joints between arcs; beyond the domain they go on with its period."""
+        turns, within = np.divmod(k, self.spans)
+        at = np.linspace(self.low, self.high, self.spans + 1)
+        return self.radius * (at[within.astype(np.int64)] + turns * (self.high - self.low))
+
+    @property
+    def knots(self) -> Array:
+        """Knots of the arcs."""
+        return bezier.full_knots(self.joint(np.append(np.arange(self.spans), self.spans)), 2)
+
+    def __call__(self, x: Array) -> Array:
+        """Our parameter of an angle."""
+        k = np.floor((x - self.low) / self.step)
+        s = tan_ratio(x - self.low - (k + 0.5) * self.step, self.step)
+        # The ends of an arc have one value, whichever arc they are computed from.
+        k, s = np.where(s >= 1.0 - 1e-14, k + 1.0, k), np.where(np.abs(s) >= 1.0 - 1e-14, -1.0, s)
+        low = self.joint(k)
+        return np.asarray(low + 0.5 * (1.0 + s) * self.radius * self.step)
+
+    def joints(self, low: float, high: float) -> Array:
+        """Angles between two angles where arcs meet."""
+        first, last = np.ceil((low - self.low) / self.step), np.floor((high - self.low) / self.step)
+        return np.asarray(self.low + self.step * np.arange(first, last + 1.0))
+
+
+Direction = Straight | Turning
+
+
+def tan_ratio(angle: Array, step: float) -> Array:
+    """Where in [-1, 1] an angle from the middle of a rational arc lies."""
+    return np.asarray(np.tan(0.5 * angle) / tan(0.25 * step))
+
+
+def arc(map_: Turning) -> Spline:
+    """Unit arc (cos, sin) of the angles of a map, homogeneous in the plane."""
+    half = 0.5 * map_.step
+    at = map_.low + half * np.arange(2 * map_.spans + 1)
+    weights = np.where(np.arange(at.size) % 2 == 1, cos(half), 1.0)
+    ring = np.column_stack([np.cos(at), np.sin(at)])
+    # Quarter turns are exact: sin(pi) is not zero in doubles.
+    ring = np.where(np.abs(ring) < 1e-15, 0.0, ring)
+    if map_.high - map_.low >= 2.0 * pi - _SAME_ANGLE:
+        ring[-1] = ring[0]
+    # The middle control point of an arc lies 1 / cos h out; in homogeneous form that is the weight's inverse.
+    return Spline(np.column_stack([ring, weights]), map_.knots, 2)
+
+
+def approximated(
+    function: Callable[[Array], Array], breaks: Array, tolerance: float
+) -> tuple[Spline, float]:
+    """A piecewise polynomial through a function, (n,) -> (n, d), that is smooth between breaks.
+
+    Interpolates at Chebyshev's points of each piece, ends included, and halves pieces until they fit.
+
+    Returns
+    -------
+    spline, deviation
+        The largest distance found at points between those of the interpolation.
+
+    Raises
+    ------
+    Unreadable
+        Some piece cannot be made to fit.
+    """
+    nodes = 0.5 - 0.5 * np.cos(np.linspace(0.0, pi, _DEGREE + 1))
+    between = 0.5 - 0.5 * np.cos(np.linspace(0.0, pi, 3 * _DEGREE + 1))
+    solve = np.linalg.inv(bezier.bernstein(_DEGREE, nodes))
+    check = bezier.bernstein(_DEGREE, between)
+    pieces, ends, worst = [], [float(breaks[0])], 0.0
+    todo = [(float(a), float(b), 0) for a, b in zip(breaks[:-1], breaks[1:], strict=True)][::-1]
+    while todo:
+        a, b, depth = todo.pop()
+        values = function(a + (b - a) * nodes)
+        piece = solve @ values
+        piece[0], piece[-1] = values[0], values[-1]
+        error = float(np.abs(check @ piece - function(a + (b - a) * between)).max())
+        if error > tolerance:
+            if depth == _HALVINGS:
+                raise Unreadable(f"a curve bends too sharply to be followed to {tolerance:.1g}")
+            todo += [(0.5 * (a + b), b, depth + 1), (a, 0.5 * (a + b), depth + 1)]
+            continue
+        pieces.append(piece)
+        ends.append(b)
+        worst = max(worst, error)
+    stack = np.array(pieces)
+    stack[1:, 0] = stack[:-1, -1]
+    return spline(bezier.joined(stack), bezier.full_knots(np.array(ends), _DEGREE), _DEGREE), worst
+
+
+def point(p: Any) -> Array:
+    """Coordinates of a point, vector or direction in space or in the plane."""
+    return np.array([p.X(), p.Y(), p.Z()] if hasattr(p, "Z") else [p.X(), p.Y()])
+
+
+def reals(array: Any) -> Array:
+    """Values of a one-dimensional array."""
+    return np.array([array.Value(k) for k in range(array.Lower(), array.Upper() + 1)], dtype=np.float64)
+
+
+def knot_row(knots: Any, times: Any) -> Array:
+    """Knots repeated as often as they count."""
+    return np.repeat(reals(knots), reals(times).astype(np.int64))
+
+
+def _bspline(curve: Any) -> Spline:
+    """Of a B-spline or Bezier curve of OCCT, in space or in the plane, that is not periodic."""
+    n = curve.NbPoles()
+    poles = np.array([point(curve.Pole(k)) for k in range(1, n + 1)])
+    weights = np.array([curve.Weight(k) for k in range(1, n + 1)]) if curve.IsRational() else None
+    degree = curve.Degree()
+    if degree > bezier.MAX_DEGREE:
+        raise Unreadable(f"a spline has degree {degree}, more than {bezier.MAX_DEGREE}")
+    if hasattr(curve, "Knots"):
+        knots = knot_row(curve.Knots(), curve.Multiplicities())
+    else:
+        knots = np.repeat([0.0, 1.0], degree + 1)
+    return spline(poles, knots, degree, weights)
+
+
+def _conic_axes(curve: Any) -> tuple[Array, Array, Array, float]:
+    """Center, the two half-axes as vectors, and a mean radius, of a circle or an ellipse."""
+    position = curve.Position()
+    x, y = point(position.XDirection()), point(position.YDirection())
+    if hasattr(curve, "Radius"):
+        major = minor = curve.Radius()
+    else:
+        major, minor = curve.MajorRadius(), curve.MinorRadius()
+    return point(position.Location()), major * x, minor * y, 0.5 * (major + minor)
+
+
+def profile(curve: Any, low: float, high: float, *, cut: bool) -> tuple[Spline, Direction, float]:
+    """A curve of OCCT, in space or in the plane, from one of its parameters to another.
+
+    Parameters
+    ----------
+    curve
+        Geom_Curve or Geom2d_Curve.
+    low, high
+        OCCT's parameters.
+    cut : bool
+        End exactly there. Otherwise splines are left whole and other curves reach a little beyond.
+
+    Returns
+    -------
+    spline, map, deviation
+        The map leads from OCCT's parameters to the spline's; the deviation is zero for what is exact.
+    """
+    o = occt()
+    if isinstance(curve, (o.Geom_TrimmedCurve, o.Geom2d_TrimmedCurve)):
+        return profile(curve.BasisCurve(), low, high, cut=cut)
+    slack = 0.0 if cut else SLACK * (high - low)
+    if isinstance(curve, (o.Geom_Line, o.Geom2d_Line)):
+        ends = np.array([low - slack, high + slack])
+        place = curve.Position()
+        along = place.Direction()
+        return (
+            spline(point(place.Location()) + ends[:, None] * point(along), np.repeat(ends, 2), 1),
+            Straight(True),
+            0.0,
+        )
+    if isinstance(curve, (o.Geom_Circle, o.Geom2d_Circle, o.Geom_Ellipse, o.Geom2d_Ellipse)):
+        center, x, y, radius = _conic_axes(curve)
+        turning = Turning.between(low, high, radius) if cut else Turning.over(low, high, radius)
+        ring = arc(turning)
+        flat = ring.points
+        space = flat[:, :1] * x + flat[:, 1:2] * y + flat[:, 2:] * center
+        return Spline(np.column_stack([space, flat[:, 2]]), ring.knots, 2), turning, 0.0
+    if isinstance(curve, (o.Geom_BSplineCurve, o.Geom2d_BSplineCurve, o.Geom_BezierCurve, o.Geom2d_BezierCurve)):
+        copy = curve.Copy()
+        if isinstance(copy, (o.Geom_BSplineCurve, o.Geom2d_BSplineCurve)):
+            first, last = copy.FirstParameter(), copy.LastParameter()
+            near = 1e-12 * (last - first)
+            if cut and (low > first + near or high < last - near):
+                copy.Segment(low, high)
+            elif copy.IsPeriodic():
+                copy.SetNotPeriodic()
+        elif cut and (low > 1e-12 or high < 1.0 - 1e-12):
+            # A cut Bezier curve runs over [0, 1] again.
+            copy.Segment(low, high)
+            made = _bspline(copy)
+            return Spline(made.points, low + (high - low) * made.knots, made.degree), Straight(False), 0.0
+        return _bspline(copy), Straight(False), 0.0
+    # Parabolas, hyperbolas, offsets: nothing but their smoothness is used.
+    size = max(1e-300, float(np.abs(point(curve.Value(low)) - point(curve.Value(high))).max()))
+    made, error = approximated(
+        lambda t: np.array([point(curve.Value(float(x))) for x in t]), np.linspace(low, high, 9), 1e-9 * size
+    )
+    return made, Straight(False), error

@@ -1,0 +1,239 @@
+"""STEP files read as bodies."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from assembly.errors import InputError
+from assembly.geometry.face import Face
+from assembly.kinematics.body import Body
+from assembly.kinematics.pose import Pose, axes_quaternion
+from assembly.step.faces import read_face
+from assembly.step.occt import occt, parts, quiet
+from assembly.step.profiles import Unreadable
+from assembly.step.tree import Color, Part, free_labels, leaves
+
+__all__ = ["UNITS", "StepError", "StepWarning", "read_step"]
+
+# Millimeters in a unit.
+UNITS = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1e3, "in": 25.4, "ft": 304.8}
+# A deviation [mm] below which a face is what the file says: OCCT takes nearer points for one.
+EXACT = 1e-7
+
+
+class StepError(InputError):
+    """A STEP file that cannot be read or written, or not whole; the text says which faces, and why."""
+
+
+class StepWarning(UserWarning):
+    """Something of a STEP file was left out or approximated; the text says what, and why."""
+
+
+@dataclass
+class _Shape:
+    """Faces of one solid, or of one sheet, in the part's own coordinates."""
+
+    faces: list[Face]
+    color: Color | None
+    name: str | None
+    missing: list[str]
+    inexact: list[str]
+
+
+def checked_unit(unit: str) -> float:
+    """Millimeters in a unit."""
+    if unit not in UNITS:
+        raise InputError(f"unit is {unit!r}; expected one of {', '.join(map(repr, UNITS))}")
+    return UNITS[unit]
+
+
+def _document(path: str) -> tuple[Any, int]:
+    """The file as a document of OCCT, in millimeters, and the number of its faces."""
+    o = occt()
+    settings = {"read.stepcaf.subshapes.name": 1, "read.step.product.mode": 1}
+    reader = o.STEPCAFControl_Reader()
+    before = {key: o.Interface_Static.IVal_s(key) for key in settings}
+    auto = o.XCAFDoc_ShapeTool.AutoNaming_s()
+    try:
+        for key, value in settings.items():
+            o.Interface_Static.SetIVal_s(key, value)
+        o.XCAFDoc_ShapeTool.SetAutoNaming_s(False)
+        if reader.ReadFile(path) != o.IFSelect_RetDone:
+            raise StepError(f"path is {path!r}; expected a STEP file, and OCCT cannot parse it")
+        document = o.TDocStd_Document(o.TCollection_ExtendedString("XmlOcaf"))
+        o.XCAFDoc_DocumentTool.SetLengthUnit_s(document, 1e-3)
+        for mode in ("SetColorMode", "SetNameMode"):
+            getattr(reader, mode)(True)
+        if not reader.Transfer(document):
+            raise StepError(f"path is {path!r}; OCCT finds no shapes in it")
+    finally:
+        o.XCAFDoc_ShapeTool.SetAutoNaming_s(auto)
+        for key, value in before.items():
+            o.Interface_Static.SetIVal_s(key, value)
+    return document, _face_count(reader)
+
+
+def _face_count(reader: Any) -> int:
+    """Number of faces in the file."""
+    model = reader.Reader().WS().Model()
+    kinds = ("StepShape_AdvancedFace", "StepShape_FaceSurface")
+    return sum(type(model.Value(k)).__name__ in kinds for k in range(1, model.NbEntities() + 1))
+
+
+def _shapes(part: Part) -> Iterator[Any]:
+    """Solids of a part, and then its shells and faces that are in no solid."""
+    o = occt()
+    yield from parts(part.shape, o.TopAbs_SOLID)
+    explorer = o.TopExp_Explorer(part.shape, o.TopAbs_SHELL, o.TopAbs_SOLID)
+    while explorer.More():
+        yield explorer.Current()
+        explorer.Next()
+    explorer = o.TopExp_Explorer(part.shape, o.TopAbs_FACE, o.TopAbs_SHELL)
+    while explorer.More():
+        yield explorer.Current()
+        explorer.Next()
+
+
+def _read(shape: Any, part: Part, scale: float) -> _Shape:
+    o = occt()
+    edges = o.ShapeMap()
+    o.TopExp.MapShapes_s(shape, o.TopAbs_EDGE, edges)
+    name, color = part.said(shape)
+    made = _Shape([], color or part.color, name, [], [])
+    taken: set[str] = set()
+    for k, face in enumerate(parts(shape, o.TopAbs_FACE), 1):
+        face = o.as_face(face)
+        own, tint = part.said(face)
+        label = unique(own or f"face {k}", taken)
+        try:
+            read = read_face(face, edges, label, scale)
+        except Unreadable as reason:
+            made.missing.append(f"{label!r}: {reason}")
+            continue
+        if read.deviation > EXACT:
+            made.inexact.append(f"{label!r} to {read.deviation:.1g} mm")
+        read.face.color = tint
+        made.faces.append(read.face)
+    return made
+
+
+def unique(name: str, taken: set[str]) -> str:
+    """The name, with a number where it is taken; taken now."""
+    candidate, k = name, 2
+    while candidate in taken:
+        candidate, k = f"{name} {k}", k + 1
+    taken.add(candidate)
+    return candidate
+
+
+def _pose(location: Any, scale: float) -> Pose:
+    transform = location.Transformation()
+    rows = np.array([[transform.Value(i, j) for j in (1, 2, 3, 4)] for i in (1, 2, 3)])
+    if np.abs(rows[:, :3].T @ rows[:, :3] - np.eye(3)).max() > 1e-9 or np.linalg.det(rows[:, :3]) < 0.0:
+        raise Unreadable("its placement is mirrored or scaled, which no rigid body can be")
+    return Pose(scale * rows[:, 3], axes_quaternion(rows[:, :3]))
+
+
+def read_step(path: str | PathLike[str], *, unit: str = "mm", strict: bool = True) -> list[Body]:
+    """The solids of a STEP file, a body each.
+
+    A part that the file's assembly uses several times becomes as many bodies, which share their faces. Geometry stays
+    in the part's own coordinates; the body's pose is the placement that the assembly gives it. Names are those of
+    the parts, and "nut" is followed by "nut 2"; faces have the names that the file gives them, or "face 1", "face 2"
+    in its order. `body.color` and `face.color` are the file's, or None.
+
+    Planes, cylinders, cones, spheres, tori, swept surfaces and splines are exact rational surfaces, and so are their
+    trims, up to curves around an axis that have no rational form (helices, intersections): those are followed to
+    1e-10 of the face's extent in (u, v). Ends of edges that the file leaves apart within its tolerance are joined.
+    Faces are a little smaller than the patches of their surfaces. Shells and faces outside of any solid become bodies
+    too. What bounds no face, as wires, points and annotations, is not read.
+
+    Parameters
+    ----------
+    path
+        A file of AP203, AP214 or AP242.
+    unit : {"mm", "um", "cm", "m", "in", "ft"}
+        Lengths are converted to it, whatever the file's own unit.
+    strict : bool
+        Raise where a face cannot be read. Otherwise it is left out, and a warning for each body says which and why.
+
+    Returns
+    -------
+    list of Body
+        In the order of the file.
+
+    Raises
+    ------
+    StepError
+        Not a STEP file, nothing in it, or faces that cannot be read, named with the reasons.
+    FileNotFoundError
+        No such file.
+    ImportError
+        OCCT is not installed: pip install "assembly[step]".
+
+    Warns
+    -----
+    StepWarning
+        Faces that are left out, or were approximated by more than 1e-7 mm (offset surfaces).
+    """
+    scale = 1.0 / checked_unit(unit)
+    if not isinstance(strict, (bool, np.bool_)):
+        raise InputError(f"strict is {strict!r}; expected True or False")
+    file = Path(fspath(path))
+    if not file.is_file():
+        raise FileNotFoundError(f"path is {str(file)!r}; no such file")
+    o = occt()
+    with quiet():
+        document, count = _document(str(file))
+        root = o.XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
+        bodies: list[Body] = []
+        missing: list[str] = []
+        inexact: list[str] = []
+        built = 0
+        taken: set[str] = set()
+        read: dict[str, list[_Shape]] = {}
+        for label in free_labels(root):
+            for leaf in leaves(label, o.TopLoc_Location(), file.stem, None):
+                entry = o.TCollection_AsciiString()
+                o.TDF_Tool.Entry_s(leaf.label, entry)
+                key = entry.ToCString()
+                if key not in read:
+                    part = Part(leaf.label)
+                    read[key] = [_read(shape, part, scale) for shape in _shapes(part)]
+                    for shape in read[key]:
+                        built += len(shape.faces) + len(shape.missing)
+                        missing += [f"{leaf.name!r}, {text}" for text in shape.missing]
+                        inexact += [f"{leaf.name!r}, {text}" for text in shape.inexact]
+                for shape in read[key]:
+                    try:
+                        pose = _pose(leaf.location, scale)
+                    except Unreadable as reason:
+                        missing.append(f"{leaf.name!r}: {reason}")
+                        continue
+                    if shape.faces:
+                        name = unique(shape.name or leaf.name or file.stem, taken)
+                        body = Body(name, shape.faces, pose.position, pose.quaternion)
+                        body.color = leaf.color or shape.color
+                        bodies.append(body)
+    if missing and strict:
+        raise StepError(f"path is {str(file)!r}; {_listed('not read', missing)}; pass strict=False to go without")
+    if not bodies:
+        raise StepError(f"path is {str(file)!r}; it has no faces")
+    if built < count:
+        missing.append(f"{count - built} of {count} faces, of which OCCT makes nothing")
+    for what, lines in (("not read", missing), ("approximated", inexact)):
+        if lines:
+            warnings.warn(f"{file.name}: {_listed(what, lines)}", StepWarning, stacklevel=2)
+    return bodies
+
+
+def _listed(what: str, lines: list[str], most: int = 10) -> str:
+    more = f"; and {len(lines) - most} more" if len(lines) > most else ""
+    return f"{what}: {'; '.join(lines[:most])}{more}"

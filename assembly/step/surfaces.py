@@ -1,0 +1,266 @@
+"""Surfaces of OCCT as NURBS surfaces, exact wherever a rational form exists.
+
+Planes, cylinders, cones, spheres, tori and swept surfaces become finite patches a little larger than the face; Bezier
+and B-spline surfaces are kept as they are. Only offset surfaces, and what is swept from curves without rational form,
+are approximated.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import cos, pi, sin
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.geometry.surface import NurbsSurface
+from assembly.step.occt import occt
+from assembly.step.profiles import (
+    SLACK,
+    Direction,
+    Spline,
+    Straight,
+    Turning,
+    Unreadable,
+    arc,
+    bezier,
+    knot_row,
+    point,
+    profile,
+    spline,
+)
+
+__all__ = ["Patch", "patch"]
+
+Array = NDArray[np.float64]
+Box = tuple[float, float, float, float]
+# Distances [mm] below which OCCT takes two points for one.
+CONFUSION = 1e-7
+
+
+@dataclass(frozen=True)
+class Patch:
+    """A surface, the maps from OCCT's (u, v) to its own, and how far it is from what the file says [mm]."""
+
+    surface: NurbsSurface
+    u: Direction
+    v: Direction
+    deviation: float = 0.0
+
+
+def _slack(low: float, high: float, least: float = -np.inf, most: float = np.inf) -> tuple[float, float]:
+    """An interval made a little larger, within bounds; an end within the slack of its bound goes there."""
+    slack = SLACK * (high - low)
+    return max(least, low - slack), min(most, high + slack)
+
+
+def _revolved(shape: Spline, turning: Turning, origin: Array, axis: Array) -> Spline:
+    """A profile turned about an axis: homogeneous (n_u, n_v, 4)."""
+    points, weights = shape.cartesian
+    along = (points - origin) @ axis
+    foot = origin + along[:, None] * axis
+    out = points - foot
+    # Ends that lie on the axis are poles.
+    out[np.linalg.norm(out, axis=1) < CONFUSION] = 0.0
+    ring = arc(turning).points
+    across = np.cross(axis, out)
+    net = np.empty((len(ring), len(points), 4))
+    net[..., :3] = (
+        ring[:, 2, None, None] * foot[None]
+        + ring[:, 0, None, None] * out[None]
+        + ring[:, 1, None, None] * across[None]
+    ) * weights[None, :, None]
+    net[..., 3] = ring[:, 2, None] * weights[None]
+    return Spline(net, turning.knots, 2)
+
+
+def _surface(net: Array, knots: tuple[Array, Array], degree: tuple[int, int]) -> NurbsSurface:
+    return NurbsSurface(net[..., :3] / net[..., 3:], knots, degree, net[..., 3])
+
+
+def _turned(shape: Spline, turning: Turning, v: Direction, origin: Array, axis: Array, deviation: float) -> Patch:
+    made = _revolved(shape, turning, origin, axis)
+    return Patch(_surface(made.points, (made.knots, shape.knots), (2, shape.degree)), turning, v, deviation)
+
+
+def _plane(surface: Any, box: Box) -> Patch:
+    place = surface.Position()
+    u, v = _slack(*box[:2]), _slack(*box[2:])
+    origin, x, y = point(place.Location()), point(place.XDirection()), point(place.YDirection())
+    net = origin + np.array(u)[:, None, None] * x + np.array(v)[None, :, None] * y
+    return Patch(NurbsSurface(net, (np.repeat(u, 2), np.repeat(v, 2)), (1, 1)), Straight(True), Straight(True))
+
+
+def _round(surface: Any, box: Box) -> Patch:
+    """Cylinder, cone, sphere or torus: a line or an arc in the plane of the axes x and z, turned about z."""
+    o = occt()
+    place = surface.Position()
+    origin, x, axis = point(place.Location()), point(place.XDirection()), point(place.Direction())
+    # A left-handed placement turns the other way round.
+    if not place.Direct():
+        axis = -axis
+    up = point(place.Direction())
+    low, high = box[2:]
+    v: Direction = Straight(True)
+    if isinstance(surface, o.Geom_CylindricalSurface):
+        radius = surface.Radius()
+        ends = np.array(_slack(low, high))
+        shape = spline(origin + radius * x + ends[:, None] * up, np.repeat(ends, 2), 1)
+    elif isinstance(surface, o.Geom_ConicalSurface):
+        angle, base = surface.SemiAngle(), surface.RefRadius()
+        apex = -base / sin(angle)
+        near = CONFUSION / abs(sin(angle))
+        if low < apex - near and high > apex + near:
+            raise Unreadable("a cone goes through its apex")
+        # The side on which most of the face lies.
+        least, most = (apex, np.inf) if high - apex > apex - low else (-np.inf, apex)
+        ends = np.array(_slack(low, high, least, most))
+        radii = base + ends * sin(angle)
+        radii[ends == apex] = 0.0
+        radius = float(np.abs(radii).max())
+        shape = spline(
+            origin + radii[:, None] * x + (ends * cos(angle))[:, None] * up, np.repeat(ends, 2), 1
+        )
+    else:
+        if isinstance(surface, o.Geom_SphericalSurface):
+            center, minor = origin, surface.Radius()
+            radius = minor
+            v = Turning.between(*_slack(low, high, -0.5 * pi, 0.5 * pi), minor)
+        else:
+            minor, radius = surface.MinorRadius(), surface.MajorRadius()
+            center = origin + radius * x
+            v = Turning.over(low, high, minor)
+        flat = arc(v)
+        ring = flat.points
+        space = minor * (ring[:, :1] * x + ring[:, 1:2] * up) + ring[:, 2:] * center
+        shape = Spline(np.column_stack([space, ring[:, 2]]), flat.knots, 2)
+    return _turned(shape, Turning.over(box[0], box[1], radius), v, origin, axis, 0.0)
+
+
+def _extruded(surface: Any, box: Box) -> Patch:
+    shape, u, deviation = profile(surface.BasisCurve(), box[0], box[1], cut=False)
+    v = np.array(_slack(*box[2:]))
+    along = point(surface.Direction())
+    net = np.repeat(shape.points[:, None], 2, axis=1)
+    net[..., :3] += shape.points[:, None, 3:] * v[None, :, None] * along
+    return Patch(_surface(net, (shape.knots, np.repeat(v, 2)), (shape.degree, 1)), u, Straight(True), deviation)
+
+
+def _axis_crossings(surface: Any, low: float, high: float) -> tuple[float, float]:
+    """A profile's range, kept from crossing the axis where only the slack would."""
+    o = occt()
+    curve = surface.BasisCurve()
+    while isinstance(curve, o.Geom_TrimmedCurve):
+        curve = curve.BasisCurve()
+    if not isinstance(curve, o.Geom_Line):
+        return low, high
+    ends = np.array(_slack(low, high))
+    origin, axis = point(surface.Location()), point(surface.Direction())
+    start, along = point(curve.Position().Location()) - origin, point(curve.Position().Direction())
+    start, along = start - (start @ axis) * axis, along - (along @ axis) * axis
+    if along @ along < 1e-24:
+        return float(ends[0]), float(ends[1])
+    nearest = -(start @ along) / (along @ along)
+    if np.linalg.norm(start + nearest * along) < CONFUSION:
+        ends = np.array(_slack(low, high, *((nearest, np.inf) if high - nearest > nearest - low else (-np.inf, nearest))))
+    return float(ends[0]), float(ends[1])
+
+
+def _revolution(surface: Any, box: Box) -> Patch:
+    o = occt()
+    low, high = _axis_crossings(surface, *box[2:])
+    curve = surface.BasisCurve()
+    basis = curve
+    while isinstance(basis, o.Geom_TrimmedCurve):
+        basis = basis.BasisCurve()
+    line = isinstance(basis, o.Geom_Line)
+    # An arc must not turn through the axis: it is cut at the ends of the face, without slack.
+    conic = isinstance(basis, (o.Geom_Circle, o.Geom_Ellipse)) and high - low < 2.0 * pi - 1e-6
+    shape, v, deviation = profile(curve, low, high, cut=line or conic)
+    origin, axis = point(surface.Location()), point(surface.Direction())
+    points, _ = shape.cartesian
+    reach = float(np.linalg.norm(np.cross(points - origin, axis), axis=1).max())
+    return _turned(shape, Turning.over(box[0], box[1], max(reach, CONFUSION)), v, origin, axis, deviation)
+
+
+def _net(surface: Any) -> tuple[Array, tuple[Array, Array], tuple[int, int]]:
+    """Homogeneous net, knots and degrees of a B-spline or Bezier surface that is not periodic."""
+    degree = (surface.UDegree(), surface.VDegree())
+    if max(degree) > bezier.MAX_DEGREE:
+        raise Unreadable(f"the surface has degree {degree}, more than {bezier.MAX_DEGREE}")
+    n, m = surface.NbUPoles(), surface.NbVPoles()
+    rational = surface.IsURational() or surface.IsVRational()
+    net = np.ones((n, m, 4))
+    for i in range(n):
+        for j in range(m):
+            weight = surface.Weight(i + 1, j + 1) if rational else 1.0
+            net[i, j, :3] = weight * point(surface.Pole(i + 1, j + 1))
+            net[i, j, 3] = weight
+    if hasattr(surface, "UKnots"):
+        knots = (
+            knot_row(surface.UKnots(), surface.UMultiplicities()),
+            knot_row(surface.VKnots(), surface.VMultiplicities()),
+        )
+    else:
+        knots = (np.repeat([0.0, 1.0], degree[0] + 1), np.repeat([0.0, 1.0], degree[1] + 1))
+    return net, knots, degree
+
+
+def _free(surface: Any, deviation: float) -> Patch:
+    copy = surface.Copy()
+    if hasattr(copy, "SetUNotPeriodic"):
+        if copy.IsUPeriodic():
+            copy.SetUNotPeriodic()
+        if copy.IsVPeriodic():
+            copy.SetVNotPeriodic()
+    net, knots, degree = _net(copy)
+    # An edge that closes, or shrinks to a point, to OCCT's confusion does so exactly.
+    for axis in (0, 1):
+        edges = np.moveaxis(net, axis, 0)
+        clamped = all(np.ptp(k) == 0.0 for k in (knots[axis][: degree[axis] + 1], knots[axis][-degree[axis] - 1 :]))
+        if not clamped:
+            continue
+        points = edges[..., :3] / edges[..., 3:]
+        if np.abs(edges[0] - edges[-1]).max() < CONFUSION:
+            edges[-1] = edges[0]
+        for end in (0, -1):
+            if np.ptp(points[end], axis=0).max() < CONFUSION:
+                edges[end, :, :3] = points[end].mean(axis=0) * edges[end, :, 3:]
+    return Patch(_surface(net, knots, degree), Straight(False), Straight(False), deviation)
+
+
+def patch(surface: Any, box: Box) -> Patch:
+    """The part of a surface in which a face lies.
+
+    Parameters
+    ----------
+    surface
+        Geom_Surface.
+    box
+        u_min, u_max, v_min, v_max of the face.
+
+    Raises
+    ------
+    Unreadable
+        Saying why.
+    """
+    o = occt()
+    while isinstance(surface, o.Geom_RectangularTrimmedSurface):
+        surface = surface.BasisSurface()
+    if isinstance(surface, o.Geom_Plane):
+        return _plane(surface, box)
+    if isinstance(surface, o.Geom_ElementarySurface):
+        return _round(surface, box)
+    if isinstance(surface, o.Geom_SurfaceOfLinearExtrusion):
+        return _extruded(surface, box)
+    if isinstance(surface, o.Geom_SurfaceOfRevolution):
+        return _revolution(surface, box)
+    if isinstance(surface, (o.Geom_BSplineSurface, o.Geom_BezierSurface)):
+        return _free(surface, 0.0)
+    part = o.Geom_RectangularTrimmedSurface(surface, *box)
+    wanted = 1e-6
+    fit = o.GeomConvert_ApproxSurface(part, wanted, o.GeomAbs_C2, o.GeomAbs_C2, 9, 9, 200, 1)
+    if not fit.HasResult():
+        raise Unreadable(f"a {type(surface).__name__.removeprefix('Geom_')} cannot be approximated to {wanted:g} mm")
+    return _free(fit.Surface(), float(fit.MaxError()))

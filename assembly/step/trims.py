@@ -1,0 +1,226 @@
+"""Boundary curves of a face in (u, v), from the curves that OCCT keeps for its edges.
+
+A curve on a surface whose parameters are lengths or spline parameters is carried over as it is. Around an axis OCCT's
+parameter is an angle and ours is rational (`profiles.Turning`): a line along one parameter stays such a line, with its
+ends mapped; any other curve, a helix say, has no rational form and is interpolated.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from assembly.geometry.curve import NurbsCurve
+from assembly.step.occt import occt
+from assembly.step.profiles import Direction, Spline, Straight, Turning, Unreadable, approximated, profile, spline
+from assembly.step.surfaces import Patch
+
+__all__ = ["Edge", "chained", "edge_curve"]
+
+Array = NDArray[np.float64]
+# Deviation allowed to curves without rational form, over the shorter side of the surface's domain.
+FOLLOWED = 1e-10
+# Curves that leave a coordinate line by less, over the side of the domain, run along it.
+LEVEL = 1e-9
+
+
+@dataclass(frozen=True)
+class Edge:
+    """One boundary curve in our (u, v), run with the material on its left.
+
+    Attributes
+    ----------
+    curve : Spline
+    level : (bool, bool)
+        Whether u, or v, is constant along it.
+    tolerance : float
+        How far its ends may be from those of its neighbors, in space [mm].
+    name : str
+        Edges of two faces that are one edge of the solid have one name.
+    deviation : float
+        Of its interpolation in (u, v).
+    """
+
+    curve: Spline
+    level: tuple[bool, bool]
+    tolerance: float
+    name: str
+    deviation: float
+
+    @property
+    def ends(self) -> Array:
+        """First and last point (2, 2)."""
+        return self.curve.cartesian[0][[0, -1]]
+
+    def moved(self, points: Array) -> Edge:
+        """The curve with its two ends at the points (2, 2); what is level stays so."""
+        made = self.curve.points.copy()
+        for axis in np.flatnonzero(self.level):
+            made[:, axis] = points[0, axis] * made[:, 2]
+        made[[0, -1], :2] = points * made[[0, -1], 2:]
+        return replace(self, curve=Spline(made, self.curve.knots, self.curve.degree))
+
+    def shifted(self, by: Array) -> Edge:
+        """The curve moved by a vector of (u, v)."""
+        made = self.curve.points.copy()
+        made[:, :2] += by * made[:, 2:]
+        return replace(self, curve=Spline(made, self.curve.knots, self.curve.degree))
+
+    def nurbs(self, scales: Array) -> NurbsCurve:
+        """As the loops of a face take it, its u and v multiplied."""
+        points, weights = self.curve.cartesian
+        return NurbsCurve(points * scales, self.curve.knots, self.curve.degree, weights, name=self.name)
+
+
+def _crossings(values: Array, at: Array, function: Any, joints: Array) -> list[float]:
+    """Parameters at which a sampled function takes one of the values of the joints."""
+    found = []
+    for joint in joints:
+        sides = values - joint
+        for k in np.flatnonzero(sides[:-1] * sides[1:] < 0.0):
+            found.append(brentq(lambda t, joint=joint: function(t) - joint, at[k], at[k + 1], xtol=1e-15, rtol=1e-15))
+        found.extend(at[sides == 0.0].tolist())
+    return found
+
+
+def _followed(source: Spline, maps: tuple[Direction, Direction], tolerance: float) -> tuple[Spline, float]:
+    """A plane curve of OCCT's (u, v) mapped to ours by interpolation."""
+    points, weights = source.cartesian
+    curve = NurbsCurve(points, source.knots, source.degree, weights)
+    breaks = curve.breaks()
+    at = np.unique(np.concatenate([np.linspace(a, b, 17) for a, b in zip(breaks[:-1], breaks[1:], strict=True)]))
+    values = curve.evaluate(at)
+    cuts = [breaks]
+    for axis, along in enumerate(maps):
+        joints = along.joints(values[:, axis].min(), values[:, axis].max())
+        cuts.append(
+            np.array(_crossings(values[:, axis], at, lambda t, axis=axis: float(curve.evaluate(t)[axis]), joints))
+        )
+    breaks = np.unique(np.concatenate(cuts))
+    short = 1e-9 * (breaks[-1] - breaks[0])
+    keep = np.append(True, np.diff(breaks) > short)
+    keep[-1] = True
+    breaks = breaks[keep]
+    if breaks.size > 2 and breaks[-1] - breaks[-2] <= short:
+        breaks = np.delete(breaks, -2)
+
+    def mapped(t: Array) -> Array:
+        there = curve.evaluate(np.clip(t, breaks[0], breaks[-1]))
+        return np.column_stack([maps[0](there[:, 0]), maps[1](there[:, 1])])
+
+    return approximated(mapped, breaks, tolerance)
+
+
+def edge_curve(edge: Any, face: Any, patch: Patch, name: str) -> Edge:
+    """The curve of an edge on a face (which is taken forward), mapped to our parameters.
+
+    Raises
+    ------
+    Unreadable
+        The edge has no curve on the face, or one that cannot be carried over.
+    """
+    o = occt()
+    low, high = o.BRep_Tool.Range_s(edge, face)
+    raw = o.BRep_Tool.CurveOnSurface_s(edge, face, low, high)
+    if raw is None:
+        raise Unreadable("an edge has no curve in the surface's parameters")
+    source, _, deviation = profile(raw, low, high, cut=True)
+    maps = (patch.u, patch.v)
+    points, weights = source.cartesian
+    scales = np.array([along.radius if isinstance(along, Turning) else 1.0 for along in maps])
+    sides = np.ptp(np.array(patch.surface.domain), axis=1)
+    extent = np.ptp(points, axis=0) * scales / sides
+    level = extent <= LEVEL
+    if level.all():
+        level[np.argmax(extent)] = False
+    other = points[:, int(level[0])]
+    if level.any() and (np.all(np.diff(other) >= 0.0) or np.all(np.diff(other) <= 0.0)):
+        ends = points[[0, -1]]
+        ends[:, level] = 0.5 * (points.min(axis=0) + points.max(axis=0))[level]
+        mapped = np.column_stack([along(column) for along, column in zip(maps, ends.T, strict=True)])
+        made = spline(mapped, np.array([0.0, 0.0, 1.0, 1.0]), 1)
+    elif all(isinstance(along, Straight) for along in maps):
+        level[:] = False
+        mapped = np.column_stack([along(column) for along, column in zip(maps, points.T, strict=True)])
+        made = spline(mapped, source.knots, source.degree, weights)
+    else:
+        level[:] = False
+        made, error = _followed(source, maps, FOLLOWED * float(sides.min()))
+        deviation += error
+    if edge.Orientation() == o.TopAbs_REVERSED:
+        made = Spline(made.points[::-1], made.knots[0] + made.knots[-1] - made.knots[::-1], made.degree)
+    tolerance = o.BRep_Tool.Tolerance_s(edge)
+    for vertex in (o.TopExp.FirstVertex_s(edge), o.TopExp.LastVertex_s(edge)):
+        if not vertex.IsNull():
+            tolerance = max(tolerance, o.BRep_Tool.Tolerance_s(vertex))
+    return Edge(made, (bool(level[0]), bool(level[1])), tolerance, name, deviation)
+
+
+def _period(patch: Patch) -> Array:
+    """Periods in u and v; infinite where the surface is not closed."""
+    pairs = zip(patch.surface.domain, patch.surface.closed, strict=True)
+    return np.array([high - low if closed else np.inf for (low, high), closed in pairs])
+
+
+def _meeting(last: Edge, first: Edge, a: Array, b: Array) -> Array:
+    """Where two curves that should meet are made to: what is level in one of them keeps its coordinate."""
+    at = 0.5 * (a + b)
+    for axis in (0, 1):
+        if last.level[axis] != first.level[axis]:
+            at[axis] = (a if last.level[axis] else b)[axis]
+    return at
+
+
+def chained(edges: list[Edge], patch: Patch) -> tuple[list[Edge], float]:
+    """Edges of one wire, head to tail, moved by periods and joined where they miss one another by the tolerance.
+
+    Returns
+    -------
+    edges, gap
+        The largest gap that was closed, in space.
+
+    Raises
+    ------
+    Unreadable
+        Two curves are farther apart than their tolerance.
+    """
+    period = _period(patch)
+    open_ = ~np.isfinite(period)
+    rows: list[Edge] = []
+    for edge in edges:
+        if rows:
+            jump = rows[-1].ends[1] - edge.ends[0]
+            turns = np.where(open_, 0.0, np.round(jump / np.where(open_, 1.0, period)))
+            if turns.any():
+                edge = edge.shifted(turns * np.where(open_, 0.0, period))
+        rows.append(edge)
+    # A ring closes up to a period, and so does its joint.
+    closing = rows[0].ends[0] - rows[-1].ends[1]
+    ring = np.where(open_, 0.0, np.round(closing / np.where(open_, 1.0, period))) * np.where(open_, 0.0, period)
+    ends = np.array([edge.ends for edge in rows])
+    made = ends.copy()
+    worst = 0.0
+    (u0, u1), (v0, v1) = patch.surface.domain
+    for k, first in enumerate(rows):
+        last = rows[k - 1]
+        across = ring if k == 0 else np.zeros(2)
+        a, b = ends[k - 1, 1] + across, ends[k, 0]
+        at = _meeting(last, first, a, b)
+        if (a != b).any():
+            inside = np.array([a, b])
+            for axis, (low, high) in enumerate(((u0, u1), (v0, v1))):
+                if open_[axis]:
+                    inside[:, axis] = np.clip(inside[:, axis], low, high)
+                else:
+                    inside[:, axis] = low + np.mod(inside[:, axis] - low, high - low)
+            spread = patch.surface.evaluate(inside[:, 0], inside[:, 1])
+            gap = float(np.linalg.norm(spread[0] - spread[1]))
+            if gap > 2.0 * (last.tolerance + first.tolerance):
+                raise Unreadable(f"two edges that should meet are {gap:.2g} mm apart")
+            worst = max(worst, gap)
+        made[k, 0], made[k - 1, 1] = at, at - across
+    return [edge.moved(pair) for edge, pair in zip(rows, made, strict=True)], worst
