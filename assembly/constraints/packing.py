@@ -24,14 +24,14 @@ from assembly.constraints.trim_contact import FORMS, TrimContact
 from assembly.constraints.turns import Turns
 from assembly.errors import InputError
 from assembly.geometry.face import Face
+from assembly.geometry.spline import CURVE_RECORD, SURFACE_RECORD
 from assembly.geometry.surface import NurbsSurface
 from assembly.geometry.trim import TRIM_FIRST
-from assembly.geometry.spline import CURVE_RECORD, SURFACE_RECORD
 from assembly.kinematics.body import Body, BodyFace
 from assembly.proximity.pairs import OFFSETS
-from assembly.proximity.solid_contact import TRACK
 from assembly.proximity.shell import EDGE_CURVE, EDGE_END, EDGE_RECORD, EDGE_START, EDGE_SURFACE
 from assembly.proximity.shell_packing import pack_shell
+from assembly.proximity.solid_contact import TRACK
 from assembly.proximity.topology import solid_of
 
 __all__ = ["Packed", "pack", "structure_of"]

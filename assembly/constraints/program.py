@@ -14,16 +14,15 @@ from assembly._kernel import kernel
 from assembly.constraints.layout import (
     BODY_F,
     BODY_G,
-    CONTACTS,
     CONTACT_RECORD,
+    CONTACTS,
     COORDINATE,
     EXTRA_COLUMN,
     FOLD,
-    FREE_COLUMN,
-    JOINTS,
     JOINT_RECORD,
     JOINT_ROW,
     JOINT_TABLE,
+    JOINTS,
     KIND,
     MOVING,
     ONE_SIDED,
@@ -31,8 +30,8 @@ from assembly.constraints.layout import (
     PROPER,
     REFERENCE,
     ROW,
-    ROWS,
     ROW_TABLE,
+    ROWS,
     SCALE,
     SECOND,
     SHELL_F,
@@ -40,7 +39,6 @@ from assembly.constraints.layout import (
     SLOTS,
     SURFACE_F,
     SURFACE_G,
-    TAPES,
     TAPE_BODIES,
     TAPE_FIRST,
     TAPE_LIST,
@@ -50,10 +48,11 @@ from assembly.constraints.layout import (
     TAPE_SECOND,
     TAPE_TABLE,
     TAPE_VALUES,
+    TAPES,
     TRACKED,
-    TRIMS,
     TRIM_FORM,
     TRIM_PAIR,
+    TRIMS,
 )
 from assembly.constraints.primitives import add_coordinate_hessian, coordinate, place_frames, write_gradient
 from assembly.constraints.tape import run_tape
@@ -66,6 +65,7 @@ from assembly.proximity.solid_contact import FEATURE_F, TRACK, search_solids, tr
 from assembly.proximity.start import global_start
 from assembly.proximity.switching import feature_at
 from assembly.proximity.velocity import GAP, add_gap_terms, gradient_row, store_record
+
 
 @kernel(inner=True)
 def track_contact(table, pool, row, q, start, patience, records, k):

@@ -242,7 +242,6 @@ def add_trim_terms(table, pool, r, loose, point, y, weight, hessian):
     for i in range(2):
         for j in range(i, 2):
             flat = (1.0 if i == j else 0.0) - n[i] * n[j]
-            hessian[at + i, at + j] += (
-                weight * jacobian[r, FREE_COLUMN + o + i] * jacobian[r, FREE_COLUMN + o + j]
-                + bend * flat / (lengths[k, o + i] * lengths[k, o + j])
-            )
+            hessian[at + i, at + j] += weight * jacobian[r, FREE_COLUMN + o + i] * jacobian[
+                r, FREE_COLUMN + o + j
+            ] + bend * flat / (lengths[k, o + i] * lengths[k, o + j])

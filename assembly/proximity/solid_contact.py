@@ -16,7 +16,7 @@ from assembly.kinematics.motion import position, relative_pose, rotation
 from assembly.proximity.extremal import CONVERGED, SINGULAR
 from assembly.proximity.feature_pair import feature_record
 from assembly.proximity.nearest import nearest_features
-from assembly.proximity.switching import feature_at, track_features
+from assembly.proximity.switching import track_features
 
 FEATURE_F, FEATURE_G, PAIR_NORMAL, TRACK = 4, 5, 6, 9
 
@@ -73,9 +73,7 @@ def track_solids(table, pool, shell_f, shell_g, i, j, q, start, patience, record
 def search_solids(table, pool, shell_f, shell_g, i, j, q, tracked, r):
     """The closest features wherever they are, into tracked[r]. Returns whether there are any."""
     relative, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
-    status, feature_f, feature_g, x, n, _gap = nearest_features(
-        table, pool, shell_f, shell_g, relative, shift, 1.0
-    )
+    status, feature_f, feature_g, x, n, _gap = nearest_features(table, pool, shell_f, shell_g, relative, shift, 1.0)
     write_tracked(x, feature_f, feature_g, n, tracked, r)
     return status == CONVERGED or status == SINGULAR
 

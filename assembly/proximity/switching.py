@@ -17,10 +17,18 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly.geometry.spline import CURVE_BREAKS, CURVE_CLOSED, CURVE_RECORD, CURVE_SPANS, curve_lanes, surface_point, xyz
+from assembly.geometry.spline import (
+    CURVE_BREAKS,
+    CURVE_CLOSED,
+    CURVE_RECORD,
+    CURVE_SPANS,
+    curve_lanes,
+    surface_point,
+    xyz,
+)
 from assembly.geometry.trim import TRIM_CURVES, TRIM_FIRST, trim_nearest, trim_side
 from assembly.geometry.vec import blend, cross, dot, matvec, matvec_t, neg, scale, sub
-from assembly.proximity.extremal import CONVERGED, LEFT_PATCH, NOT_CONVERGED, SINGULAR, into_domain
+from assembly.proximity.extremal import LEFT_PATCH, NOT_CONVERGED, into_domain
 from assembly.proximity.feature_pair import solve_features
 from assembly.proximity.shell import (
     EDGE,
@@ -46,8 +54,6 @@ from assembly.proximity.shell import (
     VERTEX,
     VERTEX_EDGE_LIST,
     VERTEX_EDGES,
-    VERTEX_FACE_LIST,
-    VERTEX_FACES,
     VERTEX_RECORD,
     VERTEX_TABLE,
 )

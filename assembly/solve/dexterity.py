@@ -21,7 +21,6 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
-from assembly.constraints.primitives import add_coordinate_hessian, coordinate
 from assembly.constraints.layout import (
     CONTACT_RECORD,
     CONTACTS,
@@ -34,6 +33,7 @@ from assembly.constraints.layout import (
     TERM_TABLE,
     TERMS,
 )
+from assembly.constraints.primitives import add_coordinate_hessian, coordinate
 from assembly.constraints.program import add_row_terms, evaluate
 from assembly.constraints.terms import DEXTERITY, TERM, TERM_BODY, TERM_KIND, TERM_PARAMETERS, TERM_TAPE, load
 from assembly.geometry.vec import add, cross, matvec, scale

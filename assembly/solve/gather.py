@@ -12,7 +12,6 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
-from assembly.constraints.primitives import place_frames
 from assembly.constraints.layout import (
     CONTACTS,
     EXTRA_COLUMN,
@@ -28,6 +27,7 @@ from assembly.constraints.layout import (
     ROWS,
     SECOND,
 )
+from assembly.constraints.primitives import place_frames
 from assembly.constraints.program import joint_row
 from assembly.kinematics.motion import retract
 from assembly.solve.linear import factorize, substitute

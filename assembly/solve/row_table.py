@@ -43,9 +43,9 @@ from assembly.constraints.layout import (
     TAPE_VALUES,
     TAPES,
     TRACKED,
-    VECTOR_TRIMS,
     TRIM_PAIR,
     TRIMS,
+    VECTOR_TRIMS,
 )
 from assembly.constraints.program import evaluate
 from assembly.constraints.terms import objective

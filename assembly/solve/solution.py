@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from assembly.constraints.constraint import Constraint
 from assembly.constraints.contact import Contact
 from assembly.constraints.joint import Joint
-from assembly.constraints.packing import Packed
 from assembly.constraints.layout import TERM_TABLE, TERMS
+from assembly.constraints.packing import Packed
 from assembly.constraints.terms import POINT_DISTANCE, POSTURE, POSTURE_PARAMETERS, TERM
 from assembly.errors import InputError
 from assembly.kinematics.body import Body

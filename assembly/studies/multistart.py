@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.constraints.packing import Packed
 from assembly.constraints.layout import TERM_TABLE, TERMS
+from assembly.constraints.packing import Packed
 from assembly.constraints.terms import POSTURE, POSTURE_POSITION, TERM, TERM_BODY, TERM_FOLLOWS, TERM_KIND
 from assembly.constraints.terms import TERM_PARAMETERS as PARAMETERS
 from assembly.errors import integer
