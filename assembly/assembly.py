@@ -106,14 +106,13 @@ class Assembly:
         for constraint in constraints:
             if not isinstance(constraint, Constraint):
                 raise TypeError(
-                    f"constraint is {constraint!r}; expected a Contact, a TrimContact, a joint, a coupling or an Expression"
+                    f"constraint is {constraint!r}; expected a contact or a trim of one, a joint, a coupling or an "
+                    "Expression"
                 )
             self._check_bodies(constraint.name, constraint.bodies)
             if any(other.name == constraint.name for other in self._constraints):
                 raise InputError(f"constraint name {constraint.name!r} is taken; expected distinct names, say name=...")
-            if isinstance(constraint, TrimContact) and not any(
-                other is constraint.contact for other in self._constraints
-            ):
+            if isinstance(constraint, TrimContact) and constraint.contact not in self._constraints:
                 raise InputError(
                     f"constraint {constraint.name!r} keeps contact {constraint.contact.name!r}, which is not in the "
                     "assembly; expected its contact to be constrained before it"

@@ -5,10 +5,10 @@ every body (-1: fixed), then a record a row (contacts first, then trims), a join
 loop works on
 
     configuration  (n, 7)       poses, scaled, positions relative to a reference
-    tracked        (k, 9)       of every contact parameters, features (`proximity/shell.py`) and normal of its pair, then
-                                (first column) unwrapped angles of joints
-    records        (k + j, R)   what the derivatives of gaps need (see `track_contact`), then frames of joints, then (if used) one of
-                                trims
+    tracked        (k, 9)       of every contact parameters, features and normal of its pair
+                                (`proximity/solid_contact.py`), then (first column) unwrapped angles of joints
+    records        (k + j, R)   what the derivatives of gaps need (see `track_contact`), then frames of joints, then
+                                one of trims that are vectors
     residual       (m,)         rows: contacts, trims, joints, tapes; behind them four for every free pair
     jacobian       (m, 16 + e)  in the twists of a row's two bodies (12), a free pair's coordinates (4), further bodies
 """

@@ -195,7 +195,7 @@ class Packed:
         header[layout.BODIES] = len(bodies)
         header[layout.MOVING] = int(slots.max()) + 1
         header[layout.CONTACTS] = len(self.contacts)
-        header[TRACKED] = len(self.contacts) + len(self._angles)
+        header[layout.TRACKED] = len(self.contacts) + len(self._angles)
         header[layout.JOINTS] = len(self._frames)
         header[layout.ROWS] = len(rows)
         header[layout.EXTRA] = extra

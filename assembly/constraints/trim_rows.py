@@ -62,7 +62,7 @@ def clear(jacobian, r):
 
 @kernel(inner=True)
 def add_coordinate(loose, records, k, i, factor, jacobian, r):
-    """Row r += factor times the derivative of coordinate i of contact k: itself an unknown, or by the contact velocity."""
+    """Row r += factor times the derivative of coordinate i of contact k: an unknown, or by the contact velocity."""
     free = loose[0]
     lengths = loose[1]
     if free[k] >= 0:
@@ -226,10 +226,7 @@ def trim_rows(table, pool, loose, point):
 
 @kernel(inner=True)
 def add_trim_terms(table, pool, r, loose, point, y, weight, hessian):
-    """Upper triangle of hessian += y (second derivative) + weight (gradient gradient^T), for a row whose contact is free.
-
-    The row is in the signed form.
-    """
+    """Upper triangle of hessian += y (second derivative) + weight (gradient gradient^T): a signed row of a free pair."""
     tracked = point[1]
     jacobian = point[4]
     free, lengths, _vectors, _block, _guess, _solids = loose

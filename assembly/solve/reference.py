@@ -377,3 +377,15 @@ def solve(
     """
     options = _checked_arguments(scene, ipopt)
     return _built(scene, scene.packed(), tuple(sorted(options.items()))).solve(q0, starts=starts)
+
+
+def _lone_faces(name: str, sides: tuple[Body | BodyFace, Body | BodyFace]) -> tuple[BodyFace, BodyFace]:
+    """The two faces of a contact, which are taken as whole surfaces here."""
+    faces = [side if isinstance(side, BodyFace) else side.faces[0] for side in sides]
+    for side in sides:
+        if isinstance(side, Body) and len(side.faces) > 1:
+            raise InputError(
+                f"contact {name!r} is of body {side.name!r} with {len(side.faces)} faces; "
+                "expected what the reference solver takes: contacts of single faces"
+            )
+    return faces[0], faces[1]

@@ -21,6 +21,7 @@ from assembly.errors import InputError, positive
 from assembly.kinematics.body import Body, Frame, Point
 from assembly.kinematics.ellipsoid import Ellipsoid
 from assembly.kinematics.pose import pose_rows, rotation_matrix
+from assembly.proximity.solid_contact import TRACK
 from assembly.solve.dexterity import DETERMINED
 from assembly.solve.solution import Solution
 from assembly.solve.tip_rates import tip_at
