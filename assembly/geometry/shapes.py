@@ -16,9 +16,27 @@ from assembly.errors import InputError, number, positive, vector
 from assembly.geometry.bezier import full_knots
 from assembly.geometry.face import Face
 from assembly.geometry.path import Path
+from assembly.geometry.solids import cam, extrusion, plate, plate_with_slot, solid_cylinder, trimmed_plane
 from assembly.geometry.surface import NurbsSurface
 
-__all__ = ["Path", "box", "cone", "cylinder", "ellipsoid", "paper_clip", "pipe", "plane", "sphere", "torus"]
+__all__ = [
+    "Path",
+    "box",
+    "cam",
+    "cone",
+    "cylinder",
+    "ellipsoid",
+    "extrusion",
+    "paper_clip",
+    "pipe",
+    "plane",
+    "plate",
+    "plate_with_slot",
+    "solid_cylinder",
+    "sphere",
+    "torus",
+    "trimmed_plane",
+]
 
 Array = NDArray[np.float64]
 _HALF = sqrt(0.5)  # the cosine of half a quarter turn

@@ -17,8 +17,9 @@ from __future__ import annotations
 FACE, EDGE, VERTEX = 0, 1, 2
 # Header: counts, and where the records begin.
 FACES, FACE_TABLE, EDGES, EDGE_TABLE, VERTICES, VERTEX_TABLE, SHELL = 0, 1, 2, 3, 4, 5, 6
-# A face: its surface record, its trim (-1: no boundary), the list that names the edge of every boundary curve.
-FACE_SURFACE, FACE_TRIM, FACE_EDGES, FACE_RECORD = 0, 1, 2, 3
+# A face: its surface record, its trim (-1: no boundary), the list that names the edge of every boundary curve (-1: of
+# a curve that is a point), and a flag in the pool for every cell of the surface: 0 where all of it is outside the trim.
+FACE_SURFACE, FACE_TRIM, FACE_EDGES, FACE_CELL_FLAGS, FACE_RECORD = 0, 1, 2, 3, 4
 # An edge: surface and curve record, its face and the other one (-1: free edge).
 EDGE_SURFACE, EDGE_CURVE, EDGE_FACE_A, EDGE_FACE_B = 0, 1, 2, 3
 # The same edge on the other face: surface and curve record, pool offset of m0, m1.
