@@ -31,8 +31,8 @@ from assembly.kinematics.body import Body, BodyFace
 from assembly.proximity.pairs import OFFSETS
 from assembly.proximity.shell import EDGE_CURVE, EDGE_END, EDGE_RECORD, EDGE_START, EDGE_SURFACE
 from assembly.proximity.shell_packing import pack_shell
+from assembly.proximity.solid import solid_of
 from assembly.proximity.solid_contact import TRACK
-from assembly.proximity.topology import solid_of
 
 __all__ = ["Packed", "pack", "structure_of"]
 

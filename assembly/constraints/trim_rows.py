@@ -226,7 +226,7 @@ def trim_rows(table, pool, loose, point):
 
 @kernel(inner=True)
 def add_trim_terms(table, pool, r, loose, point, y, weight, hessian):
-    """Upper triangle of hessian += y (second derivative) + weight (gradient gradient^T): a signed row of a free pair."""
+    """Upper triangle of hessian += y (second derivative) + weight (gradient gradient^T), of a signed row."""
     tracked = point[1]
     jacobian = point[4]
     free, lengths, _vectors, _block, _guess, _solids = loose

@@ -60,6 +60,9 @@ class ContactPair:
     gap : float
         normal . (g - f): positive apart, negative interpenetrating.
     status : PairStatus
+    features : (str, str) or None
+        Of a contact between solids the features that are closest: faces, edges or vertices. The parameters are then
+        (u, v) of a face, (t, 0) of an edge, (0, 0) of a vertex.
     """
 
     parameters: Array = field(repr=False)
@@ -67,6 +70,7 @@ class ContactPair:
     normal: Array
     gap: float
     status: PairStatus
+    features: tuple[str, str] | None = None
 
 
 def as_face(name: str, side: Side) -> Face:

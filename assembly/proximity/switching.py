@@ -215,6 +215,10 @@ def nearest_edge(table, pool, shell, code, u, v):
     trim = table[face + FACE_TRIM]
     _s, k, t, _cu, _cv, _nu, _nv = trim_nearest(table, pool, trim, 0, table[trim + TRIM_CURVES], u, v)
     number = table[table[face + FACE_EDGES] + k]
+    if number < 0:
+        # A boundary curve that is one point: the curve beside it begins or ends there.
+        k = k + 1 if k + 1 < table[trim + TRIM_CURVES] else k - 1
+        number = table[table[face + FACE_EDGES] + k]
     edge = table[shell + EDGE_TABLE] + EDGE_RECORD * number
     if table[edge + EDGE_CURVE] != table[trim + TRIM_FIRST] + CURVE_RECORD * k:
         # The edge is measured on its other face.

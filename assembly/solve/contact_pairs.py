@@ -9,8 +9,8 @@ import numpy as np
 from assembly.constraints.layout import ROW, ROW_TABLE, SHELL_F, SHELL_G
 from assembly.kinematics.body import Body, BodyFace
 from assembly.proximity.pairs import ContactPair, PairStatus, extremal_pair
+from assembly.proximity.solid import feature_name, solid_of
 from assembly.proximity.solid_contact import FEATURE_F, FEATURE_G, solid_pair
-from assembly.proximity.topology import solid_of
 
 if TYPE_CHECKING:
     from assembly.solve.solution import Solution
@@ -64,4 +64,4 @@ def _solids(solution: Solution, k: int, places: list[int]) -> ContactPair:
 def _feature_name(side: Body | BodyFace, number: int) -> str:
     """What a feature of a side is called."""
     faces = (side.face,) if isinstance(side, BodyFace) else tuple(part.face for part in side.faces)
-    return solid_of(faces).name(number)
+    return feature_name(solid_of(faces), number)

@@ -28,6 +28,7 @@ from scipy.linalg import qr
 from assembly.constraints.packing import Packed
 from assembly.errors import InputError
 from assembly.geometry.surface import NurbsSurface
+from assembly.kinematics.body import Body, BodyFace
 from assembly.proximity.solid_contact import FEATURE_F, TRACK
 from assembly.solve.augmented_lagrangian import COUNT, CULPRIT, DUAL, IMPROPER, OBJECTIVE, RESULTS, VIOLATION
 from assembly.solve.check import audit, is_extremal, twist_gradients
