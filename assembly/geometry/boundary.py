@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from assembly.errors import InputError
 from assembly.geometry.curve import NurbsCurve
-from assembly.geometry.loop import Loop, curve_ends
+from assembly.geometry.loop import TOLERANCE, Loop, curve_ends
 from assembly.geometry.surface import NurbsSurface
 from assembly.geometry.trim_table import TrimTable, build
 
@@ -208,6 +208,18 @@ def _extent(curve: NurbsCurve, axis: int) -> tuple[float, float]:
     return result[0], result[1]
 
 
+def _check_apart(table: TrimTable, chains: Sequence[range], names: Sequence[str]) -> None:
+    """Raise where curves of a boundary meet beside their common corners."""
+    found = table.crossing(TOLERANCE)
+    if found is None:
+        return
+    (k, a), (m, b) = ((n, c) for c in found[:2] for n, chain in enumerate(chains) if c in chain)
+    place = f"near (u, v) = ({found[2][0]:.6g}, {found[2][1]:.6g})"
+    if names[k] == names[m]:
+        raise InputError(f"{names[k]} crosses or touches itself {place}; expected a loop without crossings")
+    raise InputError(f"{names[m]} crosses or touches {names[k]} {place}; expected loops that are apart")
+
+
 def make_boundary(surface: NurbsSurface, outer: LoopLike | None, holes: Sequence[LoopLike]) -> Boundary:
     """Check loops and turn them; see `Face`."""
     chains: list[tuple[list[NurbsCurve], Array]] = []
@@ -243,6 +255,8 @@ def make_boundary(surface: NurbsSurface, outer: LoopLike | None, holes: Sequence
     ranges = tuple(range(a, b) for a, b in zip(stops[:-1], stops[1:], strict=True))
     closing = [bool(np.isfinite(turn).all()) for _, turn in chains]
     table = build(curves, ranges, closing, silent, surface.domain, period)
+    if outer_loop is not None or hole_loops:
+        _check_apart(table, ranges, names)
     for k, name in enumerate(names):
         if table.left[k] != 1.0 or table.right[k] != 0.0:
             raise InputError(

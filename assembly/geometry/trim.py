@@ -55,7 +55,7 @@ _BUDGET = 4000
 
 
 @kernel(inline=True)
-def _line(pool, o, degree, s):
+def piece_line(pool, o, degree, s):
     """u, v, u', v' of a rational piece."""
     p = load_lanes(pool, o + 4 * degree)
     d = 0.0 * p
@@ -92,7 +92,7 @@ def _where(pool, o, degree, middle, t0, t1, axis, target, start, end):
     low = t0
     high = t1
     t = t0 + (t1 - t0) * (target - start) / (end - start)
-    x, y, dx, dy = _line(pool, o, degree, t - middle)
+    x, y, dx, dy = piece_line(pool, o, degree, t - middle)
     for _ in range(80):
         value = x - target if axis == 0 else y - target
         slope = dx if axis == 0 else dy
@@ -108,7 +108,7 @@ def _where(pool, o, degree, middle, t0, t1, axis, target, start, end):
         if abs(step - t) <= 3e-16 * abs(step):
             break
         t = step
-        x, y, dx, dy = _line(pool, o, degree, t - middle)
+        x, y, dx, dy = piece_line(pool, o, degree, t - middle)
     return t, x, y, dx, dy
 
 
@@ -341,11 +341,11 @@ def _gap(x, low, high):
 def _end_direction(table, pool, o, i, at_end):
     """Unit direction of a piece at one of its ends, from the chord where its speed vanishes there."""
     t = pool[i + PIECE_T1] if at_end else pool[i + PIECE_T0]
-    x, y, dx, dy = _line(pool, table[o + PIECE_COEFFICIENTS], table[o + PIECE_DEGREE], t - pool[i + MIDDLE])
+    x, y, dx, dy = piece_line(pool, table[o + PIECE_COEFFICIENTS], table[o + PIECE_DEGREE], t - pool[i + MIDDLE])
     length = np.sqrt(dx * dx + dy * dy)
     if length <= 1e-9 * pool[i + BOUND_1]:
         near = t + 1e-4 * (pool[i + PIECE_T0] - pool[i + PIECE_T1]) * (1.0 if at_end else -1.0)
-        a, b, dx, dy = _line(pool, table[o + PIECE_COEFFICIENTS], table[o + PIECE_DEGREE], near - pool[i + MIDDLE])
+        a, b, dx, dy = piece_line(pool, table[o + PIECE_COEFFICIENTS], table[o + PIECE_DEGREE], near - pool[i + MIDDLE])
         dx = x - a if at_end else a - x
         dy = y - b if at_end else b - y
         length = np.sqrt(dx * dx + dy * dy)
@@ -438,7 +438,7 @@ def _foot(table, pool, trim, begin, stop, piece, t, u, v, qx, qy):
     o = table[trim + TRIM_PIECE_TABLE] + PIECE_INTS * piece
     i = table[trim + TRIM_PIECE_POOL] + PIECE_DOUBLES * piece
     size = pool[table[trim + TRIM_FRAME] + SIZE]
-    x, y, dx, dy = _line(pool, table[o + PIECE_COEFFICIENTS], table[o + PIECE_DEGREE], t - pool[i + MIDDLE])
+    x, y, dx, dy = piece_line(pool, table[o + PIECE_COEFFICIENTS], table[o + PIECE_DEGREE], t - pool[i + MIDDLE])
     ox = qx - x - pool[i + SHIFT_U]
     oy = qy - y - pool[i + SHIFT_V]
     distance = np.sqrt(ox * ox + oy * oy)
@@ -521,7 +521,7 @@ def nearest_points(table, pool, trim, first, count, u, v, out):
 def ends_of_pieces(pool, coefficients, degrees, middles, t, out):
     """Points of pieces at parameters."""
     for k in range(t.size):
-        out[k, 0], out[k, 1], _du, _dv = _line(pool, coefficients[k], degrees[k], t[k] - middles[k])
+        out[k, 0], out[k, 1], _du, _dv = piece_line(pool, coefficients[k], degrees[k], t[k] - middles[k])
 
 
 @kernel

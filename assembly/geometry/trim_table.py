@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.geometry import trim
+from assembly.geometry.crossing import first_crossing
 from assembly.geometry.curve import NurbsCurve
 from assembly.geometry.monotone import ROW, cut_curves
 from assembly.geometry.spline import (
@@ -55,6 +56,32 @@ class TrimTable:
         first = int(self.table[trim.TRIM_PIECE_TABLE])
         table[first : first + PIECE_INTS * self.pieces].reshape(-1, PIECE_INTS)[:, trim.PIECE_COEFFICIENTS] += pool_at
         return table, self.pool
+
+    def crossing(self, tolerance: float) -> tuple[int, int, Array] | None:
+        """Two boundary curves that cross, or come nearer than this part of the size, and where; None if none do."""
+        record = self.table
+        count, first = int(record[trim.TRIM_PIECES]), int(record[trim.TRIM_PIECE_POOL])
+        frame = self.pool[record[trim.TRIM_FRAME] : record[trim.TRIM_FRAME] + trim.FRAME]
+        size = float(frame[trim.SIZE])
+        low = self.pool[first : first + PIECE_DOUBLES * count].reshape(-1, PIECE_DOUBLES)[:, [0, 2]]
+        pieces, moves = np.arange(count), np.zeros((count, 2))
+        for axis in range(2):
+            period = frame[trim.PERIOD_U + axis]
+            if period:
+                # What touches the lower border of the cell meets what touches the upper one.
+                touches = low[pieces, axis] <= frame[trim.LOW_U + axis] + tolerance * size
+                pieces = np.concatenate([pieces, pieces[touches]])
+                copies = moves[touches]
+                copies[:, axis] += period
+                moves = np.concatenate([moves, copies])
+        order = np.argsort(low[pieces, 0] + moves[:, 0])
+        where = np.empty(2)
+        places = int(record[trim.TRIM_PIECE_TABLE]), first
+        a, b = first_crossing(self.table, self.pool, *places, pieces, moves, order, tolerance * size, size, where)
+        if a < 0:
+            return None
+        ints = self.table[places[0] : places[0] + PIECE_INTS * count].reshape(-1, PIECE_INTS)
+        return int(ints[a, trim.PIECE_CURVE]), int(ints[b, trim.PIECE_CURVE]), where
 
 
 def _largest_gap(low: Array, high: Array, period: float) -> float:

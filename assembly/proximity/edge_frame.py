@@ -34,7 +34,9 @@ from assembly.proximity.shell import EDGE_CURVE, EDGE_START, EDGE_SURFACE, VERTE
 FINE = 1e-13
 # Residuals below this part of the size are rounding.
 ROUNDING = 2e-15
-# A step beyond the end of an edge that is below this part of the size is rounding.
+# The same where the equations are singular: a step would be rounding over almost nothing.
+SLACK = 1e-13
+# A slope (or a length over the size) at the end of an edge that leads beyond it by less is rounding.
 BEYOND = 1e-12
 
 
@@ -118,16 +120,16 @@ def inverse(h, size, rank):
         return (i * h[3], -i * h[1], -i * h[2], i * h[0]), True
     damping = rank * size
     damping *= damping
-    # (H^T H + damping I)^-1 H^T
-    m11 = h[0] * h[0] + h[2] * h[2] + damping
-    m12 = h[0] * h[1] + h[2] * h[3]
-    m22 = h[1] * h[1] + h[3] * h[3] + damping
-    i = 1.0 / (m11 * m22 - m12 * m12)
+    # (H^T H + damping I)^-1 H^T = (det adj H + damping H^T) / (det^2 + damping |H|^2 + damping^2): nothing cancels.
+    norm2 = h[0] * h[0] + h[1] * h[1] + h[2] * h[2] + h[3] * h[3]
+    i = 1.0 / (det * det + damping * (norm2 + damping))
+    j = i * det
+    i *= damping
     return (
-        i * (m22 * h[0] - m12 * h[1]),
-        i * (m22 * h[2] - m12 * h[3]),
-        i * (m11 * h[1] - m12 * h[0]),
-        i * (m11 * h[3] - m12 * h[2]),
+        j * h[3] + i * h[0],
+        i * h[2] - j * h[1],
+        i * h[1] - j * h[2],
+        j * h[0] + i * h[3],
     ), abs(det) > rank * size * norm
 
 

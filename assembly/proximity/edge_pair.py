@@ -15,6 +15,7 @@ from assembly.proximity.edge_frame import (
     BEYOND,
     FINE,
     ROUNDING,
+    SLACK,
     across,
     edge_advance,
     edge_held,
@@ -138,35 +139,33 @@ def solve_off_face(table, pool, kind_f, f, kind_g, g, rotation, shift, x, normal
         r2 = 0.0
         if not regular:
             break
-        # At most: both free, one held, the other held, both.
-        for _ in range(3):
-            r1 = 0.0 if point_f else dot(d, t1)
-            r2 = 0.0 if point_g else dot(d, t2)
-            cosine = 0.0 if point_f or point_g else dot(t1, t2)
-            h = (
-                1.0 if point_f else 1.0 - dot(d, bent1),
-                -cosine,
-                -cosine,
-                1.0 if point_g else 1.0 + dot(d, bent2),
-            )
-            scope = 1.0 + math.sqrt(dot(d, d)) * (bend1 + bend2)
-            i, _fine = inverse(h, scope, FINE)
-            s1 = i[0] * r1 - i[1] * r2
-            s2 = i[2] * r1 - i[3] * r2
-            if limit == 0:
-                break
-            out_f = not point_f and abs(s1) > BEYOND * size and edge_held(table, pool, f, x[0], s1)
-            out_g = not point_g and abs(s2) > BEYOND * size and edge_held(table, pool, g, x[1], s2)
-            if not (out_f or out_g):
-                break
-            point_f = point_f or out_f
-            point_g = point_g or out_g
+        r1 = 0.0 if point_f else dot(d, t1)
+        r2 = 0.0 if point_g else dot(d, t2)
+        if limit > 0:
+            # At the end of an edge, and the distance would be less beyond it.
+            if abs(r1) > BEYOND * size and edge_held(table, pool, f, x[0], r1):
+                point_f = True
+                r1 = 0.0
+            if abs(r2) > BEYOND * size and edge_held(table, pool, g, x[1], -r2):
+                point_g = True
+                r2 = 0.0
+        cosine = 0.0 if point_f or point_g else dot(t1, t2)
+        h = (
+            1.0 if point_f else 1.0 - dot(d, bent1),
+            -cosine,
+            -cosine,
+            1.0 if point_g else 1.0 + dot(d, bent2),
+        )
+        scope = 1.0 + math.sqrt(dot(d, d)) * (bend1 + bend2)
+        i, fine = inverse(h, scope, FINE)
+        s1 = i[0] * r1 - i[1] * r2
+        s2 = i[2] * r1 - i[3] * r2
         step = max(abs(s1), abs(s2))
         reach_f = abs(s1) * max(bend1, 2.0 / size)
         reach_g = abs(s2) * max(bend2, 2.0 / size)
         bend = max(reach_f, reach_g)
         off = max(abs(r1), abs(r2))
-        small = off <= ROUNDING * size
+        small = off <= (ROUNDING if fine else SLACK) * size
         if small or (step <= tolerance and bend < 1e-9) or (bend < STAGNANT and step > 0.25 * previous):
             _i, isolated = inverse(h, scope, RANK)
             if point_f != (kind_f == VERTEX) or point_g != (kind_g == VERTEX):
@@ -181,10 +180,14 @@ def solve_off_face(table, pool, kind_f, f, kind_g, g, rotation, shift, x, normal
         previous = step
         factor_f = 1.0 if reach_f <= BEND else BEND / reach_f
         factor_g = 1.0 if reach_g <= BEND else BEND / reach_g
-        x = (
-            x[0] if point_f else edge_advance(table, pool, f, x[0], factor_f * s1 / speed1),
-            x[1] if point_g else edge_advance(table, pool, g, x[1], factor_g * s2 / speed2),
-        )
+        t = x[0] if point_f else edge_advance(table, pool, f, x[0], factor_f * s1 / speed1)
+        s = x[1] if point_g else edge_advance(table, pool, g, x[1], factor_g * s2 / speed2)
+        status = NOT_CONVERGED
+        if t == x[0] and s == x[1]:
+            # Held at an end and nothing else moves: the pair has left.
+            status = LEFT_PATCH
+            break
+        x = (t, s)
         iteration += 1
     _i, isolated = inverse(h, scope, RANK)
     frame = straight_frame(

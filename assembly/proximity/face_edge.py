@@ -22,6 +22,7 @@ from assembly.proximity.edge_frame import (
     BEYOND,
     FINE,
     ROUNDING,
+    SLACK,
     edge_advance,
     edge_held,
     edge_limits,
@@ -49,6 +50,8 @@ from assembly.proximity.shell import EDGE, VERTEX
 
 # A curve is steep where the part of its tangent along a face is below this (squared, of its length squared).
 STEEP = 1e-12
+# Where nothing is isolated, a residual below this (over the size, or a tilt) is none.
+LEVEL = 1e-9
 
 
 @kernel(inner=True)
@@ -105,7 +108,11 @@ def solve_on_face(table, pool, face, kind, other, rotation, shift, x, size, turn
         if not regular:
             # An apex, a crease or a cusp: there is no tangent to go on.
             break
-        fine = True
+        stuck = False
+        slide = False
+        if not point and limit > 0 and (steep or abs(tilt) > BEYOND):
+            # At the end of the edge, and the gap would be less beyond it.
+            point = edge_held(table, pool, other, x[2], -slope)
         if not point:
             unit = max(bound, abs(k))
             # The first row times the tangent, the second across it.
@@ -124,22 +131,19 @@ def solve_on_face(table, pool, face, kind, other, rotation, shift, x, size, turn
             ay = i[2] * s0 + i[3] * s1
             bx = k11 * ax + k12 * ay - r0
             by = k12 * ax + k22 * ay - r1
-            along = c0 * bx + c1 * by
-            dt = along / speed
-            slide = steep or (not fine and abs(tilt) > 1e-9)
-            if slide and limit > 0:
+            dt = (c0 * bx + c1 * by) / speed
+            slide = limit > 0 and (steep or (not fine and abs(tilt) >= LEVEL))
+            if slide:
                 # No point of the edge is extremal: on to the end where the gap is less.
                 lo, hi, endless = edge_limits(table, pool, other)
                 if endless:
                     break
                 dt = lo - hi if slope > 0.0 else hi - lo
-                along = size
-            if limit > 0 and abs(along) > BEYOND * size and edge_held(table, pool, other, x[2], dt):
-                point = True
-                dt = 0.0
+            stuck = edge_held(table, pool, other, x[2], dt)
         if point:
             unit = bound
             tilt = 0.0
+            dt = 0.0
             h = (unit * k11, unit * k12, unit * k12, unit * k22)
             i, fine = inverse(h, unit * (1.0 + abs(beta) * unit), FINE)
             ax = unit * (i[0] * r0 + i[1] * r1)
@@ -155,10 +159,11 @@ def solve_on_face(table, pool, face, kind, other, rotation, shift, x, size, turn
         bend_g = 0.0 if point or slide else step_g * max(bent, 2.0 / size)
         bend = max(bend_f, bend_g)
         off = max(abs(r0), abs(r1))
-        small = off <= ROUNDING * size and abs(tilt) <= ROUNDING
+        level = ROUNDING if fine else SLACK
+        small = off <= level * size and abs(tilt) <= level
         if small or (step <= tolerance and bend < 1e-9) or (bend < STAGNANT and step > 0.25 * previous):
             _i, isolated = inverse(h, unit * (1.0 + abs(beta) * unit), RANK)
-            done = abs(tilt) < 1e-9 and off < 1e-9 * size
+            done = abs(tilt) < LEVEL and off < LEVEL * size
             if point and kind == EDGE:
                 status = LEFT_PATCH
             elif isolated:
@@ -176,9 +181,9 @@ def solve_on_face(table, pool, face, kind, other, rotation, shift, x, size, turn
         u, v, clamped = advance(table, pool, face, x[0], x[1], du, dv, blend(factor_f * ax, tx, factor_f * ay, ty))
         t = x[2] if point else edge_advance(table, pool, other, x[2], factor_g * dt)
         status = NOT_CONVERGED
-        if clamped:
+        if clamped or stuck:
             status = LEFT_PATCH
-            # Held at the end of the patch and nothing else moves: the pair has left.
+            # Held at an end and nothing else moves: the pair has left.
             if abs(u - x[0]) + abs(v - x[1]) + abs(t - x[2]) <= 1e-12 * (abs(du) + abs(dv) + abs(dt)):
                 break
         x = (u, v, t)
