@@ -73,8 +73,9 @@ def track_solids(table, pool, shell_f, shell_g, i, j, q, start, patience, record
 def search_solids(table, pool, shell_f, shell_g, i, j, q, tracked, r):
     """The closest features wherever they are, into tracked[r]. Returns whether there are any."""
     relative, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
-    status, feature_f, feature_g, x, n, _gap = nearest_features(table, pool, shell_f, shell_g, relative, shift, 1.0)
-    write_tracked(x, feature_f, feature_g, n, tracked, r)
+    status, feature_f, feature_g, x, _gap = nearest_features(table, pool, shell_f, shell_g, relative, shift, 1.0)
+    # The normal is not known before the pair is tracked.
+    write_tracked(x, feature_f, feature_g, (0.0, 0.0, 0.0), tracked, r)
     return status == CONVERGED or status == SINGULAR
 
 
