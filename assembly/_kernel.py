@@ -27,13 +27,13 @@ import numba
 import numpy as np
 from llvmlite import ir
 from numba import njit, types
-from numba.core import caching, config, serialize
+from numba.core import caching, cgutils, config, serialize
 from numba.core.compiler import CompileResult
 from numba.core.datamodel import models
 from numba.core.typing.templates import infer, infer_global, make_overload_template
 from numba.extending import intrinsic, overload, register_model
 
-__all__ = ["kernel", "lane", "load_lanes", "store_xyz"]
+__all__ = ["address_of", "call_address", "kernel", "lane", "load_lanes", "store_xyz"]
 
 _PACKAGE = Path(__file__).resolve().parent
 _LOG = logging.getLogger("assembly")
@@ -258,6 +258,35 @@ def kernel(
 
 
 # ------------------------------------------------------------------------------------------------
+# Kernels called by address. What calls another kernel is optimized together with it, as often as it is called; a
+# large kernel that is rarely needed is compiled for itself, and its caller is given the address of its machine code.
+
+_ADDRESSED: dict[int, Callable[..., int]] = {}
+
+
+def address_of(entry: Any, *examples: Any) -> int:
+    """The address of a kernel that is an entry, compiled for arguments of the types of these examples.
+
+    It returns an integer. Only for this process: not to be kept in a file.
+    """
+    if config.DISABLE_JIT:
+        address = id(entry)
+        _ADDRESSED[address] = entry
+        return address
+    signature = tuple(numba.typeof(example) for example in examples)
+    entry.compile(signature)
+    compiled = entry.overloads[signature]
+    address = int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name))
+    _ADDRESSED[address] = entry
+    return address
+
+
+def call_address(address: int, arguments: tuple[Any, ...]) -> int:
+    """Call the kernel at an address that `address_of` gave; the arguments have the types of its examples."""
+    return int(_ADDRESSED[int(address)](*arguments))
+
+
+# ------------------------------------------------------------------------------------------------
 # Four lanes: (x, y, z, w) as one vector value. Without JIT the same names work on numpy 4-vectors.
 
 
@@ -292,6 +321,19 @@ if config.DISABLE_JIT:
         array[offset : offset + 3] = value[:3]
 
 else:
+
+    @intrinsic
+    def _call(_typing: Any, address: Any, arguments: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+            kinds = [context.get_value_type(kind) for kind in signature.args[1]]
+            function = ir.FunctionType(ir.IntType(64), kinds).as_pointer()
+            return builder.call(builder.inttoptr(values[0], function), cgutils.unpack_tuple(builder, values[1]))
+
+        return types.int64(address, arguments), generate
+
+    @overload(call_address)
+    def _call_address(address, arguments):  # type: ignore[no-untyped-def]  # Numba compares the two signatures
+        return lambda address, arguments: _call(address, arguments)
 
     @intrinsic
     def load_lanes(_typing: Any, array: Any, offset: Any) -> Any:

@@ -52,7 +52,7 @@ class Assembly:
     weights' ratios aside, and starts may change between solves without packing again.
     """
 
-    _loaded: ClassVar[set[tuple[int | None, int | None]]] = set()  # which kernels this process has
+    _loaded: ClassVar[set[int | None]] = set()  # which kernels this process has
 
     def __init__(self, bodies: Iterable[Body] = ()) -> None:
         self._bodies: list[Body] = []
@@ -205,23 +205,23 @@ class Assembly:
         state = self._start(packed, q0, starts)
         history = np.empty((min(int(settings[ITERATIONS]), MOST_HISTORY) + 1, HISTORY))
         arguments = (packed.table, packed.pool)
-        kinds = (packed.tips, packed.solids)
-        if kinds not in Assembly._loaded:
+        tips = packed.tips
+        if tips not in Assembly._loaded:
             # Loading the kernel, or compiling it, is no part of a solve's time.
-            solve_program(*arguments, _LOADING, state.copy(), history, *kinds)
-            Assembly._loaded.add(kinds)
+            solve_program(*arguments, _LOADING, state.copy(), history, tips)
+            Assembly._loaded.add(tips)
         gathers = not warm and not self._objectives
         if gathers:
             settings = settings.copy()
             settings[GATHER] = 1.0
         begin = perf_counter()
-        code = solve_program(*arguments, settings, state, history, *kinds)
+        code = solve_program(*arguments, settings, state, history, tips)
         if code != 0 and not gathers and state[packed.results_at + SCATTER] == 1.0:
             # What the start itself did not lead to may be reached from gathered bodies.
             settings = settings.copy()
             settings[GATHER] = 1.0
             other, rows = self._start(packed, q0, starts), np.empty_like(history)
-            if solve_program(*arguments, settings, other, rows, *kinds) == 0:
+            if solve_program(*arguments, settings, other, rows, tips) == 0:
                 code, state, history = 0, other, rows
         solution = Solution(self._scene, packed, state, _STATUSES[code], perf_counter() - begin, history)
         if verbose:

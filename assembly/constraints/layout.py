@@ -17,15 +17,15 @@ loop works on
 
 from __future__ import annotations
 
-from assembly.proximity.velocity import RECORD
-
 # Header of the table: counts, then where its parts begin; whether nobody asked for the
 # objective, and how many of its terms are dexterities.
 BODIES, MOVING, CONTACTS, TRACKED, JOINTS, ROWS, TAPES, TERMS, EXTRA = 0, 1, 2, 3, 4, 5, 6, 7, 8
 SLOTS, ROW_TABLE, JOINT_TABLE, TAPE_TABLE, TERM_TABLE, TAPE_ROOM, GATHER_TABLE = 9, 10, 11, 12, 13, 14, 15
 IMPLICIT, DEXTERITIES = 16, 17
 # Rows of trims follow those of contacts; whether some are vectors, which take a record of their own.
-TRIMS, VECTOR_TRIMS, HEADER = 18, 19, 20
+TRIMS, VECTOR_TRIMS = 18, 19
+# Addresses of kernels that few scenes need (`_kernel.call_address`).
+TRACK_AT, SEARCH_AT, TRIM_ROWS_AT, TRIM_TERMS_AT, HEADER = 20, 21, 22, 23, 24
 # A row: kind, its two bodies (-1: none), whether it is one-sided (residual >= 0), whether it prescribes a freedom, and
 # whether its residual is a length. Row k is that of contact k.
 ROW = 14
@@ -37,6 +37,8 @@ SURFACE_F, SURFACE_G, SHELL_F, SHELL_G = 6, 7, 8, 9
 # has (its first one says), the records of the loop's curves as edges, whether rows of vectors are one-sided.
 TRIM_PAIR, TRIM_SIDE, TRIM_LOOP, TRIM_FACTOR = 6, 7, 8, 9
 TRIM_FORM, TRIM_COUNT, TRIM_EDGES, TRIM_ONE_SIDED = 10, 11, 12, 13
+# Its forms (`trim_rows.py`).
+SIGNED, PARAMETRIC, CARTESIAN, BETWEEN = 0, 1, 2, 3
 # Of a joint: kind and component of the coordinate, the joint that has its frames, where its angle is tracked (-1: it is
 # none), where its factor, the second factor and the value are in the pool, and a second coordinate with its bodies.
 COORDINATE, COMPONENT, JOINT, ANGLE, PARAMETERS, SECOND = 6, 7, 8, 9, 10, 11
@@ -52,8 +54,6 @@ TAPE_RECORD = 8
 TAPE_FIRST, TAPE_SECOND, TAPE_VALUES, TAPE_BODIES, TAPE_LIST, TAPE_ROW_AT, TAPE_SCALE = 0, 1, 2, 3, 4, 5, 6
 # Columns of the Jacobian: twists of f and g, a free pair's coordinates, further bodies.
 FREE_COLUMN, EXTRA_COLUMN = 12, 16
-# Behind a contact's record: whether the surfaces do not cross at it, and how far it is from a fold (det H / |H|^2).
-PROPER, FOLD, CONTACT_RECORD = RECORD, RECORD + 1, RECORD + 2
 # Header of the pool.
 # length scale, reference point (1 to 3), unit of the objective: what its scaled value counts in the user's units.
 SCALE, REFERENCE, UNIT, POOL_HEADER = 0, 1, 4, 8

@@ -8,6 +8,7 @@ from math import prod, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._kernel import address_of
 from assembly.constraints import layout, tape, terms
 from assembly.constraints.constraint import Constraint, Coordinate, Equation, FramePair, structure_changes
 from assembly.constraints.contact import Contact
@@ -21,6 +22,7 @@ from assembly.constraints.primitives import AZIMUTH, TURN, place_frames
 from assembly.constraints.primitives import RECORD as JOINT_FRAMES
 from assembly.constraints.primitives import coordinate as coordinate_value
 from assembly.constraints.trim_contact import FORMS, TrimContact
+from assembly.constraints.trim_rows import trim_rows, trim_terms
 from assembly.constraints.turns import Turns
 from assembly.errors import InputError
 from assembly.geometry.face import Face
@@ -32,7 +34,7 @@ from assembly.proximity.pairs import OFFSETS
 from assembly.proximity.shell import EDGE_CURVE, EDGE_END, EDGE_RECORD, EDGE_START, EDGE_SURFACE
 from assembly.proximity.shell_packing import pack_shell
 from assembly.proximity.solid import solid_of
-from assembly.proximity.solid_contact import TRACK
+from assembly.proximity.solid_contact import TRACK, search_solids, track_solids
 
 __all__ = ["Packed", "pack", "structure_of"]
 
@@ -94,8 +96,6 @@ class Packed:
         self._header[layout.IMPLICIT] = int(implicit)
         # What the loop is compiled for: None without a dexterity.
         self.tips = 1 if self._header[layout.DEXTERITIES] else None
-        # And None where every contact is of two lone faces without boundary.
-        self.solids = 1 if self.shells or self._header[layout.TRIMS] else None
         self.table = np.concatenate(self._table)
         self.pool = np.concatenate(self._pool)
         self._sources = [item for item in self._values if item[0].source is not None]
@@ -201,6 +201,7 @@ class Packed:
         header[layout.EXTRA] = extra
         header[layout.TERMS] = len(terms_)
         header[layout.DEXTERITIES] = sum(term[0] == terms.DEXTERITY for term in terms_)
+        self._addresses(header)
         self._table[0] = header
         table = np.array([row[:6] for row in rows], dtype=np.int64).reshape(-1, 6)
         self.owners = np.array(owners, dtype=np.int64)
@@ -212,6 +213,20 @@ class Packed:
         trims = np.flatnonzero(kinds == layout.TRIM_ROW)
         self.pairs[trims] = [rows[r][layout.TRIM_PAIR] for r in trims]
         self.spans = [np.flatnonzero(self.owners == k) for k in range(len(constraints))]
+
+    def _addresses(self, header: Table) -> None:
+        """Where the kernels are that only contacts of solids, or trims, ask for."""
+        i8, f8, row, block = np.int64(0), 0.0, np.zeros(1), np.zeros((1, 1))
+        places = np.zeros(1, dtype=np.int64)
+        packed = (places, row)
+        if self.shells:
+            header[layout.TRACK_AT] = address_of(track_solids, *packed, *[i8] * 4, block, block, f8, block, block, i8)
+            header[layout.SEARCH_AT] = address_of(search_solids, *packed, i8, i8, i8, i8, block, block, i8)
+        if header[layout.TRIMS]:
+            header[layout.TRIM_ROWS_AT] = address_of(trim_rows, *packed, places, block, block, block, block, row, block)
+            header[layout.TRIM_TERMS_AT] = address_of(
+                trim_terms, *packed, i8, places, block, block, block, f8, f8, block
+            )
 
     def _gathering(self, bodies: Sequence[Body], rows: list[list[int]]) -> int:
         """Pack the order in which scattered bodies are put together; where it begins."""

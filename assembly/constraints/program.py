@@ -10,15 +10,13 @@ import math
 
 import numpy as np
 
-from assembly._kernel import kernel
+from assembly._kernel import call_address, kernel
 from assembly.constraints.layout import (
     BODY_F,
     BODY_G,
-    CONTACT_RECORD,
     CONTACTS,
     COORDINATE,
     EXTRA_COLUMN,
-    FOLD,
     JOINT_RECORD,
     JOINT_ROW,
     JOINT_TABLE,
@@ -27,15 +25,16 @@ from assembly.constraints.layout import (
     MOVING,
     ONE_SIDED,
     PARAMETERS,
-    PROPER,
     REFERENCE,
     ROW,
     ROW_TABLE,
     ROWS,
     SCALE,
+    SEARCH_AT,
     SECOND,
     SHELL_F,
     SHELL_G,
+    SIGNED,
     SLOTS,
     SURFACE_F,
     SURFACE_G,
@@ -49,19 +48,21 @@ from assembly.constraints.layout import (
     TAPE_TABLE,
     TAPE_VALUES,
     TAPES,
+    TRACK_AT,
     TRACKED,
     TRIM_FORM,
     TRIM_PAIR,
+    TRIM_ROWS_AT,
+    TRIM_TERMS_AT,
     TRIMS,
 )
 from assembly.constraints.primitives import add_coordinate_hessian, coordinate, place_frames, write_gradient
 from assembly.constraints.tape import run_tape
-from assembly.constraints.trim_rows import SIGNED, add_trim_terms, trim_rows
 from assembly.geometry.vec import dot, sub
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.extremal import CLOSE, CONVERGED, LEFT_PATCH, SINGULAR, solve_pair
 from assembly.proximity.free_pair import VARIABLES, free_hessian, free_rows
-from assembly.proximity.solid_contact import FEATURE_F, TRACK, search_solids, track_solids
+from assembly.proximity.solid_contact import CONTACT_RECORD, FEATURE_F, FOLD, PROPER, TRACK
 from assembly.proximity.start import global_start
 from assembly.proximity.switching import feature_at
 from assembly.proximity.velocity import GAP, add_gap_terms, gradient_row, store_record
@@ -103,6 +104,29 @@ def restart_contact(table, pool, row, q, records, k):
 
 
 @kernel(inner=True)
+def search_row(table, pool, row, q, tracked, r):
+    """The closest features of the solids of a row wherever they are, into tracked[r]. Whether there are any."""
+    shell_f = table[row + SHELL_F]
+    shell_g = table[row + SHELL_G]
+    i = table[row + BODY_F]
+    j = table[row + BODY_G]
+    return call_address(table[SEARCH_AT], (table, pool, shell_f, shell_g, i, j, q, tracked, r)) == 1
+
+
+@kernel(inner=True)
+def track_row(table, pool, row, q, start, patience, records, tracked, r):
+    """The features of the solids of a row from start[r] on, into tracked[r] and record r. Whether they were found."""
+    shell_f = table[row + SHELL_F]
+    shell_g = table[row + SHELL_G]
+    i = table[row + BODY_F]
+    j = table[row + BODY_G]
+    status = call_address(
+        table[TRACK_AT], (table, pool, shell_f, shell_g, i, j, q, start, patience, records, tracked, r)
+    )
+    return status == CONVERGED or status == SINGULAR
+
+
+@kernel(inner=True)
 def solids_row(table, pool, r, start, patience, point):
     """Row r, of a contact of solids. Returns whether its pair was found.
 
@@ -111,20 +135,12 @@ def solids_row(table, pool, r, start, patience, point):
     """
     q, tracked, records, residual, jacobian = point
     row = table[ROW_TABLE] + ROW * r
-    i = table[row + BODY_F]
-    j = table[row + BODY_G]
-    shell_f = table[row + SHELL_F]
-    shell_g = table[row + SHELL_G]
-    found, proper, fold = track_solids(table, pool, shell_f, shell_g, i, j, q, start, patience, records, tracked, r)
+    found = track_row(table, pool, row, q, start, patience, records, tracked, r)
     if not found and (table[row + ONE_SIDED] == 1 or patience == math.inf):
-        found = search_solids(table, pool, shell_f, shell_g, i, j, q, tracked, r)
+        found = search_row(table, pool, row, q, tracked, r)
         if found:
-            found, proper, fold = track_solids(
-                table, pool, shell_f, shell_g, i, j, q, tracked, math.inf, records, tracked, r
-            )
+            found = track_row(table, pool, row, q, tracked, math.inf, records, tracked, r)
     if found:
-        records[r, PROPER] = proper
-        records[r, FOLD] = fold
         residual[r] = records[r, GAP]
         gradient_row(records, r, jacobian, r)
     return found
@@ -140,20 +156,20 @@ def surface_of(table, row, side, tracked, r):
 
 
 @kernel(inner=True)
-def contact_row(table, pool, r, start, patience, loose, point, solids):
+def contact_row(table, pool, r, start, patience, loose, point):
     """Row r, of contact r. Returns whether its pair was found.
 
     A tracked contact is carried from `start` to its extremal pair, by steps that turn no normal by more than
     `patience`. A free one (free[r] >= 0, its place among the free ones) is evaluated at `start` itself, and its four
     rows of tangency follow the rows of the program. A one-sided row that loses its pair takes the
-    nearest one there is. `solids` is None where all contacts are of lone faces without boundary.
+    nearest one there is.
     """
     q, tracked, records, residual, jacobian = point
     free = loose[0]
     lengths = loose[1]
     row = table[ROW_TABLE] + ROW * r
-    if solids is not None:
-        if free[r] < 0 and table[row + SHELL_F] >= 0:
+    if table[row + SHELL_F] >= 0:
+        if free[r] < 0:
             return solids_row(table, pool, r, start, patience, point)
         for i in range(FEATURE_F, TRACK):
             tracked[r, i] = start[r, i]
@@ -183,8 +199,8 @@ def contact_row(table, pool, r, start, patience, loose, point, solids):
         free_rows(
             table,
             pool,
-            table[row + SURFACE_F] if solids is None else surface_of(table, row, 0, tracked, r),
-            table[row + SURFACE_G] if solids is None else surface_of(table, row, 1, tracked, r),
+            surface_of(table, row, 0, tracked, r),
+            surface_of(table, row, 1, tracked, r),
             table[row + BODY_F],
             table[row + BODY_G],
             q,
@@ -277,26 +293,19 @@ def tape_rows(table, pool, tape, q, room, residual, jacobian):
 
 
 @kernel(inner=True)
-def more_rows(table, pool, loose, point, solids):
-    """Rows of trims; `solids` is None where there are none, and nothing of them is compiled."""
-    if solids is not None:
-        trim_rows(table, pool, loose, point)
-
-
-@kernel(inner=True)
 def evaluate(table, pool, start, patience, loose, room, point):
     """Evaluate all rows at the point's poses. Returns the contact whose pair was lost, or -1.
 
     `start` are the tracked values to begin from. `point` is (poses, tracked values, records, residual, Jacobian); all
-    but the poses are written. `loose` is what pairs need: (places of the free ones, lengths, room, ..., solids).
+    but the poses are written. `loose` is what pairs need: (places of the free ones, lengths, room, ...).
     """
     q, tracked, records, residual, jacobian = point
     pairs = table[CONTACTS]
     for r in range(pairs):
-        if not contact_row(table, pool, r, start, patience, loose, point, loose[5]):
+        if not contact_row(table, pool, r, start, patience, loose, point):
             return r
     if table[TRIMS] > 0:
-        more_rows(table, pool, loose, point, loose[5])
+        call_address(table[TRIM_ROWS_AT], (table, pool, loose[0], loose[1], q, tracked, records, residual, jacobian))
     for k in range(pairs, table[TRACKED]):
         # Of an angle that no row has, only an input of a dexterity, this is all that is known.
         tracked[k, 0] = start[k, 0]
@@ -335,7 +344,7 @@ def add_gram(bases, jacobian, r, weight, hessian):
 def add_free_terms(table, pool, r, loose, point, y, weights, hessian):
     """As `add_row_terms`, for the row of a free pair and its rows of tangency."""
     q, tracked, _records, _residual, jacobian = point
-    free, lengths, vectors, block, _guess, solids = loose
+    free, lengths, vectors, block, _guess = loose
     row = table[ROW_TABLE] + ROW * r
     f = 6 * table[table[SLOTS] + table[row + BODY_F]]
     g = 6 * table[table[SLOTS] + table[row + BODY_G]]
@@ -344,8 +353,8 @@ def add_free_terms(table, pool, r, loose, point, y, weights, hessian):
     free_hessian(
         table,
         pool,
-        table[row + SURFACE_F] if solids is None else surface_of(table, row, 0, tracked, r),
-        table[row + SURFACE_G] if solids is None else surface_of(table, row, 1, tracked, r),
+        surface_of(table, row, 0, tracked, r),
+        surface_of(table, row, 1, tracked, r),
         table[row + BODY_F],
         table[row + BODY_G],
         q,
@@ -409,7 +418,10 @@ def add_row_terms(table, pool, loose, room, bases, point, y, weights, hessian):
     for r in range(pairs, pairs + table[TRIMS]):
         row = table[ROW_TABLE] + ROW * r
         if table[row + TRIM_FORM] == SIGNED and loose[0][table[row + TRIM_PAIR]] >= 0:
-            add_trim_terms(table, pool, r, loose, point, y[r], weights[r], hessian)
+            call_address(
+                table[TRIM_TERMS_AT],
+                (table, pool, r, loose[0], loose[1], point[1], jacobian, y[r], weights[r], hessian),
+            )
         elif weights[r] != 0.0:
             add_gram(bases, jacobian, r, weights[r], hessian)
     for r in range(pairs + table[TRIMS], table[ROWS]):

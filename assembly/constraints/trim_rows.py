@@ -10,7 +10,7 @@ a curve (appendix A, corrected):
 
 in the axes of the face's body, where f(u) and f(c) have no rates of their own. At a solution they depend on one
 another (the loop's extremum is then the contact's), and of their second derivatives nothing is kept. One-sided ones
-are zero on the right side of the loop.
+are zero on the right side of the loop. The loop of a solve calls the two kernels at the end by their addresses.
 """
 
 from __future__ import annotations
@@ -21,12 +21,15 @@ from assembly._kernel import kernel
 from assembly.constraints.layout import (
     BODY_F,
     BODY_G,
+    CARTESIAN,
     CONTACTS,
     FREE_COLUMN,
     JOINTS,
     MOVING,
+    PARAMETRIC,
     ROW,
     ROW_TABLE,
+    SIGNED,
     SURFACE_F,
     SURFACE_G,
     TRIM_COUNT,
@@ -49,8 +52,6 @@ from assembly.proximity.shell import EDGE, EDGE_CURVE, EDGE_RECORD, FACE
 from assembly.proximity.switching import on_surface
 from assembly.proximity.trim_distance import trim_distance
 from assembly.proximity.velocity import RATES, ZED
-
-SIGNED, PARAMETRIC, CARTESIAN, BETWEEN = 0, 1, 2, 3
 
 
 @kernel(inner=True)
@@ -211,9 +212,11 @@ def vector_rows(table, pool, first, loose, point):
             add_rate(records, scratch, o, -slope, jacobian, r)
 
 
-@kernel(inner=True)
-def trim_rows(table, pool, loose, point):
-    """All rows of trims."""
+@kernel
+def trim_rows(table, pool, free, lengths, q, tracked, records, residual, jacobian):
+    """All rows of trims, and their gradients."""
+    loose = (free, lengths)
+    point = (q, tracked, records, residual, jacobian)
     r = table[CONTACTS]
     while r < table[CONTACTS] + table[TRIMS]:
         row = table[ROW_TABLE] + ROW * r
@@ -222,14 +225,12 @@ def trim_rows(table, pool, loose, point):
         else:
             vector_rows(table, pool, r, loose, point)
         r += table[row + TRIM_COUNT]
+    return 0
 
 
-@kernel(inner=True)
-def add_trim_terms(table, pool, r, loose, point, y, weight, hessian):
+@kernel
+def trim_terms(table, pool, r, free, lengths, tracked, jacobian, y, weight, hessian):
     """Upper triangle of hessian += y (second derivative) + weight (gradient gradient^T), of a signed row."""
-    tracked = point[1]
-    jacobian = point[4]
-    free, lengths, _vectors, _block, _guess, _solids = loose
     row = table[ROW_TABLE] + ROW * r
     k = table[row + TRIM_PAIR]
     o = 2 * table[row + TRIM_SIDE]
@@ -242,3 +243,4 @@ def add_trim_terms(table, pool, r, loose, point, y, weight, hessian):
             hessian[at + i, at + j] += weight * jacobian[r, FREE_COLUMN + o + i] * jacobian[
                 r, FREE_COLUMN + o + j
             ] + bend * flat / (lengths[k, o + i] * lengths[k, o + j])
+    return 0

@@ -2,6 +2,8 @@
 
 Of every contact a solve keeps `TRACK` numbers: the coordinates of the pair (4), the two features, and the normal in the
 axes of body f, which tells on which side of each other two edges are where they touch.
+
+The kernels here are large, and few scenes need them: loops call them by address (`_kernel.call_address`).
 """
 
 from __future__ import annotations
@@ -15,10 +17,13 @@ from assembly.geometry.vec import add, matvec
 from assembly.kinematics.motion import position, relative_pose, rotation
 from assembly.proximity.extremal import CONVERGED, SINGULAR
 from assembly.proximity.feature_pair import feature_record
-from assembly.proximity.nearest import nearest_features
+from assembly.proximity.nearest import APART, nearest_features
 from assembly.proximity.switching import track_features
+from assembly.proximity.velocity import RECORD
 
 FEATURE_F, FEATURE_G, PAIR_NORMAL, TRACK = 4, 5, 6, 9
+# Behind a record: whether surfaces do not cross at the pair, and how far it is from a fold.
+PROPER, FOLD, CONTACT_RECORD = RECORD, RECORD + 1, RECORD + 2
 
 
 @kernel(inline=True)
@@ -31,7 +36,7 @@ def write_tracked(x, feature_f, feature_g, n, tracked, r):
         tracked[r, PAIR_NORMAL + i] = n[i]
 
 
-@kernel(inline=True)
+@kernel(inner=True)
 def track_row(table, pool, shell_f, shell_g, relative, shift, start, r, patience):
     """`track_features` from the tracked values start[r]."""
     return track_features(
@@ -50,44 +55,42 @@ def track_row(table, pool, shell_f, shell_g, relative, shift, start, r, patience
     )
 
 
-@kernel(inner=True)
+@kernel
 def track_solids(table, pool, shell_f, shell_g, i, j, q, start, patience, records, tracked, r):
-    """Newton and switching from the tracked values start[r]; fills record r and tracked[r].
+    """Newton and switching from the tracked values start[r]; fills record r and tracked[r]. Returns the status.
 
-    Bodies i and j stand as q says. Returns whether it succeeded, whether the surfaces do not cross, and how far the
-    pair is from a fold.
+    Bodies i and j stand as q says; no step turns a normal by more than `patience`.
     """
     turn = rotation(q, i)
     relative, shift = relative_pose(q, i, turn, j, rotation(q, j))
     status, feature_f, feature_g, x, frame, _switches = track_row(
         table, pool, shell_f, shell_g, relative, shift, start, r, patience
     )
-    if status != CONVERGED and status != SINGULAR:
-        return False, 0.0, 0.0
-    feature_record(turn, shift, frame, records, r)
-    write_tracked(x, feature_f, feature_g, frame[0], tracked, r)
-    return True, 1.0 if frame[14] else 0.0, frame[15]
+    if status == CONVERGED or status == SINGULAR:
+        feature_record(turn, shift, frame, records, r)
+        records[r, PROPER] = 1.0 if frame[14] else 0.0
+        records[r, FOLD] = frame[15]
+        write_tracked(x, feature_f, feature_g, frame[0], tracked, r)
+    return status
 
 
-@kernel(inner=True)
+@kernel
 def search_solids(table, pool, shell_f, shell_g, i, j, q, tracked, r):
     """The closest features wherever they are, into tracked[r]. Returns whether there are any."""
     relative, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
     status, feature_f, feature_g, x, _gap = nearest_features(table, pool, shell_f, shell_g, relative, shift, 1.0)
     # The normal is not known before the pair is tracked.
     write_tracked(x, feature_f, feature_g, (0.0, 0.0, 0.0), tracked, r)
-    return status == CONVERGED or status == SINGULAR
+    return 1 if status == APART else 0
 
 
 @kernel
 def solid_pair(table, pool, shell_f, shell_g, q, tracked, out):
-    """One pair for Python: from tracked[0], or the closest one where that is NaN; tracked[0] is overwritten.
+    """The pair tracked in row 0, for Python.
 
     q : (2, 7), poses of f and g. out: point of f (3), point of g (3), normal (3), all in world axes, gap. Returns the
     status.
     """
-    if math.isnan(tracked[0, 0]):
-        search_solids(table, pool, shell_f, shell_g, 0, 1, q, tracked, 0)
     turn = rotation(q, 0)
     relative, shift = relative_pose(q, 0, turn, 1, rotation(q, 1))
     status, feature_f, feature_g, x, frame, _switches = track_row(

@@ -26,11 +26,9 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly.constraints.layout import (
     BODIES,
-    CONTACT_RECORD,
     CONTACTS,
     EXTRA,
     EXTRA_COLUMN,
-    FOLD,
     IMPLICIT,
     JOINTS,
     MOVING,
@@ -45,7 +43,7 @@ from assembly.constraints.layout import (
 from assembly.constraints.program import add_row_terms, evaluate
 from assembly.constraints.terms import objective, recenter
 from assembly.proximity.free_pair import VARIABLES, VECTORS
-from assembly.proximity.solid_contact import TRACK
+from assembly.proximity.solid_contact import CONTACT_RECORD, FOLD, TRACK
 from assembly.solve.contacts import free_folds, start_contacts
 from assembly.solve.gather import gather, scattered
 from assembly.solve.linear import factorize_shifted
@@ -93,11 +91,10 @@ def unknowns(n):
 
 
 @kernel
-def solve_program(table, pool, settings, state, history, tips, solids):
+def solve_program(table, pool, settings, state, history, tips):
     """Solve in place. State: q (n, 7) | tracked (k, 4) | multipliers (m) | residuals (m) | results.
 
-    `tips` is None where no term of the objective is a dexterity, `solids` where all contacts are of lone faces without
-    boundary.
+    `tips` is None where no term of the objective is a dexterity.
     """
     bodies = table[BODIES]
     pairs = table[CONTACTS]
@@ -158,7 +155,6 @@ def solve_program(table, pool, settings, state, history, tips, solids):
         np.empty((VECTORS if pairs > 0 else 0, 3, VARIABLES)),
         np.empty((VARIABLES if pairs > 0 else 0, VARIABLES)),
         tracked[2],
-        solids,
     )
     place_rows(table, free, bases, one_sided)
     envelope(table, bases, rows, n, last, last_row)
@@ -191,8 +187,8 @@ def solve_program(table, pool, settings, state, history, tips, solids):
     status = RUNNING
     results[CULPRIT] = -1.0
 
-    lost = start_contacts(table, pool, here[0], here[1], free, loose[1], solids)
-    count = free_folds(table, pool, here[2], here[1], active, free, loose[1], -1.0, -1, solids)
+    lost = start_contacts(table, pool, here[0], here[1], free, loose[1])
+    count = free_folds(table, pool, here[2], here[1], active, free, loose[1], -1.0, -1)
     if lost < 0 and count == 0:
         lost = evaluate(table, pool, here[1], math.inf, loose, room, here)
     if lost >= 0:
@@ -204,7 +200,7 @@ def solve_program(table, pool, settings, state, history, tips, solids):
         gather(table, pool, bases, table[SLOTS], here)
         for k in range(pairs):
             here[1][k, 0] = math.nan
-        start_contacts(table, pool, here[0], here[1], free, loose[1], solids)
+        start_contacts(table, pool, here[0], here[1], free, loose[1])
         if table[IMPLICIT] == 1:
             recenter(table, pool, here[0])
         for r in range(m):
@@ -219,7 +215,7 @@ def solve_program(table, pool, settings, state, history, tips, solids):
     while status == RUNNING:
         weigh_rows(rows, one_sided, here[3], y, mu, forces, active)
         if pairs > 0:
-            count = free_folds(table, pool, here[2], here[1], active, free, loose[1], below, lost, solids)
+            count = free_folds(table, pool, here[2], here[1], active, free, loose[1], below, lost)
         if m + 4 * count != rows:
             for r in range(rows, most):
                 # New rows of tangency say nothing yet: least squares leave them out.

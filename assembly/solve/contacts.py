@@ -4,33 +4,29 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from assembly._kernel import kernel
 from assembly.constraints.layout import (
     BODY_F,
     BODY_G,
     CONTACTS,
-    FOLD,
     ONE_SIDED,
     ROW,
     ROW_TABLE,
     SHELL_F,
     SHELL_G,
+    SIGNED,
     SURFACE_F,
     SURFACE_G,
     TRIM_FORM,
     TRIM_PAIR,
     TRIMS,
 )
-from assembly.constraints.program import surface_of
-from assembly.constraints.trim_rows import SIGNED
-from assembly.geometry.trim import trim_side
+from assembly.constraints.program import search_row, surface_of, track_row
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.extremal import CONVERGED, SINGULAR, pair_frame
 from assembly.proximity.free_pair import coordinate_lengths
-from assembly.proximity.shell import FACE, FACE_RECORD, FACE_TABLE, FACE_TRIM
-from assembly.proximity.solid_contact import FEATURE_F, FEATURE_G, search_solids
+from assembly.proximity.shell import FACE
+from assembly.proximity.solid_contact import FEATURE_F, FEATURE_G, FOLD
 from assembly.proximity.start import global_start
 from assembly.proximity.switching import feature_kind
 
@@ -44,28 +40,14 @@ def on_faces(table, row, contacts, k):
 
 
 @kernel(inner=True)
-def within_faces(table, pool, row, contacts, k):
-    """Whether the points of contact k lie within the boundaries of its faces."""
-    for side in range(2):
-        shell = table[row + SHELL_F + side]
-        trim = table[table[shell + FACE_TABLE] + FACE_RECORD * np.int64(contacts[k, FEATURE_F + side]) + FACE_TRIM]
-        if trim >= 0 and trim_side(table, pool, trim, contacts[k, 2 * side], contacts[k, 2 * side + 1]) < 0:
-            return False
-    return True
-
-
-@kernel(inner=True)
-def free_pair(table, pool, row, k, contacts, free, lengths, solids):
+def free_pair(table, pool, row, k, contacts, free, lengths):
     """Make the coordinates of contact k unknowns; False where they cannot be: at a pole, and of edges and vertices."""
     x = (contacts[k, 0], contacts[k, 1], contacts[k, 2], contacts[k, 3])
-    if solids is None:
-        coordinate_lengths(table, pool, table[row + SURFACE_F], table[row + SURFACE_G], x, lengths, k)
-    else:
-        if table[row + SHELL_F] >= 0 and not on_faces(table, row, contacts, k):
-            return False
-        f = surface_of(table, row, 0, contacts, k)
-        g = surface_of(table, row, 1, contacts, k)
-        coordinate_lengths(table, pool, f, g, x, lengths, k)
+    if table[row + SHELL_F] >= 0 and not on_faces(table, row, contacts, k):
+        return False
+    f = surface_of(table, row, 0, contacts, k)
+    g = surface_of(table, row, 1, contacts, k)
+    coordinate_lengths(table, pool, f, g, x, lengths, k)
     if min(min(lengths[k, 0], lengths[k, 1]), min(lengths[k, 2], lengths[k, 3])) < 1e-6:
         return False
     free[k] = 0
@@ -73,7 +55,7 @@ def free_pair(table, pool, row, k, contacts, free, lengths, solids):
 
 
 @kernel(inner=True)
-def start_contacts(table, pool, q, contacts, free, lengths, solids):
+def start_contacts(table, pool, q, contacts, free, lengths):
     """Global starts for the contacts whose parameters are NaN. Returns a contact that found none, or -1.
 
     Where a pair does not exist yet (a face tilted against another), its coordinates become unknowns at once.
@@ -84,22 +66,21 @@ def start_contacts(table, pool, q, contacts, free, lengths, solids):
             continue
         i = table[row + BODY_F]
         j = table[row + BODY_G]
-        if solids is not None:
-            if table[row + SHELL_F] >= 0:
-                if not search_solids(table, pool, table[row + SHELL_F], table[row + SHELL_G], i, j, q, contacts, k):
-                    return k
-                continue
+        if table[row + SHELL_F] >= 0:
+            if not search_row(table, pool, row, q, contacts, k):
+                return k
+            continue
         turn, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
         status, x, _gap = global_start(table, pool, table[row + SURFACE_F], table[row + SURFACE_G], turn, shift, 1.0)
         contacts[k, 0], contacts[k, 1], contacts[k, 2], contacts[k, 3] = x
         if status != CONVERGED and status != SINGULAR:
-            if not free_pair(table, pool, row, k, contacts, free, lengths, solids):
+            if not free_pair(table, pool, row, k, contacts, free, lengths):
                 return k
     return -1
 
 
 @kernel(inner=True)
-def free_folds(table, pool, records, contacts, active, free, lengths, below, lost, solids):
+def free_folds(table, pool, records, contacts, active, free, lengths, below, lost):
     """Mark the pairs near a fold, and the lost one, as free. Returns how many are free now.
 
     An idle one-sided row asks nothing of its pair.
@@ -111,12 +92,12 @@ def free_folds(table, pool, records, contacts, active, free, lengths, below, los
         k = table[row + TRIM_PAIR]
         counts = table[row + TRIM_FORM] == SIGNED
         if free[k] < 0 and counts and not (table[row + ONE_SIDED] == 1 and active[r] == 0.0):
-            free_pair(table, pool, table[ROW_TABLE] + ROW * k, k, contacts, free, lengths, solids)
+            free_pair(table, pool, table[ROW_TABLE] + ROW * k, k, contacts, free, lengths)
     for k in range(table[CONTACTS]):
         row = table[ROW_TABLE] + ROW * k
         idle = table[row + ONE_SIDED] == 1 and active[k] == 0.0
         if free[k] < 0 and not idle and (abs(records[k, FOLD]) < below or k == lost):
-            free_pair(table, pool, row, k, contacts, free, lengths, solids)
+            free_pair(table, pool, row, k, contacts, free, lengths)
         if free[k] >= 0:
             free[k] = count
             count += 1
@@ -124,10 +105,11 @@ def free_folds(table, pool, records, contacts, active, free, lengths, below, los
 
 
 @kernel(inner=True)
-def free_pairs_hold(table, pool, q, contacts, free, tolerance, solids):
+def free_pairs_hold(table, pool, q, contacts, free, tolerance, records, spare):
     """Whether every free pair is extremal by the frames of tracked pairs, which know poles.
 
-    Its own rows do not tell at a pole or an apex: there a tangent vanishes, and its row with it.
+    Its own rows do not tell at a pole or an apex: there a tangent vanishes, and its row with it. Writes into `records`
+    and `spare` tracked values.
     """
     for k in range(table[CONTACTS]):
         row = table[ROW_TABLE] + ROW * k
@@ -137,16 +119,17 @@ def free_pairs_hold(table, pool, q, contacts, free, tolerance, solids):
         j = table[row + BODY_G]
         turn, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
         x = (contacts[k, 0], contacts[k, 1], contacts[k, 2], contacts[k, 3])
-        if solids is None:
-            frame = pair_frame(table, pool, table[row + SURFACE_F], table[row + SURFACE_G], turn, shift, x)
-        else:
-            if table[row + SHELL_F] >= 0 and not within_faces(table, pool, row, contacts, k):
-                return False
-            f = surface_of(table, row, 0, contacts, k)
-            g = surface_of(table, row, 1, contacts, k)
-            frame = pair_frame(table, pool, f, g, turn, shift, x)
+        f = surface_of(table, row, 0, contacts, k)
+        g = surface_of(table, row, 1, contacts, k)
+        frame = pair_frame(table, pool, f, g, turn, shift, x)
         residual = frame[9]
         tilt = max(abs(residual[2]), abs(residual[3]))
         if not frame[11] or not tilt <= 1e-9 or not max(abs(residual[0]), abs(residual[1])) <= tolerance:
             return False
+        if table[row + SHELL_F] >= 0:
+            # On solids the pair must not have left its faces.
+            if not track_row(table, pool, row, q, contacts, math.inf, records, spare, k):
+                return False
+            if spare[k, FEATURE_F] != contacts[k, FEATURE_F] or spare[k, FEATURE_G] != contacts[k, FEATURE_G]:
+                return False
     return True

@@ -22,7 +22,6 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly.constraints.layout import (
-    CONTACT_RECORD,
     CONTACTS,
     DRIVE,
     JOINTS,
@@ -38,6 +37,7 @@ from assembly.constraints.program import add_row_terms, evaluate
 from assembly.constraints.terms import DEXTERITY, TERM, TERM_BODY, TERM_KIND, TERM_PARAMETERS, TERM_TAPE, load
 from assembly.geometry.vec import add, cross, matvec, scale
 from assembly.kinematics.motion import rotation
+from assembly.proximity.solid_contact import CONTACT_RECORD
 from assembly.solve.rates import rate_system, settle
 from assembly.solve.rows import carry, move, slot, times
 from assembly.solve.singular_values import measure_jacobian

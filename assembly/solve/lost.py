@@ -45,7 +45,5 @@ def goal(solution: Solution) -> tuple[float, float]:
     packed = solution._packed
     gradient = np.empty(6 * packed.count)
     free = np.empty(len(packed.contacts), dtype=np.int64)
-    value = gradient_at(
-        packed.table, solution._wished_pool(), solution._state, free, gradient, packed.tips, packed.solids
-    )
+    value = gradient_at(packed.table, solution._wished_pool(), solution._state, free, gradient, packed.tips)
     return float(value) * packed.unit, float(np.abs(gradient).max())

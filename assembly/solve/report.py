@@ -9,7 +9,6 @@ from assembly.constraints.layout import (
     BODIES,
     CONTACTS,
     IS_LENGTH,
-    PROPER,
     REFERENCE,
     ROW,
     ROW_TABLE,
@@ -20,7 +19,7 @@ from assembly.constraints.layout import (
 )
 from assembly.constraints.program import evaluate
 from assembly.proximity.extremal import BEND
-from assembly.proximity.solid_contact import TRACK
+from assembly.proximity.solid_contact import PROPER, TRACK
 from assembly.solve.contacts import free_pairs_hold
 from assembly.solve.rows import violation_of
 
@@ -57,7 +56,8 @@ def judge(table, pool, state, loose, room, shape, rows, here, trial, bound):
     for r in range(rows):
         here[3][r] = trial[3][r]
     violation = violation_of(trial[3], shape[1], rows)
-    return violation <= bound and free_pairs_hold(table, pool, q, here[1], loose[0], 1e-9, loose[5]), violation
+    holds = free_pairs_hold(table, pool, q, here[1], loose[0], 1e-9, trial[2], loose[4])
+    return holds and violation <= bound, violation
 
 
 @kernel(inner=True)

@@ -16,7 +16,6 @@ from assembly.constraints.layout import (
     BODIES,
     BODY_F,
     BODY_G,
-    CONTACT_RECORD,
     CONTACTS,
     EXTRA,
     EXTRA_COLUMN,
@@ -50,7 +49,7 @@ from assembly.constraints.layout import (
 from assembly.constraints.program import evaluate
 from assembly.constraints.terms import objective
 from assembly.proximity.free_pair import VARIABLES, VECTORS
-from assembly.proximity.solid_contact import TRACK
+from assembly.proximity.solid_contact import CONTACT_RECORD, TRACK
 from assembly.solve.augmented_lagrangian import FREE_BELOW
 from assembly.solve.contacts import free_folds, start_contacts
 from assembly.solve.rows import envelope, place_rows
@@ -115,7 +114,7 @@ def spread_rows(table, free, count, packed, out):
 
 
 @kernel(inner=True, allocates=True)
-def point_at(table, pool, state, free, solids):
+def point_at(table, pool, state, free):
     """A point of the loop at a state: whether all its rows are evaluated (-1, or the contact that is lost), how many
     contacts are at folds, the point, and what pairs and tapes need.
 
@@ -138,7 +137,6 @@ def point_at(table, pool, state, free, solids):
         np.empty((VECTORS if pairs > 0 else 0, 3, VARIABLES)),
         np.empty((VARIABLES if pairs > 0 else 0, VARIABLES)),
         np.empty((tracks, TRACK)),
-        solids,
     )
     scaled_poses(table, pool, state, q)
     for k in range(tracks):
@@ -147,11 +145,11 @@ def point_at(table, pool, state, free, solids):
     for k in range(pairs):
         free[k] = -1
     count = 0
-    lost = start_contacts(table, pool, q, tracked, free, loose[1], solids)
+    lost = start_contacts(table, pool, q, tracked, free, loose[1])
     if lost < 0:
         # Every contact counts here, also one that pushes nothing.
         active = np.ones(most)
-        count = free_folds(table, pool, records, tracked, active, free, loose[1], -1.0, -1, solids)
+        count = free_folds(table, pool, records, tracked, active, free, loose[1], -1.0, -1)
         before = -1
         while count != before:
             for k in range(tracks):
@@ -159,12 +157,12 @@ def point_at(table, pool, state, free, solids):
                     start[k, i] = tracked[k, i]
             lost = evaluate(table, pool, start, math.inf, loose, room, point)
             before = count
-            count = free_folds(table, pool, records, tracked, active, free, loose[1], FREE_BELOW, lost, solids)
+            count = free_folds(table, pool, records, tracked, active, free, loose[1], FREE_BELOW, lost)
     return lost, count, point, loose, room
 
 
 @kernel
-def rows_at(table, pool, state, free, residual, jacobian, solids):
+def rows_at(table, pool, state, free, residual, jacobian):
     """Evaluate all rows at a state. Returns a contact that has no pair there, or -1.
 
     state : tracked values are overwritten by those found; NaN parameters of a contact are found by a global start
@@ -172,7 +170,7 @@ def rows_at(table, pool, state, free, residual, jacobian, solids):
     residual (m + 4 contacts), jacobian (m + 4 contacts, 6 bodies + 4 contacts) : as many rows and columns are written
     as there are folds
     """
-    lost, count, point, _loose, _room = point_at(table, pool, state, free, solids)
+    lost, count, point, _loose, _room = point_at(table, pool, state, free)
     _q, tracked, _records, values, packed = point
     for k in range(table[TRACKED]):
         for i in range(TRACK):
@@ -185,12 +183,12 @@ def rows_at(table, pool, state, free, residual, jacobian, solids):
 
 
 @kernel
-def gradient_at(table, pool, state, free, gradient, tips, solids):
+def gradient_at(table, pool, state, free, gradient, tips):
     """The objective's gradient in the twists of all bodies (6 bodies), zero for fixed ones. Returns its value.
 
     `tips` is None where no term is a dexterity. Dexterities are left out where a contact has no pair.
     """
-    lost, count, point, loose, room = point_at(table, pool, state, free, solids)
+    lost, count, point, loose, room = point_at(table, pool, state, free)
     rows = table[ROWS] + 4 * count
     n = 6 * table[MOVING] + 4 * count
     shape = (

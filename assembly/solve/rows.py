@@ -243,7 +243,6 @@ def carry(table, pool, bases, loose, tracked, records, d, alpha):
     """
     lengths = loose[1]
     out = loose[4]
-    solids = loose[5]
     for k in range(table[CONTACTS], table[TRACKED]):
         out[k, 0] = tracked[k, 0]
     for k in range(table[CONTACTS]):
@@ -266,18 +265,17 @@ def carry(table, pool, bases, loose, tracked, records, d, alpha):
                 s *= alpha
                 for i in range(4):
                     out[k, i] += records[k, RATES + 4 * i + j] * s
-        keep_inside(table, pool, row, tracked, k, out, solids)
+        keep_inside(table, pool, row, tracked, k, out)
 
 
 @kernel(inner=True)
-def keep_inside(table, pool, row, tracked, k, out, solids):
+def keep_inside(table, pool, row, tracked, k, out):
     """A prediction may run over the end of a patch; Newton starts inside."""
-    if solids is not None:
+    if table[row + SHELL_F] >= 0:
         for i in range(FEATURE_F, TRACK):
             out[k, i] = tracked[k, i]
-        if table[row + SHELL_F] >= 0:
-            # What becomes of edges is up to switching.
-            return
+        # What becomes of edges is up to switching.
+        return
     for side in range(2):
         i = 2 * side
         out[k, i], out[k, i + 1], _clamped = into_domain(

@@ -159,7 +159,7 @@ def _balancing(
         directions = np.vstack([directions, across])
     gradient = np.empty(jacobian.shape[1])
     free = np.empty(len(packed.contacts), dtype=np.int64)
-    gradient_at(packed.table, solution._wished_pool(), solution._state, free, gradient, packed.tips, packed.solids)
+    gradient_at(packed.table, solution._wished_pool(), solution._state, free, gradient, packed.tips)
     moving = np.repeat([not body.fixed for body in solution._scene.bodies], 6)
     lacking = -(gradient + z @ jacobian)[moving]
     amounts = np.linalg.lstsq((directions @ jacobian[:, moving]).T, lacking, rcond=1e-12)[0]

@@ -95,9 +95,7 @@ class Problem:
         packed = self.packed
         state = self.start(q, after)
         history = np.empty((1, HISTORY))
-        code = solve_program(
-            packed.table, packed.pool, Options().settings(), state, history, packed.tips, packed.solids
-        )
+        code = solve_program(packed.table, packed.pool, Options().settings(), state, history, packed.tips)
         return Solution(self._scene, packed, state, _STATUSES[code], 0.0, history)
 
     def violations(self, solution: Solution) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 
 from assembly.constraints import layout, program
 from assembly.proximity.free_pair import VARIABLES, VECTORS
-from assembly.proximity.solid_contact import TRACK
+from assembly.proximity.solid_contact import CONTACT_RECORD, TRACK
 from assembly.solve.contacts import start_contacts
 from assembly.solve.rows import envelope, place_rows
 from assembly.solve.search import goal
@@ -30,7 +30,7 @@ class LoopPoint:
         self.point = (
             scaled,
             np.zeros((tracks, TRACK)),
-            np.ones((pairs + int(table[layout.JOINTS] + table[layout.VECTOR_TRIMS]), layout.CONTACT_RECORD)),
+            np.ones((pairs + int(table[layout.JOINTS] + table[layout.VECTOR_TRIMS]), CONTACT_RECORD)),
             np.empty(self.rows),
             np.zeros((self.rows, layout.EXTRA_COLUMN + 6 * int(table[layout.EXTRA]))),
         )
@@ -42,7 +42,7 @@ class LoopPoint:
         )
         free = np.full(pairs, -1, dtype=np.int64)
         room = (np.empty((VECTORS, 3, VARIABLES)), np.empty((VARIABLES, VARIABLES)))
-        self.loose = (free, np.empty((pairs, 4)), *room, np.empty((tracks, TRACK)), packed.solids)
+        self.loose = (free, np.empty((pairs, 4)), *room, np.empty((tracks, TRACK)))
         at = table[layout.TAPE_ROOM]
         self.room = tuple(np.empty(size) for size in table[at : at + 3])
         place_rows(table, free, self.shape[0], self.shape[1])
@@ -52,7 +52,7 @@ class LoopPoint:
             state[packed.contacts_at : packed.angles_at] = np.nan
             packed.start_angles(np.array(q, dtype=float), state, False)
             tracked = state[packed.contacts_at : packed.multipliers_at].reshape(-1, TRACK)
-            assert start_contacts(table, self.pool, scaled, tracked, free, self.loose[1], packed.solids) < 0
+            assert start_contacts(table, self.pool, scaled, tracked, free, self.loose[1]) < 0
         lost = program.evaluate(table, self.pool, np.array(tracked), np.inf, self.loose, self.room, self.point)
         assert lost < 0
 

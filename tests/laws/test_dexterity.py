@@ -104,7 +104,7 @@ def test_gradients_through_a_contact_at_a_fold():
             there = state.copy()
             q = there[: packed.contacts_at].reshape(-1, 7)
             q[:] = moved(scene, q, t * along[1:].ravel())
-            value = evaluate(packed.table, packed.pool, there, free, gradient, packed.tips, packed.solids)
+            value = evaluate(packed.table, packed.pool, there, free, gradient, packed.tips)
             assert free[0] == 0
             return value, gradient
 
