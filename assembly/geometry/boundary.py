@@ -115,10 +115,12 @@ def _without_seams(loop: Loop, surface: NurbsSurface) -> tuple[list[tuple[list[N
                 ends[:, axis] = value
                 silent.append(segment(*ends))
     if period.any():
-        for k, curve in enumerate(curves):
-            for other in range(k + 1, len(curves)):
-                if keep[k] and keep[other] and _are_seam(curve, curves[other], period, slack):
-                    keep[k] = keep[other] = False
+        ends = np.array([curve_ends(curve) for curve in curves])
+        jump = ends[None, :, ::-1] - ends[:, None]
+        whole = np.where(period > 0.0, np.round(jump / np.where(period > 0.0, period, 1.0)) * period, 0.0)
+        for k, other in np.argwhere((np.abs(jump - whole) <= slack).all(axis=(2, 3))).tolist():
+            if k < other and keep[k] and keep[other] and _are_seam(curves[k], curves[other], period, slack):
+                keep[k] = keep[other] = False
     if keep.all():
         return [(curves, loop.turn)], silent
     # Runs of what is left, then linked where one ends at the start of another.
@@ -164,33 +166,42 @@ def _as_loop(given: LoopLike, name: str, surface: NurbsSurface) -> Loop:
         if not isinstance(given, (NurbsCurve, Iterable)):
             raise TypeError(f"{name} is {given!r}; expected a Loop, a NurbsCurve or several")
         loop = Loop(given, period=periods(surface), name=name)
-    clamped = []
-    for k, curve in enumerate(loop.curves):
-        points = curve.control_points
-        for axis in range(2):
-            if surface.closed[axis]:
-                continue
-            low, high = surface.domain[axis]
-            slack = SLACK * (high - low)
-            least, most = points[:, axis].min(), points[:, axis].max()
-            if least < low or most > high:
-                least, most = _extent(curve, axis)
-            if least < low - slack or most > high + slack:
+    loop.curves = _in_domain(loop.curves, name, surface)
+    return loop
+
+
+def _in_domain(curves: tuple[NurbsCurve, ...], name: str, surface: NurbsSurface) -> tuple[NurbsCurve, ...]:
+    """Curves inside the domain of open directions, their control points near an edge of it moved onto the edge."""
+    counts = [len(curve.weights) for curve in curves]
+    given = np.concatenate([curve.control_points for curve in curves])
+    starts = np.cumsum([0, *counts[:-1]])
+    points = given.copy()
+    for axis in range(2):
+        if surface.closed[axis]:
+            continue
+        low, high = surface.domain[axis]
+        slack = SLACK * (high - low)
+        least = np.minimum.reduceat(given[:, axis], starts)
+        most = np.maximum.reduceat(given[:, axis], starts)
+        for k in np.flatnonzero((least < low - slack) | (most > high + slack)).tolist():
+            a, b = _extent(curves[k], axis)
+            if a < low - slack or b > high + slack:
                 raise InputError(
-                    f"{name} leaves the domain: curve {k} has {'uv'[axis]} from {least:g} to {most:g}; "
+                    f"{name} leaves the domain: curve {k} has {'uv'[axis]} from {a:g} to {b:g}; "
                     f"expected {'uv'[axis]} in [{low:g}, {high:g}]"
                 )
-            near = (np.abs(points[:, axis] - low) <= slack) | (np.abs(points[:, axis] - high) <= slack)
-            if near.any():
-                # Onto the edge that was meant, so that a pole edge or a natural edge is met exactly.
-                points = points.copy()
-                points[:, axis] = np.where(
-                    near, np.where(points[:, axis] < 0.5 * (low + high), low, high), points[:, axis]
-                )
-        same = points is curve.control_points
-        clamped.append(curve if same else NurbsCurve(points, curve.knots, curve.degree, curve.weights, name=curve.name))
-    loop.curves = tuple(clamped)
-    return loop
+        # A pole edge or a natural edge that was meant is met exactly.
+        for edge in (low, high):
+            points[np.abs(points[:, axis] - edge) <= slack, axis] = edge
+    changed = np.add.reduceat((points != given).any(axis=1), starts) > 0
+    if not changed.any():
+        return curves
+    return tuple(
+        NurbsCurve(points[first : first + count], curve.knots, curve.degree, curve.weights, name=curve.name)
+        if differs
+        else curve
+        for curve, first, count, differs in zip(curves, starts, counts, changed, strict=True)
+    )
 
 
 def _extent(curve: NurbsCurve, axis: int) -> tuple[float, float]:
