@@ -83,7 +83,8 @@ class _Axis:
         self.sign = 1.0 if axis == 0 else -1.0
         ends = sorted(self.sign * x for x in surface.domain[self.other])
         self.bottom, self.top = ends[0], ends[1]
-        self.around = ends[1] - ends[0] if surface.closed[self.other] else 0.0
+        # The seams of u are cut first, and then u is not closed any more.
+        self.around = ends[1] - ends[0] if surface.closed[1] and axis == 0 else 0.0
         bits = surface._pole_bits
         low_pole, high_pole = bool(bits & (4, 1)[axis]), bool(bits & (8, 2)[axis])
         self.poles = (low_pole, high_pole) if axis == 0 else (high_pole, low_pole)
@@ -280,18 +281,61 @@ def _cycles(pieces: list[Piece]) -> list[list[Piece]]:
     return cycles
 
 
-def _with_poles(chain: list[NurbsCurve], surface: NurbsSurface) -> list[Piece]:
-    """A chain with the edges at poles that it leaves out."""
+def _along_pole(point: Array, surface: NurbsSurface) -> tuple[int, int, float] | None:
+    """The pole that a boundary ends at: its side (0, 1, 2, 3: low u, high u, low v, high v), the direction along it
+    (0: u, 1: v), and the sign of that direction with the material to the left.
+    """
+    for side in range(4):
+        axis, end = divmod(side, 2)
+        low, high = surface.domain[axis]
+        if surface._pole_bits & (1 << side) and abs(point[axis] - (low, high)[end]) <= ON_SEAM * (high - low):
+            return side, 1 - axis, 1.0 if side in (1, 2) else -1.0
+    return None
+
+
+def _with_poles(chains: list[list[NurbsCurve]], surface: NurbsSurface) -> list[list[Piece]]:
+    """Chains with the edges at poles, which the boundary of a face leaves out.
+
+    A boundary that ends at a pole goes on along it, with the material to the left, to the next one that begins there.
+    """
     periods = [high - low if closed else 0.0 for (low, high), closed in zip(surface.domain, surface.closed, strict=True)]
-    row: list[Piece] = []
-    for k, curve in enumerate(chain):
-        row.append(Piece(curve, EDGE))
-        end, start = curve.control_points[-1], chain[(k + 1) % len(chain)].control_points[0]
-        gap = start - end
+    size = max(np.ptp(side) for side in surface.domain)
+    done, broken = [], []
+    for chain in chains:
+        row = [Piece(curve, EDGE) for curve in chain]
+        gap = row[0].ends[0] - row[-1].ends[1]
         whole = [round(g / t) * t if t else 0.0 for g, t in zip(gap, periods, strict=True)]
-        if np.abs(gap - whole).max() > 1e-9 * max(np.ptp(side) for side in surface.domain):
-            row.append(Piece(segment(end, start), POLE))
-    return row
+        (done if np.abs(gap - whole).max() <= ON_SEAM * size else broken).append(row)
+    while broken:
+        row = broken.pop()
+        while True:
+            end = row[-1].ends[1]
+            pole = _along_pole(end, surface)
+            if pole is None:
+                raise Uncut("its boundary is open")
+            side, along, sign = pole
+            period = periods[along]
+            found = []
+            for other in (row, *broken):
+                start = other[0].ends[0]
+                there = _along_pole(start, surface)
+                way = sign * float(start[along] - end[along])
+                if period:
+                    way %= period
+                if there is not None and there[0] == side and way >= 0.0:
+                    found.append((way, len(found), other))
+            if not found:
+                raise Uncut("its boundary is open at a pole")
+            way, _, other = min(found)
+            corner = end.copy()
+            corner[along] += sign * way
+            row.append(Piece(segment(end, corner), POLE))
+            if other is row:
+                break
+            broken = [each for each in broken if each is not other]
+            row += other
+        done.append(row)
+    return done
 
 
 def cut_open(face: Any) -> list[list[Piece]]:
@@ -307,7 +351,7 @@ def cut_open(face: Any) -> list[list[Piece]]:
     """
     surface: NurbsSurface = face.surface
     boundary = [curve if _is_clamped(curve) else curve.elevate(curve.degree) for curve in face.boundary]
-    chains = [_with_poles([boundary[k] for k in chain], surface) for chain in face.chains]
+    chains = _with_poles([[boundary[k] for k in chain] for chain in face.chains], surface)
     for axis in (0, 1):
         if surface.closed[axis]:
             chains = _cut(chains, _Axis(surface, axis))

@@ -14,6 +14,7 @@ __all__ = ["occt", "parts", "quiet"]
 _MODULES = (
     "BRep",
     "BRepBuilderAPI",
+    "BRepCheck",
     "BRepLib",
     "BRepTools",
     "Geom",

@@ -76,7 +76,7 @@ class Edge:
         return NurbsCurve(points * scales, self.curve.knots, self.curve.degree, weights, name=self.name)
 
 
-def _crossings(values: Array, at: Array, function: Any, joints: Array) -> list[float]:
+def crossings(values: Array, at: Array, function: Any, joints: Array) -> list[float]:
     """Parameters at which a sampled function takes one of the values of the joints."""
     found = []
     for joint in joints:
@@ -98,7 +98,7 @@ def _followed(source: Spline, maps: tuple[Direction, Direction], tolerance: floa
     for axis, along in enumerate(maps):
         joints = along.joints(values[:, axis].min(), values[:, axis].max())
         cuts.append(
-            np.array(_crossings(values[:, axis], at, lambda t, axis=axis: float(curve.evaluate(t)[axis]), joints))
+            np.array(crossings(values[:, axis], at, lambda t, axis=axis: float(curve.evaluate(t)[axis]), joints))
         )
     breaks = np.unique(np.concatenate(cuts))
     short = 1e-9 * (breaks[-1] - breaks[0])
