@@ -151,7 +151,7 @@ def _without_seams(loop: Loop, surface: NurbsSurface) -> tuple[list[tuple[list[N
             chain = chain + runs.pop(follows[0])
         # Joined once more: by whole periods, and exactly at the new corners.
         if np.abs(apart(chain, chain)).max() <= reach:
-            joined = Loop(chain, tolerance=2.0 * reach / loop.size, period=periods(surface))
+            joined = Loop.unchecked(chain, 2.0 * reach / loop.size, periods(surface), "loop")
             chains.append((list(joined.curves), joined.turn))
         else:
             chains.append((chain, np.full(2, np.nan)))
@@ -161,11 +161,11 @@ def _without_seams(loop: Loop, surface: NurbsSurface) -> tuple[list[tuple[list[N
 def _as_loop(given: LoopLike, name: str, surface: NurbsSurface) -> Loop:
     """A loop with the surface's periods, inside the domain of its open directions."""
     if isinstance(given, Loop):
-        loop = Loop(given.curves, tolerance=given.tolerance, period=periods(surface), name=name)
+        loop = Loop.unchecked(given.curves, given.tolerance, periods(surface), name)
     else:
         if not isinstance(given, (NurbsCurve, Iterable)):
             raise TypeError(f"{name} is {given!r}; expected a Loop, a NurbsCurve or several")
-        loop = Loop(given, period=periods(surface), name=name)
+        loop = Loop.unchecked(given, TOLERANCE, periods(surface), name)
     loop.curves = _in_domain(loop.curves, name, surface)
     return loop
 

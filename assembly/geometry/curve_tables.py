@@ -8,6 +8,15 @@ from __future__ import annotations
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly.geometry.spline import (
+    CURVE_BREAKS,
+    CURVE_CLOSED,
+    CURVE_COEFFICIENTS,
+    CURVE_DEGREE,
+    CURVE_SPANS,
+    curve_lanes,
+    xyz,
+)
 
 
 @kernel
@@ -36,10 +45,10 @@ def bezier_tables(points, weights, knots, shape, powers, coincident, bezier, poo
                 pool[place] = knots[j]
                 place += 1
                 spans += 1
-        records[curve, 0] = p
-        records[curve, 1] = spans
-        records[curve, 2] = breaks
-        records[curve, 3] = place
+        records[curve, CURVE_DEGREE] = p
+        records[curve, CURVE_SPANS] = spans
+        records[curve, CURVE_BREAKS] = breaks
+        records[curve, CURVE_COEFFICIENTS] = place
         begin = at
         for j in range(p, n):
             a = knots[first_knot + j]
@@ -88,7 +97,26 @@ def bezier_tables(points, weights, knots, shape, powers, coincident, bezier, poo
         size = np.sqrt((high_u - low_u) ** 2 + (high_v - low_v) ** 2)
         gap_u = bezier[begin] / bezier[begin + 2] - bezier[at - 3] / bezier[at - 1]
         gap_v = bezier[begin + 1] / bezier[begin + 2] - bezier[at - 2] / bezier[at - 1]
-        records[curve, 4] = 1 if size > 0.0 and np.sqrt(gap_u**2 + gap_v**2) <= coincident * size else 0
+        records[curve, CURVE_CLOSED] = 1 if size > 0.0 and np.sqrt(gap_u**2 + gap_v**2) <= coincident * size else 0
         first_point += n
         first_knot += n + p + 1
     return at, place, finite
+
+
+@kernel
+def swept_area(pool, records, u, v, nodes, weights):
+    """The area that the way from (u, v) to a point sweeps as the point runs along curves."""
+    total = 0.0
+    table = records.ravel()
+    for curve in range(records.shape[0]):
+        r = curve * records.shape[1]
+        breaks = records[curve, CURVE_BREAKS]
+        for span in range(records[curve, CURVE_SPANS]):
+            half = 0.5 * (pool[breaks + span + 1] - pool[breaks + span])
+            middle = 0.5 * (pool[breaks + span + 1] + pool[breaks + span])
+            for k in range(nodes.size):
+                a, b, _c = curve_lanes(table, pool, r, middle + half * nodes[k])
+                x, y, _z = xyz(a)
+                dx, dy, _dz = xyz(b)
+                total += 0.5 * half * weights[k] * ((x - u) * dy - (y - v) * dx)
+    return total

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 
 from assembly.errors import InputError, number
 from assembly.geometry.curve import NurbsCurve
+from assembly.geometry.curve_packing import signed_area
+from assembly.geometry.trim_table import build
 
 __all__ = ["Loop"]
 
@@ -76,7 +78,7 @@ class Loop:
     Raises
     ------
     InputError
-        A curve that is not plane, or a gap between two curves, with its size.
+        A curve that is not plane, a gap between two curves, with its size, or curves that cross or touch.
     """
 
     def __init__(
@@ -85,7 +87,33 @@ class Loop:
         *,
         tolerance: float = TOLERANCE,
         period: Sequence[float] | None = None,
-        name: str = "loop",
+    ) -> None:
+        self._make(curves, tolerance, period, "loop")
+        (u, v), (x, y) = self._box()
+        closes = period is not None or not self.turn.any()
+        table = build(self.curves, (range(len(self.curves)),), (closes,), (), ((u, x), (v, y)), self.period)
+        found = table.crossing(TOLERANCE)
+        if found is not None:
+            u, v = found[2]
+            raise InputError(
+                f"loop crosses or touches itself near (u, v) = ({u:.6g}, {v:.6g}); expected a loop without crossings"
+            )
+
+    @classmethod
+    def unchecked(
+        cls, curves: NurbsCurve | Iterable[NurbsCurve], tolerance: float, period: Sequence[float], name: str
+    ) -> Loop:
+        """A loop by its name in messages; whether it crosses itself is looked at later, with all loops of a face."""
+        loop = object.__new__(cls)
+        loop._make(curves, tolerance, period, name)
+        return loop
+
+    def _make(
+        self,
+        curves: NurbsCurve | Iterable[NurbsCurve],
+        tolerance: float,
+        period: Sequence[float] | None,
+        name: str,
     ) -> None:
         parts = [curves] if isinstance(curves, NurbsCurve) else list(curves)
         if not parts:
@@ -97,8 +125,9 @@ class Loop:
                 raise InputError(f"{name}[{k}] is a curve in space; expected a plane curve in (u, v)")
         self.tolerance = number("tolerance", tolerance)
         self.period = (0.0, 0.0) if period is None else (float(period[0]), float(period[1]))
-        points = np.concatenate([curve.control_points for curve in parts])
-        self.size = float(np.linalg.norm(np.ptp(points, axis=0)))
+        self.curves = tuple(parts)
+        low, high = self._box()
+        self.size = float(np.linalg.norm(high - low))
         if not self.size > 0.0:
             raise InputError(f"{name} is a single point; expected a loop")
         self._join([_clamped(curve) for curve in parts], period is not None, name)
@@ -149,6 +178,10 @@ class Loop:
         self.curves = tuple(parts)
         self.turn = snapped
 
+    def _box(self) -> tuple[Array, Array]:
+        points = np.concatenate([curve.control_points for curve in self.curves])
+        return points.min(axis=0), points.max(axis=0)
+
     def __repr__(self) -> str:
         around = f", turning by {self.turn.tolist()}" if self.turn.any() else ""
         return f"Loop({len(self.curves)} curves{around})"
@@ -156,26 +189,7 @@ class Loop:
     @property
     def area(self) -> float:
         """Signed area, positive counterclockwise; of a loop that turns, of no meaning."""
-        # About a point of the loop, so that one far from the origin loses nothing.
-        origin = self.curves[0].control_points[0]
-        total = 0.0
-        x, weights = np.polynomial.legendre.leggauss(8)
-        lines = []
-        for curve in self.curves:
-            if curve.degree == 1:
-                lines.append(curve.control_points - origin)
-                continue
-            at = curve.breaks()
-            t = 0.5 * (at[:-1, None] + at[1:, None] + np.diff(at)[:, None] * x)
-            points, slopes = curve.evaluate(t, 1)
-            points = points - origin
-            cross = points[..., 0] * slopes[..., 1] - points[..., 1] * slopes[..., 0]
-            total += 0.25 * float((cross * weights * np.diff(at)[:, None]).sum())
-        if lines:
-            begins = np.concatenate([line[:-1] for line in lines])
-            stops = np.concatenate([line[1:] for line in lines])
-            total += 0.5 * float((begins[:, 0] * stops[:, 1] - begins[:, 1] * stops[:, 0]).sum())
-        return total
+        return signed_area(self.curves)
 
     def reversed(self) -> Loop:
         """The same loop run the other way round."""

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
 from math import comb
 
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.errors import InputError
 from assembly.geometry import trim
-from assembly.geometry.bezier import MAX_DEGREE, power_matrix
 from assembly.geometry.crossing import first_crossing
-from assembly.geometry.curve import COINCIDENT, NurbsCurve
-from assembly.geometry.curve_tables import bezier_tables
+from assembly.geometry.curve import NurbsCurve
+from assembly.geometry.curve_packing import packed_curves
 from assembly.geometry.monotone import ROW, cut_curves
 from assembly.geometry.spline import (
     CURVE_BREAKS,
@@ -101,39 +98,12 @@ def _largest_gap(low: Array, high: Array, period: float) -> float:
     return float(middles[best])
 
 
-def _tables(curves: Sequence[NurbsCurve], shape: Ints) -> tuple[Array, Array, Ints]:
-    """Bezier points, pool and records of plane curves."""
-    points = np.concatenate([curve.control_points for curve in curves])
-    weights = np.concatenate([curve.weights for curve in curves])
-    knots = np.concatenate([curve.knots for curve in curves])
-    degree, count = shape[:, 0], shape[:, 1]
-    room = (count - degree) * (degree + 1)
-    bezier, pool = np.empty(3 * int(room.sum())), np.empty(int((4 * room + count - degree + 1).sum()))
-    records = np.empty((len(curves), CURVE_RECORD), dtype=np.int64)
-    filled, used, finite = bezier_tables(
-        points, weights, knots, shape, _power_matrices(), COINCIDENT, bezier, pool, records
-    )
-    if not finite:
-        raise InputError("knots span a domain too short for doubles at this degree; expected a scale nearer to one")
-    return bezier[:filled], pool[:used], records
-
-
-@cache
-def _power_matrices() -> Array:
-    """`bezier.power_matrix` by degree, in one array."""
-    matrices = np.zeros((MAX_DEGREE + 1, MAX_DEGREE + 1, MAX_DEGREE + 1))
-    for degree in range(MAX_DEGREE + 1):
-        matrices[degree, : degree + 1, : degree + 1] = power_matrix(degree)
-    return matrices
-
-
 class _Pieces:
     """Pieces while they are made: columns of equal length, in the order of the curves."""
 
     def __init__(self, curves: Sequence[NurbsCurve], chains: Sequence[range], closing: Sequence[bool]) -> None:
-        shape = np.array([(curve.degree, len(curve.weights)) for curve in curves], dtype=np.int64).reshape(-1, 2)
-        bezier, self.pool, self.records = _tables(curves, shape)
-        shape[:, 1] = self.records[:, CURVE_SPANS]
+        bezier, self.pool, self.records = packed_curves(curves)
+        shape = self.records[:, [CURVE_DEGREE, CURVE_SPANS]]
         breaks = np.concatenate([self.pool[r[CURVE_BREAKS] : r[CURVE_COEFFICIENTS]] for r in self.records.tolist()])
         rows = np.empty((int((8 * shape[:, 0] * shape[:, 1]).sum()), ROW))
         rows = rows[: cut_curves(bezier, breaks, shape, _BINOMIALS, rows)].copy()
