@@ -20,6 +20,7 @@ from scipy.optimize import brentq
 from assembly.errors import AssemblyError
 from assembly.geometry.curve import NurbsCurve
 from assembly.geometry.surface import NurbsSurface
+from assembly.step.trims import sampled
 
 __all__ = ["EDGE", "POLE", "SEAM", "Piece", "cut_open", "part_of"]
 
@@ -66,9 +67,7 @@ def part_of(curve: NurbsCurve, cuts: list[float]) -> list[NurbsCurve]:
         last = int(np.searchsorted(curve.knots, b, side="left"))
         inner = curve.knots[(curve.knots > a) & (curve.knots < b)]
         knots = np.concatenate([np.full(p + 1, a), inner, np.full(p + 1, b)])
-        parts.append(
-            NurbsCurve(curve.control_points[first:last], knots, p, curve.weights[first:last], name=curve.name)
-        )
+        parts.append(NurbsCurve(curve.control_points[first:last], knots, p, curve.weights[first:last], name=curve.name))
     return parts
 
 
@@ -100,6 +99,11 @@ class _Axis:
         return float(self.sign * point[self.other])
 
 
+def _root(curve: NurbsCurve, axis: int, line: float, low: float, high: float) -> float:
+    """Where a coordinate of a curve takes a value, between parameters on either side of it."""
+    return float(brentq(lambda t: float(curve.evaluate(t)[axis]) - line, low, high, xtol=1e-300, rtol=1e-15))
+
+
 def _split(piece: Piece, axis: _Axis) -> list[Piece]:
     """The piece cut where it crosses a seam, its ends put onto the seam where they are next to it."""
     curve, a = piece.curve, axis.axis
@@ -117,23 +121,17 @@ def _split(piece: Piece, axis: _Axis) -> list[Piece]:
         np.ceil((points[:, a].max() - axis.low) / axis.period) + 1.0,
     )
     breaks = curve.breaks()
-    at = np.unique(np.concatenate([np.linspace(x, y, 33) for x, y in zip(breaks[:-1], breaks[1:], strict=True)]))
+    at = sampled(breaks, 33)
     values = curve.evaluate(at)[:, a]
     cuts = []
     for line in lines:
         side = values - line
         side[np.abs(side) <= near] = 0.0
-        for k in range(at.size - 1):
-            if side[k] * side[k + 1] < 0.0:
-                cuts.append(
-                    float(
-                        brentq(
-                            lambda t, line=line: float(curve.evaluate(t)[a]) - line, at[k], at[k + 1], xtol=1e-15 * (1.0 + abs(at[k]))
-                        )
-                    )
-                )
-            elif 0 < k and side[k] == 0.0 and side[k - 1] * side[k + 1] < 0.0:
-                cuts.append(float(at[k]))
+        # Sides of the samples that are not on the line: a cut where they change.
+        off = np.flatnonzero(side)
+        for k, after in zip(off.tolist(), off[1:].tolist(), strict=False):
+            if side[k] * side[after] < 0.0:
+                cuts.append(_root(curve, a, line, at[k], at[after]) if after == k + 1 else float(at[k + 1]))
     made = []
     for part in part_of(curve, sorted(cuts)):
         ends = part.control_points.copy()
@@ -247,10 +245,7 @@ def _cut(chains: list[list[Piece]], axis: _Axis) -> list[list[Piece]]:
         if start is None and end is None and axis.around:
             up.next, down.next = up, down
             continue
-        for crossing, pole, height, first, second in (
-            (start, axis.poles[0], bottom, down, up),
-            (end, axis.poles[1], top, up, down),
-        ):
+        for crossing, pole, first, second in ((start, axis.poles[0], down, up), (end, axis.poles[1], up, down)):
             if crossing is None and not pole:
                 raise Uncut("its boundary is open at the seam")
             if crossing is None:
@@ -298,9 +293,11 @@ def _with_poles(chains: list[list[NurbsCurve]], surface: NurbsSurface) -> list[l
 
     A boundary that ends at a pole goes on along it, with the material to the left, to the next one that begins there.
     """
-    periods = [high - low if closed else 0.0 for (low, high), closed in zip(surface.domain, surface.closed, strict=True)]
-    size = max(np.ptp(side) for side in surface.domain)
-    done, broken = [], []
+    sides = [high - low for low, high in surface.domain]
+    periods = [side if closed else 0.0 for side, closed in zip(sides, surface.closed, strict=True)]
+    size = max(sides)
+    done: list[list[Piece]] = []
+    broken: list[list[Piece]] = []
     for chain in chains:
         row = [Piece(curve, EDGE) for curve in chain]
         gap = row[0].ends[0] - row[-1].ends[1]
@@ -315,7 +312,7 @@ def _with_poles(chains: list[list[NurbsCurve]], surface: NurbsSurface) -> list[l
                 raise Uncut("its boundary is open")
             side, along, sign = pole
             period = periods[along]
-            found = []
+            found: list[tuple[float, int, list[Piece]]] = []
             for other in (row, *broken):
                 start = other[0].ends[0]
                 there = _along_pole(start, surface)

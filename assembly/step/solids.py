@@ -18,7 +18,7 @@ from assembly.geometry.surface import NurbsSurface
 from assembly.step.cuts import POLE, SEAM, Piece, cut_open
 from assembly.step.occt import occt, parts
 from assembly.step.profiles import approximated
-from assembly.step.trims import crossings
+from assembly.step.trims import crossings, sampled
 
 __all__ = ["Sewn", "sewn"]
 
@@ -160,7 +160,7 @@ class _FaceBuilder:
             points = net[0, 0] + (curve.control_points - [u0, v0]) @ np.array([x, y])
             return flat, spline_curve(points, curve.weights, curve.knots, curve.degree), low, high, False
         breaks = [curve.breaks()]
-        at = np.unique(np.concatenate([np.linspace(a, b, 17) for a, b in zip(breaks[0][:-1], breaks[0][1:], strict=True)]))
+        at = sampled(breaks[0], 17)
         values = curve.evaluate(at)
         for axis, knots in enumerate(self.surface.breaks()):
             breaks.append(

@@ -19,7 +19,7 @@ from assembly.step.occt import occt
 from assembly.step.profiles import Direction, Spline, Straight, Turning, Unreadable, approximated, profile, spline
 from assembly.step.surfaces import Patch
 
-__all__ = ["Edge", "chained", "edge_curve"]
+__all__ = ["Edge", "chained", "crossings", "edge_curve", "sampled"]
 
 Array = NDArray[np.float64]
 # Deviation allowed to curves without rational form, over the shorter side of the surface's domain.
@@ -76,6 +76,11 @@ class Edge:
         return NurbsCurve(points * scales, self.curve.knots, self.curve.degree, weights, name=self.name)
 
 
+def sampled(breaks: Array, count: int) -> Array:
+    """Parameters between breaks, with the breaks."""
+    return np.unique(np.concatenate([np.linspace(a, b, count) for a, b in zip(breaks[:-1], breaks[1:], strict=True)]))
+
+
 def crossings(values: Array, at: Array, function: Any, joints: Array) -> list[float]:
     """Parameters at which a sampled function takes one of the values of the joints."""
     found = []
@@ -92,7 +97,7 @@ def _followed(source: Spline, maps: tuple[Direction, Direction], tolerance: floa
     points, weights = source.cartesian
     curve = NurbsCurve(points, source.knots, source.degree, weights)
     breaks = curve.breaks()
-    at = np.unique(np.concatenate([np.linspace(a, b, 17) for a, b in zip(breaks[:-1], breaks[1:], strict=True)]))
+    at = sampled(breaks, 17)
     values = curve.evaluate(at)
     cuts = [breaks]
     for axis, along in enumerate(maps):
