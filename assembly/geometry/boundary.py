@@ -265,7 +265,7 @@ def make_boundary(surface: NurbsSurface, outer: LoopLike | None, holes: Sequence
     stops = np.cumsum([0] + [len(chain) for chain, _ in chains]).tolist()
     ranges = tuple(range(a, b) for a, b in zip(stops[:-1], stops[1:], strict=True))
     closing = [bool(np.isfinite(turn).all()) for _, turn in chains]
-    table = build(curves, ranges, closing, silent, surface.domain, period)
+    table = build(curves, ranges, closing, silent if curves else (), surface.domain, period)
     if outer_loop is not None or hole_loops:
         _check_apart(table, ranges, names)
     for k, name in enumerate(names):

@@ -22,6 +22,8 @@ Ints = NDArray[np.int64]
 
 def packed_curves(curves: Sequence[NurbsCurve]) -> tuple[Array, Array, Ints]:
     """Bezier points, pool and records of plane curves."""
+    if not curves:
+        return np.empty(0), np.empty(0), np.empty((0, CURVE_RECORD), dtype=np.int64)
     shape = np.array([(curve.degree, len(curve.weights)) for curve in curves], dtype=np.int64).reshape(-1, 2)
     points = np.concatenate([curve.control_points for curve in curves])
     weights = np.concatenate([curve.weights for curve in curves])

@@ -104,7 +104,9 @@ class _Pieces:
     def __init__(self, curves: Sequence[NurbsCurve], chains: Sequence[range], closing: Sequence[bool]) -> None:
         bezier, self.pool, self.records = packed_curves(curves)
         shape = self.records[:, [CURVE_DEGREE, CURVE_SPANS]]
-        breaks = np.concatenate([self.pool[r[CURVE_BREAKS] : r[CURVE_COEFFICIENTS]] for r in self.records.tolist()])
+        breaks = np.concatenate(
+            [np.empty(0)] + [self.pool[r[CURVE_BREAKS] : r[CURVE_COEFFICIENTS]] for r in self.records.tolist()]
+        )
         rows = np.empty((int((8 * shape[:, 0] * shape[:, 1]).sum()), ROW))
         rows = rows[: cut_curves(bezier, breaks, shape, _BINOMIALS, rows)].copy()
         self.curve = rows[:, 0].astype(np.int64)
@@ -163,7 +165,8 @@ class _Pieces:
                 self.pool, int(self.coefficients[piece]), int(self.degree[piece]), float(self.middle[piece]),
                 float(t0), float(t1), axis, float(level), float(a[axis]), float(b[axis]),
             )  # fmt: skip
-            point = np.array([x, y])
+            # Cuts along u come first: nothing has been moved along the axis itself.
+            point = np.array([x, y]) + self.shift[piece]
             point[axis] = level
             times.append(t)
             points.append(point)
@@ -223,7 +226,8 @@ def build(
     for axis, period in enumerate(periods):
         if period:
             values = pieces.ends[:, :, axis]
-            low[axis] = _largest_gap(values.min(axis=1), values.max(axis=1), period)
+            if values.size:
+                low[axis] = _largest_gap(values.min(axis=1), values.max(axis=1), period)
             high[axis] = low[axis] + period
             pieces.cut(axis, float(low[axis]), period)
     pieces.join(periods)
