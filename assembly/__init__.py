@@ -57,6 +57,8 @@ if TYPE_CHECKING:
     from assembly.solve.tip import dexterity_ellipsoid as dexterity_ellipsoid
     from assembly.solve.tip import dexterity_value as dexterity_value
     from assembly.solve.tip import tip_jacobian as tip_jacobian
+    from assembly.step import read_step as read_step
+    from assembly.step import write_step as write_step
 else:
     __getattr__, __dir__, __all__ = lazy_names(
         __name__,
@@ -101,10 +103,12 @@ else:
             "errors": "assembly.errors",
             "load": "assembly.scene_file",
             "proximity": "assembly.proximity",
+            "read_step": "assembly.step",
             "reference": "assembly.solve.reference",
             "shapes": "assembly.geometry.shapes",
             "statics": "assembly.solve.statics",
             "tip_jacobian": "assembly.solve.tip",
             "view": "assembly.view",
+            "write_step": "assembly.step",
         },
     )

@@ -194,7 +194,8 @@ def border(face: Face, tolerance: float, angle: float) -> Border:
         About the most that the boundary turns from chord to chord [rad].
     """
     if not face.boundary:
-        return Border(face, *np.empty((2, 0), dtype=np.int64), np.empty((0, 2)), np.empty((0, 2, 2)))
+        none = np.empty(0, dtype=np.int64)
+        return Border(face, none, none, np.empty((0, 2)), np.empty((0, 2, 2)))
     steps = _steps(face, tolerance, angle)
     places = [curve.evaluate(t) for curve, t in zip(face.boundary, steps, strict=True)]
     reach = _JOINED * np.ptp(np.concatenate(places), axis=0).max()
@@ -216,7 +217,7 @@ def border(face: Face, tolerance: float, angle: float) -> Border:
             chains.append(np.full(len(curve), number))
             spans.append(span)
             ends.append(segments)
-    found = Border(face, *(np.concatenate(parts) for parts in (curves, chains, spans, ends)))
+    found = Border(face, np.concatenate(curves), np.concatenate(chains), np.concatenate(spans), np.concatenate(ends))
     for _ in range(_HALVINGS):
         rows = found.sagging(tolerance)
         if not len(rows):

@@ -115,10 +115,12 @@ def _without_seams(loop: Loop, surface: NurbsSurface) -> tuple[list[tuple[list[N
                 ends[:, axis] = value
                 silent.append(segment(*ends))
     if period.any():
-        for k, curve in enumerate(curves):
-            for other in range(k + 1, len(curves)):
-                if keep[k] and keep[other] and _are_seam(curve, curves[other], period, slack):
-                    keep[k] = keep[other] = False
+        ends = np.array([curve_ends(curve) for curve in curves])
+        jump = ends[None, :, ::-1] - ends[:, None]
+        whole = np.where(period > 0.0, np.round(jump / np.where(period > 0.0, period, 1.0)) * period, 0.0)
+        for k, other in np.argwhere((np.abs(jump - whole) <= slack).all(axis=(2, 3))).tolist():
+            if k < other and keep[k] and keep[other] and _are_seam(curves[k], curves[other], period, slack):
+                keep[k] = keep[other] = False
     if keep.all():
         return [(curves, loop.turn)], silent
     # Runs of what is left, then linked where one ends at the start of another.
@@ -149,7 +151,7 @@ def _without_seams(loop: Loop, surface: NurbsSurface) -> tuple[list[tuple[list[N
             chain = chain + runs.pop(follows[0])
         # Joined once more: by whole periods, and exactly at the new corners.
         if np.abs(apart(chain, chain)).max() <= reach:
-            joined = Loop(chain, tolerance=2.0 * reach / loop.size, period=periods(surface))
+            joined = Loop.unchecked(chain, 2.0 * reach / loop.size, periods(surface), "loop")
             chains.append((list(joined.curves), joined.turn))
         else:
             chains.append((chain, np.full(2, np.nan)))
@@ -159,38 +161,47 @@ def _without_seams(loop: Loop, surface: NurbsSurface) -> tuple[list[tuple[list[N
 def _as_loop(given: LoopLike, name: str, surface: NurbsSurface) -> Loop:
     """A loop with the surface's periods, inside the domain of its open directions."""
     if isinstance(given, Loop):
-        loop = Loop(given.curves, tolerance=given.tolerance, period=periods(surface), name=name)
+        loop = Loop.unchecked(given.curves, given.tolerance, periods(surface), name)
     else:
         if not isinstance(given, (NurbsCurve, Iterable)):
             raise TypeError(f"{name} is {given!r}; expected a Loop, a NurbsCurve or several")
-        loop = Loop(given, period=periods(surface), name=name)
-    clamped = []
-    for k, curve in enumerate(loop.curves):
-        points = curve.control_points
-        for axis in range(2):
-            if surface.closed[axis]:
-                continue
-            low, high = surface.domain[axis]
-            slack = SLACK * (high - low)
-            least, most = points[:, axis].min(), points[:, axis].max()
-            if least < low or most > high:
-                least, most = _extent(curve, axis)
-            if least < low - slack or most > high + slack:
+        loop = Loop.unchecked(given, TOLERANCE, periods(surface), name)
+    loop.curves = _in_domain(loop.curves, name, surface)
+    return loop
+
+
+def _in_domain(curves: tuple[NurbsCurve, ...], name: str, surface: NurbsSurface) -> tuple[NurbsCurve, ...]:
+    """Curves inside the domain of open directions, their control points near an edge of it moved onto the edge."""
+    counts = [len(curve.weights) for curve in curves]
+    given = np.concatenate([curve.control_points for curve in curves])
+    starts = np.cumsum([0, *counts[:-1]])
+    points = given.copy()
+    for axis in range(2):
+        if surface.closed[axis]:
+            continue
+        low, high = surface.domain[axis]
+        slack = SLACK * (high - low)
+        least = np.minimum.reduceat(given[:, axis], starts)
+        most = np.maximum.reduceat(given[:, axis], starts)
+        for k in np.flatnonzero((least < low - slack) | (most > high + slack)).tolist():
+            a, b = _extent(curves[k], axis)
+            if a < low - slack or b > high + slack:
                 raise InputError(
-                    f"{name} leaves the domain: curve {k} has {'uv'[axis]} from {least:g} to {most:g}; "
+                    f"{name} leaves the domain: curve {k} has {'uv'[axis]} from {a:g} to {b:g}; "
                     f"expected {'uv'[axis]} in [{low:g}, {high:g}]"
                 )
-            near = (np.abs(points[:, axis] - low) <= slack) | (np.abs(points[:, axis] - high) <= slack)
-            if near.any():
-                # Onto the edge that was meant, so that a pole edge or a natural edge is met exactly.
-                points = points.copy()
-                points[:, axis] = np.where(
-                    near, np.where(points[:, axis] < 0.5 * (low + high), low, high), points[:, axis]
-                )
-        same = points is curve.control_points
-        clamped.append(curve if same else NurbsCurve(points, curve.knots, curve.degree, curve.weights, name=curve.name))
-    loop.curves = tuple(clamped)
-    return loop
+        # A pole edge or a natural edge that was meant is met exactly.
+        for edge in (low, high):
+            points[np.abs(points[:, axis] - edge) <= slack, axis] = edge
+    changed = np.add.reduceat((points != given).any(axis=1), starts) > 0
+    if not changed.any():
+        return curves
+    return tuple(
+        NurbsCurve(points[first : first + count], curve.knots, curve.degree, curve.weights, name=curve.name)
+        if differs
+        else curve
+        for curve, first, count, differs in zip(curves, starts, counts, changed, strict=True)
+    )
 
 
 def _extent(curve: NurbsCurve, axis: int) -> tuple[float, float]:
@@ -254,7 +265,7 @@ def make_boundary(surface: NurbsSurface, outer: LoopLike | None, holes: Sequence
     stops = np.cumsum([0] + [len(chain) for chain, _ in chains]).tolist()
     ranges = tuple(range(a, b) for a, b in zip(stops[:-1], stops[1:], strict=True))
     closing = [bool(np.isfinite(turn).all()) for _, turn in chains]
-    table = build(curves, ranges, closing, silent, surface.domain, period)
+    table = build(curves, ranges, closing, silent if curves else (), surface.domain, period)
     if outer_loop is not None or hole_loops:
         _check_apart(table, ranges, names)
     for k, name in enumerate(names):

@@ -63,9 +63,16 @@ def creases(curve: NurbsCurve) -> tuple[Array, Array, Array]:
     before, after : (n, d)
         The directions in which the curve arrives and leaves.
     """
-    knots, times = np.unique(curve.knots, return_counts=True)
     low, high = curve.domain
-    at = knots[(times >= curve.degree) & (knots > low) & (knots < high)]
+    inner = curve.knots[(curve.knots > low) & (curve.knots < high)]
+    nothing = np.empty((2, 0, curve.control_points.shape[1]))
+    if inner.size < curve.degree:
+        return np.empty(0), *nothing
+    # A knot that is there as often as the degree is itself so many places on.
+    last = inner[curve.degree - 1 :]
+    at = np.unique(last[last == inner[: last.size]])
+    if not at.size:
+        return at, *nothing
     pieces = curve.bezier_pieces()
     points = pieces[..., :-1] / pieces[..., -1:]
     behind = np.searchsorted(curve.breaks(), at) - 1

@@ -3,36 +3,66 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly.errors import InputError
 from assembly.geometry.boundary import Boundary, LoopLike, make_boundary
 from assembly.geometry.curve import NurbsCurve, checked_name, flat, parameters
+from assembly.geometry.derivative_bounds import derivative_bounds
 from assembly.geometry.loop import Loop
+from assembly.geometry.measures import area_and_volume
+from assembly.geometry.space_nearest import nearest_in_space
 from assembly.geometry.spline import SIGN
 from assembly.geometry.surface import NurbsSurface
 from assembly.geometry.trim import locate_points, nearest_points
 
-__all__ = ["Face"]
+__all__ = ["BoundaryPoint", "Face"]
+
+
+@dataclass(frozen=True, eq=False)
+class BoundaryPoint:
+    """Nearest points of a boundary: signed distance (positive inside), curve, its parameter, and (u, v)."""
+
+    distance: NDArray[np.float64]
+    curve: NDArray[np.int64]
+    t: NDArray[np.float64]
+    point: NDArray[np.float64]
 
 
 class Face:
-    """A surface with an orientation.
+    """A surface with a side that is outside, and with a boundary: what is left of it after trimming.
 
     Parameters
     ----------
     surface : NurbsSurface
+    outer : NurbsCurve, several of them, or Loop, optional
+        The outer boundary in (u, v); the edge of the surface by default. On a surface that is closed in u or v it
+        may be drawn with seams, or be a ring once around with material on its left, the other ring among `holes`.
+    holes : sequence of the same
+        Inner boundaries. The outer loop is turned counterclockwise and holes clockwise; rings stay as they are.
     name : str, optional
         The surface's name by default.
     reversed : bool
         The outward normal is Su x Sv, or its negative when reversed.
 
+    Attributes
+    ----------
+    boundary : tuple of NurbsCurve
+        All boundary curves, material on their left, without seams and without edges that are one point in space.
+    chains : tuple of range
+        Which of them follow one another.
+
     Raises
     ------
     TypeError
-        The surface is something else.
+        The surface or a loop is something else.
+    InputError
+        Naming the loop: one that is open, crosses or touches itself or another, leaves the domain, or does not
+        bound the face together with the others.
     """
 
     def __init__(
@@ -84,21 +114,136 @@ class Face:
         """Table and pool of the boundary as kernels read it, for being appended at these places."""
         return self._boundary.table.at(table_at, pool_at)
 
+    def _at(self, u: ArrayLike, v: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64], tuple[int, ...]]:
+        """Flat parameters and their common shape."""
+        at_u, at_v = parameters("u", u), parameters("v", v)
+        try:
+            shape = np.broadcast_shapes(at_u.shape, at_v.shape)
+        except ValueError:
+            raise InputError(
+                f"u and v have shapes {at_u.shape} and {at_v.shape}; expected shapes that broadcast"
+            ) from None
+        for name, at in (("u", at_u), ("v", at_v)):
+            if not np.isfinite(at).all():
+                raise InputError(f"{name} is {at[~np.isfinite(at)].flat[0]}; expected finite parameters")
+        return flat(np.broadcast_to(at_u, shape)), flat(np.broadcast_to(at_v, shape)), shape
+
     def locate(self, u: ArrayLike, v: ArrayLike) -> NDArray[np.int64]:
-        """1 inside, 0 on the boundary (within 1e-12 of its size), -1 outside; parameters broadcast."""
-        at_u, at_v = np.broadcast_arrays(parameters("u", u), parameters("v", v))
+        """On which side of the boundary points are, decided on its true curves.
+
+        Parameters
+        ----------
+        u, v : arrays that broadcast
+            Any sheet of a closed direction.
+
+        Returns
+        -------
+        1 inside, 0 on the boundary (within 1e-12 of its size in (u, v)), -1 outside; the common shape.
+
+        Raises
+        ------
+        InputError
+            A parameter that is not finite.
+        """
+        at_u, at_v, shape = self._at(u, v)
         table, pool = self.packed_trim()
         side = np.empty(at_u.size, dtype=np.int64)
-        locate_points(table, pool, 0, flat(at_u), flat(at_v), side)
-        return side.reshape(at_u.shape)
+        locate_points(table, pool, 0, at_u, at_v, side)
+        return side.reshape(shape)
 
-    def trim_distance(self, u: ArrayLike, v: ArrayLike) -> NDArray[np.float64]:
-        """Signed distance to the boundary in (u, v), positive inside."""
-        at_u, at_v = np.broadcast_arrays(parameters("u", u), parameters("v", v))
+    def contains(self, u: ArrayLike, v: ArrayLike) -> NDArray[np.bool_]:
+        """Whether points are inside or on the boundary; see `locate`."""
+        return np.asarray(self.locate(u, v) >= 0)
+
+    def _nearest(self, u: ArrayLike, v: ArrayLike) -> tuple[NDArray[np.float64], tuple[int, ...]]:
+        at_u, at_v, shape = self._at(u, v)
         table, pool = self.packed_trim()
         out = np.empty((at_u.size, 7))
-        nearest_points(table, pool, 0, 0, len(self.boundary), flat(at_u), flat(at_v), out)
-        return out[:, 0].reshape(at_u.shape)
+        nearest_points(table, pool, 0, 0, len(self.boundary), at_u, at_v, out)
+        return out, shape
+
+    def trim_distance(self, u: ArrayLike, v: ArrayLike) -> NDArray[np.float64]:
+        """Signed Euclidean distance to the boundary in (u, v), positive inside, infinite without a boundary.
+
+        Parameters
+        ----------
+        u, v : arrays that broadcast
+
+        Raises
+        ------
+        InputError
+            A parameter that is not finite.
+        """
+        out, shape = self._nearest(u, v)
+        return out[:, 0].reshape(shape)
+
+    def nearest_on_boundary(self, u: ArrayLike, v: ArrayLike) -> BoundaryPoint:
+        """The nearest point of the boundary in (u, v), certified by branch and bound.
+
+        Parameters
+        ----------
+        u, v : arrays that broadcast
+
+        Raises
+        ------
+        InputError
+            A parameter that is not finite, or a face without a boundary.
+        """
+        if not self.boundary:
+            raise InputError(f"{self!r} has no boundary: its surface is closed and has no loops")
+        out, shape = self._nearest(u, v)
+        return BoundaryPoint(
+            distance=out[:, 0].reshape(shape),
+            curve=out[:, 1].astype(np.int64).reshape(shape),
+            t=out[:, 2].reshape(shape),
+            point=out[:, 3:5].reshape((*shape, 2)),
+        )
+
+    def space_distance(self, u: ArrayLike, v: ArrayLike) -> NDArray[np.float64]:
+        """Signed distance in space from S(u, v) to the boundary, positive inside, infinite without a boundary.
+
+        Parameters
+        ----------
+        u, v : arrays that broadcast
+            In the domain of open directions; beyond it they count as at its end.
+
+        Raises
+        ------
+        InputError
+            A parameter that is not finite.
+        """
+        at_u, at_v, shape = self._at(u, v)
+        record, surface_pool = self.surface.packed()
+        table, pool = self.packed_trim(record.size, surface_pool.size)
+        out = np.empty((at_u.size, 3))
+        nearest_in_space(
+            np.concatenate([record, table]),
+            np.concatenate([surface_pool, pool]),
+            0,
+            record.size,
+            self._derivative_bounds,
+            self.surface.size,
+            at_u,
+            at_v,
+            out,
+        )
+        return np.where(self.locate(at_u, at_v) < 0, -out[:, 0], out[:, 0]).reshape(shape)
+
+    @cached_property
+    def _derivative_bounds(self) -> NDArray[np.float64]:
+        return derivative_bounds(self.surface)
+
+    @cached_property
+    def _integrals(self) -> NDArray[np.float64]:
+        return area_and_volume(self.surface, self._boundary.table)
+
+    def area(self) -> float:
+        """Area of the face, to 1e-10 of itself."""
+        return float(self._integrals[0])
+
+    def volume_integral(self) -> float:
+        """One third of the integral of S.n over the face, n outward: summed over a closed body, its volume."""
+        return self.sign * float(self._integrals[1])
 
     def __repr__(self) -> str:
         label = "" if self.name is None else f"{self.name!r}, "

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 
 from assembly.errors import InputError, number
 from assembly.geometry.curve import NurbsCurve
+from assembly.geometry.curve_packing import signed_area
+from assembly.geometry.trim_table import build
 
 __all__ = ["Loop"]
 
@@ -23,6 +25,9 @@ TOLERANCE = 1e-9
 
 def curve_ends(curve: NurbsCurve) -> Array:
     """First and last point of a curve, (2, d)."""
+    p, knots = curve.degree, curve.knots
+    if knots[0] == knots[p] and knots[-1] == knots[-p - 1]:
+        return curve.control_points[[0, -1]]
     pieces = curve.bezier_pieces()
     ends = np.array([pieces[0, 0], pieces[-1, -1]])
     return np.asarray(ends[:, :-1] / ends[:, -1:])
@@ -38,10 +43,7 @@ def _clamped(curve: NurbsCurve) -> NurbsCurve:
 
 def _with_ends(curve: NurbsCurve, start: Array, end: Array) -> NurbsCurve:
     """A curve whose ends are moved a little."""
-    points = curve.control_points
-    if (points[0] == start).all() and (points[-1] == end).all():
-        return curve
-    points = points.copy()
+    points = curve.control_points.copy()
     points[0], points[-1] = start, end
     return NurbsCurve(points, curve.knots, curve.degree, curve.weights, name=curve.name)
 
@@ -76,7 +78,7 @@ class Loop:
     Raises
     ------
     InputError
-        A curve that is not plane, or a gap between two curves, with its size.
+        A curve that is not plane, a gap between two curves, with its size, or curves that cross or touch.
     """
 
     def __init__(
@@ -85,7 +87,33 @@ class Loop:
         *,
         tolerance: float = TOLERANCE,
         period: Sequence[float] | None = None,
-        name: str = "loop",
+    ) -> None:
+        self._make(curves, tolerance, period, "loop")
+        (u, v), (x, y) = self._box()
+        closes = period is not None or not self.turn.any()
+        table = build(self.curves, (range(len(self.curves)),), (closes,), (), ((u, x), (v, y)), self.period)
+        found = table.crossing(TOLERANCE)
+        if found is not None:
+            u, v = found[2]
+            raise InputError(
+                f"loop crosses or touches itself near (u, v) = ({u:.6g}, {v:.6g}); expected a loop without crossings"
+            )
+
+    @classmethod
+    def unchecked(
+        cls, curves: NurbsCurve | Iterable[NurbsCurve], tolerance: float, period: Sequence[float], name: str
+    ) -> Loop:
+        """A loop by its name in messages; whether it crosses itself is looked at later, with all loops of a face."""
+        loop = object.__new__(cls)
+        loop._make(curves, tolerance, period, name)
+        return loop
+
+    def _make(
+        self,
+        curves: NurbsCurve | Iterable[NurbsCurve],
+        tolerance: float,
+        period: Sequence[float] | None,
+        name: str,
     ) -> None:
         parts = [curves] if isinstance(curves, NurbsCurve) else list(curves)
         if not parts:
@@ -97,8 +125,9 @@ class Loop:
                 raise InputError(f"{name}[{k}] is a curve in space; expected a plane curve in (u, v)")
         self.tolerance = number("tolerance", tolerance)
         self.period = (0.0, 0.0) if period is None else (float(period[0]), float(period[1]))
-        boxes = np.array([curve.bounding_box() for curve in parts])
-        self.size = float(np.linalg.norm(np.ptp(boxes.reshape(-1, 2), axis=0)))
+        self.curves = tuple(parts)
+        low, high = self._box()
+        self.size = float(np.linalg.norm(high - low))
         if not self.size > 0.0:
             raise InputError(f"{name} is a single point; expected a loop")
         self._join([_clamped(curve) for curve in parts], period is not None, name)
@@ -108,18 +137,19 @@ class Loop:
         ends = np.array([curve_ends(curve) for curve in parts])
         periods = np.array(self.period)
         whole = np.where(periods > 0.0, periods, 1.0)
-        for k in range(1, len(parts)):
-            gap = ends[k, 0] - ends[k - 1, 1]
-            shift = np.where(periods > 0.0, -np.round(gap / whole) * periods, 0.0)
-            if shift.any():
-                parts[k] = moved(parts[k], shift)
-                ends[k] += shift
-            length = float(np.linalg.norm(gap + shift))
-            if length > allowed:
-                raise InputError(
-                    f"{name} is open: a gap of {length:.3g} between curves {k - 1} and {k}; "
-                    f"expected curves that meet within {allowed:.3g}"
-                )
+        gaps = ends[1:, 0] - ends[:-1, 1]
+        jumps = np.where(periods > 0.0, np.round(gaps / whole) * periods, 0.0)
+        lengths = np.linalg.norm(gaps - jumps, axis=1)
+        if (lengths > allowed).any():
+            k = int(np.argmax(lengths > allowed))
+            raise InputError(
+                f"{name} is open: a gap of {lengths[k]:.3g} between curves {k} and {k + 1}; "
+                f"expected curves that meet within {allowed:.3g}"
+            )
+        if jumps.any():
+            shifts = np.concatenate([np.zeros((1, 2)), -np.cumsum(jumps, axis=0)])
+            parts = [moved(curve, shift) for curve, shift in zip(parts, shifts, strict=True)]
+            ends = ends + shifts[:, None]
         turn = ends[-1, 1] - ends[0, 0]
         snapped = np.where(periods > 0.0, np.round(turn / whole) * periods, 0.0)
         if known and np.abs(snapped / whole).sum() > 1.0:
@@ -142,8 +172,15 @@ class Loop:
         corners = np.where(exact, before, 0.5 * (before + ends[:, 0]))
         after = np.roll(corners, -1, axis=0)
         after[-1] += snapped
-        self.curves = tuple(_with_ends(*each) for each in zip(parts, corners, after, strict=True))
+        differs = (ends[:, 0] != corners).any(axis=1) | (ends[:, 1] != after).any(axis=1)
+        for k in np.flatnonzero(differs).tolist():
+            parts[k] = _with_ends(parts[k], corners[k], after[k])
+        self.curves = tuple(parts)
         self.turn = snapped
+
+    def _box(self) -> tuple[Array, Array]:
+        points = np.concatenate([curve.control_points for curve in self.curves])
+        return points.min(axis=0), points.max(axis=0)
 
     def __repr__(self) -> str:
         around = f", turning by {self.turn.tolist()}" if self.turn.any() else ""
@@ -152,19 +189,7 @@ class Loop:
     @property
     def area(self) -> float:
         """Signed area, positive counterclockwise; of a loop that turns, of no meaning."""
-        total = 0.0
-        x, weights = np.polynomial.legendre.leggauss(8)
-        for curve in self.curves:
-            if curve.degree == 1 and len(curve.control_points) == 2:
-                (a, b), (c, d) = curve.control_points
-                total += 0.5 * (a * d - b * c)
-                continue
-            at = curve.breaks()
-            t = 0.5 * (at[:-1, None] + at[1:, None] + np.diff(at)[:, None] * x)
-            points, slopes = curve.evaluate(t, 1)
-            cross = points[..., 0] * slopes[..., 1] - points[..., 1] * slopes[..., 0]
-            total += 0.25 * float((cross * weights * np.diff(at)[:, None]).sum())
-        return total
+        return signed_area(self.curves)
 
     def reversed(self) -> Loop:
         """The same loop run the other way round."""

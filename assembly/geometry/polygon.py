@@ -36,6 +36,9 @@ _NEAR = 0.4
 _OBLIQUE_AXES = np.array([[1.0, 0.0], [0.15, 1.0]])
 # In parts of an edge: how far off its middle the surface may be at its middle parameters, along the surface.
 _OBLIQUE = 0.3
+# How much farther than the angle asked for a surface may turn along an edge, and what part of the tolerance is so
+# little that it does not matter how far it turns.
+_ARCHED, _UNSEEN = 1.5, 0.01
 # Normals of a corner between two sides of a crease are taken this far inside each triangle, in parts of it.
 _INWARD = 1e-6
 
@@ -87,7 +90,8 @@ def facets(face: Face, tolerance: float, *, angle: float = 0.25 * pi) -> Facets:
     if not isinstance(face, Face):
         raise TypeError(f"face is {face!r}; expected a Face")
     reach, turn = positive("tolerance", tolerance), min(positive("angle", angle), 0.25 * pi)
-    if face.outer is None and not face.holes:
+    # A closed surface within a loop along its seam is whole, too.
+    if (face.outer is None and not face.holes) or not face.boundary:
         return _untrimmed(face, reach, turn)
     return _Trimmed(face, reach, turn).facets()
 
@@ -103,8 +107,10 @@ class _Apart(NamedTuple):
     triangles: Indices
 
 
-def _measured(face: Face, parameters: Array, points: Array, triangles: Indices, tolerance: float) -> _Apart:
-    """Where the surface is farther than a tolerance from triangles.
+def _measured(
+    face: Face, parameters: Array, points: Array, triangles: Indices, tolerance: float, angle: float
+) -> _Apart:
+    """Where the surface is farther than a tolerance from triangles, or turns too far along them.
 
     The point of the surface at the middle parameters of an edge or a triangle is apart from its middle along the
     surface and across: across counts, and along as soon as the first is no more told apart from the second.
@@ -124,7 +130,9 @@ def _measured(face: Face, parameters: Array, points: Array, triangles: Indices, 
     along = np.linalg.norm(apart, axis=1)
     length = np.linalg.norm(points[edges[:, 1]] - points[edges[:, 0]], axis=1)
     size = np.concatenate([length, length[number].max(axis=1)])
-    bad = (across > tolerance) | (along > np.maximum(_OBLIQUE * size, tolerance))
+    # An arc that turns by an angle rises by an eighth of it, times its chord.
+    arched = np.maximum(_ARCHED / 8.0 * angle * size, _UNSEEN * tolerance)
+    bad = (across > np.minimum(tolerance, arched)) | (along > np.maximum(_OBLIQUE * size, tolerance))
     wrong, hollow = bad[: len(edges)] & (length > 0.0), bad[len(edges) :]
     # Facets that look inward, other than by the width of a hair.
     flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -220,7 +228,7 @@ class _Trimmed:
 
     def __init__(self, face: Face, tolerance: float, angle: float) -> None:
         self.face = face
-        self.tolerance = tolerance
+        self.tolerance, self.angle = tolerance, angle
         self.poles = [divmod(side, 2) for side in pole_sides(face.surface)]
         sheet = unrolled(border(face, tolerance, angle))
         self.grid = axes(face.surface, sheet.box, tolerance, angle)
@@ -276,9 +284,8 @@ class _Trimmed:
             found = self._vertices()
             k = len(self.rim.curve)
             hull = np.array([line.hull for line in self.lines], dtype=bool)[found.line]
-            mesh = triangulated(
-                self._steps(found.parameters) @ _OBLIQUE_AXES, found.segments, np.flatnonzero(~hull) + k
-            )
+            soft = (np.flatnonzero(~hull) + k).tolist()
+            mesh = triangulated(self._steps(found.parameters) @ _OBLIQUE_AXES, found.segments, soft)
             crossing = np.unique(np.array([j for j in mesh.blocked if j < k], dtype=np.int64))
             if not len(crossing) or parting == _PARTINGS:
                 break
@@ -335,7 +342,7 @@ class _Trimmed:
             corners = points[triangles]
             sides = np.abs(corners - np.roll(corners, 1, axis=1)).max(axis=2)
             triangles = triangles[(sides > 0.0).all(axis=1)]
-            apart = _measured(self.face, found.parameters, points, triangles, self.tolerance)
+            apart = _measured(self.face, found.parameters, points, triangles, self.tolerance, self.angle)
             if not len(apart.edges) and not len(apart.triangles):
                 break
             self._divide(found, apart.edges, edges, owner)
@@ -401,7 +408,7 @@ def _untrimmed(face: Face, tolerance: float, angle: float) -> Facets:
         corners = vertices[triangles]
         sides = np.abs(corners - np.roll(corners, 1, axis=1)).max(axis=2)
         triangles = triangles[(sides > 0.0).all(axis=1)]
-        apart = _measured(face, parameters.reshape(-1, 2), vertices, triangles, tolerance)
+        apart = _measured(face, parameters.reshape(-1, 2), vertices, triangles, tolerance, angle)
         if not len(apart.edges) and not len(apart.triangles):
             break
         u, v = _halved(u, v, apart, triangles)

@@ -18,7 +18,7 @@ from assembly.geometry.bezier import full_knots
 from assembly.geometry.curve import NurbsCurve
 from assembly.geometry.curve_parts import smooth_parts
 from assembly.geometry.face import Face
-from assembly.geometry.loop import Loop
+from assembly.geometry.loop import TOLERANCE, Loop
 from assembly.geometry.surface import NurbsSurface
 
 __all__ = ["cam", "extrusion", "plate", "plate_with_slot", "solid_cylinder", "trimmed_plane"]
@@ -60,14 +60,17 @@ def _rectangle(x: float, y: float) -> list[NurbsCurve]:
     return [_segment(corners[k], corners[(k + 1) % 4]) for k in range(4)]
 
 
+def _loop(name: str, curves: NurbsCurve | Iterable[NurbsCurve]) -> Loop:
+    """A loop that closes; whether it crosses itself is found when a face is made of it."""
+    return Loop.unchecked(curves, TOLERANCE, (0.0, 0.0), name)
+
+
 def _profile(name: str, profile: Any) -> list[NurbsCurve]:
     """The curves of a closed plane profile, cut at corners inside them."""
     if not isinstance(profile, (Loop, NurbsCurve, Iterable)) or isinstance(profile, (str, bytes)):
         raise TypeError(f"{name} is {profile!r}; expected a Loop, a closed NurbsCurve, or several that close")
-    loop = profile if isinstance(profile, Loop) else Loop(profile, name=name)
-    if loop.turn.any():
-        raise InputError(f"{name} is open: its end is {loop.turn.tolist()} from its start; expected a closed profile")
-    return [part for curve in loop.curves for part in smooth_parts(curve)]
+    curves = profile.curves if isinstance(profile, Loop) else profile
+    return [part for curve in _loop(name, curves).curves for part in smooth_parts(curve)]
 
 
 def _several(name: str, profiles: Any) -> list[list[NurbsCurve]]:
@@ -132,9 +135,9 @@ def _extruded(
     top = _cap(outer, holes, 0.5 * height, "top", False)
     bottom = _cap(outer, holes, -0.5 * height, "bottom", True)
     # The cap has the curves with material on the left: some have been run the other way round.
-    labels = list(names if Loop(outer).area > 0.0 else names[::-1])
+    labels = list(names if _loop("profile", outer).area > 0.0 else names[::-1])
     for hole, group in zip(holes, hole_names, strict=True):
-        labels += group if Loop(hole).area < 0.0 else group[::-1]
+        labels += group if _loop("hole", hole).area < 0.0 else group[::-1]
     walls = [_wall(curve, height, name) for curve, name in zip(top.boundary, labels, strict=True)]
     return (*walls, bottom, top)
 

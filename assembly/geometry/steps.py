@@ -90,7 +90,7 @@ def _creases(surface: NurbsSurface, direction: int, low: float, high: float, acr
     at = np.unique(np.add.outer(turns * period, breaks[full]))
     at = at[(at > low + 1e-9 * period) & (at < high - 1e-9 * period)]
     if not len(at):
-        return at
+        return np.empty(0)
     beside = _BESIDE * period * np.array([-1.0, 1.0])
     grid = _grid(np.add.outer(at, beside).ravel(), across)
     _, su, sv = on_surface(surface, grid if direction == 0 else grid[:, ::-1], 1)

@@ -69,7 +69,7 @@ def piece_line(pool, o, degree, s):
 
 
 @kernel(inline=True)
-def _bend(pool, o, degree, s):
+def piece_bend(pool, o, degree, s):
     """u, v, u', v', u'', v'' of a rational piece."""
     p = load_lanes(pool, o + 4 * degree)
     d = 0.0 * p
@@ -243,7 +243,7 @@ def _newton(pool, o, degree, middle, a, b, t, qx, qy):
     high = b
     f = 0.0
     for _ in range(60):
-        x, y, dx, dy, ddx, ddy = _bend(pool, o, degree, t - middle)
+        x, y, dx, dy, ddx, ddy = piece_bend(pool, o, degree, t - middle)
         ex = x - qx
         ey = y - qy
         f = 0.5 * (ex * ex + ey * ey)
@@ -285,7 +285,7 @@ def nearest_on_piece(pool, o, degree, middle, t0, t1, m1, m2, m3, qx, qy, best, 
     for _ in range(_BUDGET):
         half = 0.5 * h
         m = t0 + (index + 0.5) * h
-        x, y, dx, dy, ddx, ddy = _bend(pool, o, degree, m - middle)
+        x, y, dx, dy, ddx, ddy = piece_bend(pool, o, degree, m - middle)
         ex = x - qx
         ey = y - qy
         f = 0.5 * (ex * ex + ey * ey)
@@ -370,6 +370,8 @@ def trim_nearest(table, pool, trim, first, count, u, v):
     slack = 1e-15 * pool[frame + SIZE] ** 2
     copies_u = 1 if period_u != 0.0 else 0
     copies_v = 1 if period_v != 0.0 else 0
+    if begin == stop:
+        return np.inf, -1, 0.0, u, v, 0.0, 0.0
     best = np.inf
     piece = begin
     t = pool[doubles + PIECE_DOUBLES * begin + PIECE_T0]

@@ -12,12 +12,14 @@ from numpy.typing import NDArray
 from assembly.geometry import trim
 from assembly.geometry.crossing import first_crossing
 from assembly.geometry.curve import NurbsCurve
+from assembly.geometry.curve_packing import packed_curves
 from assembly.geometry.monotone import ROW, cut_curves
 from assembly.geometry.spline import (
     CURVE_BREAKS,
     CURVE_COEFFICIENTS,
     CURVE_DEGREE,
     CURVE_RECORD,
+    CURVE_SPANS,
 )
 from assembly.geometry.trim import PIECE_DOUBLES, PIECE_INTS, TRIM_RECORD
 
@@ -100,14 +102,11 @@ class _Pieces:
     """Pieces while they are made: columns of equal length, in the order of the curves."""
 
     def __init__(self, curves: Sequence[NurbsCurve], chains: Sequence[range], closing: Sequence[bool]) -> None:
-        packs = [curve.packed() for curve in curves]
-        pools = np.cumsum([0] + [pool.size for _, pool in packs])
-        self.records = np.array([record for record, _ in packs], dtype=np.int64).reshape(-1, CURVE_RECORD)
-        self.records[:, [CURVE_BREAKS, CURVE_COEFFICIENTS]] += pools[:-1, None]
-        self.pool = np.concatenate([pool for _, pool in packs])
-        shape = np.array([[curve.degree, record[1]] for curve, (record, _) in zip(curves, packs, strict=True)])
-        bezier = np.concatenate([curve.bezier_pieces().ravel() for curve in curves])
-        breaks = np.concatenate([pool[: record[1] + 1] for record, pool in packs])
+        bezier, self.pool, self.records = packed_curves(curves)
+        shape = self.records[:, [CURVE_DEGREE, CURVE_SPANS]]
+        breaks = np.concatenate(
+            [np.empty(0)] + [self.pool[r[CURVE_BREAKS] : r[CURVE_COEFFICIENTS]] for r in self.records.tolist()]
+        )
         rows = np.empty((int((8 * shape[:, 0] * shape[:, 1]).sum()), ROW))
         rows = rows[: cut_curves(bezier, breaks, shape, _BINOMIALS, rows)].copy()
         self.curve = rows[:, 0].astype(np.int64)
@@ -166,7 +165,8 @@ class _Pieces:
                 self.pool, int(self.coefficients[piece]), int(self.degree[piece]), float(self.middle[piece]),
                 float(t0), float(t1), axis, float(level), float(a[axis]), float(b[axis]),
             )  # fmt: skip
-            point = np.array([x, y])
+            # Cuts along u come first: nothing has been moved along the axis itself.
+            point = np.array([x, y]) + self.shift[piece]
             point[axis] = level
             times.append(t)
             points.append(point)
@@ -226,7 +226,8 @@ def build(
     for axis, period in enumerate(periods):
         if period:
             values = pieces.ends[:, :, axis]
-            low[axis] = _largest_gap(values.min(axis=1), values.max(axis=1), period)
+            if values.size:
+                low[axis] = _largest_gap(values.min(axis=1), values.max(axis=1), period)
             high[axis] = low[axis] + period
             pieces.cut(axis, float(low[axis]), period)
     pieces.join(periods)

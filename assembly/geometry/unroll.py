@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,10 +116,11 @@ def _beside(border: Border, outer: int, periods: Array) -> Border:
     """Holes moved by whole periods to where they are holes of the outer chain."""
     ends = border.ends.copy()
     polygon = ends[border.chain == outer]
-    order = sorted(((i, j) for i in range(-3, 4) for j in range(-3, 4)), key=lambda way: abs(way[0]) + abs(way[1]))
+    ways_in_turns = sorted(product(range(-3, 4), repeat=2), key=lambda way: abs(way[0]) + abs(way[1]))
+    order = [np.array(way) for way in ways_in_turns]
     for number in np.unique(border.chain):
         own = border.chain == number
-        ways = (np.array(way) * periods for way in order if (periods[np.nonzero(way)[0]] > 0.0).all())
+        ways = (way * periods for way in order if (periods[way != 0] > 0.0).all())
         if number != outer:
             ends[own] += next((way for way in ways if _winding(polygon, ends[own][0, 0] + way)), np.zeros(2))
     return replace(border, ends=ends)

@@ -7,6 +7,11 @@ from typing import TYPE_CHECKING
 from assembly._lazy import lazy_names
 
 if TYPE_CHECKING:
+    from assembly.proximity.curve_pairs import CurvePair as CurvePair
+    from assembly.proximity.curve_pairs import curve_contact_jacobian as curve_contact_jacobian
+    from assembly.proximity.curve_pairs import curve_gap_gradient as curve_gap_gradient
+    from assembly.proximity.curve_pairs import curve_gap_hessian as curve_gap_hessian
+    from assembly.proximity.curve_pairs import extremal_curve_pair as extremal_curve_pair
     from assembly.proximity.pairs import ContactPair as ContactPair
     from assembly.proximity.pairs import PairStatus as PairStatus
     from assembly.proximity.pairs import contact_jacobian as contact_jacobian
@@ -17,6 +22,11 @@ else:
     __getattr__, __dir__, __all__ = lazy_names(
         __name__,
         {
+            "CurvePair": "assembly.proximity.curve_pairs",
+            "curve_contact_jacobian": "assembly.proximity.curve_pairs",
+            "curve_gap_gradient": "assembly.proximity.curve_pairs",
+            "curve_gap_hessian": "assembly.proximity.curve_pairs",
+            "extremal_curve_pair": "assembly.proximity.curve_pairs",
             "ContactPair": "assembly.proximity.pairs",
             "PairStatus": "assembly.proximity.pairs",
             "contact_jacobian": "assembly.proximity.pairs",

@@ -34,8 +34,8 @@ from assembly.geometry.vec import add, cross, dot, matvec, scale, sub
 # A node: box, model (S0, then the vectors p, q, l, m, k and e), sphere, unit normal of the linear part.
 U0, V0, HALF_U, HALF_V, POINT, LINEAR_U, LINEAR_V = 0, 1, 2, 3, 4, 7, 10
 SQUARE_U, MIXED, SQUARE_V, REST, CENTER, RADIUS, NORMAL = 13, 16, 19, 22, 23, 26, 27
-# How much the normal turns over the box, in radians, and how much curvatures change.
-BEND, CHANGE, NODE = 30, 31, 32
+# What of e is along that normal; how much it turns over the box, in radians, and how much curvatures change.
+REST_N, BEND, CHANGE, NODE = 30, 31, 32, 33
 # Where weights vary by more than this over a box it has no model: e is infinite and its sphere is what bounds it.
 LEAST_WEIGHT = 0.1
 # Roundings of coordinates in points and coefficients.
@@ -65,10 +65,12 @@ def vanish(pool, o, stride, count):
 
 
 @kernel(inner=True)
-def remainder(table, pool, r, iu, iv, u0, v0, a, b, origin, p, q, l, m, k, work):
-    """The most that a piece of the surface is off the quadratic over a box; `work` holds 4 by 16 by 16 numbers.
+def remainder(table, pool, r, iu, iv, u0, v0, a, b, origin, p, q, l, m, k, n, work):
+    """How far a piece of the surface may be off the quadratic over a box; `work` holds 4 by 16 by 16 numbers.
 
-    The piece may be one beside the middle of the box: then terms of low order remain too.
+    Returns the bound of the length, that of the part along n, the four terms of third order along n (s^3, s^2 t, ...),
+    and a bound of the others along n. The piece may be one beside the middle of the box: then terms of low order
+    remain too.
     """
     ou = table[r + BREAKS_U] + iu
     ov = table[r + BREAKS_V] + iv
@@ -114,10 +116,16 @@ def remainder(table, pool, r, iu, iv, u0, v0, a, b, origin, p, q, l, m, k, work)
         for j in range(nv + 1):
             least -= abs(work[3, i, j])
     if not least > LEAST_WEIGHT * work[3, 0, 0]:
-        return math.inf
+        return math.inf, math.inf, 0.0, 0.0, 0.0, 0.0, math.inf
     ex = 0.0
     ey = 0.0
     ez = 0.0
+    along = 0.0
+    beyond = 0.0
+    c30 = 0.0
+    c21 = 0.0
+    c12 = 0.0
+    c03 = 0.0
     for i in range(nu + 3):
         for j in range(nv + 3):
             x = 0.0
@@ -155,7 +163,21 @@ def remainder(table, pool, r, iu, iv, u0, v0, a, b, origin, p, q, l, m, k, work)
             ex += abs(x)
             ey += abs(y)
             ez += abs(z)
-    return math.sqrt(ex * ex + ey * ey + ez * ez) / least
+            height = n[0] * x + n[1] * y + n[2] * z
+            along += abs(height)
+            if i + j > 3:
+                beyond += abs(height)
+            elif i == 3:
+                c30 = height
+            elif i == 2 and j == 1:
+                c21 = height
+            elif i == 1 and j == 2:
+                c12 = height
+            elif j == 3:
+                c03 = height
+    w = 1.0 / work[3, 0, 0]
+    e = math.sqrt(ex * ex + ey * ey + ez * ez) / least
+    return e, along / least, c30 * w, c21 * w, c12 * w, c03 * w, beyond / least
 
 
 @kernel(inner=True)
@@ -173,9 +195,51 @@ def face_model(table, pool, r, turn, shift, nodes, i, work):
     k = scale(0.5 * b * b, svv)
     iu = find_span(pool, table[r + BREAKS_U], table[r + SPANS_U], u0)
     iv = find_span(pool, table[r + BREAKS_V], table[r + SPANS_V], v0)
-    e = remainder(table, pool, r, iu, iv, u0, v0, a, b, s0, p, q, l, m, k, work)
-    e += ROUNDING * (abs(s0[0]) + abs(s0[1]) + abs(s0[2]) + abs(shift[0]) + abs(shift[1]) + abs(shift[2]))
-    place_model(turn, shift, s0, p, q, l, m, k, e, nodes, i)
+    n = cross(p, q)
+    nn = dot(n, n)
+    n = scale(1.0 / math.sqrt(nn), n) if nn > 1e-20 * dot(p, p) * dot(q, q) and nn > 0.0 else (0.0, 0.0, 0.0)
+    e, along, c30, c21, c12, c03, beyond = remainder(table, pool, r, iu, iv, u0, v0, a, b, s0, p, q, l, m, k, n, work)
+    noise = ROUNDING * (abs(s0[0]) + abs(s0[1]) + abs(s0[2]) + abs(shift[0]) + abs(shift[1]) + abs(shift[2]))
+    place_model(turn, shift, s0, p, q, l, m, k, e + noise, nodes, i)
+    if nn > 0.0 and nodes[i, BEND] < math.inf:
+        nodes[i, REST_N] = along + noise
+        change = curvature_change(p, q, l, m, k, n, c30, c21, c12, c03)
+        across = nn / max(dot(p, p), dot(q, q))
+        nodes[i, CHANGE] = (change + 12.0 * beyond) / across
+
+
+@kernel(inner=True)
+def curvature_change(p, q, l, m, k, n, c30, c21, c12, c03):
+    """How much the second fundamental form changes over a box, in its half widths, whatever the parameters do.
+
+    The covariant derivative h_ij;k = n.S_ijk - G^l_ij h_kl - G^l_ki h_lj - G^l_kj h_il, with G the tangential parts of
+    the second derivatives in the basis S_u, S_v.
+    """
+    uu = dot(p, p)
+    uv = dot(p, q)
+    vv = dot(q, q)
+    det = 1.0 / (uu * vv - uv * uv)
+    # Tangential parts (G^u, G^v) of S_uu = 2 l, S_uv = m, S_vv = 2 k, and their heights.
+    x = 2.0 * dot(l, p)
+    y = 2.0 * dot(l, q)
+    a1 = det * (vv * x - uv * y)
+    a2 = det * (uu * y - uv * x)
+    x = dot(m, p)
+    y = dot(m, q)
+    b1 = det * (vv * x - uv * y)
+    b2 = det * (uu * y - uv * x)
+    x = 2.0 * dot(k, p)
+    y = 2.0 * dot(k, q)
+    d1 = det * (vv * x - uv * y)
+    d2 = det * (uu * y - uv * x)
+    h = 2.0 * dot(l, n)
+    i = dot(m, n)
+    j = 2.0 * dot(k, n)
+    uuu = abs(6.0 * c30 - 3.0 * (a1 * h + a2 * i))
+    uuv = abs(2.0 * c21 - (a1 * i + a2 * j) - 2.0 * (b1 * h + b2 * i))
+    uvv = abs(2.0 * c12 - (d1 * h + d2 * i) - 2.0 * (b1 * i + b2 * j))
+    vvv = abs(6.0 * c03 - 3.0 * (d1 * i + d2 * j))
+    return max(max(uuu + uuv, uuv + uvv), uvv + vvv)
 
 
 @kernel(inner=True)
@@ -190,6 +254,7 @@ def place_model(turn, shift, s0, p, q, l, m, k, e, nodes, i):
     put(nodes, i, MIXED, matvec(turn, m))
     put(nodes, i, SQUARE_V, matvec(turn, k))
     nodes[i, REST] = e
+    nodes[i, REST_N] = e
     uu = dot(p, p)
     vv = dot(q, q)
     uv = dot(p, q)
@@ -227,13 +292,15 @@ def crest(l, k):
 
 @kernel(inline=True)
 def support(nodes, i, x, y, z):
-    """The most of n.(S - S0) over a node, but for its rest; n = (x, y, z)."""
+    """The most of n.(S - S0) over a node; n = (x, y, z) is a unit vector."""
     lu = x * nodes[i, LINEAR_U] + y * nodes[i, LINEAR_U + 1] + z * nodes[i, LINEAR_U + 2]
     lv = x * nodes[i, LINEAR_V] + y * nodes[i, LINEAR_V + 1] + z * nodes[i, LINEAR_V + 2]
     ku = x * nodes[i, SQUARE_U] + y * nodes[i, SQUARE_U + 1] + z * nodes[i, SQUARE_U + 2]
     kv = x * nodes[i, SQUARE_V] + y * nodes[i, SQUARE_V + 1] + z * nodes[i, SQUARE_V + 2]
     m = x * nodes[i, MIXED] + y * nodes[i, MIXED + 1] + z * nodes[i, MIXED + 2]
-    return crest(lu, ku) + crest(lv, kv) + abs(m)
+    c = x * nodes[i, NORMAL] + y * nodes[i, NORMAL + 1] + z * nodes[i, NORMAL + 2]
+    rest = abs(c) * nodes[i, REST_N] + math.sqrt(max(1.0 - c * c, 0.0)) * nodes[i, REST]
+    return crest(lu, ku) + crest(lv, kv) + abs(m) + rest
 
 
 @kernel(inner=True)
@@ -245,7 +312,7 @@ def bound_along(a, i, b, j, n):
         + y * (b[j, POINT + 1] - a[i, POINT + 1])
         + z * (b[j, POINT + 2] - a[i, POINT + 2])
     )
-    return apart - support(a, i, x, y, z) - support(b, j, -x, -y, -z) - a[i, REST] - b[j, REST]
+    return apart - support(a, i, x, y, z) - support(b, j, -x, -y, -z)
 
 
 @kernel(inner=True)

@@ -104,6 +104,7 @@ def wide_remainder(table, pool, r, u0, v0, a, b, s0, p, q, l, m, k, work):
     if (around_u == 1 and a >= 0.5 * period_u) or (around_v == 1 and b >= 0.5 * period_v):
         return math.inf
     most = 0.0
+    none = (0.0, 0.0, 0.0)
     for turn_u in range(-around_u, around_u + 1):
         move_u = turn_u * period_u
         for iu in range(nu):
@@ -113,7 +114,9 @@ def wide_remainder(table, pool, r, u0, v0, a, b, s0, p, q, l, m, k, work):
                 move_v = turn_v * period_v
                 for iv in range(nv):
                     if meets(pool, bv, iv, move_v, v0, b):
-                        e = remainder(table, pool, r, iu, iv, u0 - move_u, v0 - move_v, a, b, s0, p, q, l, m, k, work)
+                        u = u0 - move_u
+                        v = v0 - move_v
+                        e = remainder(table, pool, r, iu, iv, u, v, a, b, s0, p, q, l, m, k, none, work)[0]
                         most = max(most, e)
     return most
 

@@ -252,19 +252,21 @@ def from_middles(table, pool, a, ai, i, b, bi, j, x):
 
 @kernel(inner=True)
 def is_known(table, pool, a, ai, i, b, bi, j, extrema, owners, count):
-    """Whether the only extremum that two cells may hold is one that is known."""
+    """Whether the only extremum that two cells may hold is one that is known; half widths from the nearest one."""
     bend = max(a[i, BEND], b[j, BEND])
+    nearest = math.inf
     for k in range(count):
         if owners[k, 0] != ai[i, FEATURE] or owners[k, 1] != bi[j, FEATURE]:
             continue
         s = from_middles(table, pool, a, ai, i, b, bi, j, (extrema[k, 0], extrema[k, 1], extrema[k, 2], extrema[k, 3]))
+        nearest = min(nearest, s)
         if s <= BESIDE and bend <= TRUSTED:
-            return True
+            return True, s
         if s <= FAR:
             change = a[i, CHANGE] * extrema[k, 5] * extrema[k, 5] + b[j, CHANGE]
             if extrema[k, 4] > 1.5 * max(s, 1.0) * change:
-                return True
-    return False
+                return True, s
+    return False, nearest
 
 
 @kernel(inner=True)
@@ -337,10 +339,8 @@ def crossing_point(table, pool, kind_f, f, kind_g, g, turn, shift, x, size):
         det = dot(row0, cross(row1, row2))
         if not det > 1e-14:
             return x, False
-        y = scale(
-            1.0 / det,
-            add(scale(d[0], cross(row1, row2)), add(scale(d[1], cross(row2, row0)), scale(d[2], cross(row0, row1)))),
-        )
+        y = blend(d[0] / det, cross(row1, row2), d[1] / det, cross(row2, row0))
+        y = add(y, scale(d[2] / det, cross(row0, row1)))
         uf, vf = within(table, pool, kind_f, f, x[0] + su * dot(a, y), x[1] + sv * dot(b, y))
         ug, vg = within(table, pool, kind_g, g, x[2] - tu * dot(c, y), x[3] - tv * dot(e, y))
         x = (uf, vf, ug, vg)
@@ -371,6 +371,9 @@ def larger_first(a, ai, i, b, bi, j):
         return True
     if ai[i, KIND] == VERTEX or bi[j, KIND] == VERTEX:
         return bi[j, KIND] == VERTEX
+    if ai[i, LEVEL] == CELL:
+        # What keeps the bound from the distance, or else the extent.
+        return a[i, REST] + 0.02 * a[i, RADIUS] >= b[j, REST] + 0.02 * b[j, RADIUS]
     return a[i, RADIUS] >= b[j, RADIUS]
 
 
@@ -516,9 +519,11 @@ def search(table, pool, shell_f, shell_g, turn, shift, size, upper):
                 gap = apart
             if excluded(a, i, kind_f, b, j, kind_g) and ready != 2:
                 continue
-            if is_known(table, pool, a, ai, i, b, bi, j, extrema, owners, known):
+            settled, beside = is_known(table, pool, a, ai, i, b, bi, j, extrema, owners, known)
+            if settled:
                 continue
-            if ready == 2 or max(a[i, BEND], b[j, BEND]) < SMOOTH:
+            # Beside an extremum Newton's method would find that one again.
+            if ready == 2 or (max(a[i, BEND], b[j, BEND]) < SMOOTH and beside > FAR):
                 found, x, beta, least, stretch = extremum_near(
                     table, pool, kind_f, f, kind_g, g, turn, shift, start, n, size
                 )
@@ -538,10 +543,8 @@ def search(table, pool, shell_f, shell_g, turn, shift, size, upper):
                         extrema[known, 5] = stretch
                         owners[known, 0] = ai[i, FEATURE]
                         owners[known, 1] = bi[j, FEATURE]
-                        if not is_known(table, pool, a, ai, i, b, bi, j, extrema[known:], owners[known:], 1):
-                            known += 1
-                        else:
-                            known += 1
+                        known += 1
+                        if is_known(table, pool, a, ai, i, b, bi, j, extrema[known - 1 :], owners[known - 1 :], 1)[0]:
                             continue
             if key <= 0.0 and a[i, BEND] + b[j, BEND] < SMOOTH:
                 x, crosses = crossing_point(table, pool, kind_f, f, kind_g, g, turn, shift, start, size)

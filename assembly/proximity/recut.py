@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from assembly.geometry.boundary import segment
+from assembly.geometry.boundary import periods, segment
 from assembly.geometry.curve import NurbsCurve
 from assembly.geometry.face import Face
-from assembly.geometry.loop import Loop
+from assembly.geometry.loop import TOLERANCE, Loop
 
 __all__ = ["with_cuts"]
 
@@ -33,7 +33,7 @@ def _loop_with_cuts(loop: Loop, boundary: Sequence[NurbsCurve], parts: Sequence[
     for curve in loop.curves:
         found = next((k for k, other in enumerate(boundary) if len(parts[k]) > 1 and _is_moved(curve, other)), None)
         curves.extend([curve] if found is None else parts[found])
-    return Loop(curves, tolerance=max(loop.tolerance, 1e-9), period=loop.period)
+    return Loop.unchecked(curves, loop.tolerance, loop.period, "loop")
 
 
 def with_cuts(face: Face, parts: Sequence[Sequence[NurbsCurve]]) -> Face:
@@ -50,7 +50,8 @@ def with_cuts(face: Face, parts: Sequence[Sequence[NurbsCurve]]) -> Face:
         # The edge of the surface, seams and pole edges and all.
         (a, b), (c, d) = face.surface.domain
         corners = np.array([[a, c], [b, c], [b, d], [a, d]])
-        outer = Loop([segment(corners[k], corners[(k + 1) % 4]) for k in range(4)])
+        edges = [segment(corners[k], corners[(k + 1) % 4]) for k in range(4)]
+        outer = Loop.unchecked(edges, TOLERANCE, periods(face.surface), "outer")
     boundary = face.boundary
     return Face(
         face.surface,

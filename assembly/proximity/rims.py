@@ -12,18 +12,28 @@ from assembly.geometry.curve import NurbsCurve
 from assembly.geometry.curve_parts import CORNER, between, creases
 from assembly.geometry.face import Face
 
-__all__ = ["Rim", "corners", "turn"]
+__all__ = ["Rim", "corners", "cross", "turn"]
 
 Array = NDArray[np.float64]
 # Gauss points of an interval between samples; the middle one shows how far the curve bulges.
 _GAUSS = np.array([-sqrt(0.6), 0.0, sqrt(0.6)])
 _GAUSS_WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18.0
 _NEWTON_STEPS = 12
+# A place is good enough when it is known to this part of the tolerance.
+_CLOSE = 1e-3
+
+
+def cross(a: Array, b: Array) -> Array:
+    """Cross products of vectors (..., 3), for a few of them much faster than numpy's."""
+    x, y, z = a[..., 0], a[..., 1], a[..., 2]
+    p, q, r = b[..., 0], b[..., 1], b[..., 2]
+    return np.stack([y * r - z * q, z * p - x * r, x * q - y * p], axis=-1)
 
 
 def turn(a: Array, b: Array) -> Array:
     """Angles between vectors (..., 3), right to rounding for small ones too."""
-    angle: Array = np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), (a * b).sum(axis=-1))
+    across = cross(a, b)
+    angle: Array = np.arctan2(np.sqrt((across**2).sum(axis=-1)), (a * b).sum(axis=-1))
     return angle
 
 
@@ -69,7 +79,7 @@ class Rim:
         uv, rate = self.curve.evaluate(t, 1)
         point, su, sv = self.face.surface.evaluate(*self._inside(uv), 1)
         tangent = su * rate[..., :1] + sv * rate[..., 1:]
-        return point, self.face.sign * np.cross(su, sv), self.face.sign * tangent
+        return point, self.face.sign * cross(su, sv), self.face.sign * tangent
 
     def _inside(self, uv: Array) -> tuple[Array, Array]:
         """Parameters without the little by which a curve of a file runs out of an open direction."""
@@ -144,26 +154,30 @@ class Rim:
         points, lengths = self._measured[1], self._measured[3]
         return np.asarray(lengths @ (0.5 * (points[:-1] + points[1:])) / lengths.sum())
 
-    def nearest(self, points: Array) -> tuple[Array, Array]:
+    def nearest(self, points: Array, guess: Array | None = None) -> tuple[Array, Array]:
         """Parameters (m,) of the nearest points of the curve and distances (m,) of points (m, 3) near it.
 
-        Gauss and Newton's iteration from the nearest sample: it converges quadratically for points on the curve.
+        Gauss and Newton's iteration: it converges quadratically for points on the curve. It starts from the given
+        parameters, or where they are far off or missing from the nearest sample.
         """
         samples, at = self.samples
         low, high = self.curve.domain
-        first = ((points[:, None] - at) ** 2).sum(axis=2).argmin(axis=1)
-        t = samples[first]
+        if guess is not None:
+            place, _ = self.evaluate(guess)
+            if (np.abs(points - place) <= _CLOSE * self.tolerance).all():
+                return guess, np.sqrt(((points - place) ** 2).sum(axis=1))
+        t = samples[((points[:, None] - at) ** 2).sum(axis=2).argmin(axis=1)]
         best, least = t, np.full(len(points), np.inf)
         for _ in range(_NEWTON_STEPS):
             place, rate = self.evaluate(t)
             offset = points - place
             distance = np.sqrt((offset**2).sum(axis=1))
             nearer = distance < least
-            if not nearer.any():
-                break
             best, least = np.where(nearer, t, best), np.where(nearer, distance, least)
-            speed = np.maximum((rate**2).sum(axis=1), 1e-300)
-            t = t + (offset * rate).sum(axis=1) / speed
+            along, speed = (offset * rate).sum(axis=1), np.maximum((rate**2).sum(axis=1), 1e-300)
+            if not nearer.any() or (np.abs(along) <= _CLOSE * self.tolerance * np.sqrt(speed)).all():
+                break
+            t = t + along / speed
             t = low + (t - low) % (high - low) if self.closed else np.clip(t, low, high)
         return best, least
 

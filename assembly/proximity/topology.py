@@ -24,7 +24,7 @@ from assembly.geometry.curve import NurbsCurve
 from assembly.geometry.curve_parts import CORNER
 from assembly.geometry.face import Face
 from assembly.proximity.recut import with_cuts
-from assembly.proximity.rims import Rim, corners
+from assembly.proximity.rims import Rim, corners, cross, turn
 
 __all__ = ["Edge", "Topology", "Vertex", "topology_of"]
 
@@ -35,6 +35,8 @@ _TOLERANCE = 1e-6
 _SAME_LENGTH = 1e-2
 # Where two curves are compared, as parts of the domain.
 _STATIONS = np.linspace(0.0, 1.0, 11)[1:-1]
+# How far from a pole the trim is asked, as a part of the domain.
+_BESIDE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +55,7 @@ class Edge:
     start, end : int or None
         Vertices; None for an edge that is closed smoothly.
     length : float
+        In space, to some five digits.
     convex : bool or None
         Whether material bends away at it somewhere (True), or toward the outside (False); None where the faces go
         smoothly into each other, and for a free edge.
@@ -285,14 +288,14 @@ def _compared(a: Rim, b: Rim) -> _Match | None:
     low, high = a.curve.domain
     t = low + (high - low) * _STATIONS
     points, normals_a, along_a = a.frames(t)
-    at_b, distance = b.nearest(points)
+    start, end = b.curve.domain
+    at_b, distance = b.nearest(points, end - (end - start) * _STATIONS)
     if distance.max() > a.tolerance:
         return None
     _, normals_b, along_b = b.frames(at_b)
     if (along_a * along_b).sum() >= 0.0:
         return None
     if b.closed:
-        start, end = b.curve.domain
         at_b = np.unwrap(at_b, period=end - start)
     centered = t - t.mean()
     slope = float(centered @ at_b / (centered @ centered))
@@ -302,7 +305,7 @@ def _compared(a: Rim, b: Rim) -> _Match | None:
 
 def _bend(normals_a: Array, along_a: Array, normals_b: Array) -> bool | None:
     """Whether two faces make a convex edge: from their normals and the first one's tangent at some points."""
-    inward = np.cross(normals_a, along_a)
+    inward = cross(normals_a, along_a)
     size_a, size_b = np.linalg.norm(normals_a, axis=1), np.linalg.norm(normals_b, axis=1)
     size = np.linalg.norm(inward, axis=1) * size_b
     regular = (size > 0.0) & (size_a > 0.0)
@@ -376,12 +379,16 @@ def _joined(faces: tuple[Face, ...], chains: list[list[list[Rim]]], tolerance: f
     for rim, pair in ends.items():
         for vertex in pair:
             around[vertex].add(rim.number)
+    tips = [(tip, number) for number, face in enumerate(faces) for tip in _tips(face, points, tolerance)]
+    points = np.concatenate([points, *(tip[None] for tip, _ in tips)])
+    incident += [[] for _ in tips]
+    around += [{number} for _, number in tips]
     points.flags.writeable = False
     vertices = tuple(
         Vertex(point, tuple(at), tuple(sorted(near))) for point, at, near in zip(points, incident, around, strict=True)
     )
     face_edges = tuple(tuple(numbers.get(rim) for loop in loops for rim in loop) for loops in chains)
-    chi = len(vertices) - sum(edge.start is not None for edge in edges)
+    chi = len(vertices) - len(tips) - sum(edge.start is not None for edge in edges)
     chi += sum(_characteristic(face, loops, ends) for face, loops in zip(faces, chains, strict=True))
     return Topology(faces, tuple(edges), vertices, face_edges, tolerance, chi)
 
@@ -402,3 +409,33 @@ def _characteristic(face: Face, loops: list[list[Rim]], ends: dict[Rim, tuple[in
         groups = [group for group in groups if group not in joined] + [{start, end}.union(*joined)]
     whole_torus = all(face.surface.closed) and face.outer is None
     return (0 if whole_torus else 2) - count - len(groups)
+
+
+def _tips(face: Face, points: Array, tolerance: float) -> list[Array]:
+    """Poles inside a face where it has no tangent plane, as the tip of a cone, but for those among given points."""
+    surface = face.surface
+    found = []
+    for k in range(4):
+        if not surface._pole_bits >> k & 1:
+            continue
+        axis, side = divmod(k, 2)
+        low, high = surface.domain[axis]
+        start, stop = surface.domain[1 - axis]
+        uv = np.empty((2, _STATIONS.size))
+        uv[1 - axis] = start + (stop - start) * _STATIONS
+        # The trim is asked beside the pole: there the pole's own side is one of its curves.
+        uv[axis] = high - _BESIDE * (high - low) if side else low + _BESIDE * (high - low)
+        if face.boundary and (face.locate(*uv) < 0).any():
+            continue
+        uv[axis] = (low, high)[side]
+        tip = surface.evaluate(uv[0, 0], uv[1, 0])
+        if len(points) and np.linalg.norm(points - tip, axis=1).min() <= tolerance:
+            continue
+        try:
+            normals = surface.normal(*uv)
+        except InputError:
+            found.append(tip)
+            continue
+        if turn(normals, normals[0]).max() > CORNER:
+            found.append(tip)
+    return found

@@ -6,5 +6,6 @@ OCCT comes with the extra `step` and is imported when a file is read or written.
 from __future__ import annotations
 
 from assembly.step.reader import StepError, StepWarning, read_step
+from assembly.step.writer import write_step
 
-__all__ = ["StepError", "StepWarning", "read_step"]
+__all__ = ["StepError", "StepWarning", "read_step", "write_step"]

@@ -20,6 +20,7 @@ from scipy.optimize import brentq
 from assembly.errors import AssemblyError
 from assembly.geometry.curve import NurbsCurve
 from assembly.geometry.surface import NurbsSurface
+from assembly.step.trims import sampled
 
 __all__ = ["EDGE", "POLE", "SEAM", "Piece", "cut_open", "part_of"]
 
@@ -66,9 +67,7 @@ def part_of(curve: NurbsCurve, cuts: list[float]) -> list[NurbsCurve]:
         last = int(np.searchsorted(curve.knots, b, side="left"))
         inner = curve.knots[(curve.knots > a) & (curve.knots < b)]
         knots = np.concatenate([np.full(p + 1, a), inner, np.full(p + 1, b)])
-        parts.append(
-            NurbsCurve(curve.control_points[first:last], knots, p, curve.weights[first:last], name=curve.name)
-        )
+        parts.append(NurbsCurve(curve.control_points[first:last], knots, p, curve.weights[first:last], name=curve.name))
     return parts
 
 
@@ -83,7 +82,8 @@ class _Axis:
         self.sign = 1.0 if axis == 0 else -1.0
         ends = sorted(self.sign * x for x in surface.domain[self.other])
         self.bottom, self.top = ends[0], ends[1]
-        self.around = ends[1] - ends[0] if surface.closed[self.other] else 0.0
+        # The seams of u are cut first, and then u is not closed any more.
+        self.around = ends[1] - ends[0] if surface.closed[1] and axis == 0 else 0.0
         bits = surface._pole_bits
         low_pole, high_pole = bool(bits & (4, 1)[axis]), bool(bits & (8, 2)[axis])
         self.poles = (low_pole, high_pole) if axis == 0 else (high_pole, low_pole)
@@ -97,6 +97,11 @@ class _Axis:
     def height(self, point: Array) -> float:
         """h of (u, v)."""
         return float(self.sign * point[self.other])
+
+
+def _root(curve: NurbsCurve, axis: int, line: float, low: float, high: float) -> float:
+    """Where a coordinate of a curve takes a value, between parameters on either side of it."""
+    return float(brentq(lambda t: float(curve.evaluate(t)[axis]) - line, low, high, xtol=1e-300, rtol=1e-15))
 
 
 def _split(piece: Piece, axis: _Axis) -> list[Piece]:
@@ -116,23 +121,17 @@ def _split(piece: Piece, axis: _Axis) -> list[Piece]:
         np.ceil((points[:, a].max() - axis.low) / axis.period) + 1.0,
     )
     breaks = curve.breaks()
-    at = np.unique(np.concatenate([np.linspace(x, y, 33) for x, y in zip(breaks[:-1], breaks[1:], strict=True)]))
+    at = sampled(breaks, 33)
     values = curve.evaluate(at)[:, a]
     cuts = []
     for line in lines:
         side = values - line
         side[np.abs(side) <= near] = 0.0
-        for k in range(at.size - 1):
-            if side[k] * side[k + 1] < 0.0:
-                cuts.append(
-                    float(
-                        brentq(
-                            lambda t, line=line: float(curve.evaluate(t)[a]) - line, at[k], at[k + 1], xtol=1e-15 * (1.0 + abs(at[k]))
-                        )
-                    )
-                )
-            elif 0 < k and side[k] == 0.0 and side[k - 1] * side[k + 1] < 0.0:
-                cuts.append(float(at[k]))
+        # Sides of the samples that are not on the line: a cut where they change.
+        off = np.flatnonzero(side)
+        for k, after in zip(off.tolist(), off[1:].tolist(), strict=False):
+            if side[k] * side[after] < 0.0:
+                cuts.append(_root(curve, a, line, at[k], at[after]) if after == k + 1 else float(at[k + 1]))
     made = []
     for part in part_of(curve, sorted(cuts)):
         ends = part.control_points.copy()
@@ -246,10 +245,7 @@ def _cut(chains: list[list[Piece]], axis: _Axis) -> list[list[Piece]]:
         if start is None and end is None and axis.around:
             up.next, down.next = up, down
             continue
-        for crossing, pole, height, first, second in (
-            (start, axis.poles[0], bottom, down, up),
-            (end, axis.poles[1], top, up, down),
-        ):
+        for crossing, pole, first, second in ((start, axis.poles[0], down, up), (end, axis.poles[1], up, down)):
             if crossing is None and not pole:
                 raise Uncut("its boundary is open at the seam")
             if crossing is None:
@@ -280,18 +276,63 @@ def _cycles(pieces: list[Piece]) -> list[list[Piece]]:
     return cycles
 
 
-def _with_poles(chain: list[NurbsCurve], surface: NurbsSurface) -> list[Piece]:
-    """A chain with the edges at poles that it leaves out."""
-    periods = [high - low if closed else 0.0 for (low, high), closed in zip(surface.domain, surface.closed, strict=True)]
-    row: list[Piece] = []
-    for k, curve in enumerate(chain):
-        row.append(Piece(curve, EDGE))
-        end, start = curve.control_points[-1], chain[(k + 1) % len(chain)].control_points[0]
-        gap = start - end
+def _along_pole(point: Array, surface: NurbsSurface) -> tuple[int, int, float] | None:
+    """The pole that a boundary ends at: its side (0, 1, 2, 3: low u, high u, low v, high v), the direction along it
+    (0: u, 1: v), and the sign of that direction with the material to the left.
+    """
+    for side in range(4):
+        axis, end = divmod(side, 2)
+        low, high = surface.domain[axis]
+        if surface._pole_bits & (1 << side) and abs(point[axis] - (low, high)[end]) <= ON_SEAM * (high - low):
+            return side, 1 - axis, 1.0 if side in (1, 2) else -1.0
+    return None
+
+
+def _with_poles(chains: list[list[NurbsCurve]], surface: NurbsSurface) -> list[list[Piece]]:
+    """Chains with the edges at poles, which the boundary of a face leaves out.
+
+    A boundary that ends at a pole goes on along it, with the material to the left, to the next one that begins there.
+    """
+    sides = [high - low for low, high in surface.domain]
+    periods = [side if closed else 0.0 for side, closed in zip(sides, surface.closed, strict=True)]
+    size = max(sides)
+    done: list[list[Piece]] = []
+    broken: list[list[Piece]] = []
+    for chain in chains:
+        row = [Piece(curve, EDGE) for curve in chain]
+        gap = row[0].ends[0] - row[-1].ends[1]
         whole = [round(g / t) * t if t else 0.0 for g, t in zip(gap, periods, strict=True)]
-        if np.abs(gap - whole).max() > 1e-9 * max(np.ptp(side) for side in surface.domain):
-            row.append(Piece(segment(end, start), POLE))
-    return row
+        (done if np.abs(gap - whole).max() <= ON_SEAM * size else broken).append(row)
+    while broken:
+        row = broken.pop()
+        while True:
+            end = row[-1].ends[1]
+            pole = _along_pole(end, surface)
+            if pole is None:
+                raise Uncut("its boundary is open")
+            side, along, sign = pole
+            period = periods[along]
+            found: list[tuple[float, int, list[Piece]]] = []
+            for other in (row, *broken):
+                start = other[0].ends[0]
+                there = _along_pole(start, surface)
+                way = sign * float(start[along] - end[along])
+                if period:
+                    way %= period
+                if there is not None and there[0] == side and way >= 0.0:
+                    found.append((way, len(found), other))
+            if not found:
+                raise Uncut("its boundary is open at a pole")
+            way, _, other = min(found)
+            corner = end.copy()
+            corner[along] += sign * way
+            row.append(Piece(segment(end, corner), POLE))
+            if other is row:
+                break
+            broken = [each for each in broken if each is not other]
+            row += other
+        done.append(row)
+    return done
 
 
 def cut_open(face: Any) -> list[list[Piece]]:
@@ -307,7 +348,7 @@ def cut_open(face: Any) -> list[list[Piece]]:
     """
     surface: NurbsSurface = face.surface
     boundary = [curve if _is_clamped(curve) else curve.elevate(curve.degree) for curve in face.boundary]
-    chains = [_with_poles([boundary[k] for k in chain], surface) for chain in face.chains]
+    chains = _with_poles([[boundary[k] for k in chain] for chain in face.chains], surface)
     for axis in (0, 1):
         if surface.closed[axis]:
             chains = _cut(chains, _Axis(surface, axis))

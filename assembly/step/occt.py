@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
 from importlib import import_module
 from types import SimpleNamespace
 from typing import Any
 
-__all__ = ["occt", "parts", "quiet"]
+__all__ = ["occt", "parts", "quiet", "settings"]
 
 _MODULES = (
     "BRep",
     "BRepBuilderAPI",
+    "BRepCheck",
     "BRepLib",
     "BRepTools",
     "Geom",
@@ -91,6 +92,20 @@ def quiet() -> Iterator[None]:
     finally:
         for printer in kept:
             printers.Append(printer)
+
+
+@contextmanager
+def settings(values: Mapping[str, int]) -> Iterator[None]:
+    """Have OCCT's global settings at other values."""
+    table = occt().Interface_Static
+    before = {key: table.IVal_s(key) for key in values}
+    for key, value in values.items():
+        table.SetIVal_s(key, value)
+    try:
+        yield
+    finally:
+        for key, value in before.items():
+            table.SetIVal_s(key, value)
 
 
 def parts(shape: Any, kind: Any) -> list[Any]:

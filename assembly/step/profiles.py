@@ -153,9 +153,7 @@ def arc(map_: Turning) -> Spline:
     return Spline(np.column_stack([ring, weights]), map_.knots, 2)
 
 
-def approximated(
-    function: Callable[[Array], Array], breaks: Array, tolerance: float
-) -> tuple[Spline, float]:
+def approximated(function: Callable[[Array], Array], breaks: Array, tolerance: float) -> tuple[Spline, float]:
     """A piecewise polynomial through a function, (n,) -> (n, d), that is smooth between breaks.
 
     Interpolates at Chebyshev's points of each piece, ends included, and halves pieces until they fit.

@@ -16,7 +16,7 @@ from assembly.geometry.face import Face
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import Pose, axes_quaternion
 from assembly.step.faces import read_face
-from assembly.step.occt import occt, parts, quiet
+from assembly.step.occt import occt, parts, quiet, settings
 from assembly.step.profiles import Unreadable
 from assembly.step.tree import Color, Part, free_labels, leaves
 
@@ -57,26 +57,22 @@ def checked_unit(unit: str) -> float:
 def _document(path: str) -> tuple[Any, int]:
     """The file as a document of OCCT, in millimeters, and the number of its faces."""
     o = occt()
-    settings = {"read.stepcaf.subshapes.name": 1, "read.step.product.mode": 1}
+    # Settings exist once there is a reader.
     reader = o.STEPCAFControl_Reader()
-    before = {key: o.Interface_Static.IVal_s(key) for key in settings}
     auto = o.XCAFDoc_ShapeTool.AutoNaming_s()
     try:
-        for key, value in settings.items():
-            o.Interface_Static.SetIVal_s(key, value)
         o.XCAFDoc_ShapeTool.SetAutoNaming_s(False)
-        if reader.ReadFile(path) != o.IFSelect_RetDone:
-            raise StepError(f"path is {path!r}; expected a STEP file, and OCCT cannot parse it")
-        document = o.TDocStd_Document(o.TCollection_ExtendedString("XmlOcaf"))
-        o.XCAFDoc_DocumentTool.SetLengthUnit_s(document, 1e-3)
-        for mode in ("SetColorMode", "SetNameMode"):
-            getattr(reader, mode)(True)
-        if not reader.Transfer(document):
-            raise StepError(f"path is {path!r}; OCCT finds no shapes in it")
+        with settings({"read.stepcaf.subshapes.name": 1, "read.step.product.mode": 1}):
+            if reader.ReadFile(path) != o.IFSelect_RetDone:
+                raise StepError(f"path is {path!r}; expected a STEP file, and OCCT cannot parse it")
+            document = o.TDocStd_Document(o.TCollection_ExtendedString("XmlOcaf"))
+            o.XCAFDoc_DocumentTool.SetLengthUnit_s(document, 1e-3)
+            for mode in ("SetColorMode", "SetNameMode"):
+                getattr(reader, mode)(True)
+            if not reader.Transfer(document):
+                raise StepError(f"path is {path!r}; OCCT finds no shapes in it")
     finally:
         o.XCAFDoc_ShapeTool.SetAutoNaming_s(auto)
-        for key, value in before.items():
-            o.Interface_Static.SetIVal_s(key, value)
     return document, _face_count(reader)
 
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.geometry import bezier
 from assembly.geometry.surface import NurbsSurface
 from assembly.step.occt import occt
 from assembly.step.profiles import (
@@ -24,7 +25,6 @@ from assembly.step.profiles import (
     Turning,
     Unreadable,
     arc,
-    bezier,
     knot_row,
     point,
     profile,
@@ -67,9 +67,7 @@ def _revolved(shape: Spline, turning: Turning, origin: Array, axis: Array) -> Sp
     across = np.cross(axis, out)
     net = np.empty((len(ring), len(points), 4))
     net[..., :3] = (
-        ring[:, 2, None, None] * foot[None]
-        + ring[:, 0, None, None] * out[None]
-        + ring[:, 1, None, None] * across[None]
+        ring[:, 2, None, None] * foot[None] + ring[:, 0, None, None] * out[None] + ring[:, 1, None, None] * across[None]
     ) * weights[None, :, None]
     net[..., 3] = ring[:, 2, None] * weights[None]
     return Spline(net, turning.knots, 2)
@@ -119,9 +117,7 @@ def _round(surface: Any, box: Box) -> Patch:
         radii = base + ends * sin(angle)
         radii[ends == apex] = 0.0
         radius = float(np.abs(radii).max())
-        shape = spline(
-            origin + radii[:, None] * x + (ends * cos(angle))[:, None] * up, np.repeat(ends, 2), 1
-        )
+        shape = spline(origin + radii[:, None] * x + (ends * cos(angle))[:, None] * up, np.repeat(ends, 2), 1)
     else:
         if isinstance(surface, o.Geom_SphericalSurface):
             center, minor = origin, surface.Radius()
@@ -163,7 +159,8 @@ def _axis_crossings(surface: Any, low: float, high: float) -> tuple[float, float
         return float(ends[0]), float(ends[1])
     nearest = -(start @ along) / (along @ along)
     if np.linalg.norm(start + nearest * along) < CONFUSION:
-        ends = np.array(_slack(low, high, *((nearest, np.inf) if high - nearest > nearest - low else (-np.inf, nearest))))
+        bounds = (nearest, np.inf) if high - nearest > nearest - low else (-np.inf, nearest)
+        ends = np.array(_slack(low, high, *bounds))
     return float(ends[0]), float(ends[1])
 
 

@@ -19,7 +19,7 @@ from assembly.step.occt import occt
 from assembly.step.profiles import Direction, Spline, Straight, Turning, Unreadable, approximated, profile, spline
 from assembly.step.surfaces import Patch
 
-__all__ = ["Edge", "chained", "edge_curve"]
+__all__ = ["Edge", "chained", "crossings", "edge_curve", "sampled"]
 
 Array = NDArray[np.float64]
 # Deviation allowed to curves without rational form, over the shorter side of the surface's domain.
@@ -76,7 +76,12 @@ class Edge:
         return NurbsCurve(points * scales, self.curve.knots, self.curve.degree, weights, name=self.name)
 
 
-def _crossings(values: Array, at: Array, function: Any, joints: Array) -> list[float]:
+def sampled(breaks: Array, count: int) -> Array:
+    """Parameters between breaks, with the breaks."""
+    return np.unique(np.concatenate([np.linspace(a, b, count) for a, b in zip(breaks[:-1], breaks[1:], strict=True)]))
+
+
+def crossings(values: Array, at: Array, function: Any, joints: Array) -> list[float]:
     """Parameters at which a sampled function takes one of the values of the joints."""
     found = []
     for joint in joints:
@@ -92,13 +97,13 @@ def _followed(source: Spline, maps: tuple[Direction, Direction], tolerance: floa
     points, weights = source.cartesian
     curve = NurbsCurve(points, source.knots, source.degree, weights)
     breaks = curve.breaks()
-    at = np.unique(np.concatenate([np.linspace(a, b, 17) for a, b in zip(breaks[:-1], breaks[1:], strict=True)]))
+    at = sampled(breaks, 17)
     values = curve.evaluate(at)
     cuts = [breaks]
     for axis, along in enumerate(maps):
         joints = along.joints(values[:, axis].min(), values[:, axis].max())
         cuts.append(
-            np.array(_crossings(values[:, axis], at, lambda t, axis=axis: float(curve.evaluate(t)[axis]), joints))
+            np.array(crossings(values[:, axis], at, lambda t, axis=axis: float(curve.evaluate(t)[axis]), joints))
         )
     breaks = np.unique(np.concatenate(cuts))
     short = 1e-9 * (breaks[-1] - breaks[0])

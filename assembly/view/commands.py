@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from assembly.view.item import FIELD_OF_VIEW, Item, Picture
 from assembly.view.mesh import Mesh
 from assembly.view.motion import quaternions
+from assembly.view.outline import Lines
 
 __all__ = ["ROOT", "Command", "commands", "motion", "packed", "stillness"]
 
@@ -28,6 +29,8 @@ _LIGHT = "/Lights/FillLight/<object>"
 _BACKGROUND = ((1.0, 1.0, 1.0), (0.87, 0.90, 0.94))
 # What changes less is not seen, nor kept by single precision.
 _MOTIONLESS = 1e-9
+# Color of edges.
+_EDGE = 0x23262D
 _IDENTITY = np.eye(4).ravel().tolist()
 
 
@@ -48,6 +51,11 @@ def _geometry(mesh: Mesh, identifier: str) -> Command:
     return {"uuid": identifier, "type": "BufferGeometry", "data": data}
 
 
+def _line_geometry(lines: Lines, identifier: str) -> Command:
+    data = {"attributes": {"position": _array(lines.points, "float")}, "index": _array(lines.segments, "index")}
+    return {"uuid": identifier, "type": "BufferGeometry", "data": data}
+
+
 def _material(item: Item, identifier: str) -> Command:
     red, green, blue = (round(255.0 * part) for part in item.color)
     material: Command = {
@@ -58,6 +66,9 @@ def _material(item: Item, identifier: str) -> Command:
         "shininess": 70.0,
         "side": 2,  # both sides: open surfaces have an inside to look at
     }
+    if item.lines is not None:
+        # A little farther away than it is, so that lines on it are seen whole.
+        material.update(polygonOffset=True, polygonOffsetFactor=1.0, polygonOffsetUnits=1.0)
     if item.in_front:
         # Transparent things are drawn last.
         material.update(transparent=True, opacity=0.85, depthTest=False)
@@ -65,6 +76,23 @@ def _material(item: Item, identifier: str) -> Command:
         # The near side only, and nothing behind it is left out.
         material.update(transparent=True, opacity=item.opacity, depthWrite=False, side=0)
     return material
+
+
+def _object(path: str, kind: str, geometry: Command, material: Command) -> Command:
+    """The command that puts something at a path, which may move it."""
+    described = {
+        "metadata": {"version": 4.5, "type": "Object"},
+        "geometries": [geometry],
+        "materials": [material],
+        "object": {
+            "uuid": path,
+            "type": kind,
+            "geometry": geometry["uuid"],
+            "material": material["uuid"],
+            "matrix": _IDENTITY,
+        },
+    }
+    return {"type": "set_object", "path": path, "object": described}
 
 
 def _path(item: Item) -> str:
@@ -81,20 +109,13 @@ def commands(picture: Picture) -> Iterator[Command]:
     yield {"type": "delete", "path": ROOT}
     for item in picture.items:
         path = _path(item)
-        described = {
-            "metadata": {"version": 4.5, "type": "Object"},
-            "geometries": [_geometry(item.mesh, f"{path}:geometry")],
-            "materials": [_material(item, f"{path}:material")],
-            "object": {
-                "uuid": path,
-                "type": "Mesh",
-                "geometry": f"{path}:geometry",
-                "material": f"{path}:material",
-                "matrix": _IDENTITY,
-            },
-        }
-        yield {"type": "set_object", "path": path, "object": described}
+        yield _object(path, "Mesh", _geometry(item.mesh, f"{path}:geometry"), _material(item, f"{path}:material"))
         yield {"type": "set_transform", "path": path, "matrix": item.matrix.T.ravel().tolist()}
+        if item.lines is not None:
+            # Below the item's path, so that it moves with it.
+            below = f"{path}/edges"
+            material = {"uuid": f"{below}:material", "type": "LineBasicMaterial", "color": _EDGE}
+            yield _object(below, "LineSegments", _line_geometry(item.lines, f"{below}:geometry"), material)
     for path in ("/Grid", "/Axes"):
         yield _property(path, "visible", False)
     for name, color in zip(("top_color", "bottom_color"), _BACKGROUND, strict=True):

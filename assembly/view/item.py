@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from assembly.kinematics.body import Body
 from assembly.view.mesh import Mesh
 from assembly.view.motion import rotations
+from assembly.view.outline import Lines
 
 __all__ = ["FIELD_OF_VIEW", "Color", "Item", "Picture", "Place", "Stations", "framed"]
 
@@ -44,6 +45,8 @@ class Item:
         Seen through what stands before it.
     opacity : float
         From 0 to 1.
+    lines : Lines, optional
+        Edges to be drawn over the mesh, in the same coordinates.
     """
 
     path: tuple[str, ...]
@@ -54,6 +57,7 @@ class Item:
     scale: Array = field(default_factory=lambda: np.ones(3))
     in_front: bool = False
     opacity: float = 1.0
+    lines: Lines | None = None
 
     @property
     def matrix(self) -> Array:

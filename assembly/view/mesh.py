@@ -1,21 +1,25 @@
-"""Triangles of a surface, close enough that a picture of it looks round.
+"""Triangles of faces, close enough that a picture of them looks round.
 
 Each span of the surface becomes a grid of cells, as many as its tangents and normals turn in it and closer where they
 turn faster: a straight leg of a wire costs one cell along, and a bend many. Corners lie on the surface and carry
-its normals.
+its normals. A trimmed face is made of facets (`geometry/polygon.py`) that turn as little.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assembly.errors import InputError
 from assembly.geometry.face import Face
+from assembly.geometry.polygon import facets
 from assembly.geometry.surface import NurbsSurface
 from assembly.kinematics.body import Body
+from assembly.view.outline import extent, turning
 
 __all__ = ["Mesh", "body_mesh", "face_mesh", "joined"]
 
@@ -131,6 +135,19 @@ def _rows(
     return np.array(points), np.array(normals), begins
 
 
+# Meshes of faces that were drawn before, which bodies may share, by what else they depend on.
+_known: WeakKeyDictionary[Face, dict[tuple[float, ...], Mesh]] = WeakKeyDictionary()
+# Distance of a trimmed face's facets, in parts of its body's extent: that alone would show in an outline.
+_TOLERANCE = 1e-3
+
+
+def _kept(face: Face, key: tuple[float, ...], make: Callable[[], Mesh]) -> Mesh:
+    meshes = _known.setdefault(face, {})
+    if key not in meshes:
+        meshes[key] = make()
+    return meshes[key]
+
+
 def face_mesh(face: Face, budget: int = 20_000) -> Mesh:
     """Triangles of a face, in body coordinates.
 
@@ -138,7 +155,7 @@ def face_mesh(face: Face, budget: int = 20_000) -> Mesh:
     ----------
     face : Face
     budget : int
-        Vertices to stay below where the surface's spans allow it, at the cost of roundness.
+        Vertices to stay below where the surface's spans allow it, at the cost of roundness; trimmed faces do not.
 
     Returns
     -------
@@ -150,17 +167,32 @@ def face_mesh(face: Face, budget: int = 20_000) -> Mesh:
     InputError
         A surface that has no normals.
     """
+    return _face_mesh(face, budget, extent([face]), turning(1))
+
+
+def _face_mesh(face: Face, budget: int, size: float, angle: float) -> Mesh:
+    if face.outer is None and not face.holes:
+        return _kept(face, (budget,), lambda: _grid_mesh(face, budget))
+    return _kept(face, (size, angle), lambda: _facets_mesh(face, _TOLERANCE * size, angle))
+
+
+def _facets_mesh(face: Face, tolerance: float, angle: float) -> Mesh:
+    found = facets(face, tolerance, angle=angle)
+    return Mesh(found.points, found.normals, found.triangles)
+
+
+def _grid_mesh(face: Face, budget: int) -> Mesh:
     surface = face.surface
-    turning = [_turning(surface, direction) for direction in (0, 1)]
+    turns = [_turning(surface, direction) for direction in (0, 1)]
     angle = _ANGLE
     while True:
-        cells = [np.maximum(np.ceil(degrees.sum(axis=1) / angle), 1.0).astype(np.int64) for degrees, _ in turning]
+        cells = [np.maximum(np.ceil(degrees.sum(axis=1) / angle), 1.0).astype(np.int64) for degrees, _ in turns]
         if (cells[0].sum() + 1) * (cells[1].sum() + 1) <= budget or max(c.max() for c in cells) == 1:
             break
         angle *= 1.2
     (u, normal_u, i), (v, normal_v, j) = (
         _rows(breaks, degrees, count, creased)
-        for breaks, count, (degrees, creased) in zip(surface.breaks(), cells, turning, strict=True)
+        for breaks, count, (degrees, creased) in zip(surface.breaks(), cells, turns, strict=True)
     )
     points = surface.evaluate(u[:, None], v[None, :])
     for axis, closed in enumerate(surface.closed):
@@ -186,4 +218,6 @@ def body_mesh(body: Body, budget: int = 20_000) -> Mesh | None:
     if not body.faces:
         return None
     share = max(budget // len(body.faces), 100)
-    return joined([face_mesh(side.face, share) for side in body.faces])
+    faces = [side.face for side in body.faces]
+    size, angle = extent(faces), turning(len(faces))
+    return joined([_face_mesh(face, share, size, angle) for face in faces])

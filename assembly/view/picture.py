@@ -22,6 +22,7 @@ from assembly.view.item import Color, Item, Picture, Place, Stations, framed
 from assembly.view.marks import arrow, ball, cross
 from assembly.view.mesh import Mesh, body_mesh
 from assembly.view.motion import aligned, sample_times
+from assembly.view.outline import Lines, body_lines
 from assembly.view.series import (
     Ellipsoids,
     Pairs,
@@ -114,7 +115,10 @@ def _bodies(
         middle = 0.5 * (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0))
         about = Mesh(mesh.vertices - middle, mesh.normals, mesh.triangles)
         position = place(stations.points(body, scale * middle / place.scale))
-        yield Item(path, about, color, position, rotation, scale)
+        lines = body_lines(body)
+        if lines is not None:
+            lines = Lines(lines.points - middle, lines.segments)
+        yield Item(path, about, color, position, rotation, scale, lines=lines)
 
 
 def _contact(pair: Pairs, place: Place) -> Iterator[Item]:

@@ -1,0 +1,157 @@
+"""Bodies written to STEP files."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Sequence
+from os import PathLike, fspath
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from assembly.errors import AssemblyError, InputError
+from assembly.kinematics.body import Body
+from assembly.kinematics.pose import Pose
+from assembly.solve.solution import Solution
+from assembly.step.occt import occt, quiet, settings
+from assembly.step.reader import StepError, StepWarning, checked_unit, unique
+from assembly.step.solids import sewn
+from assembly.step.tree import Color
+
+if TYPE_CHECKING:
+    from assembly.assembly import Assembly
+
+__all__ = ["write_step"]
+
+
+def _placed(what: Any) -> list[tuple[Body, Pose]]:
+    """Bodies and where they stand."""
+    if isinstance(what, Solution):
+        return [(body, what.pose(body)) for body in what._scene.bodies]
+    bodies = [what] if isinstance(what, Body) else getattr(what, "bodies", what)
+    if not isinstance(bodies, Iterable) or isinstance(bodies, str):
+        raise TypeError(f"what is {what!r}; expected an Assembly, a Solution, a Body or several")
+    rows = list(bodies)
+    for body in rows:
+        if not isinstance(body, Body):
+            raise TypeError(f"what holds {body!r}; expected bodies")
+    if not rows:
+        raise InputError("what has no bodies; expected at least one")
+    return [(body, body.pose) for body in rows]
+
+
+def _named(label: Any, name: str) -> None:
+    o = occt()
+    o.TDataStd_Name.Set_s(label, o.TCollection_ExtendedString(name, True))
+
+
+def _color(color: Color) -> Any:
+    o = occt()
+    return o.Quantity_Color(*map(float, color), o.Quantity_TOC_sRGB)
+
+
+class _Document:
+    """A document of OCCT with one assembly, to which parts are added."""
+
+    def __init__(self, name: str) -> None:
+        o = occt()
+        self.made = o.TDocStd_Document(o.TCollection_ExtendedString("XmlOcaf"))
+        o.XCAFDoc_DocumentTool.SetLengthUnit_s(self.made, 1e-3)
+        self.shapes = o.XCAFDoc_DocumentTool.ShapeTool_s(self.made.Main())
+        self.colors = o.XCAFDoc_DocumentTool.ColorTool_s(self.made.Main())
+        self.root = self.shapes.NewShape()
+        _named(self.root, name)
+
+    def part(self, body: Body, scale: float) -> tuple[Any, bool]:
+        """Label of the body's faces as a part, and whether they close."""
+        o = occt()
+        faces = [side.face for side in body.faces]
+        made = sewn(faces, scale)
+        label = self.shapes.AddShape(made.shape, False)
+        _named(label, body.name)
+        if body.color is not None:
+            self.colors.SetColor(label, _color(body.color), o.XCAFDoc_ColorSurf)
+        for side, image in zip(body.faces, made.faces, strict=True):
+            sub = self.shapes.AddSubShape(label, image)
+            if not sub.IsNull():
+                _named(sub, side.name)
+                if side.face.color is not None:
+                    self.colors.SetColor(sub, _color(side.face.color), o.XCAFDoc_ColorSurf)
+        return label, made.closed
+
+    def place(self, part: Any, name: str, pose: Pose, scale: float, color: Color | None) -> None:
+        """One more instance of a part; a color where it is not the part's."""
+        o = occt()
+        w, x, y, z = pose.quaternion.tolist()
+        transform = o.gp_Trsf()
+        transform.SetTransformation(o.gp_Quaternion(x, y, z, w), o.gp_Vec(*(scale * pose.position).tolist()))
+        label = self.shapes.AddComponent(self.root, part, o.TopLoc_Location(transform))
+        _named(label, name)
+        if color is not None:
+            self.colors.SetColor(label, _color(color), o.XCAFDoc_ColorSurf)
+
+
+def write_step(
+    path: str | PathLike[str], what: Assembly | Solution | Body | Sequence[Body], *, unit: str = "mm"
+) -> None:
+    """Write bodies to a STEP file (AP214, in millimeters), each where it stands.
+
+    The file has one assembly. Bodies that share their faces are instances of one part where their names follow from
+    its name ("nut", "nut 2"), so that `read_step` gives the same bodies again: names, poses, colors, names and colors
+    of faces. Faces that close are written as a solid, others as shells. Planes are written as planes and all other
+    surfaces as B-splines, both exactly; of the edges, lines in (u, v) and curves in planes are exact and others are
+    followed to 1e-10 of the surface's size.
+
+    Parameters
+    ----------
+    path
+        Where to write.
+    what : Assembly, Solution, Body or several bodies
+        Bodies of a solution stand where it puts them. Bodies without faces are left out, and a warning says so.
+    unit : {"mm", "um", "cm", "m", "in", "ft"}
+        What the bodies' lengths are; they are converted to millimeters.
+
+    Raises
+    ------
+    StepError
+        Nothing to write, faces that cannot be written, a path that cannot be written to.
+    ImportError
+        OCCT is not installed: pip install "assembly[step]".
+    """
+    scale = checked_unit(unit)
+    placed = _placed(what)
+    file = Path(fspath(path))
+    o = occt()
+    # Settings exist once there is a writer.
+    writer = o.STEPCAFControl_Writer()
+    bare = [body.name for body, _ in placed if not body.faces]
+    with quiet(), settings({"write.stepcaf.subshapes.name": 1, "write.step.assembly": 1}):
+        document = _Document(file.stem)
+        parts: dict[tuple[int, ...], tuple[Any, Body]] = {}
+        taken: set[str] = set()
+        for body, pose in placed:
+            if not body.faces:
+                continue
+            key = tuple(id(side.face) for side in body.faces)
+            base = parts.get(key)
+            if base is None or unique(base[1].name, set(taken)) != body.name:
+                try:
+                    label, _ = document.part(body, scale)
+                except AssemblyError as error:
+                    raise StepError(f"what has body {body.name!r}, which cannot be written: {error}") from error
+                base = (label, body)
+                parts.setdefault(key, base)
+            taken.add(body.name)
+            own = None if body.color == base[1].color else body.color
+            document.place(base[0], body.name, pose, scale, own)
+        if not taken:
+            raise StepError("what has no body with faces; expected something to write")
+        document.shapes.UpdateAssemblies()
+        for mode in ("SetColorMode", "SetNameMode"):
+            getattr(writer, mode)(True)
+        if not writer.Transfer(document.made, o.STEPControl_AsIs):
+            raise StepError(f"path is {str(file)!r}; OCCT cannot turn the bodies into STEP")
+        if writer.Write(str(file)) != o.IFSelect_RetDone:
+            raise StepError(f"path is {str(file)!r}; OCCT cannot write there")
+    if bare:
+        names = ", ".join(map(repr, bare))
+        warnings.warn(f"{file.name}: bodies without faces are left out: {names}", StepWarning, stacklevel=2)

@@ -1,0 +1,82 @@
+"""Edges of bodies as thin lines: the boundaries of their faces.
+
+Neighboring faces have the same corners on the edge they share, so that it is drawn once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.geometry.border import border
+from assembly.geometry.face import Face
+from assembly.kinematics.body import Body
+
+__all__ = ["Lines", "body_lines", "extent", "turning"]
+
+Array = NDArray[np.float64]
+# Degrees that boundaries turn from corner to corner, as meshes do; where there are many faces each is small.
+_ANGLE = 7.5
+_MANY, _COARSEST = 100, 2.0
+# In parts of the extent: distance of a chord from its arc, and points that are one.
+_TOLERANCE, _SAME = 1e-3, 1e-6
+# A boundary that is only to be measured.
+_COARSE = 0.25 * np.pi
+
+# Boundaries of faces that were drawn before, which bodies may share, by tolerance and angle; chords (k, 2, 3).
+_known: WeakKeyDictionary[Face, dict[tuple[float, float], Array]] = WeakKeyDictionary()
+
+
+@dataclass(frozen=True, eq=False)
+class Lines:
+    """Straight lines between points (n, 3): segments (k, 2) of int."""
+
+    points: Array
+    segments: NDArray[np.int64]
+
+
+def _chords(face: Face, tolerance: float, angle: float) -> Array:
+    found = _known.setdefault(face, {})
+    if (tolerance, angle) not in found:
+        chords = border(face, tolerance, angle).points
+        # A step along a pole stays where it is.
+        found[tolerance, angle] = chords[(chords[:, 0] != chords[:, 1]).any(axis=1)]
+    return found[tolerance, angle]
+
+
+def turning(count: int) -> float:
+    """Angle [rad] that meshes and boundaries of so many faces of a body may turn from corner to corner."""
+    return float(np.deg2rad(_ANGLE * np.clip(np.sqrt(count / _MANY), 1.0, _COARSEST)))
+
+
+def extent(faces: Sequence[Face]) -> float:
+    """About the diagonal of the box around faces, as far as they go within their surfaces."""
+    boxes = []
+    for face in faces:
+        # Around a closed surface, or without a loop, a face may go far beyond its boundary.
+        if face.outer is None or face.outer.turn.any():
+            boxes.append(np.array(face.surface.bounding_box()))
+        else:
+            chords = _chords(face, face.surface.size, _COARSE)
+            boxes.append(np.stack([chords.min(axis=(0, 1)), chords.max(axis=(0, 1))]))
+    corners = np.concatenate(boxes)
+    return float(np.linalg.norm(np.ptp(corners, axis=0)))
+
+
+def body_lines(body: Body) -> Lines | None:
+    """Edges of a body, in body coordinates; None for a body without edges."""
+    faces = [side.face for side in body.faces]
+    if not faces:
+        return None
+    size = extent(faces)
+    chords = np.concatenate([_chords(face, _TOLERANCE * size, turning(len(faces))) for face in faces])
+    if not len(chords):
+        return None
+    points = chords.reshape(-1, 3)
+    _, first, place = np.unique(np.round(points / (_SAME * size)), axis=0, return_index=True, return_inverse=True)
+    segments = np.unique(np.sort(place.reshape(-1, 2), axis=1), axis=0)
+    return Lines(points[first], segments[segments[:, 0] != segments[:, 1]])
