@@ -32,7 +32,7 @@ from assembly.geometry.spline import (
     surface_point,
 )
 from assembly.geometry.trim import TRIM_CURVES, trim_nearest, trim_side
-from assembly.geometry.vec import add, cross, dot, matvec, scale, sub
+from assembly.geometry.vec import add, blend, cross, dot, matvec, scale, sub
 from assembly.proximity.box_model import (
     BEND,
     CENTER,
