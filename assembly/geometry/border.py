@@ -23,8 +23,10 @@ __all__ = ["Border", "border", "on_surface", "pole_sides"]
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
-# Parts of a span at whose middles the curvature is taken: many for a single span, fewer for each of many.
-_MOST, _LEAST = 16, 4
+# Parts of a curve, and the fewest of a span, at whose middles the curvature is taken.
+_PARTS, _LEAST = 64, 4
+# What part of the tolerance chords are meant to keep to: what is measured in the end is a little more or less.
+_AIM = 0.85
 # A chord in excess of a whole number by less is not worth another; the measurement has the last word.
 _SPARE = 0.02
 # Tangents that differ by more [rad] on the two sides of a knot make a corner.
@@ -135,7 +137,7 @@ class Border:
 def _parts(curve: NurbsCurve) -> tuple[Array, list[int]]:
     """Ends of short parts of a curve, and which of them begin a smooth stretch, or end the last."""
     breaks = curve.breaks()
-    parts = int(np.clip(2 * _MOST // (len(breaks) - 1), _LEAST, _MOST))
+    parts = max(_PARTS // (len(breaks) - 1), _LEAST)
     t = np.linspace(breaks[:-1], breaks[1:], parts, endpoint=False, axis=1)
     corners = []
     for k in range(1, len(breaks) - 1):
@@ -165,7 +167,7 @@ def _steps(face: Face, tolerance: float, angle: float) -> list[Array]:
     """Parameters of the corners on each boundary curve."""
     parts = [_parts(curve) for curve in face.boundary]
     speed, curvature = _curvature(face, [0.5 * (t[:-1] + t[1:]) for t, _ in parts])
-    density = speed * np.maximum(np.sqrt(curvature / (8.0 * tolerance)), curvature / angle)
+    density = speed * np.maximum(np.sqrt(curvature / (8.0 * _AIM * tolerance)), curvature / angle)
     steps, begin = [], 0
     for t, stretches in parts:
         width = np.diff(t)

@@ -113,11 +113,12 @@ def _measured(
     """Where the surface is farther than a tolerance from triangles, or turns too far along them.
 
     The point of the surface at the middle parameters of an edge or a triangle is apart from its middle along the
-    surface and across: across counts, and along as soon as the first is no more told apart from the second.
+    surface and across: across counts, and along as soon as the first is no more told apart from the second. At the
+    last edges whatever is not along the edge counts.
     """
     n = len(points)
     pairs = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
-    keys, number = np.unique(pairs @ np.array([n, 1]), return_inverse=True)
+    keys, first, number = np.unique(pairs @ np.array([n, 1]), return_index=True, return_inverse=True)
     edges = np.column_stack(np.divmod(keys, n))
     number = number.reshape(-1, 3)
     corners = points[triangles]
@@ -128,7 +129,16 @@ def _measured(
     apart = there - middle
     across = np.abs((apart * normal).sum(axis=1))
     along = np.linalg.norm(apart, axis=1)
-    length = np.linalg.norm(points[edges[:, 1]] - points[edges[:, 0]], axis=1)
+    ways = points[edges[:, 1]] - points[edges[:, 0]]
+    length = np.linalg.norm(ways, axis=1)
+    # Where facets end, none goes on across the foot of the normal. At a seam one does, from corners of the same place.
+    _, place = np.unique(points, axis=0, return_inverse=True)
+    _, same, uses = np.unique(
+        np.sort(place.reshape(-1)[pairs], axis=1) @ np.array([n, 1]), return_inverse=True, return_counts=True
+    )
+    last = np.flatnonzero(uses[same.reshape(-1)[first]] == 1)
+    way = unit(ways[last])
+    across[last] = np.linalg.norm(apart[last] - (apart[last] * way).sum(axis=1, keepdims=True) * way, axis=1)
     size = np.concatenate([length, length[number].max(axis=1)])
     # An arc that turns by an angle rises by an eighth of it, times its chord.
     arched = np.maximum(_ARCHED / 8.0 * angle * size, _UNSEEN * tolerance)

@@ -177,19 +177,12 @@ def _touching(low: Array, high: Array, other_low: Array, other_high: Array, peri
     return np.asarray(other_low + lift <= high[:, None])
 
 
-def outside_cells(face: Face, surface: NurbsSurface, rows: Array) -> NDArray[np.bool_]:
-    """Which cells of a surface (`geometry/cells.py`) lie wholly outside the trim of the face.
+def outside_cells(face: Face, rows: Array) -> NDArray[np.bool_]:
+    """Which cells (n, CELL_SIZE) of a face's surface (`geometry/cells.py`) lie wholly outside its trim.
 
     A cell that no boundary curve enters is on one side: that of its middle.
-
-    Parameters
-    ----------
-    face
-    surface
-        The face's own, or the same one in another size.
-    rows : (n, CELL_SIZE)
-        Its cells.
     """
+    surface = face.surface
     curves = [curve_boxes(curve, first_cells(curve)) for curve in face.boundary]
     outside = np.zeros(len(rows), dtype=bool)
     if not curves:

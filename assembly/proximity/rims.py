@@ -172,13 +172,15 @@ class Rim:
             place, rate = self.evaluate(t)
             offset = points - place
             distance = np.sqrt((offset**2).sum(axis=1))
-            nearer = distance < least
-            best, least = np.where(nearer, t, best), np.where(nearer, distance, least)
-            along, speed = (offset * rate).sum(axis=1), np.maximum((rate**2).sum(axis=1), 1e-300)
-            if not nearer.any() or (np.abs(along) <= _CLOSE * self.tolerance * np.sqrt(speed)).all():
-                break
-            t = t + along / speed
+            speed = np.maximum((rate**2).sum(axis=1), 1e-300)
+            step = (offset * rate).sum(axis=1) / speed
+            t = t + step
             t = low + (t - low) % (high - low) if self.closed else np.clip(t, low, high)
+            nearer = distance < least
+            # One step further than what has been measured: the last one, if small, leaves rounding alone.
+            best, least = np.where(nearer, t, best), np.where(nearer, distance, least)
+            if not nearer.any() or (np.abs(step) * np.sqrt(speed) <= _CLOSE * self.tolerance).all():
+                break
         return best, least
 
 

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assembly.errors import positive
 from assembly.geometry.face import Face
-from assembly.geometry.spline import CELL_COUNT, CELLS, CURVE_RECORD
-from assembly.geometry.surface import NurbsSurface
+from assembly.geometry.spline import CELLS, COEFFICIENTS, CURVE_RECORD
 from assembly.geometry.trim import TRIM_FIRST
 from assembly.proximity import shell
 from assembly.proximity.edge_cells import edge_cells, outside_cells
@@ -64,16 +65,16 @@ def pack_shell(topology: Topology, scale: float, table_at: int = 0, pool_at: int
         Of the shell's header in the table.
     """
     scale = positive("scale", scale)
+    parts = _parts(topology)
     writer = _Writer(table_at, pool_at)
     header = np.zeros(shell.SHELL, dtype=np.int64)
     offset, _ = writer.add(header)
-    faces, surfaces, places = [], [], []
-    for face, edges in zip(topology.faces, topology.face_edges, strict=True):
-        record, surface, curves = _face(writer, face, edges, scale)
+    faces, places = [], []
+    for face, flags, edges in zip(topology.faces, parts.flags, topology.face_edges, strict=True):
+        record, curves = _face(writer, face, flags, edges, 1.0 / scale)
         faces.append(record)
-        surfaces.append(surface)
         places.append(curves)
-    cells = _cells(topology, surfaces, scale)
+    cells = [rows * [1.0, 1.0, *[1.0 / scale] * 4] for rows in parts.cells]
     edge_rows = []
     for edge, rows in zip(topology.edges, cells, strict=True):
         _, map_at = writer.add(pool=edge.map_b)
@@ -111,13 +112,14 @@ def pack_shell(topology: Topology, scale: float, table_at: int = 0, pool_at: int
 
 
 def _face(
-    writer: _Writer, face: Face, edges: Sequence[int | None], scale: float
-) -> tuple[list[int], NurbsSurface, int]:
-    """Pack a face: its record, its scaled surface, and where the records of its boundary curves begin."""
-    surface = face.surface.transformed(scale=1.0 / scale)
-    record, pool = Face(surface, reversed=face.reversed).packed()
-    cells = pool[record[CELLS] :][: CELL_SIZE * record[CELL_COUNT]].reshape(-1, CELL_SIZE)
-    record = record.copy()
+    writer: _Writer, face: Face, flags: Array, edges: Sequence[int | None], factor: float
+) -> tuple[list[int], int]:
+    """Pack a face: its record, and where the records of its boundary curves begin."""
+    record, pool = face.packed()
+    record, pool = record.copy(), pool.copy()
+    coefficients, cells = record[COEFFICIENTS], record[CELLS]
+    pool[coefficients:cells].reshape(-1, 4)[:, :3] *= factor
+    pool[cells:].reshape(-1, CELL_SIZE)[:, 2:9] *= factor
     record[list(OFFSETS)] += writer.pool_at
     surface_at, _ = writer.add(record, pool)
     trim_at = curves = -1
@@ -126,21 +128,46 @@ def _face(
         curves = int(table[TRIM_FIRST])
         trim_at, _ = writer.add(table, pool)
     listed, _ = writer.add([-1 if edge is None else edge for edge in edges])
-    flags = np.where(outside_cells(face, surface, cells), 0.0, 1.0)
     _, flags_at = writer.add(pool=flags)
-    return [surface_at, trim_at, listed, flags_at], surface, curves
+    return [surface_at, trim_at, listed, flags_at], curves
 
 
-def _cells(topology: Topology, surfaces: Sequence[NurbsSurface], scale: float) -> list[Array]:
+@dataclass(frozen=True, eq=False)
+class _Parts:
+    """What takes long and is the same in every scene: flags of the faces' cells, cells of the edges."""
+
+    flags: list[Array]
+    cells: list[Array]
+
+
+_KNOWN: WeakKeyDictionary[Topology, _Parts] = WeakKeyDictionary()
+
+
+def _parts(topology: Topology) -> _Parts:
+    known = _KNOWN.get(topology)
+    if known is None:
+        known = _KNOWN[topology] = _Parts([_flags(face) for face in topology.faces], _cells(topology))
+    return known
+
+
+def _flags(face: Face) -> Array:
+    """1 for every cell that may hold material of the face."""
+    record, pool = face.packed()
+    rows = pool[record[CELLS] :].reshape(-1, CELL_SIZE)
+    return np.where(outside_cells(face, rows), 0.0, 1.0)
+
+
+def _cells(topology: Topology) -> list[Array]:
     """The cells of every edge, face by face."""
     result: list[Array] = [np.empty((0, shell.EDGE_CELL_SIZE))] * len(topology.edges)
     groups: list[list[int]] = [[] for _ in topology.faces]
     for k, edge in enumerate(topology.edges):
         groups[edge.face_a].append(k)
-    for number, group in enumerate(groups):
+    for face, group in zip(topology.faces, groups, strict=True):
         if group:
-            curves = [topology.faces[number].boundary[topology.edges[k].curve_a] for k in group]
-            lengths = [topology.edges[k].length / scale for k in group]
-            for k, rows in zip(group, edge_cells(surfaces[number], curves, lengths), strict=True):
+            edges = [topology.edges[k] for k in group]
+            curves = [face.boundary[edge.curve_a] for edge in edges]
+            lengths = [edge.length for edge in edges]
+            for k, rows in zip(group, edge_cells(face.surface, curves, lengths), strict=True):
                 result[k] = rows
     return result

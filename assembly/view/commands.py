@@ -13,7 +13,6 @@ import umsgpack
 from numpy.typing import NDArray
 
 from assembly.view.item import FIELD_OF_VIEW, Item, Picture
-from assembly.view.mesh import Mesh
 from assembly.view.motion import quaternions
 from assembly.view.outline import Lines
 
@@ -45,8 +44,11 @@ def _array(rows: NDArray[Any], kind: str) -> Command:
     return {"itemSize": size, "type": name, "array": _numbers(rows, kind), "normalized": False}
 
 
-def _geometry(mesh: Mesh, identifier: str) -> Command:
+def _geometry(item: Item, identifier: str) -> Command:
+    mesh = item.mesh
     attributes = {"position": _array(mesh.vertices, "float"), "normal": _array(mesh.normals, "float")}
+    if mesh.colors is not None:
+        attributes["color"] = _array(np.where(np.isnan(mesh.colors), item.color, mesh.colors), "float")
     data = {"attributes": attributes, "index": _array(mesh.triangles, "index")}
     return {"uuid": identifier, "type": "BufferGeometry", "data": data}
 
@@ -57,7 +59,9 @@ def _line_geometry(lines: Lines, identifier: str) -> Command:
 
 
 def _material(item: Item, identifier: str) -> Command:
-    red, green, blue = (round(255.0 * part) for part in item.color)
+    # Where vertices have colors, those are shone at with white.
+    colored = item.mesh.colors is not None
+    red, green, blue = (round(255.0 * part) for part in ((1.0, 1.0, 1.0) if colored else item.color))
     material: Command = {
         "uuid": identifier,
         "type": "MeshPhongMaterial",
@@ -66,6 +70,8 @@ def _material(item: Item, identifier: str) -> Command:
         "shininess": 70.0,
         "side": 2,  # both sides: open surfaces have an inside to look at
     }
+    if colored:
+        material["vertexColors"] = True
     if item.lines is not None:
         # A little farther away than it is, so that lines on it are seen whole.
         material.update(polygonOffset=True, polygonOffsetFactor=1.0, polygonOffsetUnits=1.0)
@@ -109,7 +115,7 @@ def commands(picture: Picture) -> Iterator[Command]:
     yield {"type": "delete", "path": ROOT}
     for item in picture.items:
         path = _path(item)
-        yield _object(path, "Mesh", _geometry(item.mesh, f"{path}:geometry"), _material(item, f"{path}:material"))
+        yield _object(path, "Mesh", _geometry(item, f"{path}:geometry"), _material(item, f"{path}:material"))
         yield {"type": "set_transform", "path": path, "matrix": item.matrix.T.ravel().tolist()}
         if item.lines is not None:
             # Below the item's path, so that it moves with it.

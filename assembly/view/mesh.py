@@ -8,7 +8,7 @@ its normals. A trimmed face is made of facets (`geometry/polygon.py`) that turn 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -45,29 +45,45 @@ class Mesh:
     vertices, normals : (n, 3)
     triangles : (m, 3) of int
         Corners, counterclockwise seen from outside.
+    colors : (n, 3), optional
+        Red, green, blue from 0 to 1; NaN for vertices that have no color of their own.
     """
 
     vertices: Array
     normals: Array
     triangles: NDArray[np.int64]
+    colors: Array | None = None
+
+    def about(self, point: Array) -> Mesh:
+        """The mesh moved so that a point comes to the origin."""
+        return replace(self, vertices=self.vertices - point)
 
     def transformed(self, matrix: Array) -> Mesh:
         """The mesh moved by a homogeneous (4, 4) matrix whose scale may differ by axis; no mirror images."""
         linear = matrix[:3, :3]
         normals = self.normals @ np.linalg.inv(linear)
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-        return Mesh(self.vertices @ linear.T + matrix[:3, 3], normals, self.triangles)
+        return replace(self, vertices=self.vertices @ linear.T + matrix[:3, 3], normals=normals)
 
 
 def joined(meshes: list[Mesh]) -> Mesh:
     """Several meshes as one."""
     starts = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes])
     triangles = [mesh.triangles + start for mesh, start in zip(meshes, starts[:-1], strict=True)]
+    colors = None
+    if any(mesh.colors is not None for mesh in meshes):
+        none = (np.full_like(mesh.vertices, np.nan) if mesh.colors is None else mesh.colors for mesh in meshes)
+        colors = np.concatenate(list(none))
     return Mesh(
         np.concatenate([mesh.vertices for mesh in meshes]),
         np.concatenate([mesh.normals for mesh in meshes]),
         np.concatenate(triangles),
+        colors,
     )
+
+
+def _colored(mesh: Mesh, color: tuple[float, float, float] | None) -> Mesh:
+    return mesh if color is None else replace(mesh, colors=np.tile(color, (len(mesh.vertices), 1)))
 
 
 def _unit(vectors: Array) -> Array:
@@ -220,4 +236,4 @@ def body_mesh(body: Body, budget: int = 20_000) -> Mesh | None:
     share = max(budget // len(body.faces), 100)
     faces = [side.face for side in body.faces]
     size, angle = extent(faces), turning(len(faces))
-    return joined([_face_mesh(face, share, size, angle) for face in faces])
+    return joined([_colored(_face_mesh(face, share, size, angle), getattr(face, "color", None)) for face in faces])

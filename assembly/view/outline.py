@@ -38,6 +38,10 @@ class Lines:
     points: Array
     segments: NDArray[np.int64]
 
+    def about(self, point: Array) -> Lines:
+        """The lines moved so that a point comes to the origin."""
+        return Lines(self.points - point, self.segments)
+
 
 def _chords(face: Face, tolerance: float, angle: float) -> Array:
     found = _known.setdefault(face, {})

@@ -22,7 +22,7 @@ from assembly.view.item import Color, Item, Picture, Place, Stations, framed
 from assembly.view.marks import arrow, ball, cross
 from assembly.view.mesh import Mesh, body_mesh
 from assembly.view.motion import aligned, sample_times
-from assembly.view.outline import Lines, body_lines
+from assembly.view.outline import body_lines
 from assembly.view.series import (
     Ellipsoids,
     Pairs,
@@ -81,11 +81,14 @@ _OUTLOOKS = 200
 
 
 def _colors(bodies: Sequence[Body]) -> Iterator[Color]:
-    """Colors by name, the other bodies in turn with those that no name has taken."""
+    """Colors of their own, or by name, or in turn with those that no name has taken."""
     names = [body.name.strip().lower() for body in bodies]
     free = [color for color in _PALETTE if color not in [_NAMED.get(name) for name in names]]
     turns = cycle(free or _PALETTE)
     for body, name in zip(bodies, names, strict=True):
+        if getattr(body, "color", None) is not None:
+            yield body.color
+            continue
         if body.fixed and not body.faces and name not in _NAMED:
             # The ground of a mechanism.
             yield _GROUND
@@ -113,12 +116,11 @@ def _bodies(
             mesh, scale = link_mesh(place.scale * held[body], size), np.ones(3)
         # About its own middle, for a shape that was drawn far from the origin of its body.
         middle = 0.5 * (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0))
-        about = Mesh(mesh.vertices - middle, mesh.normals, mesh.triangles)
         position = place(stations.points(body, scale * middle / place.scale))
         lines = body_lines(body)
         if lines is not None:
-            lines = Lines(lines.points - middle, lines.segments)
-        yield Item(path, about, color, position, rotation, scale, lines=lines)
+            lines = lines.about(middle)
+        yield Item(path, mesh.about(middle), color, position, rotation, scale, lines=lines)
 
 
 def _contact(pair: Pairs, place: Place) -> Iterator[Item]:

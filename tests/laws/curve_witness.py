@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tests.laws.witness import STEP, Stack, rotated
+from tests.laws.witness import STEP, rotated
 
 
 class CurveStack:

@@ -125,23 +125,22 @@ def plane_curve(rng, surface, at):
     for k in range(2):
         breaks = surface.breaks()[k]
         i = min(np.searchsorted(breaks, at[k], "right") - 1, breaks.size - 2)
-        span.append(0.2 * (breaks[i + 1] - breaks[i]))
+        span.append(0.18 * (breaks[i + 1] - breaks[i]))
     angle = rng.uniform(0.0, 6.3)
-    t = np.linspace(-1.0, 1.0, 6)
-    x, y = t, rng.uniform(-0.5, 0.5) * t * t + 0.05 * rng.normal(size=6)
-    points = np.stack([np.cos(angle) * x - np.sin(angle) * y, np.sin(angle) * x + np.cos(angle) * y], 1)
-    knots = np.concatenate([np.zeros(4), [0.35, 0.7], np.ones(4)]) * rng.uniform(0.5, 3.0)
-    weights = rng.uniform(0.8, 1.2, 6)
-    curve = NurbsCurve(points * span, knots, 3, weights)
-    t = float(curve.domain[1] * 0.5)
-    return NurbsCurve(points * span + np.asarray(at) - curve.evaluate(t), knots, 3, weights), t
+    x, y = np.linspace(-1.0, 1.0, 4), rng.uniform(-0.2, 0.2, 4)
+    points = span * np.stack([np.cos(angle) * x - np.sin(angle) * y, np.sin(angle) * x + np.cos(angle) * y], 1)
+    # One piece: differences feel the derivatives of short pieces.
+    knots = np.repeat([0.0, rng.uniform(0.5, 3.0)], 4)
+    curve = NurbsCurve(points, knots, 3, rng.uniform(0.9, 1.1, 4))
+    t = float(curve.domain[1] * rng.uniform(0.4, 0.6))
+    return NurbsCurve(points + np.asarray(at) - curve.evaluate(t), knots, 3, curve.weights), t
 
 
 def space_curve(rng):
     """A bent curve in space and a parameter inside of a span."""
     count = 7
     points = np.stack([np.linspace(-1.0, 1.0, count), np.zeros(count), np.zeros(count)], 1)
-    points += rng.normal(size=(count, 3)) * [0.05, 0.25, 0.25]
+    points += rng.normal(size=(count, 3)) * [0.03, 0.12, 0.12]
     knots = np.concatenate([np.zeros(4), [0.25, 0.5, 0.75], np.ones(4)]) * rng.uniform(0.5, 3.0)
     curve = NurbsCurve(points, knots, 3, rng.uniform(0.8, 1.2, count))
     return curve, float(curve.domain[1] * rng.uniform(0.3, 0.45))
