@@ -224,7 +224,7 @@ def _check_apart(table: TrimTable, chains: Sequence[range], names: Sequence[str]
     found = table.crossing(TOLERANCE)
     if found is None:
         return
-    (k, a), (m, b) = ((n, c) for c in found[:2] for n, chain in enumerate(chains) if c in chain)
+    k, m = sorted(n for curve in found[:2] for n, chain in enumerate(chains) if curve in chain)
     place = f"near (u, v) = ({found[2][0]:.6g}, {found[2][1]:.6g})"
     if names[k] == names[m]:
         raise InputError(f"{names[k]} crosses or touches itself {place}; expected a loop without crossings")

@@ -150,8 +150,9 @@ def winding(table, pool, trim, u, v):
     y = _into_cell(v, pool[frame + LOW_V], pool[frame + HIGH_V], pool[frame + PERIOD_V])
     # A pole edge is no boundary: its points belong to the face, with those just inside.
     z = x
-    if pool[frame + PERIOD_U] == 0.0 and x >= pool[frame + HIGH_U]:
-        z = pool[frame + HIGH_U] - 1e-15 * (pool[frame + HIGH_U] - pool[frame + LOW_U])
+    extent = pool[frame + HIGH_U] - pool[frame + LOW_U]
+    if pool[frame + PERIOD_U] == 0.0 and 0.0 <= x - pool[frame + HIGH_U] <= 1e-14 * extent:
+        z = pool[frame + HIGH_U] - 1e-15 * extent
     w = _steps(pool, table[trim + TRIM_STEP_POOL], table[trim + TRIM_STEPS], pool[frame + BOTTOM], x)
     o = table[trim + TRIM_PIECE_TABLE]
     i = table[trim + TRIM_PIECE_POOL]
