@@ -268,6 +268,22 @@ def test_a_gap_within_the_tolerance_is_closed_and_a_wider_one_is_not():
     assert topology_of(far, tolerance=1e-5 * size).is_closed
 
 
+@pytest.mark.parametrize(("bulge", "joins"), [(0.0, True), (5e-6, True), (5e-5, False)])
+def test_curves_between_common_ends_may_be_a_little_off(bulge, joins):
+    """Two faces of a folded sheet whose common side is a line on one and an arch on the other."""
+    size = 10.0 * sqrt(2.0)
+    arch = NurbsCurve([[0, 0], [0.5, -2.0 * bulge * size], [1, 0.0]], [0, 0, 0, 1, 1, 1], 2)
+    rest = [line((1, 0), (1, 1)), line((1, 1), (0, 1)), line((0, 1), (0, 0))]
+    knots = np.array([-5.0, -5.0, 5.0, 5.0])
+    flat = [[[a, b, 0.0] for b in (-5, 5)] for a in (-5, 5)]
+    folded = Face(NurbsSurface(flat, (knots, knots), (1, 1)), [arch, *rest])
+    upright = [[[a, 0.0, -b] for b in (-5, 5)] for a in (-5, 5)]
+    other = Face(NurbsSurface(upright, (knots, knots), (1, 1)), [line((0, 0), (1, 0)), *rest], reversed=True)
+    topology = topology_of([folded, other], tolerance=1e-6 * size)
+    assert len(topology.vertices) == 6
+    assert len(topology.edges) == (7 if joins else 8)
+
+
 def test_faces_with_contradicting_sides_do_not_join():
     bottom, top = shapes.box(1, 2, 3)[4:]
     faces = [*shapes.box(1, 2, 3)[:4], bottom, Face(top.surface, reversed=True)]
