@@ -151,6 +151,7 @@ def topology_of(faces: Iterable[Face], tolerance: float | None = None) -> Topolo
             for rim in loop:
                 parts[rim.index].append(rim.curve)
         given[number] = with_cuts(given[number], parts)
+        assert len(given[number].boundary) == sum(map(len, parts))
     return _joined(tuple(given), chains, survey)
 
 
