@@ -28,7 +28,8 @@ import numpy as np
 from llvmlite import ir
 from numba import njit, types
 from numba.core import caching, cgutils, config, serialize
-from numba.core.compiler import CompileResult
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler, CompileResult
 from numba.core.datamodel import models
 from numba.core.typing.templates import infer, infer_global, make_overload_template
 from numba.extending import intrinsic, overload, register_model
@@ -188,6 +189,52 @@ class _Cache(caching._Cache):
         return self._folder / f"{self._title()}-{hashlib.sha256(key).hexdigest()[:32]}"
 
 
+class _NoEnvironment:
+    """Numba's code generator, but that a kernel without code of its own has no place for its environment either."""
+
+    def __init__(self, codegen: Any) -> None:
+        self._codegen = codegen
+
+    def set_env(self, _name: str, _environment: Any) -> None:
+        """Nothing to do."""
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._codegen, name)
+
+
+class _InnerLibrary(JITCodeLibrary):
+    """The code of a kernel that only kernels call: linked together and left as it is.
+
+    Numba optimizes every library with all it calls and makes machine code of it, once more at every level of calls.
+    Of inner kernels neither is ever used: the entry that calls them is optimized as a whole.
+    """
+
+    @property
+    def codegen(self) -> Any:
+        return _NoEnvironment(self._codegen)
+
+    def get_pointer_to_function(self, _name: str) -> int:
+        self._ensure_finalized()
+        return 0
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._verify_declare_only_symbols()
+        self._finalized = True
+
+
+class _InnerCompiler(Compiler):
+    """Numba's compiler, with such a library."""
+
+    def __init__(self, typing_context: Any, target_context: Any, _library: Any, *rest: Any) -> None:
+        library = _InnerLibrary(target_context.codegen(), "inner")
+        library.enable_object_caching()
+        super().__init__(typing_context, target_context, library, *rest)
+
+
 class _OncePerSignature(dict[Any, Any]):
     """Numba keys what it has compiled for kernels by types and by the caller's flags. Ours have flags of their own.
 
@@ -204,7 +251,13 @@ class _OncePerSignature(dict[Any, Any]):
 
 def _callable_from_kernels(function: Callable[..., Any], settings: dict[str, Any]) -> None:
     """Let kernels call a function, compiled by these settings; in Python it stays what it is."""
-    options = {"no_cpython_wrapper": True, "nopython": True, **settings}
+    options = {
+        "no_cpython_wrapper": True,
+        "no_cfunc_wrapper": True,
+        "nopython": True,
+        "pipeline_class": _InnerCompiler,
+        **settings,
+    }
 
     def implementation(*_arguments: Any, **_keywords: Any) -> Callable[..., Any]:
         return function
