@@ -106,7 +106,7 @@ def run(quick: bool) -> dict[str, Any]:
     """Sides of points, then times."""
     plane = shapes.plane(10.0, 10.0)
     faces = [Face(plane, *_loops(seed)) for seed in range(3 if quick else 50)]
-    each = 1_000 if quick else 10_000
+    each = 1_000 if quick else 11_000
     right = judged = beside = beside_right = 0
     error = 0.0
     for seed, face in enumerate(faces):

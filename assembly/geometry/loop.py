@@ -90,8 +90,9 @@ class Loop:
     ) -> None:
         self._make(curves, tolerance, period, "loop")
         (u, v), (x, y) = self._box()
-        closes = period is not None or not self.turn.any()
-        table = build(self.curves, (range(len(self.curves)),), (closes,), (), ((u, x), (v, y)), self.period)
+        # In the unrolled plane: seams meet one period away, and whether anything else does is for a face to see.
+        chain = range(len(self.curves))
+        table = build(self.curves, (chain,), (not self.turn.any(),), (), ((u, x), (v, y)), (0.0, 0.0))
         found = table.crossing(TOLERANCE)
         if found is not None:
             u, v = found[2]
