@@ -174,6 +174,28 @@ def test_a_face_that_cannot_be_read_is_named(tmp_path, monkeypatch):
     assert "face 3" not in [side.name for side in body.faces] and "face 4" in [side.name for side in body.faces]
 
 
+def test_faces_that_occt_drops_are_counted(tmp_path, monkeypatch):
+    file = File()
+    file.part(box(), "box")
+    path = file.write(tmp_path / "box.step")
+    known = reader.document_of
+    monkeypatch.setattr(reader, "document_of", lambda path: (known(path)[0], known(path)[1] + 2))
+    with pytest.warns(StepWarning, match="box.step: not read: 2 of 8 faces, of which OCCT makes nothing"):
+        (body,) = asm.read_step(path)
+    assert len(body.faces) == 6
+
+
+@pytest.mark.parametrize("mirror", [True, False])
+def test_placements_that_are_not_rigid_are_refused(mirror):
+    transform = O.gp_Trsf()
+    if mirror:
+        transform.SetMirror(O.gp_Ax2(O.gp_Pnt(0, 0, 0), O.gp_Dir(0, 0, 1)))
+    else:
+        transform.SetScale(O.gp_Pnt(0, 0, 0), 2.0)
+    with pytest.raises(Unreadable, match="mirrored or scaled"):
+        reader._pose(O.TopLoc_Location(transform), 1.0)
+
+
 def test_approximated_faces_are_named(tmp_path):
     file = File()
     file.part(swollen(), "vase")

@@ -10,7 +10,7 @@ import pytest
 
 import assembly as asm
 from assembly.step.occt import occt, quiet
-from assembly.step.reader import _document, _shapes
+from assembly.step.reader import _shapes, document_of
 from assembly.step.tree import Part, free_labels, leaves
 from tests.step.models import O, areas, faces, off, volumes
 
@@ -33,7 +33,7 @@ def file(request):
 def occt_solids(path):
     """Name of the part and solid, as OCCT has them."""
     with quiet():
-        document, _ = _document(str(path))
+        document, _ = document_of(str(path))
         root = occt().XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
         for label in free_labels(root):
             for leaf in leaves(label, O.TopLoc_Location(), path.stem, None):
