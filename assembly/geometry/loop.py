@@ -21,6 +21,8 @@ __all__ = ["Loop"]
 Array = NDArray[np.float64]
 # Curves that end this part of the loop's size from where the next one begins are joined.
 TOLERANCE = 1e-9
+# Curves smaller than this part of the loop's size are left out.
+_NO_LENGTH = 1e-12
 
 
 def curve_ends(curve: NurbsCurve) -> Array:
@@ -131,6 +133,8 @@ class Loop:
         self.size = float(np.linalg.norm(high - low))
         if not self.size > 0.0:
             raise InputError(f"{name} is a single point; expected a loop")
+        # Files have edges of no length where something else was once; they have no direction.
+        parts = [c for c in parts if np.ptp(c.control_points, axis=0).max() > _NO_LENGTH * self.size]
         self._join([_clamped(curve) for curve in parts], period is not None, name)
 
     def _join(self, parts: list[NurbsCurve], known: bool, name: str) -> None:

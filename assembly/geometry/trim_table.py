@@ -113,6 +113,8 @@ def _largest_gap(low: Array, high: Array, period: float) -> float:
 class _Pieces:
     """Pieces while they are made: columns of equal length, in the order of the curves."""
 
+    COLUMNS = ("curve", "degree", "coefficients", "middle", "bounds", "shift", "t", "ends", "before", "after")
+
     def __init__(self, curves: Sequence[NurbsCurve], chains: Sequence[range], closing: Sequence[bool]) -> None:
         bezier, self.pool, self.records = packed_curves(curves)
         shape = self.records[:, [CURVE_DEGREE, CURVE_SPANS]]
@@ -185,7 +187,7 @@ class _Pieces:
         times.append(t1)
         points.append(b)
         extra = len(times) - 2
-        for name in ("curve", "degree", "coefficients", "middle", "bounds", "shift", "t", "ends", "before", "after"):
+        for name in _Pieces.COLUMNS:
             column = getattr(self, name)
             setattr(self, name, np.insert(column, [piece] * extra, column[piece], axis=0))
         self.before = np.where(self.before > piece, self.before + extra, self.before)
@@ -200,6 +202,22 @@ class _Pieces:
         self.after[piece + extra] = last
         if last >= 0:
             self.before[last] = piece + extra
+
+    def drop_empty(self) -> None:
+        """Leave out pieces without length, of repeated control points: they have no direction."""
+        keep = (self.ends[:, 0] != self.ends[:, 1]).any(axis=1)
+        if keep.all():
+            return
+        for k in np.flatnonzero(~keep).tolist():
+            before, after = self.before[k], self.after[k]
+            if before >= 0:
+                self.after[before] = after
+            if after >= 0:
+                self.before[after] = before
+        place = np.append(np.cumsum(keep) - 1, -1)
+        for name in _Pieces.COLUMNS:
+            setattr(self, name, getattr(self, name)[keep])
+        self.before, self.after = place[self.before], place[self.after]
 
     def join(self, periods: tuple[float, float]) -> None:
         """Let every piece begin exactly where the one before it ends, but for whole periods."""
@@ -243,6 +261,7 @@ def build(
             high[axis] = low[axis] + period
             pieces.cut(axis, float(low[axis]), period)
     pieces.join(periods)
+    pieces.drop_empty()
     if periods[1]:
         # Upward through the bottom of the cell: material is to the left, so w falls by one to the right.
         begins, stops = pieces.ends[:, 0], pieces.ends[:, 1]

@@ -130,6 +130,19 @@ def test_a_cusp_has_the_right_sides():
     assert face.locate(0.0, 0.0) == 0
 
 
+def test_repeated_points_and_curves_of_no_length_do_no_harm():
+    corners = [ELL[0], ELL[0], *ELL[1:4], ELL[3], *ELL[4:]]
+    edges = polygon(*ELL)
+    edges.insert(2, segment(ELL[2], ELL[2]))
+    plain = Face(PLANE, polygon(*ELL))
+    u, v = np.random.default_rng(0).uniform(-3, 3, (2, 500))
+    u, v = np.append(u, [0.0, -2.3, 0.0]), np.append(v, [0.0, -2.4, -1e-3])
+    for outer in (polyline(*corners), edges):
+        face = Face(PLANE, outer)
+        np.testing.assert_array_equal(face.locate(u, v), plain.locate(u, v))
+        np.testing.assert_allclose(face.trim_distance(u, v), plain.trim_distance(u, v), rtol=0, atol=ROUNDING)
+
+
 def test_sheets_of_a_cylinder():
     face = Face(CYLINDER, None, [circle((0.1, 1.0), 0.3)])
     u, v = np.random.default_rng(1).uniform(0, AROUND, 2000), np.random.default_rng(2).uniform(0, 2, 2000)
