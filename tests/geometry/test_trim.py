@@ -130,6 +130,20 @@ def test_a_cusp_has_the_right_sides():
     assert face.locate(0.0, 0.0) == 0
 
 
+@pytest.mark.parametrize("size", [1e-2, 1e-4])
+def test_a_small_face_far_from_the_origin(size):
+    # Coordinates of 1e4 have a rounding of 2e-12: a billionth of the size is less.
+    at = np.array([1e4, -1e4])
+    low, high = at - 1.0, at + 1.0
+    corners = [[[u, v, 0.0] for v in (low[1], high[1])] for u in (low[0], high[0])]
+    knots = [np.repeat([a, b], 2) for a, b in zip(low, high, strict=True)]
+    face = Face(NurbsSurface(corners, knots, (1, 1)), circle(at, size), [circle(at, 0.5 * size)])
+    radius = size * np.array([0.0, 0.25, 0.4, 0.6, 0.75, 0.9, 1.1])
+    np.testing.assert_array_equal(face.locate(at[0] + radius, at[1]), [-1, -1, -1, 1, 1, 1, -1])
+    wanted = np.minimum(size - radius, radius - 0.5 * size)
+    np.testing.assert_allclose(face.trim_distance(at[0] + radius, at[1]), wanted, rtol=0, atol=2e-11)
+
+
 def test_repeated_points_and_curves_of_no_length_do_no_harm():
     corners = [ELL[0], ELL[0], *ELL[1:4], ELL[3], *ELL[4:]]
     edges = polygon(*ELL)
