@@ -21,6 +21,8 @@ __all__ = ["Loop"]
 Array = NDArray[np.float64]
 # Curves that end this part of the loop's size from where the next one begins are joined.
 TOLERANCE = 1e-9
+# Curves smaller than this part of the loop's size are left out.
+_NO_LENGTH = 1e-12
 
 
 def curve_ends(curve: NurbsCurve) -> Array:
@@ -90,8 +92,9 @@ class Loop:
     ) -> None:
         self._make(curves, tolerance, period, "loop")
         (u, v), (x, y) = self._box()
-        closes = period is not None or not self.turn.any()
-        table = build(self.curves, (range(len(self.curves)),), (closes,), (), ((u, x), (v, y)), self.period)
+        # In the unrolled plane: seams meet one period away, and whether anything else does is for a face to see.
+        chain = range(len(self.curves))
+        table = build(self.curves, (chain,), (not self.turn.any(),), (), ((u, x), (v, y)), (0.0, 0.0))
         found = table.crossing(TOLERANCE)
         if found is not None:
             u, v = found[2]
@@ -130,6 +133,8 @@ class Loop:
         self.size = float(np.linalg.norm(high - low))
         if not self.size > 0.0:
             raise InputError(f"{name} is a single point; expected a loop")
+        # Files have edges of no length where something else was once; they have no direction.
+        parts = [c for c in parts if np.ptp(c.control_points, axis=0).max() > _NO_LENGTH * self.size]
         self._join([_clamped(curve) for curve in parts], period is not None, name)
 
     def _join(self, parts: list[NurbsCurve], known: bool, name: str) -> None:

@@ -33,6 +33,7 @@ BOUND_1, BOUND_2, BOUND_3, START, END = 9, 10, 11, 12, 14
 PIECE_DOUBLES = 16
 # Where the distance hardly changes, as from the center of a circle, this part of its square is let go.
 LET_GO = 1e-10
+_ROUNDING = 4e-15
 # Intervals that a query may look at on one piece before its bounds are taken as they are.
 _BUDGET = 4000
 
@@ -159,11 +160,13 @@ def nearest_on_piece(pool, o, degree, middle, t0, t1, m1, m2, m3, qx, qy, best):
         reach = half
         if bent > 0.0:
             reach = min(half, abs(g) / bent)
-        low = f - abs(g) * reach + 0.5 * bent * reach * reach
+        # What rounding may have added comes off: for a point near the curve the bound is a small difference.
+        low = f - abs(g) * reach + 0.5 * bent * reach * reach - _ROUNDING * (f + abs(g) * half)
         if low < best:
             # A tangent and how far the piece may be from it.
             along = min(max(-g / speed, -half), half) if speed > 0.0 else 0.0
             apart = np.sqrt((ex + along * dx) ** 2 + (ey + along * dy) ** 2) - 0.5 * m2 * half * half
+            apart -= _ROUNDING * (np.sqrt(2.0 * f) + m1 * half)
             if apart > 0.0:
                 low = max(low, 0.5 * apart * apart)
         if low < best:

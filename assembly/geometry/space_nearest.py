@@ -43,6 +43,7 @@ from assembly.geometry.spline import (
 from assembly.geometry.vec import add, blend, dot, scale, sub
 
 _BUDGET = 4000
+_ROUNDING = 4e-15
 
 
 @kernel(inner=True)
@@ -123,10 +124,10 @@ def _search(table, pool, surface, o, i, q, m1, m2, m3, best):
         third = 3.0 * m1 * m2 + (np.sqrt(2.0 * f) + m1 * half) * m3
         bent = curvature - third * half / 3.0
         reach = min(half, abs(g) / bent) if bent > 0.0 else half
-        low = f - abs(g) * reach + 0.5 * bent * reach * reach
+        low = f - abs(g) * reach + 0.5 * bent * reach * reach - _ROUNDING * (f + abs(g) * half)
         along = min(max(-g / speed, -half), half) if speed > 0.0 else 0.0
         beside = add(e, scale(along, d))
-        apart = np.sqrt(dot(beside, beside)) - 0.5 * m2 * half * half
+        apart = np.sqrt(dot(beside, beside)) - 0.5 * m2 * half * half - _ROUNDING * (np.sqrt(2.0 * f) + m1 * half)
         if apart > 0.0:
             low = max(low, 0.5 * apart * apart)
         if low < best:

@@ -30,6 +30,8 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 # A point this part of the boundary's size from it is on it.
 ON_BOUNDARY = 1e-12
+# Some roundings of a coordinate, as a part of it.
+NOISE = 1e-14
 _BINOMIALS = np.array([[comb(n, k) for k in range(32)] for n in range(32)], dtype=float)
 # Fields that point into the table and into the pool.
 _TABLE_FIELDS = [layout.TRIM_FIRST, layout.TRIM_PIECE_TABLE, layout.TRIM_CURVE_PIECES]
@@ -77,13 +79,15 @@ class TrimTable:
         count, first = int(record[layout.TRIM_PIECES]), int(record[layout.TRIM_PIECE_POOL])
         frame = self.pool[record[layout.TRIM_FRAME] : record[layout.TRIM_FRAME] + layout.FRAME]
         size = float(frame[layout.SIZE])
-        low = self.pool[first : first + PIECE_DOUBLES * count].reshape(-1, PIECE_DOUBLES)[:, [0, 2]]
+        boxes = self.pool[first : first + PIECE_DOUBLES * count].reshape(-1, PIECE_DOUBLES)[:, :4]
+        low = boxes[:, [0, 2]]
+        nearest = max(tolerance * size, NOISE * float(np.abs(boxes).max(initial=0.0)))
         pieces, moves = np.arange(count), np.zeros((count, 2))
         for axis in range(2):
             period = frame[layout.PERIOD_U + axis]
             if period:
                 # What touches the lower border of the cell meets what touches the upper one.
-                touches = low[pieces, axis] <= frame[layout.LOW_U + axis] + tolerance * size
+                touches = low[pieces, axis] <= frame[layout.LOW_U + axis] + nearest
                 pieces = np.concatenate([pieces, pieces[touches]])
                 copies = moves[touches]
                 copies[:, axis] += period
@@ -91,7 +95,7 @@ class TrimTable:
         order = np.argsort(low[pieces, 0] + moves[:, 0])
         where = np.empty(2)
         places = int(record[layout.TRIM_PIECE_TABLE]), first
-        a, b = first_crossing(self.table, self.pool, *places, pieces, moves, order, tolerance * size, size, where)
+        a, b = first_crossing(self.table, self.pool, *places, pieces, moves, order, nearest, size, where)
         if a < 0:
             return None
         ints = self.table[places[0] : places[0] + PIECE_INTS * count].reshape(-1, PIECE_INTS)
@@ -112,6 +116,8 @@ def _largest_gap(low: Array, high: Array, period: float) -> float:
 
 class _Pieces:
     """Pieces while they are made: columns of equal length, in the order of the curves."""
+
+    COLUMNS = ("curve", "degree", "coefficients", "middle", "bounds", "shift", "t", "ends", "before", "after")
 
     def __init__(self, curves: Sequence[NurbsCurve], chains: Sequence[range], closing: Sequence[bool]) -> None:
         bezier, self.pool, self.records = packed_curves(curves)
@@ -185,7 +191,7 @@ class _Pieces:
         times.append(t1)
         points.append(b)
         extra = len(times) - 2
-        for name in ("curve", "degree", "coefficients", "middle", "bounds", "shift", "t", "ends", "before", "after"):
+        for name in _Pieces.COLUMNS:
             column = getattr(self, name)
             setattr(self, name, np.insert(column, [piece] * extra, column[piece], axis=0))
         self.before = np.where(self.before > piece, self.before + extra, self.before)
@@ -200,6 +206,22 @@ class _Pieces:
         self.after[piece + extra] = last
         if last >= 0:
             self.before[last] = piece + extra
+
+    def drop_empty(self) -> None:
+        """Leave out pieces without length, of repeated control points: they have no direction."""
+        keep = (self.ends[:, 0] != self.ends[:, 1]).any(axis=1)
+        if keep.all():
+            return
+        for k in np.flatnonzero(~keep).tolist():
+            before, after = self.before[k], self.after[k]
+            if before >= 0:
+                self.after[before] = after
+            if after >= 0:
+                self.before[after] = before
+        place = np.append(np.cumsum(keep) - 1, -1)
+        for name in _Pieces.COLUMNS:
+            setattr(self, name, getattr(self, name)[keep])
+        self.before, self.after = place[self.before], place[self.after]
 
     def join(self, periods: tuple[float, float]) -> None:
         """Let every piece begin exactly where the one before it ends, but for whole periods."""
@@ -243,6 +265,7 @@ def build(
             high[axis] = low[axis] + period
             pieces.cut(axis, float(low[axis]), period)
     pieces.join(periods)
+    pieces.drop_empty()
     if periods[1]:
         # Upward through the bottom of the cell: material is to the left, so w falls by one to the right.
         begins, stops = pieces.ends[:, 0], pieces.ends[:, 1]
@@ -316,9 +339,10 @@ def _table(
         )
         point += pieces.shift[longest]
         across = np.column_stack([-extent[longest, 1], extent[longest, 0]])
-        across *= 1e-10 * size / np.linalg.norm(across, axis=1, keepdims=True)
-        for beside, out in ((point + across, left), (point - across, right)):
-            windings(table, pool, 0, beside[:, 0].copy(), beside[:, 1].copy(), out)
+        beside = max(1e-10 * size, NOISE * float(np.abs(pieces.ends).max()))
+        across *= beside / np.linalg.norm(across, axis=1, keepdims=True)
+        for probe, out in ((point + across, left), (point - across, right)):
+            windings(table, pool, 0, probe[:, 0].copy(), probe[:, 1].copy(), out)
         # w is to be 1 where there is material.
         bottom = 1.0 - left[0]
         pool[frame_at + layout.BOTTOM] += bottom

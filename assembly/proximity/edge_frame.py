@@ -150,10 +150,10 @@ def pair_response(f, g, beta, unit):
 
 
 @kernel(inline=True)
-def fold_of(h):
-    """det H / |H|^2: how far a pair is from a fold, where it ceases to be isolated; zero for H = 0."""
+def fold_of(h, size):
+    """det H / |H|^2: how far a pair is from a fold, where it ceases to be isolated; zero where H is nothing."""
     norm2 = h[0] * h[0] + h[1] * h[1] + h[2] * h[2] + h[3] * h[3]
-    return (h[0] * h[3] - h[1] * h[2]) / norm2 if norm2 > 0.0 else 0.0
+    return (h[0] * h[3] - h[1] * h[2]) / norm2 if norm2 > 1e-18 * size * size else 0.0
 
 
 @kernel(inner=True)

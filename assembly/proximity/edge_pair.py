@@ -31,6 +31,8 @@ from assembly.proximity.shell import VERTEX
 
 # Points closer than this part of the size coincide: their difference has no direction.
 COINCIDENT = 1e-13
+# Of lines at a larger angle the normal is across both, even where their points are hardly determined.
+NEARLY = 3e-8
 
 
 @kernel(inline=True)
@@ -45,14 +47,15 @@ def unit_tangent(ct, ctt):
 
 
 @kernel(inner=True)
-def normal_between(d, t1, t2, curves, n, size):
+def normal_between(d, t1, t2, curves, n, size, isolated):
     """Unit normal from the first feature to the second, and whether it is certain."""
     distance = math.sqrt(dot(d, d))
     known = dot(n, n) > 0.25
     if curves:
         w = cross(t1, t2)
         sine = math.sqrt(dot(w, w))
-        if sine * size > distance and sine > 1e-12:
+        # What has the smaller error. Along nearly parallel lines the points are uncertain, and with them d.
+        if (sine * size > distance and sine > 1e-12) or (sine > NEARLY and not isolated):
             w = scale(1.0 / sine, w)
             toward = dot(w, n) if known else dot(w, d)
             return (neg(w) if toward < 0.0 else w), True
@@ -81,12 +84,12 @@ def straight_side(tx, ty, n, tangent, bent, speed, point, unit):
 
 
 @kernel(inner=True)
-def straight_frame(side_f, side_g, residual, normal, size, regular, isolated, h):
+def straight_frame(side_f, side_g, residual, normal, size, regular, isolated, h, scope):
     """The frame of a pair without faces."""
     p, t1, bent1, speed1, point_f = side_f
     q, t2, bent2, speed2, point_g = side_g
     d = sub(q, p)
-    n, sure = normal_between(d, t1, t2, not (point_f or point_g), normal, size)
+    n, sure = normal_between(d, t1, t2, not (point_f or point_g), normal, size, isolated)
     tx = across(n, t1 if dot(t1, t1) > 0.5 else t2)
     ty = cross(n, tx)
     beta = dot(n, d)
@@ -111,7 +114,7 @@ def straight_frame(side_f, side_g, residual, normal, size, regular, isolated, h)
         regular,
         isolated,
         True,
-        fold_of(h),
+        fold_of(h, scope),
     )
 
 
@@ -139,27 +142,33 @@ def solve_off_face(table, pool, kind_f, f, kind_g, g, rotation, shift, x, normal
         r2 = 0.0
         if not regular:
             break
-        r1 = 0.0 if point_f else dot(d, t1)
-        r2 = 0.0 if point_g else dot(d, t2)
+        scope = 1.0 + math.sqrt(dot(d, d)) * (bend1 + bend2)
+        r1 = dot(d, t1)
+        r2 = dot(d, t2)
         if limit > 0:
             # At the end of an edge, and the distance would be less beyond it.
-            if abs(r1) > BEYOND * size and edge_held(table, pool, f, x[0], r1):
-                point_f = True
-                r1 = 0.0
-            if abs(r2) > BEYOND * size and edge_held(table, pool, g, x[1], -r2):
-                point_g = True
-                r2 = 0.0
-        cosine = 0.0 if point_f or point_g else dot(t1, t2)
-        h = (
-            1.0 if point_f else 1.0 - dot(d, bent1),
-            -cosine,
-            -cosine,
-            1.0 if point_g else 1.0 + dot(d, bent2),
-        )
-        scope = 1.0 + math.sqrt(dot(d, d)) * (bend1 + bend2)
-        i, fine = inverse(h, scope, FINE)
-        s1 = i[0] * r1 - i[1] * r2
-        s2 = i[2] * r1 - i[3] * r2
+            point_f = point_f or (abs(r1) > BEYOND * size and edge_held(table, pool, f, x[0], r1))
+            point_g = point_g or (abs(r2) > BEYOND * size and edge_held(table, pool, g, x[1], -r2))
+        while True:
+            r1 = 0.0 if point_f else r1
+            r2 = 0.0 if point_g else r2
+            cosine = 0.0 if point_f or point_g else dot(t1, t2)
+            h = (
+                1.0 if point_f else 1.0 - dot(d, bent1),
+                -cosine,
+                -cosine,
+                1.0 if point_g else 1.0 + dot(d, bent2),
+            )
+            i, fine = inverse(h, scope, FINE)
+            s1 = i[0] * r1 - i[1] * r2
+            s2 = i[2] * r1 - i[3] * r2
+            # Or a step leads beyond it.
+            out_f = limit > 0 and not point_f and abs(s1) > BEYOND * size and edge_held(table, pool, f, x[0], s1)
+            out_g = limit > 0 and not point_g and abs(s2) > BEYOND * size and edge_held(table, pool, g, x[1], s2)
+            if not (out_f or out_g):
+                break
+            point_f = point_f or out_f
+            point_g = point_g or out_g
         step = max(abs(s1), abs(s2))
         reach_f = abs(s1) * max(bend1, 2.0 / size)
         reach_g = abs(s2) * max(bend2, 2.0 / size)
@@ -180,18 +189,22 @@ def solve_off_face(table, pool, kind_f, f, kind_g, g, rotation, shift, x, normal
         previous = step
         factor_f = 1.0 if reach_f <= BEND else BEND / reach_f
         factor_g = 1.0 if reach_g <= BEND else BEND / reach_g
-        t = x[0] if point_f else edge_advance(table, pool, f, x[0], factor_f * s1 / speed1)
-        s = x[1] if point_g else edge_advance(table, pool, g, x[1], factor_g * s2 / speed2)
-        status = NOT_CONVERGED
-        if t == x[0] and s == x[1]:
-            # Held at an end and nothing else moves: the pair has left.
-            status = LEFT_PATCH
-            break
-        x = (t, s)
+        x = (
+            x[0] if point_f else edge_advance(table, pool, f, x[0], factor_f * s1 / speed1),
+            x[1] if point_g else edge_advance(table, pool, g, x[1], factor_g * s2 / speed2),
+        )
         iteration += 1
     _i, isolated = inverse(h, scope, RANK)
     frame = straight_frame(
-        (p, t1, bent1, speed1, point_f), (q, t2, bent2, speed2, point_g), (r1, r2), normal, size, regular, isolated, h
+        (p, t1, bent1, speed1, point_f),
+        (q, t2, bent2, speed2, point_g),
+        (r1, r2),
+        normal,
+        size,
+        regular,
+        isolated,
+        h,
+        scope,
     )
     if status == CONVERGED and not frame[13]:
         status = SINGULAR

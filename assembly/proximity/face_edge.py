@@ -108,7 +108,6 @@ def solve_on_face(table, pool, face, kind, other, rotation, shift, x, size, turn
         if not regular:
             # An apex, a crease or a cusp: there is no tangent to go on.
             break
-        stuck = False
         slide = False
         if not point and limit > 0 and (steep or abs(tilt) > BEYOND):
             # At the end of the edge, and the gap would be less beyond it.
@@ -139,7 +138,8 @@ def solve_on_face(table, pool, face, kind, other, rotation, shift, x, size, turn
                 if endless:
                     break
                 dt = lo - hi if slope > 0.0 else hi - lo
-            stuck = edge_held(table, pool, other, x[2], dt)
+            # Held too where the step leads beyond the end: the slope may be that of a face not solved yet.
+            point = limit > 0 and abs(dt) * speed > BEYOND * size and edge_held(table, pool, other, x[2], dt)
         if point:
             unit = bound
             tilt = 0.0
@@ -181,14 +181,16 @@ def solve_on_face(table, pool, face, kind, other, rotation, shift, x, size, turn
         u, v, clamped = advance(table, pool, face, x[0], x[1], du, dv, blend(factor_f * ax, tx, factor_f * ay, ty))
         t = x[2] if point else edge_advance(table, pool, other, x[2], factor_g * dt)
         status = NOT_CONVERGED
-        if clamped or stuck:
+        if clamped:
             status = LEFT_PATCH
-            # Held at an end and nothing else moves: the pair has left.
+            # Held at the end of the patch and nothing else moves: the pair has left.
             if abs(u - x[0]) + abs(v - x[1]) + abs(t - x[2]) <= 1e-12 * (abs(du) + abs(dv) + abs(dt)):
                 break
         x = (u, v, t)
         iteration += 1
-    _i, isolated = inverse(h, unit * (1.0 + abs(beta) * unit), RANK)
+    scope = unit * (1.0 + abs(beta) * unit)
+    _i, isolated = inverse(h, scope, RANK)
+    fold = fold_of(h, scope)
     return (
         status,
         x,
@@ -197,7 +199,7 @@ def solve_on_face(table, pool, face, kind, other, rotation, shift, x, size, turn
         (r0, r1, tilt),
         (regular and not (steep and not point), point, isolated),
         # Positive, as of two faces, where the pair is closest or deepest.
-        fold_of(h) if point else -fold_of(h),
+        fold if point else -fold,
     )
 
 

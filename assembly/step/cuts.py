@@ -17,40 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from assembly.errors import AssemblyError
 from assembly.geometry.curve import NurbsCurve
 from assembly.geometry.surface import NurbsSurface
+from assembly.step.pieces import NEAR, POLE, SEAM, Piece, Uncut, closed_at_poles, segment
 from assembly.step.trims import sampled
+from assembly.step.unrolled import opened
 
-__all__ = ["EDGE", "POLE", "SEAM", "Piece", "cut_open", "part_of"]
+__all__ = ["cut_open", "part_of"]
 
 Array = NDArray[np.float64]
-EDGE, SEAM, POLE = "edge", "seam", "pole"
-# Parts of a period within which a point is on the seam.
-ON_SEAM = 1e-9
-
-
-class Uncut(AssemblyError):
-    """A boundary that does not enclose a region."""
-
-
-@dataclass(eq=False)
-class Piece:
-    """A directed curve in (u, v) with the material on its left, and what it is: EDGE, SEAM or POLE."""
-
-    curve: NurbsCurve
-    kind: str
-    next: Piece | None = None
-
-    @property
-    def ends(self) -> Array:
-        """First and last point (2, 2)."""
-        return self.curve.control_points[[0, -1]]
-
-
-def segment(a: Array, b: Array) -> NurbsCurve:
-    """The straight line from a to b over [0, 1]."""
-    return NurbsCurve([a, b], [0.0, 0.0, 1.0, 1.0], 1)
 
 
 def part_of(curve: NurbsCurve, cuts: list[float]) -> list[NurbsCurve]:
@@ -108,7 +83,7 @@ def _split(piece: Piece, axis: _Axis) -> list[Piece]:
     """The piece cut where it crosses a seam, its ends put onto the seam where they are next to it."""
     curve, a = piece.curve, axis.axis
     points = curve.control_points.copy()
-    near = ON_SEAM * axis.period
+    near = NEAR * axis.period
     for k in (0, -1):
         line = axis.low + np.round((points[k, a] - axis.low) / axis.period) * axis.period
         if abs(points[k, a] - line) <= near:
@@ -148,7 +123,7 @@ def _strip(piece: Piece, axis: _Axis) -> int:
     low, high = piece.curve.domain
     middle = float(piece.curve.evaluate(np.linspace(low, high, 9)[1:-1])[:, axis.axis].mean())
     at = (middle - axis.low) / axis.period
-    if abs(at - round(at)) <= ON_SEAM:
+    if abs(at - round(at)) <= NEAR:
         up = axis.height(piece.ends[1]) > axis.height(piece.ends[0])
         return round(at) - (1 if up else 0)
     return int(np.floor(at))
@@ -234,8 +209,8 @@ def _cut(chains: list[list[Piece]], axis: _Axis) -> list[list[Piece]]:
                 crossings.append(_Crossing(axis.height(piece.ends[1]), step > 0, piece, after))
             else:
                 raise Uncut("its boundary jumps over a period")
-        for piece, strip in zip(row, strips, strict=True):
-            _moved(piece, axis, strip)
+        for piece, number in zip(row, strips, strict=True):
+            _moved(piece, axis, number)
         pieces += row
     high = axis.low + axis.period
     for start, end, bottom, top in _stretches(crossings, axis, inside):
@@ -276,70 +251,12 @@ def _cycles(pieces: list[Piece]) -> list[list[Piece]]:
     return cycles
 
 
-def _along_pole(point: Array, surface: NurbsSurface) -> tuple[int, int, float] | None:
-    """The pole that a boundary ends at: its side (0, 1, 2, 3: low u, high u, low v, high v), the direction along it
-    (0: u, 1: v), and the sign of that direction with the material to the left.
-    """
-    for side in range(4):
-        axis, end = divmod(side, 2)
-        low, high = surface.domain[axis]
-        if surface._pole_bits & (1 << side) and abs(point[axis] - (low, high)[end]) <= ON_SEAM * (high - low):
-            return side, 1 - axis, 1.0 if side in (1, 2) else -1.0
-    return None
+def cut_open(face: Any) -> tuple[NurbsSurface, list[list[Piece]]]:
+    """A surface, and closed chains of pieces in its domain around the face's region.
 
-
-def _with_poles(chains: list[list[NurbsCurve]], surface: NurbsSurface) -> list[list[Piece]]:
-    """Chains with the edges at poles, which the boundary of a face leaves out.
-
-    A boundary that ends at a pole goes on along it, with the material to the left, to the next one that begins there.
-    """
-    sides = [high - low for low, high in surface.domain]
-    periods = [side if closed else 0.0 for side, closed in zip(sides, surface.closed, strict=True)]
-    size = max(sides)
-    done: list[list[Piece]] = []
-    broken: list[list[Piece]] = []
-    for chain in chains:
-        row = [Piece(curve, EDGE) for curve in chain]
-        gap = row[0].ends[0] - row[-1].ends[1]
-        whole = [round(g / t) * t if t else 0.0 for g, t in zip(gap, periods, strict=True)]
-        (done if np.abs(gap - whole).max() <= ON_SEAM * size else broken).append(row)
-    while broken:
-        row = broken.pop()
-        while True:
-            end = row[-1].ends[1]
-            pole = _along_pole(end, surface)
-            if pole is None:
-                raise Uncut("its boundary is open")
-            side, along, sign = pole
-            period = periods[along]
-            found: list[tuple[float, int, list[Piece]]] = []
-            for other in (row, *broken):
-                start = other[0].ends[0]
-                there = _along_pole(start, surface)
-                way = sign * float(start[along] - end[along])
-                if period:
-                    way %= period
-                if there is not None and there[0] == side and way >= 0.0:
-                    found.append((way, len(found), other))
-            if not found:
-                raise Uncut("its boundary is open at a pole")
-            way, _, other = min(found)
-            corner = end.copy()
-            corner[along] += sign * way
-            row.append(Piece(segment(end, corner), POLE))
-            if other is row:
-                break
-            broken = [each for each in broken if each is not other]
-            row += other
-        done.append(row)
-    return done
-
-
-def cut_open(face: Any) -> list[list[Piece]]:
-    """Closed chains of pieces in the domain of a face's surface, around its region.
-
-    Seams come in pairs, one piece on either side of the domain. A face without a boundary on a surface that is not
-    closed has none either.
+    Where the region goes round the surface, it is cut at the seam, and the two sides of the seam are pieces in pairs;
+    where it does not, the surface is opened beside it. A face without a boundary on a surface that is not closed has
+    no chains.
 
     Raises
     ------
@@ -348,11 +265,14 @@ def cut_open(face: Any) -> list[list[Piece]]:
     """
     surface: NurbsSurface = face.surface
     boundary = [curve if _is_clamped(curve) else curve.elevate(curve.degree) for curve in face.boundary]
-    chains = _with_poles([[boundary[k] for k in chain] for chain in face.chains], surface)
+    chains = closed_at_poles([[boundary[k] for k in chain] for chain in face.chains], surface)
+    for axis in (0, 1):
+        if surface.closed[axis] and chains:
+            surface = opened(chains, surface, axis)
     for axis in (0, 1):
         if surface.closed[axis]:
             chains = _cut(chains, _Axis(surface, axis))
-    return chains
+    return surface, chains
 
 
 def _is_clamped(curve: NurbsCurve) -> bool:

@@ -16,7 +16,7 @@ from assembly.geometry.surface import NurbsSurface
 from assembly.step.occt import occt, parts
 from assembly.step.profiles import Unreadable
 from assembly.step.surfaces import Patch, patch
-from assembly.step.trims import Edge, chained, edge_curve
+from assembly.step.trims import Edge, chained, edge_curve, head_to_tail
 
 __all__ = ["Read", "read_face"]
 
@@ -39,24 +39,17 @@ def _is_boundary(edge: Any) -> bool:
     return edge.Orientation() in (o.TopAbs_FORWARD, o.TopAbs_REVERSED)
 
 
-def _ordered(wire: Any, face: Any) -> list[Any]:
-    """Edges of a wire, each beginning where the one before ends."""
+def _edges(wire: Any, face: Any) -> tuple[list[Any], bool]:
+    """Edges of a wire, and whether each begins where the one before ends."""
     o = occt()
-    count = sum(_is_boundary(edge) for edge in parts(wire, o.TopAbs_EDGE))
-    for candidate in (wire, None):
-        if candidate is None:
-            # Edges that are not stored in order, or whose vertices are not shared.
-            fix = o.ShapeFix_Wire(wire, face, 1e-6)
-            fix.FixReorder()
-            candidate = fix.Wire()
-        walk = o.BRepTools_WireExplorer(candidate, face)
-        edges = []
-        while walk.More():
-            edges.append(o.as_edge(walk.Current()))
-            walk.Next()
-        if len(edges) == count:
-            return edges
-    raise Unreadable(f"a loop of {count} edges breaks off after {len(edges)}")
+    walk = o.BRepTools_WireExplorer(wire, face)
+    found = []
+    while walk.More():
+        found.append(o.as_edge(walk.Current()))
+        walk.Next()
+    every = [o.as_edge(edge) for edge in parts(wire, o.TopAbs_EDGE) if _is_boundary(edge)]
+    # Where vertices are not shared the walk ends early.
+    return (found, True) if len(found) == len(every) else (every, False)
 
 
 def _is_seam(edge: Any, face: Any) -> bool:
@@ -66,12 +59,13 @@ def _is_seam(edge: Any, face: Any) -> bool:
 def _loop(wire: Any, face: Any, where: Patch, edges: Any) -> tuple[list[Edge], float] | None:
     """The boundary curves of a wire; None where nothing is left of it but seams and poles."""
     o = occt()
-    row = _ordered(wire, face)
+    row, ordered = _edges(wire, face)
     seams = [edge for edge in row if _is_seam(edge, face)]
     bare = all(o.BRep_Tool.Degenerated_s(edge) or _is_seam(edge, face) for edge in row)
     if not row or (bare and len(seams) % 2 == 0):
         return None
-    return chained([edge_curve(edge, face, where, f"edge {edges.FindIndex(edge)}") for edge in row], where)
+    curves = [edge_curve(edge, face, where, f"edge {edges.FindIndex(edge)}") for edge in row]
+    return chained(curves if ordered else head_to_tail(curves, where), where)
 
 
 def _scaled(where: Patch, scale: float) -> tuple[NurbsSurface, Array]:

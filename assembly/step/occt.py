@@ -14,7 +14,6 @@ __all__ = ["occt", "parts", "quiet", "settings"]
 _MODULES = (
     "BRep",
     "BRepBuilderAPI",
-    "BRepCheck",
     "BRepLib",
     "BRepTools",
     "Geom",
@@ -27,7 +26,6 @@ _MODULES = (
     "Quantity",
     "STEPCAFControl",
     "STEPControl",
-    "ShapeFix",
     "TCollection",
     "TDF",
     "TDataStd",

@@ -54,7 +54,7 @@ def checked_unit(unit: str) -> float:
     return UNITS[unit]
 
 
-def _document(path: str) -> tuple[Any, int]:
+def document_of(path: str) -> tuple[Any, int]:
     """The file as a document of OCCT, in millimeters, and the number of its faces."""
     o = occt()
     # Settings exist once there is a reader.
@@ -81,6 +81,15 @@ def _face_count(reader: Any) -> int:
     model = reader.Reader().WS().Model()
     kinds = ("StepShape_AdvancedFace", "StepShape_FaceSurface")
     return sum(type(model.Value(k)).__name__ in kinds for k in range(1, model.NbEntities() + 1))
+
+
+def solids_of(path: str) -> Iterator[Any]:
+    """OCCT's shapes of the bodies that `read_step` makes, in their order."""
+    document, _ = document_of(path)
+    root = occt().XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
+    for label in free_labels(root):
+        for leaf in leaves(label, occt().TopLoc_Location(), None, None):
+            yield from _shapes(Part(leaf.label))
 
 
 def _shapes(part: Part) -> Iterator[Any]:
@@ -187,7 +196,7 @@ def read_step(path: str | PathLike[str], *, unit: str = "mm", strict: bool = Tru
         raise FileNotFoundError(f"path is {str(file)!r}; no such file")
     o = occt()
     with quiet():
-        document, count = _document(str(file))
+        document, count = document_of(str(file))
         root = o.XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
         bodies: list[Body] = []
         missing: list[str] = []

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from assembly.geometry.curve import NurbsCurve
 from assembly.geometry.face import Face
 from assembly.geometry.surface import NurbsSurface
-from assembly.step.cuts import POLE, SEAM, Piece, cut_open
+from assembly.step.cuts import cut_open
 from assembly.step.occt import occt, parts
+from assembly.step.pieces import POLE, SEAM, Piece
 from assembly.step.profiles import approximated
 from assembly.step.trims import crossings, sampled
 
@@ -106,9 +107,10 @@ class _FaceBuilder:
 
     def __init__(self, face: Face) -> None:
         o = occt()
-        self.face, self.surface = face, face.surface
+        self.face = face
+        self.surface, self.chains = cut_open(face)
         self.build = o.BRep_Builder()
-        self.geometry = occt_surface(face.surface)
+        self.geometry = occt_surface(self.surface)
         self.plane = isinstance(self.geometry, o.Geom_Plane)
         self.made = o.TopoDS_Face()
         self.build.MakeFace(self.made, self.geometry, EDGE_TOLERANCE)
@@ -201,16 +203,15 @@ class _FaceBuilder:
     def result(self) -> Any:
         """The face."""
         o = occt()
-        chains = cut_open(self.face)
         seams: list[tuple[Piece, Any, bool]] = []
-        for chain in chains:
+        for chain in self.chains:
             wire = o.TopoDS_Wire()
             self.build.MakeWire(wire)
             for piece in chain:
                 if piece.kind == SEAM:
                     known = next(((edge, back) for other, edge, back in seams if other is piece), None)
                     if known is None:
-                        partner = self._partner(piece, chains)
+                        partner = self._partner(piece)
                         edge, back = self.edge(piece, partner)
                         seams.append((partner, edge, not back))
                     else:
@@ -222,13 +223,13 @@ class _FaceBuilder:
             self.build.Add(self.made, wire)
         return self.made.Oriented(o.TopAbs_REVERSED if self.face.reversed else o.TopAbs_FORWARD)
 
-    def _partner(self, piece: Piece, chains: list[list[Piece]]) -> Piece:
+    def _partner(self, piece: Piece) -> Piece:
         """The piece on the other side of the domain that goes back along the same stretch of a seam."""
         a, b = piece.ends
         axis = int(a[0] != b[0])
         found = [
             (float(np.abs(other.ends[::-1, 1 - axis] - piece.ends[:, 1 - axis]).max()), id(other), other)
-            for chain in chains
+            for chain in self.chains
             for other in chain
             if other.kind == SEAM and other is not piece and other.ends[0, axis] == other.ends[1, axis] != a[axis]
         ]

@@ -19,7 +19,7 @@ from assembly.step.occt import occt
 from assembly.step.profiles import Direction, Spline, Straight, Turning, Unreadable, approximated, profile, spline
 from assembly.step.surfaces import Patch
 
-__all__ = ["Edge", "chained", "crossings", "edge_curve", "sampled"]
+__all__ = ["Edge", "chained", "crossings", "edge_curve", "head_to_tail", "sampled"]
 
 Array = NDArray[np.float64]
 # Deviation allowed to curves without rational form, over the shorter side of the surface's domain.
@@ -178,6 +178,18 @@ def _meeting(last: Edge, first: Edge, a: Array, b: Array) -> Array:
         if last.level[axis] != first.level[axis]:
             at[axis] = (a if last.level[axis] else b)[axis]
     return at
+
+
+def head_to_tail(edges: list[Edge], patch: Patch) -> list[Edge]:
+    """Edges in an order in which each begins nearest to where the one before ends, up to periods."""
+    period = _period(patch)
+    whole = np.where(np.isfinite(period), period, 1.0)
+    row, left = edges[:1], edges[1:]
+    while left:
+        jumps = np.array([edge.ends[0] for edge in left]) - row[-1].ends[1]
+        jumps -= np.where(np.isfinite(period), np.round(jumps / whole) * whole, 0.0)
+        row.append(left.pop(int(np.argmin(np.linalg.norm(jumps, axis=1)))))
+    return row
 
 
 def chained(edges: list[Edge], patch: Patch) -> tuple[list[Edge], float]:

@@ -66,6 +66,12 @@ def test_a_loop_may_turn_once_around():
     np.testing.assert_allclose(sheets.curves[1].control_points[0], [4.0, 1.5], rtol=0, atol=1e-14)
 
 
+def test_seams_are_no_crossings_of_a_loop():
+    loop = Loop(seamed(0.5, 1.5), tolerance=1e-7, period=(AROUND, 0.0))
+    assert not loop.turn.any()
+    assert len(Face(CYLINDER, loop).boundary) == 2
+
+
 @pytest.mark.parametrize(
     ("curves", "text"),
     [

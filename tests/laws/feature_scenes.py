@@ -178,5 +178,7 @@ def place(rng, f, x_f, g, x_g, gap, scale=True):
     # Body g's own outward vector m becomes -n.
     matrix = world @ axes(n, 0.0) @ axes(-m, rng.uniform(0.0, 6.3)).T
     at = world @ (p + gap * n) + q_f[:3]
-    e = quaternion_of(matrix) * (np.linalg.norm(random_quaternion(rng)) if scale else 1.0)
+    e = quaternion_of(matrix)
+    # The sign of an eigenvector hangs on rounding.
+    e *= np.copysign(1.0, e[0]) * (np.linalg.norm(random_quaternion(rng)) if scale else 1.0)
     return np.concatenate([q_f, at - matrix @ r, e]), world @ n

@@ -527,7 +527,7 @@ def test_bad_input():
             topology_of(faces, tolerance)
 
 
-def test_sine_free_angles():
+def test_blades_are_convex():
     """A blade (both faces on the same side of their edge) counts as convex, whatever rounding says."""
     for tilt in (0.0, 1e-9, -1e-9):
         x = np.array([cos(tilt), 0.0, sin(tilt)])

@@ -124,28 +124,51 @@ def test_triangles_are_unreadable():
         read_face(face, O.ShapeMap(), None)
 
 
-def test_a_gap_beyond_the_tolerance_is_unreadable():
-    # A triangle whose last side ends 1e-3 from where the first begins, and claims 1e-7.
-    build, plane = O.BRep_Builder(), O.Geom_Plane(O.gp_Pln())
-    face, wire = O.TopoDS_Face(), O.TopoDS_Wire()
-    build.MakeFace(face, plane, 1e-7)
+def sheet_of(points, order, shared, ends=None):
+    """A polygon in the plane whose edges stand in any order and share their vertices or not."""
+    build, face, wire = O.BRep_Builder(), O.TopoDS_Face(), O.TopoDS_Wire()
+    build.MakeFace(face, O.Geom_Plane(O.gp_Pln()), 1e-7)
     build.MakeWire(wire)
-    points = [(0, 0), (1, 0), (0, 1), (0, 1e-3)]
-    corners = []
-    for x, y in points[:3]:
-        corner = O.TopoDS_Vertex()
-        build.MakeVertex(corner, O.gp_Pnt(x, y, 0), 1e-7)
-        corners.append(corner)
-    for k, (a, b) in enumerate(zip(points, points[1:], strict=False)):
-        along = O.gp_Dir2d(b[0] - a[0], b[1] - a[1])
-        length = float(np.hypot(b[0] - a[0], b[1] - a[1]))
-        edge = O.TopoDS_Edge()
+    vertices, edges = {}, []
+    for k, (a, b) in enumerate(zip(points, ends or points[1:] + points[:1], strict=True)):
+        edge, step = O.TopoDS_Edge(), (b[0] - a[0], b[1] - a[1])
         build.MakeEdge(edge)
-        build.UpdateEdge(edge, O.Geom2d_Line(O.gp_Pnt2d(*map(float, a)), along), face, 1e-7)
-        build.Range(edge, 0.0, length)
-        build.Add(edge, corners[k].Oriented(O.TopAbs_FORWARD))
-        build.Add(edge, corners[(k + 1) % 3].Oriented(O.TopAbs_REVERSED))
-        build.Add(wire, edge)
+        build.UpdateEdge(edge, O.Geom2d_Line(O.gp_Pnt2d(*a), O.gp_Dir2d(*step)), face, 1e-7)
+        build.Range(edge, 0.0, float(np.hypot(*step)))
+        for corner, side in ((k, O.TopAbs_FORWARD), ((k + 1) % len(points), O.TopAbs_REVERSED)):
+            key = corner if shared else (corner, k)
+            if key not in vertices:
+                vertices[key] = O.TopoDS_Vertex()
+                build.MakeVertex(vertices[key], O.gp_Pnt(*points[corner], 0.0), 1e-7)
+            build.Add(edge, vertices[key].Oriented(side))
+        edges.append(edge)
+    for k in order:
+        build.Add(wire, edges[k])
     build.Add(face, wire)
+    return face
+
+
+PENTAGON = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.5, 1.5), (0.0, 1.0)]
+
+
+@pytest.mark.parametrize("shared", [True, False])
+@pytest.mark.parametrize("order", [(0, 1, 2, 3, 4), (0, 2, 1, 4, 3)])
+def test_edges_may_stand_in_any_order_and_lack_common_vertices(shared, order):
+    found = read_face(sheet_of(PENTAGON, order, shared), O.ShapeMap(), None)
+    assert found.face.area() == pytest.approx(1.25, rel=1e-14)
+
+
+def test_gaps_within_the_tolerance_are_closed_and_said():
+    ends = [*PENTAGON[1:], (0.0, 1e-7)]
+    found = read_face(sheet_of(PENTAGON, range(5), True, ends), O.ShapeMap(), None)
+    assert found.gap == pytest.approx(1e-7, rel=1e-6)
+    assert found.face.area() == pytest.approx(1.25, abs=1e-7)
+    # Lines along u or v stay so: of the two ends that are apart, each moves along its own line.
+    points = np.array([curve.control_points[0] for curve in found.face.boundary])
+    np.testing.assert_allclose(points[0], (0.0, 0.0), rtol=0, atol=1e-15)
+
+
+def test_a_gap_beyond_the_tolerance_is_unreadable():
+    ends = [*PENTAGON[1:], (0.0, 1e-3)]
     with pytest.raises(Unreadable, match=r"two edges that should meet are 0\.001 mm apart"):
-        read_face(face, O.ShapeMap(), None)
+        read_face(sheet_of(PENTAGON, range(5), True, ends), O.ShapeMap(), None)

@@ -1,0 +1,187 @@
+"""Regions cut open at seams, which needs no OCCT."""
+
+from __future__ import annotations
+
+from math import pi
+
+import numpy as np
+import pytest
+
+import assembly as asm
+from assembly.geometry.bezier import full_knots
+from assembly.step.cuts import cut_open, part_of
+from assembly.step.pieces import EDGE, POLE, SEAM, Uncut
+from assembly.step.profiles import Turning, Unreadable, approximated, arc
+from assembly.step.unrolled import strip
+
+
+def circle(center, radius, clockwise=False):
+    points = np.array([[1, 0], [1, 1], [0, 1], [-1, 1], [-1, 0], [-1, -1], [0, -1], [1, -1], [1, 0]], dtype=float)
+    points = radius * (points[::-1] if clockwise else points) + center
+    half = np.sqrt(0.5)
+    return asm.NurbsCurve(points, full_knots(np.linspace(0.0, 1.0, 5), 2), 2, [1, half] * 4 + [1])
+
+
+def line(a, b):
+    return asm.NurbsCurve([a, b], [0, 0, 1, 1], 1)
+
+
+def polygon_area(chain):
+    """Signed area in (u, v)."""
+    points = np.concatenate([piece.curve.evaluate(np.linspace(*piece.curve.domain, 4001)[:-1]) for piece in chain])
+    x, y = points.T
+    return 0.5 * np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))
+
+
+TUBE, BALL, WHEEL = asm.shapes.cylinder(1.0, 4.0), asm.shapes.sphere(1.0), asm.shapes.torus(4.0, 1.0)
+U = 2.0 * pi
+# Face, area in (u, v), number of chains, and of seam pieces and poles.
+CASES = {
+    "whole cylinder": (lambda: asm.Face(TUBE), 4.0 * U, 1, 2, 0),
+    "whole sphere": (lambda: asm.Face(BALL), pi * U, 1, 2, 2),
+    "whole torus": (lambda: asm.Face(WHEEL), 4.0 * U * U, 1, 4, 0),
+    "window beside the seam": (lambda: asm.Face(TUBE, holes=[circle((3.0, 2.0), 0.5, True)]), 4 * U - pi / 4, 2, 2, 0),
+    "window at the seam": (lambda: asm.Face(TUBE, holes=[circle((0.1, 2.0), 0.5, True)]), 4 * U - pi / 4, 1, 4, 0),
+    "two at the seam": (
+        lambda: asm.Face(TUBE, holes=[circle((0.1, 1.0), 0.5, True), circle((U, 3.0), 0.5, True)]),
+        4 * U - pi / 2,
+        1,
+        6,
+        0,
+    ),
+    "window at both seams": (lambda: asm.Face(WHEEL, holes=[circle((0, 0), 0.5, True)]), 4 * U * U - pi / 4, 1, 4, 0),
+    "rings": (
+        lambda: asm.Face(TUBE, [line((0.3, 1.0), (0.3 + U, 1.0))], [[line((0.5 + U, 2.5), (0.5, 2.5))]]),
+        1.5 * U,
+        1,
+        2,
+        0,
+    ),
+    "a ring and a pole": (lambda: asm.Face(BALL, [line((1.0, 2.0), (1.0 + U, 2.0))]), (pi - 2.0) * U, 1, 2, 1),
+    "the other pole": (lambda: asm.Face(BALL, [line((1.0 + U, 2.0), (1.0, 2.0))]), 2.0 * U, 1, 2, 1),
+    "ring over the seam of a torus": (
+        lambda: asm.Face(WHEEL, [line((0, -1.0), (4 * U, -1.0))], [[line((4 * U, 1.0), (0, 1.0))]]),
+        8.0 * U,
+        1,
+        2,
+        0,
+    ),
+    "ring the other way": (
+        lambda: asm.Face(WHEEL, [line((-1.0, U), (-1.0, 0.0))], [[line((1.0, 0), (1.0, U))]]),
+        2.0 * U,
+        1,
+        2,
+        0,
+    ),
+    "patch at both seams": (lambda: asm.Face(WHEEL, circle((0.0, 0.0), 0.5)), pi / 4, 1, 0, 0),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_chains_close_in_the_domain_around_the_region(name):
+    make, area, chains, seams, poles = CASES[name]
+    surface, found = cut_open(make())
+    pieces = [piece for chain in found for piece in chain]
+    assert len(found) == chains
+    assert [sum(piece.kind == kind for piece in pieces) for kind in (SEAM, POLE)] == [seams, poles]
+    low, high = np.array(surface.domain).T
+    for chain in found:
+        for before, piece in zip(chain[-1:] + chain[:-1], chain, strict=True):
+            # Roots of crossings are good to rounding.
+            np.testing.assert_allclose(before.ends[1], piece.ends[0], rtol=0, atol=1e-13 * (high - low).max())
+            points = piece.curve.control_points
+            assert (points >= low - 1e-12).all() and (points <= high + 1e-12).all() or piece.kind == EDGE
+            at = piece.curve.evaluate(np.linspace(*piece.curve.domain, 50))
+            assert (at >= low - 1e-12).all() and (at <= high + 1e-12).all()
+    # Of polygons with thousands of corners.
+    assert sum(map(polygon_area, found)) == pytest.approx(area, rel=1e-6)
+    # The two sides of a seam run against each other.
+    along = np.array([piece.ends[1] - piece.ends[0] for piece in pieces if piece.kind == SEAM]).reshape(-1, 2)
+    np.testing.assert_allclose(along.sum(axis=0), 0.0, atol=1e-12)
+
+
+def test_a_ring_without_its_other_side_is_open():
+    face = asm.Face(TUBE)
+    surface, (chain,) = cut_open(face)
+    assert [piece.kind for piece in chain].count(EDGE) == 2
+
+    class Broken:
+        surface = TUBE
+        boundary = face.boundary[:1]
+        chains = face.chains[:1]
+
+    with pytest.raises(Uncut, match="open at the seam"):
+        cut_open(Broken())
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_parts_of_curves_are_the_curve(seed):
+    random = np.random.default_rng(seed)
+    knots = np.concatenate([[0.0] * 4, [0.3, 0.3, 0.7], [1.0] * 4])
+    curve = asm.NurbsCurve(random.normal(size=(7, 2)), knots, 3, random.uniform(0.5, 2.0, 7), name="edge 4")
+    cuts = [0.2, 0.3, float(random.uniform(0.4, 0.6)), 0.9]
+    parts = part_of(curve, cuts)
+    assert [part.domain for part in parts] == list(zip([0.0, *cuts], [*cuts, 1.0], strict=True))
+    for part in parts:
+        t = np.linspace(*part.domain, 11)
+        # Knot insertion is convex: rounding alone.
+        np.testing.assert_allclose(part.evaluate(t), curve.evaluate(t), rtol=0, atol=1e-14)
+        assert part.name == "edge 4"
+
+
+@pytest.mark.parametrize(("low", "high"), [(0.3, 1.0), (-1.0, 0.5), (5.0, 20.0), (0.0, U), (1.25 * U, 1.75 * U)])
+@pytest.mark.parametrize("axis", [0, 1])
+def test_strips_are_the_surface_unrolled(axis, low, high):
+    scale = (4.0, 1.0)[axis]
+    made = strip(WHEEL, axis, scale * low, scale * high)
+    assert made.domain[axis] == (scale * low, scale * high)
+    assert made.closed[axis] == (high - low == U) and made.closed[1 - axis]
+    t, other = np.linspace(scale * low, scale * high, 40), np.linspace(0.0, 1.0, 40)
+    at = (t, other) if axis == 0 else (other, t)
+    inside = np.where(np.arange(40) < 39, t, t[-1] - 1e-15)
+    wrapped = np.mod(inside, scale * U)
+    where = (wrapped, other) if axis == 0 else (other, wrapped)
+    np.testing.assert_allclose(made.evaluate(*at), WHEEL.evaluate(*where), rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize(("low", "high"), [(0.0, U), (-3.0, 1.0), (0.1, 0.2), (1.0, 6.9)])
+def test_turning_is_the_angle_on_rational_arcs(low, high):
+    turning = Turning.between(low, high, 2.5)
+    ring = arc(turning)
+    points, weights = ring.cartesian
+    curve = asm.NurbsCurve(points, ring.knots, 2, weights)
+    angles = np.linspace(low, high, 101)
+    at = np.clip(turning(angles), *curve.domain)
+    # Both are exact formulas.
+    np.testing.assert_allclose(
+        curve.evaluate(at), np.column_stack([np.cos(angles), np.sin(angles)]), rtol=0, atol=1e-14
+    )
+    assert (np.diff(turning(angles)) > 0.0).all()
+    np.testing.assert_allclose(turning(np.array([low, high])), curve.domain, rtol=0, atol=0)
+    # Joints are the same number from either side, and go on with the period.
+    np.testing.assert_allclose(turning(turning.joints(low, high)), curve.breaks(), rtol=1e-15, atol=1e-15)
+    np.testing.assert_allclose(turning(angles + high - low), turning(angles) + 2.5 * (high - low), rtol=1e-13)
+
+
+def test_nearly_a_turn_is_a_whole_one():
+    assert Turning.over(0.5, 0.5 + 0.96 * U, 1.0).high == pytest.approx(0.5 + U, rel=1e-15)
+    made = Turning.over(1e-9, U - 1e-9, 1.0)
+    assert (made.low, made.spans) == (0.0, 4)
+    part = Turning.over(0.0, 3.2, 1.0)
+    assert part.low == pytest.approx(-0.1) and part.high == pytest.approx(3.3) and part.spans == 3
+
+
+def test_approximations_say_how_far_off_they_are():
+    def helix(t):
+        return np.column_stack([np.cos(3.0 * t), np.sin(3.0 * t), t])
+
+    made, error = approximated(helix, np.array([0.0, 2.0]), 1e-11)
+    points, weights = made.cartesian
+    curve = asm.NurbsCurve(points, made.knots, made.degree, weights)
+    t = np.linspace(0.0, 2.0, 5001)
+    worst = np.abs(curve.evaluate(t) - helix(t)).max()
+    # The check looks at twenty-two points a piece.
+    assert error <= 1e-11 and worst <= 1.2 * error + 1e-15
+    np.testing.assert_array_equal(curve.control_points[[0, -1]], helix(np.array([0.0, 2.0])))
+    with pytest.raises(Unreadable, match="too sharply"):
+        approximated(lambda t: np.abs(t[:, None] - 0.3), np.array([0.0, 1.0]), 1e-12)

@@ -1,0 +1,240 @@
+"""Whole files: names, placements, colors, units, what cannot be read."""
+
+from __future__ import annotations
+
+from math import pi
+
+import numpy as np
+import pytest
+
+import assembly as asm
+from assembly.step import StepError, StepWarning, reader
+from assembly.step.faces import read_face
+from assembly.step.occt import quiet, settings
+from assembly.step.profiles import Unreadable
+from tests.step.models import MODELS, O, box, cylinder, faces, joined, pushed, swollen, vase
+
+
+class File:
+    """A STEP file written through OCCT's own tools, not ours."""
+
+    def __init__(self):
+        self.document = O.TDocStd_Document(O.TCollection_ExtendedString("XmlOcaf"))
+        O.XCAFDoc_DocumentTool.SetLengthUnit_s(self.document, 1e-3)
+        self.shapes = O.XCAFDoc_DocumentTool.ShapeTool_s(self.document.Main())
+        self.colors = O.XCAFDoc_DocumentTool.ColorTool_s(self.document.Main())
+
+    def part(self, shape, name):
+        label = self.shapes.AddShape(shape, False)
+        return self.named(label, name)
+
+    def group(self, name):
+        return self.named(self.shapes.NewShape(), name)
+
+    def named(self, label, name):
+        O.TDataStd_Name.Set_s(label, O.TCollection_ExtendedString(name, True))
+        return label
+
+    def put(self, group, part, pose, name=""):
+        w, x, y, z = pose.quaternion.tolist()
+        transform = O.gp_Trsf()
+        transform.SetTransformation(O.gp_Quaternion(x, y, z, w), O.gp_Vec(*pose.position.tolist()))
+        return self.named(self.shapes.AddComponent(group, part, O.TopLoc_Location(transform)), name)
+
+    def paint(self, label, rgb):
+        self.colors.SetColor(label, O.Quantity_Color(*rgb, O.Quantity_TOC_sRGB), O.XCAFDoc_ColorSurf)
+
+    def write(self, path, unit="MM"):
+        self.shapes.UpdateAssemblies()
+        writer = O.STEPCAFControl_Writer()
+        before = O.Interface_Static.CVal_s("write.step.unit")
+        O.Interface_Static.SetCVal_s("write.step.unit", unit)
+        try:
+            with quiet(), settings({"write.stepcaf.subshapes.name": 1}):
+                assert writer.Transfer(self.document, O.STEPControl_AsIs)
+                assert writer.Write(str(path)) == O.IFSelect_RetDone
+        finally:
+            O.Interface_Static.SetCVal_s("write.step.unit", before)
+        return path
+
+
+POSES = [
+    asm.Pose((1.0, 2.0, 3.0)),
+    asm.Pose.from_axis_angle((1.0, 2.0, -1.0), 1.1, (4.0, -5.0, 6.0)),
+    asm.Pose.from_axis_angle((0.0, 1.0, 0.0), pi, (0.1, 0.2, 0.3)),
+]
+
+
+@pytest.fixture
+def nested(tmp_path):
+    """A pin and a plate twice each in a group that stands in the root twice."""
+    file = File()
+    pin, plate = file.part(cylinder(0.5, 3.0), "pin"), file.part(box(), "plate")
+    group, root = file.group("pair"), file.group("machine")
+    file.paint(pin, (0.8, 0.4, 0.2))
+    file.put(group, pin, POSES[0], "left pin")
+    file.paint(file.put(group, pin, POSES[1], "right pin"), (0.0, 0.0, 1.0))
+    file.put(group, plate, asm.Pose())
+    file.put(root, group, POSES[1])
+    file.put(root, group, POSES[2])
+    top = faces(O.XCAFDoc_ShapeTool.GetShape_s(plate))[-1]
+    side = file.shapes.AddSubShape(plate, top)
+    file.named(side, "top")
+    file.paint(side, (1.0, 0.0, 0.0))
+    return file.write(tmp_path / "machine.step")
+
+
+def test_an_assembly_is_read_with_names_placements_and_colors(nested):
+    bodies = asm.read_step(nested)
+    assert [body.name for body in bodies] == ["pin", "pin 2", "plate", "pin 3", "pin 4", "plate 2"]
+    wanted = [outer @ inner for outer in POSES[1:] for inner in (POSES[0], POSES[1], asm.Pose())]
+    for body, pose in zip(bodies, wanted, strict=True):
+        # Directions and points have some thirteen digits in the file.
+        np.testing.assert_allclose(body.pose.matrix, pose.matrix, rtol=0, atol=1e-11)
+    # OCCT keeps colors in single precision, and they come as files have them.
+    assert [body.color for body in bodies] == 2 * [(0.8, 0.4, 0.2), (0.0, 0.0, 1.0), None]
+
+
+def test_instances_share_their_faces(nested):
+    bodies = asm.read_step(nested)
+    pins = [body for body in bodies if body.name.startswith("pin")]
+    assert all(a.face is b.face for pin in pins for a, b in zip(pin.faces, pins[0].faces, strict=True))
+
+
+def test_faces_have_names_and_colors(nested):
+    plate = next(body for body in asm.read_step(nested) if body.name == "plate")
+    assert sum(side.name == "top" for side in plate.faces) == 1
+    assert plate.face("top").face.color == (1.0, 0.0, 0.0)
+    assert plate.face("face 1").face.color is None
+    assert len({side.name for side in plate.faces}) == 6
+    # z = 3 is the last face of OCCT's box.
+    np.testing.assert_allclose(plate.face("top").face.normal(0.0, 0.0), (0.0, 0.0, 1.0), rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize("written", ["MM", "INCH", "M"])
+@pytest.mark.parametrize(("unit", "mm"), [("mm", 1.0), ("m", 1e3), ("in", 25.4), ("um", 1e-3)])
+def test_lengths_come_in_the_unit_asked_for(tmp_path, written, unit, mm):
+    file = File()
+    root = file.group("root")
+    file.put(root, file.part(cylinder(2.0, 5.0), "pin"), asm.Pose((10.0, 0.0, -20.0)))
+    (body,) = asm.read_step(file.write(tmp_path / "pin.step", written), unit=unit)
+    np.testing.assert_allclose(body.pose.position, np.array([10.0, 0.0, -20.0]) / mm, rtol=1e-12, atol=1e-12 / mm)
+    assert sum(side.face.volume_integral() for side in body.faces) == pytest.approx(20.0 * pi / mm**3, rel=1e-11)
+
+
+def test_solids_of_one_part_are_bodies(tmp_path):
+    both = O.TopoDS_Compound()
+    build = O.BRep_Builder()
+    build.MakeCompound(both)
+    build.Add(both, box())
+    build.Add(both, cylinder(0.5, 1.0, ((9, 9, 9), (0, 0, 1))))
+    file = File()
+    file.part(both, "set")
+    bodies = asm.read_step(file.write(tmp_path / "set.step"))
+    assert [(body.name, len(body.faces)) for body in bodies] == [("set", 6), ("set 2", 3)]
+
+
+def test_sheets_are_bodies_too(tmp_path):
+    file = File()
+    file.part(faces(cylinder(2.0, 5.0))[0], "pipe")
+    (body,) = asm.read_step(file.write(tmp_path / "pipe.step"))
+    assert [side.face.area() for side in body.faces] == pytest.approx([20.0 * pi], rel=1e-13)
+
+
+@pytest.mark.parametrize("name", ["boss", "drilled torus", "wedge of a sphere", "crossed cylinders", "loft", "torus"])
+def test_what_goes_through_a_file_is_what_was_there(tmp_path, name):
+    shape = MODELS[name]()
+    numbers = O.ShapeMap()
+    O.TopExp.MapShapes_s(shape, O.TopAbs_EDGE, numbers)
+    direct = [read_face(face, numbers, None).face for face in faces(shape)]
+    file = File()
+    file.part(shape, name)
+    (body,) = asm.read_step(file.write(tmp_path / "part.step"))
+    # Curves of (u, v) may come out of the file anew.
+    assert sorted(side.face.area() for side in body.faces) == pytest.approx(
+        sorted(face.area() for face in direct), rel=1e-8
+    )
+
+
+def test_a_face_that_cannot_be_read_is_named(tmp_path, monkeypatch):
+    file = File()
+    file.part(joined(box(), box(1.0, 1.0, 1.0, (0, 0, 3))), "tower")
+    path = file.write(tmp_path / "tower.step")
+
+    def fails(face, edges, name, scale):
+        if name == "face 3":
+            raise Unreadable("two edges that should meet are 1 mm apart")
+        return read_face(face, edges, name, scale)
+
+    monkeypatch.setattr(reader, "read_face", fails)
+    with pytest.raises(StepError, match="not read: 'tower', 'face 3': two edges that should meet are 1 mm apart; pass"):
+        asm.read_step(path)
+    with pytest.warns(StepWarning, match="tower.step: not read: 'tower', 'face 3'"):
+        (body,) = asm.read_step(path, strict=False)
+    assert "face 3" not in [side.name for side in body.faces] and "face 4" in [side.name for side in body.faces]
+
+
+def test_faces_that_occt_drops_are_counted(tmp_path, monkeypatch):
+    file = File()
+    file.part(box(), "box")
+    path = file.write(tmp_path / "box.step")
+    known = reader.document_of
+    monkeypatch.setattr(reader, "document_of", lambda path: (known(path)[0], known(path)[1] + 2))
+    with pytest.warns(StepWarning, match="box.step: not read: 2 of 8 faces, of which OCCT makes nothing"):
+        (body,) = asm.read_step(path)
+    assert len(body.faces) == 6
+
+
+@pytest.mark.parametrize("mirror", [True, False])
+def test_placements_that_are_not_rigid_are_refused(mirror):
+    transform = O.gp_Trsf()
+    if mirror:
+        transform.SetMirror(O.gp_Ax2(O.gp_Pnt(0, 0, 0), O.gp_Dir(0, 0, 1)))
+    else:
+        transform.SetScale(O.gp_Pnt(0, 0, 0), 2.0)
+    with pytest.raises(Unreadable, match="mirrored or scaled"):
+        reader._pose(O.TopLoc_Location(transform), 1.0)
+
+
+def test_approximated_faces_are_named(tmp_path):
+    file = File()
+    file.part(swollen(), "vase")
+    path = file.write(tmp_path / "vase.step")
+    # The offset surface is followed to less than OCCT tells points apart, so that there is nothing to warn of.
+    (body,) = asm.read_step(path)
+    assert len(body.faces) == 26
+
+
+def test_large_deviations_are_said(tmp_path, monkeypatch):
+    file = File()
+    file.part(pushed(vase()), "vase")
+    path = file.write(tmp_path / "vase.step")
+    monkeypatch.setattr(reader, "EXACT", -1.0)
+    with pytest.warns(StepWarning, match="vase.step: approximated: 'vase', 'face 1' to 0 mm; "):
+        asm.read_step(path)
+
+
+def test_bad_arguments_are_named(tmp_path, nested):
+    with pytest.raises(FileNotFoundError, match="no such file"):
+        asm.read_step(tmp_path / "none.step")
+    with pytest.raises(ValueError, match="unit is 'inch'; expected one of 'um', 'mm', 'cm', 'm', 'in', 'ft'"):
+        asm.read_step(nested, unit="inch")
+    with pytest.raises(ValueError, match="strict is 1; expected True or False"):
+        asm.read_step(nested, strict=1)
+    (tmp_path / "text.step").write_text("no STEP file\n")
+    with pytest.raises(StepError, match="expected a STEP file"):
+        asm.read_step(tmp_path / "text.step")
+
+
+def test_a_file_without_faces_is_refused(tmp_path):
+    file = File()
+    file.part(O.BRepBuilderAPI_MakeEdge(O.gp_Pnt(0, 0, 0), O.gp_Pnt(1, 0, 0)).Edge(), "wire")
+    with pytest.raises(StepError, match="it has no faces"):
+        asm.read_step(file.write(tmp_path / "wire.step"))
+
+
+def test_nothing_is_printed_and_occt_s_settings_are_left_as_they_were(nested, capfd):
+    before = O.Interface_Static.IVal_s("read.stepcaf.subshapes.name"), O.XCAFDoc_ShapeTool.AutoNaming_s()
+    asm.read_step(nested)
+    assert capfd.readouterr().out == ""
+    assert (O.Interface_Static.IVal_s("read.stepcaf.subshapes.name"), O.XCAFDoc_ShapeTool.AutoNaming_s()) == before

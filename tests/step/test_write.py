@@ -1,0 +1,221 @@
+"""What is written is read again: bodies, poses, shapes, names, colors."""
+
+from __future__ import annotations
+
+from math import pi
+
+import numpy as np
+import pytest
+
+import assembly as asm
+from assembly.geometry.bezier import full_knots
+from assembly.step import StepError, StepWarning
+from assembly.step.faces import read_face
+from assembly.step.occt import parts
+from assembly.step.solids import sewn
+from tests.step.models import MODELS, O, areas, faces, off, volumes
+
+HALF = np.sqrt(0.5)
+
+
+def ring(center, radius, clockwise=False):
+    """A circle in (u, v)."""
+    points = np.array([[1, 0], [1, 1], [0, 1], [-1, 1], [-1, 0], [-1, -1], [0, -1], [1, -1], [1, 0]], dtype=float)
+    points = radius * (points[::-1] if clockwise else points) + center
+    return asm.NurbsCurve(points, full_knots(np.linspace(0.0, 1.0, 5), 2), 2, [1, HALF] * 4 + [1])
+
+
+def measures(body):
+    return sum(side.face.area() for side in body.faces), sum(side.face.volume_integral() for side in body.faces)
+
+
+def again(path, what, **options):
+    asm.write_step(path, what, **options)
+    return asm.read_step(path, **options)
+
+
+SHAPES = {
+    "box": lambda: asm.shapes.box(1.0, 2.0, 3.0),
+    "sphere": lambda: asm.shapes.sphere(2.0),
+    "ellipsoid": lambda: asm.shapes.ellipsoid(1.0, 2.0, 3.0),
+    "torus": lambda: asm.shapes.torus(4.0, 1.0),
+    "paper clip": lambda: asm.shapes.paper_clip(length=33.0, width=8.0, wire_radius=0.5),
+}
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_closed_shapes_are_solids(tmp_path, name):
+    body = asm.Body(name, SHAPES[name](), position=(1.0, 2.0, 3.0))
+    made = sewn([side.face for side in body.faces], 1.0)
+    assert made.closed and made.shape.ShapeType() == O.TopAbs_SOLID and O.BRepCheck_Analyzer(made.shape).IsValid()
+    (back,) = again(tmp_path / "part.step", body)
+    assert back.name == name and len(back.faces) == len(body.faces)
+    # The surfaces are the same; full circles come back as they were written.
+    assert measures(back) == pytest.approx(measures(body), rel=1e-12)
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_sewn_faces_are_the_solid_they_came_from(name):
+    shape = MODELS[name]()
+    numbers = O.ShapeMap()
+    O.TopExp.MapShapes_s(shape, O.TopAbs_EDGE, numbers)
+    direct = [read_face(face, numbers, None).face for face in faces(shape)]
+    made = sewn(direct, 1.0)
+    assert made.closed and O.BRepCheck_Analyzer(made.shape).IsValid()
+    assert len(parts(made.shape, O.TopAbs_FACE)) == len(direct)
+    # OCCT measures what we made of its shape, by a rule that stops at 1e-9.
+    assert off(areas(made.shape)[1], [sum(face.area() for face in direct)]) < 1e-7
+    assert off(volumes(made.shape)[1], [sum(face.volume_integral() for face in direct)]) < 1e-6
+
+
+@pytest.mark.parametrize("name", ["boss", "drilled torus", "drilled cone", "wedge of a sphere", "crossed cylinders"])
+def test_a_round_trip_keeps_shapes(tmp_path, name):
+    shape = MODELS[name]()
+    numbers = O.ShapeMap()
+    O.TopExp.MapShapes_s(shape, O.TopAbs_EDGE, numbers)
+    body = asm.Body(name, [read_face(face, numbers, f"side {k}").face for k, face in enumerate(faces(shape))])
+    (back,) = again(tmp_path / "part.step", body)
+    assert {side.name for side in back.faces} == {side.name for side in body.faces}
+    for side in body.faces:
+        # Surfaces are written exactly; edges between them within 1e-10 of their size, and OCCT's 1e-7 of vertices.
+        assert back.face(side.name).face.area() == pytest.approx(side.face.area(), rel=1e-7)
+    assert measures(back)[1] == pytest.approx(measures(body)[1], rel=1e-7)
+
+
+def test_windows_across_seams_are_cut_open(tmp_path):
+    tube = asm.shapes.cylinder(1.0, 4.0)
+    for center in ((0.0, 2.0), (2.0 * pi, 2.0), (3.0, 2.0)):
+        face = asm.Face(tube, holes=[ring(center, 0.5, clockwise=True)])
+        (back,) = again(tmp_path / "tube.step", asm.Body("tube", face))
+        assert back.faces[0].face.area() == pytest.approx(face.area(), rel=1e-8)
+    wheel = asm.shapes.torus(4.0, 1.0)
+    for center in ((0.0, 0.0), (8.0 * pi, 3.0), (10.0, 2.0 * pi), (10.0, 3.0)):
+        face = asm.Face(wheel, holes=[ring(center, 0.5, clockwise=True)])
+        (back,) = again(tmp_path / "wheel.step", asm.Body("wheel", face))
+        assert back.faces[0].face.area() == pytest.approx(face.area(), rel=1e-8)
+        assert face.area() < 16.0 * pi**2 - 0.5
+
+
+def test_a_patch_on_a_closed_surface(tmp_path):
+    for center in ((0.0, 0.0), (3.0, 2.0)):
+        face = asm.Face(asm.shapes.torus(4.0, 1.0), outer=ring(center, 0.5), reversed=True)
+        (back,) = again(tmp_path / "patch.step", asm.Body("patch", face))
+        assert back.faces[0].face.area() == pytest.approx(face.area(), rel=1e-8)
+        assert back.faces[0].face.volume_integral() == pytest.approx(face.volume_integral(), rel=1e-8)
+
+
+def test_a_thread_that_winds_several_times_is_one_face(tmp_path):
+    # Two and a half turns, a strip 0.4 high with a pitch of 1, and a hole in its second turn.
+    tube, turns, pitch, height = asm.shapes.cylinder(1.0, 4.0), 2.5, 1.0, 0.4
+    end = 2.0 * pi * turns
+    corners = [(0.0, 0.1), (end, 0.1 + turns * pitch), (end, 0.1 + height + turns * pitch), (0.0, 0.1 + height)]
+    sides = [asm.NurbsCurve([a, b], [0, 0, 1, 1], 1) for a, b in zip(corners, corners[1:] + corners[:1], strict=True)]
+    u = 2.0 * pi * 1.3
+    face = asm.Face(tube, sides, [ring((u, 0.1 + 1.3 * pitch + 0.2), 0.1, clockwise=True)])
+    made = sewn([face], 1.0)
+    assert O.BRepCheck_Analyzer(made.shape).IsValid()
+    (back,) = again(tmp_path / "thread.step", asm.Body("thread", face))
+    assert back.faces[0].face.area() == pytest.approx(face.area(), rel=1e-8)
+    # The parameter is the angle at quarters of the turn, and within a few percent of it everywhere.
+    assert face.area() == pytest.approx(end * height - 0.01 * pi, rel=1e-2)
+
+
+def test_unclamped_surfaces_are_written(tmp_path):
+    random = np.random.default_rng(3)
+    grid = np.meshgrid(np.arange(6.0), np.arange(5.0), indexing="ij")
+    net = np.stack([*grid, random.normal(size=(6, 5))], axis=-1)
+    surface = asm.NurbsSurface(net, (np.arange(10.0), np.arange(8.0)), (3, 2), random.uniform(0.5, 2.0, (6, 5)))
+    body = asm.Body("hills", surface)
+    (back,) = again(tmp_path / "hills.step", body)
+    assert measures(back)[0] == pytest.approx(measures(body)[0], rel=1e-11)
+
+
+def test_a_solved_assembly_is_written_where_it_stands(tmp_path):
+    wire = asm.shapes.torus(1.0, 0.12)
+    first = asm.Body("first", wire, fixed=True)
+    second = asm.Body("second", wire, position=(0.9, 0.1, 0.0), quaternion=(0.7, 0.7, 0.1, 0.0))
+    scene = asm.Assembly([first, second])
+    scene.constrain(asm.Contact(first, second))
+    scene.minimize(asm.PointDistance(second.point(1.0, 0.0, 0.0), target=(1.5, 0.7, 0.2)))
+    solution = scene.solve()
+    assert solution.success
+    assert np.abs(solution.q - scene.q).max() > 1e-3
+    for what, q in ((solution, solution.q), (scene, scene.q), (scene.bodies, scene.q)):
+        back = again(tmp_path / "wires.step", what)
+        assert [body.name for body in back] == ["first", "second"]
+        for body, row in zip(back, q, strict=True):
+            wanted = asm.Pose(row[:3], row[3:])
+            np.testing.assert_allclose(body.pose.matrix, wanted.matrix, rtol=0, atol=1e-11)
+    # Two bodies of one surface, but of faces of their own.
+    assert back[0].faces[0].face is not back[1].faces[0].face
+
+
+def test_bodies_that_share_faces_are_instances_of_one_part(tmp_path):
+    sides = asm.shapes.box(1.0, 2.0, 3.0)
+    names = ["nut", "nut 2", "nut 3", "spacer", "spacer 3"]
+    bodies = [asm.Body(name, sides, position=(float(k), 0.0, 0.0)) for k, name in enumerate(names)]
+    bodies[0].color = (0.1, 0.2, 0.3)
+    bodies[1].color = (0.4, 0.5, 0.6)
+    bodies[4].color = (0.7, 0.8, 0.9)
+    back = again(tmp_path / "nuts.step", bodies)
+    assert [body.name for body in back] == names
+    assert [body.color for body in back] == [(0.1, 0.2, 0.3), (0.4, 0.5, 0.6), (0.1, 0.2, 0.3), None, (0.7, 0.8, 0.9)]
+    assert len({id(side.face) for body in back[:3] for side in body.faces}) == 6
+    assert (tmp_path / "nuts.step").read_text().count("MANIFOLD_SOLID_BREP(") == 3
+
+
+def test_face_names_and_colors_are_kept(tmp_path):
+    body = asm.Body("box", asm.shapes.box(1.0, 2.0, 3.0))
+    body.faces[2].face.color = (0.2, 0.4, 0.6)
+    (back,) = again(tmp_path / "box.step", body)
+    assert {side.name: side.face.color for side in back.faces} == {side.name: side.face.color for side in body.faces}
+    for side in body.faces:
+        mine, other = side.face.surface, back.face(side.name).face.surface
+        np.testing.assert_allclose(
+            back.face(side.name).face.normal(*np.mean(other.domain, axis=1)),
+            side.face.normal(*np.mean(mine.domain, axis=1)),
+            rtol=0,
+            atol=1e-14,
+        )
+
+
+def test_units(tmp_path):
+    body = asm.Body("ball", asm.shapes.sphere(0.002), position=(0.1, 0.0, 0.0))
+    asm.write_step(tmp_path / "ball.step", body, unit="m")
+    (back,) = asm.read_step(tmp_path / "ball.step")
+    np.testing.assert_allclose(back.pose.position, (100.0, 0.0, 0.0), rtol=1e-13)
+    assert measures(back)[0] == pytest.approx(16.0 * pi, rel=1e-12)
+    (metric,) = asm.read_step(tmp_path / "ball.step", unit="m")
+    assert measures(metric)[0] == pytest.approx(16e-6 * pi, rel=1e-12)
+
+
+def test_open_shapes_are_shells(tmp_path):
+    open_box = asm.shapes.box(1.0, 2.0, 3.0)[:5]
+    made = sewn(open_box, 1.0)
+    assert not made.closed and len(parts(made.shape, O.TopAbs_SHELL)) == 1
+    (back,) = again(tmp_path / "open.step", asm.Body("open", open_box))
+    assert len(back.faces) == 5
+
+
+def test_nothing_is_printed(tmp_path, capfd):
+    asm.write_step(tmp_path / "ball.step", asm.Body("ball", asm.shapes.sphere(1.0)))
+    assert capfd.readouterr().out == ""
+
+
+def test_bad_arguments_are_named(tmp_path):
+    ball, frame = asm.Body("ball", asm.shapes.sphere(1.0)), asm.Body("frame")
+    with pytest.raises(ValueError, match="unit is 'inch'"):
+        asm.write_step(tmp_path / "a.step", ball, unit="inch")
+    with pytest.raises(TypeError, match="what is 3; expected an Assembly, a Solution, a Body or several"):
+        asm.write_step(tmp_path / "a.step", 3)
+    with pytest.raises(TypeError, match="what holds 'ball'"):
+        asm.write_step(tmp_path / "a.step", ["ball"])
+    with pytest.raises(ValueError, match="what has no bodies"):
+        asm.write_step(tmp_path / "a.step", asm.Assembly())
+    with pytest.raises(StepError, match="no body with faces"):
+        asm.write_step(tmp_path / "a.step", frame)
+    with pytest.warns(StepWarning, match="a.step: bodies without faces are left out: 'frame'"):
+        asm.write_step(tmp_path / "a.step", [frame, ball])
+    assert [body.name for body in asm.read_step(tmp_path / "a.step")] == ["ball"]
+    with pytest.raises(StepError, match="cannot write there"):
+        asm.write_step(tmp_path / "none" / "a.step", ball)
