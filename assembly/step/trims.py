@@ -43,6 +43,8 @@ class Edge:
         Edges of two faces that are one edge of the solid have one name.
     deviation : float
         Of its interpolation in (u, v).
+    seam : bool
+        Whether the face has it on both sides.
     """
 
     curve: Spline
@@ -50,6 +52,7 @@ class Edge:
     tolerance: float
     name: str
     deviation: float
+    seam: bool = False
 
     @property
     def ends(self) -> Array:
@@ -162,7 +165,7 @@ def edge_curve(edge: Any, face: Any, patch: Patch, name: str) -> Edge:
     for vertex in (o.TopExp.FirstVertex_s(edge), o.TopExp.LastVertex_s(edge)):
         if not vertex.IsNull():
             tolerance = max(tolerance, o.BRep_Tool.Tolerance_s(vertex))
-    return Edge(made, (bool(level[0]), bool(level[1])), tolerance, name, deviation)
+    return Edge(made, (bool(level[0]), bool(level[1])), tolerance, name, deviation, o.BRep_Tool.IsClosed_s(edge, face))
 
 
 def _period(patch: Patch) -> Array:
@@ -251,7 +254,7 @@ def _match_seams(rows: list[Edge], joints: Array, period: Array) -> None:
     whole = np.where(np.isfinite(period), period, 1.0)
     for i, edge in enumerate(rows):
         for j in range(i + 1, len(rows)):
-            if rows[j].name != edge.name:
+            if not edge.seam or rows[j].name != edge.name:
                 continue
             for here, there in ((i, (j + 1) % len(rows)), ((i + 1) % len(rows), j)):
                 if here == there:

@@ -196,7 +196,7 @@ def test_both_sides_of_a_seam_end_at_the_same_places():
 
     def edge(name, a, b, level):
         made = spline(np.array([a, b]), np.array([0.0, 0.0, 1.0, 1.0]), 1)
-        return Edge(made, level, 1e-7, name, 0.0)
+        return Edge(made, level, 1e-7, name, 0.0, seam=name == "edge 1")
 
     rows = [
         edge("edge 1", (U, 1.0), (U, 3.0), (True, False)),
