@@ -31,6 +31,8 @@ Array = NDArray[np.float64]
 def part_of(curve: NurbsCurve, cuts: list[float]) -> list[NurbsCurve]:
     """The parts of a clamped curve between parameters."""
     p = curve.degree
+    level = np.ptp(curve.control_points, axis=0) == 0.0
+    value = curve.control_points[0]
     for cut in cuts:
         present = int(np.count_nonzero(curve.knots == cut))
         if present < p:
@@ -42,7 +44,9 @@ def part_of(curve: NurbsCurve, cuts: list[float]) -> list[NurbsCurve]:
         last = int(np.searchsorted(curve.knots, b, side="left"))
         inner = curve.knots[(curve.knots > a) & (curve.knots < b)]
         knots = np.concatenate([np.full(p + 1, a), inner, np.full(p + 1, b)])
-        parts.append(NurbsCurve(curve.control_points[first:last], knots, p, curve.weights[first:last], name=curve.name))
+        # What is constant stays so to the last bit.
+        points = np.where(level, value, curve.control_points[first:last])
+        parts.append(NurbsCurve(points, knots, p, curve.weights[first:last], name=curve.name))
     return parts
 
 

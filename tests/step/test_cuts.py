@@ -51,6 +51,13 @@ CASES = {
         6,
         0,
     ),
+    "cut twice": (
+        lambda: asm.Face(asm.shapes.torus(1.5891826, 0.6356730), holes=[circle((9.9, 1.1), 0.5, True)]),
+        U * 1.5891826 * U * 0.6356730 - pi / 4,
+        1,
+        6,
+        0,
+    ),
     "window at both seams": (lambda: asm.Face(WHEEL, holes=[circle((0, 0), 0.5, True)]), 4 * U * U - pi / 4, 1, 4, 0),
     "rings": (
         lambda: asm.Face(TUBE, [line((0.3, 1.0), (0.3 + U, 1.0))], [[line((0.5 + U, 2.5), (0.5, 2.5))]]),
@@ -97,7 +104,12 @@ def test_chains_close_in_the_domain_around_the_region(name):
             assert (at >= low - 1e-12).all() and (at <= high + 1e-12).all()
     # Of polygons with thousands of corners.
     assert sum(map(polygon_area, found)) == pytest.approx(area, rel=1e-6)
-    # The two sides of a seam run against each other.
+    # Seams are lines to the last bit, however often they are cut, and their two sides run against each other.
+    sides = {axis: set(surface.domain[axis]) for axis in (0, 1)}
+    for piece in pieces:
+        if piece.kind == SEAM:
+            axis = int(np.ptp(piece.ends[:, 1]) == 0.0)
+            assert set(piece.ends[:, axis].tolist()) <= sides[axis] and np.ptp(piece.ends[:, axis]) == 0.0
     along = np.array([piece.ends[1] - piece.ends[0] for piece in pieces if piece.kind == SEAM]).reshape(-1, 2)
     np.testing.assert_allclose(along.sum(axis=0), 0.0, atol=1e-12)
 
