@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from assembly._kernel import kernel
-from assembly.geometry.trim import (
+from assembly.geometry.pieces import (
     BOUND_2,
     END,
     MIDDLE,

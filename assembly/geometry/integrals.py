@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly.geometry.pieces import piece_line
 from assembly.geometry.spline import (
     BREAKS_U,
     BREAKS_V,
@@ -21,7 +22,6 @@ from assembly.geometry.spline import (
     into_domain,
     surface_point,
 )
-from assembly.geometry.trim import piece_line
 from assembly.geometry.vec import cross, dot
 
 

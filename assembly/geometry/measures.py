@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.geometry import trim
+from assembly.geometry import pieces as layout
 from assembly.geometry.integrals import along_bottom, along_pieces
 from assembly.geometry.surface import NurbsSurface
 from assembly.geometry.trim_table import TrimTable
@@ -19,6 +19,7 @@ from assembly.geometry.trim_table import TrimTable
 __all__ = ["area_and_volume"]
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
 # Numbers of nodes, one after the other, until two of them agree to this part.
 _NODES = (6, 12, 24, 48, 96, 192)
 _AGREE = 1e-13
@@ -42,46 +43,46 @@ def _levels(knots: Array, low: float, high: float, period: float) -> Array:
 def _rows(table: TrimTable, levels: tuple[Array, Array]) -> tuple[Array, NDArray[np.int64], NDArray[np.int64]]:
     """Parts of pieces on which no knot of the surface is passed."""
     record, pool = table.table, table.pool
-    count, first = int(record[trim.TRIM_ALL]), int(record[trim.TRIM_PIECE_POOL])
-    ints = record[record[trim.TRIM_PIECE_TABLE] :][: count * trim.PIECE_INTS].reshape(-1, trim.PIECE_INTS)
-    doubles = pool[first : first + count * trim.PIECE_DOUBLES].reshape(-1, trim.PIECE_DOUBLES)
+    count, first = int(record[layout.TRIM_ALL]), int(record[layout.TRIM_PIECE_POOL])
+    ints = record[record[layout.TRIM_PIECE_TABLE] :][: count * layout.PIECE_INTS].reshape(-1, layout.PIECE_INTS)
+    doubles = pool[first : first + count * layout.PIECE_DOUBLES].reshape(-1, layout.PIECE_DOUBLES)
     rows, which = [], []
-    for k in np.flatnonzero(ints[:, trim.PIECE_SIGN_U]).tolist():
+    for k in np.flatnonzero(ints[:, layout.PIECE_SIGN_U]).tolist():
         piece = doubles[k]
-        t0, t1 = float(piece[trim.PIECE_T0]), float(piece[trim.PIECE_T1])
+        t0, t1 = float(piece[layout.PIECE_T0]), float(piece[layout.PIECE_T1])
         cuts = [t0, t1]
         for axis in range(2):
-            low, high, shift = piece[2 * axis], piece[2 * axis + 1], piece[trim.SHIFT_U + axis]
-            start, end = float(piece[trim.START + axis] - shift), float(piece[trim.END + axis] - shift)
+            low, high, shift = piece[2 * axis], piece[2 * axis + 1], piece[layout.SHIFT_U + axis]
+            start, end = float(piece[layout.START + axis] - shift), float(piece[layout.END + axis] - shift)
             for level in levels[axis][(levels[axis] > low) & (levels[axis] < high)]:
-                t, _, _ = trim.cut_of_piece(
-                    pool, int(ints[k, trim.PIECE_COEFFICIENTS]), int(ints[k, trim.PIECE_DEGREE]),
-                    float(piece[trim.MIDDLE]), t0, t1, axis, float(level - shift), start, end,
+                t, _, _ = layout.cut_of_piece(
+                    pool, int(ints[k, layout.PIECE_COEFFICIENTS]), int(ints[k, layout.PIECE_DEGREE]),
+                    float(piece[layout.MIDDLE]), t0, t1, axis, float(level - shift), start, end,
                 )  # fmt: skip
                 cuts.append(min(max(t, t0), t1))
         cuts.sort()
         for a, b in zip(cuts[:-1], cuts[1:], strict=True):
-            rows.append([a, b, piece[trim.MIDDLE], piece[trim.SHIFT_U], piece[trim.SHIFT_V]])
+            rows.append([a, b, piece[layout.MIDDLE], piece[layout.SHIFT_U], piece[layout.SHIFT_V]])
             which.append(k)
     chosen = ints[np.array(which, dtype=np.int64)]
-    coefficients, degrees = chosen[:, trim.PIECE_COEFFICIENTS].copy(), chosen[:, trim.PIECE_DEGREE].copy()
+    coefficients, degrees = chosen[:, layout.PIECE_COEFFICIENTS].copy(), chosen[:, layout.PIECE_DEGREE].copy()
     return np.array(rows).reshape(-1, 5), coefficients, degrees
 
 
 def area_and_volume(surface: NurbsSurface, table: TrimTable) -> Array:
     """Area, and integral of S.(Su x Sv) / 3, of the part of a surface that a trim leaves: (2,)."""
-    at = int(table.table[trim.TRIM_FRAME])
-    frame = table.pool[at : at + trim.FRAME]
+    at = int(table.table[layout.TRIM_FRAME])
+    frame = table.pool[at : at + layout.FRAME]
     breaks = surface.breaks()
-    levels = tuple(
-        _levels(breaks[k], frame[trim.LOW_U + k], frame[trim.HIGH_U + k], frame[trim.PERIOD_U + k]) for k in range(2)
-    )
+    low, high = frame[[layout.LOW_U, layout.LOW_V]], frame[[layout.HIGH_U, layout.HIGH_V]]
+    period = frame[[layout.PERIOD_U, layout.PERIOD_V]]
+    levels = tuple(_levels(*each) for each in zip(surface.breaks(), low, high, period, strict=True))
     rows, coefficients, degrees = _rows(table, (levels[0], levels[1]))
-    steps = int(table.table[trim.TRIM_STEPS])
-    walk = table.pool[table.table[trim.TRIM_STEP_POOL] :][: 2 * steps].reshape(-1, 2)
+    steps = int(table.table[layout.TRIM_STEPS])
+    walk = table.pool[table.table[layout.TRIM_STEP_POOL] :][: 2 * steps].reshape(-1, 2)
     ends = np.unique(np.concatenate([levels[0], walk[:, 0]]))
     stretches = np.column_stack([ends[:-1], ends[1:]])
-    w = np.full(len(stretches), frame[trim.BOTTOM])
+    w = np.full(len(stretches), frame[layout.BOTTOM])
     for u, value in walk:
         w[stretches[:, 0] >= u] = value
     stretches, w = stretches[w != 0.0], w[w != 0.0]
@@ -89,7 +90,7 @@ def area_and_volume(surface: NurbsSurface, table: TrimTable) -> Array:
     shift = surface_pool.size
     pool = np.concatenate([surface_pool, table.pool])
 
-    def sides(count: int, pieces: Array, bottom: Array) -> tuple[Array, Array]:
+    def sides(count: int, pieces: Indices, bottom: Indices) -> tuple[Array, Array]:
         out, low = np.empty((len(pieces), 2)), np.empty((len(bottom), 2))
         gauss = _gauss(count)
         if len(pieces):
@@ -101,7 +102,7 @@ def area_and_volume(surface: NurbsSurface, table: TrimTable) -> Array:
         return out, low * w[bottom, None]
 
     # Only what two numbers of nodes disagree on is done again with more.
-    pieces, bottom = np.arange(len(rows)), np.arange(len(stretches))
+    pieces, bottom = np.arange(len(rows), dtype=np.intp), np.arange(len(stretches), dtype=np.intp)
     along, below = sides(_NODES[0], pieces, bottom)
     for count in _NODES[1:]:
         more, more_below = sides(count, pieces, bottom)

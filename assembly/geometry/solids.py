@@ -131,14 +131,16 @@ def _extruded(
     names: Sequence[str],
     hole_names: Sequence[Sequence[str]],
 ) -> tuple[Face, ...]:
-    """Walls, bottom and top; names are those of the curves in the order in which these came."""
+    """Walls in the order of the curves, with their names; bottom and top."""
     top = _cap(outer, holes, 0.5 * height, "top", False)
     bottom = _cap(outer, holes, -0.5 * height, "bottom", True)
-    # The cap has the curves with material on the left: some have been run the other way round.
-    labels = list(names if _loop("profile", outer).area > 0.0 else names[::-1])
-    for hole, group in zip(holes, hole_names, strict=True):
-        labels += group if _loop("hole", hole).area < 0.0 else group[::-1]
-    walls = [_wall(curve, height, name) for curve, name in zip(top.boundary, labels, strict=True)]
+    walls: list[Face] = []
+    sides = [(outer, names, 1.0), *zip(holes, hole_names, [-1.0] * len(holes), strict=True)]
+    for (curves, labels, sense), chain in zip(sides, top.chains, strict=True):
+        boundary = [top.boundary[k] for k in chain]
+        # The cap has the curves with material on the left, so some are run the other way round.
+        ordered = boundary if sense * _loop("profile", curves).area > 0.0 else boundary[::-1]
+        walls += [_wall(curve, height, name) for curve, name in zip(ordered, labels, strict=True)]
     return (*walls, bottom, top)
 
 
@@ -279,13 +281,13 @@ def plate_with_slot(
 def cam(radii: ArrayLike, height: float, bore: float) -> tuple[Face, ...]:
     """A disc cam about the z axis with a round bore: faces "cam", "bore", "bottom" and "top".
 
-    The profile is the closed cubic spline, curved continuously, of control points at equal angles around the axis,
-    the first of them on the x axis.
+    The profile is the closed cubic spline, continuous in curvature, through points at equal angles around the axis;
+    it begins at the first of them, on the x axis.
 
     Parameters
     ----------
     radii : (n,)
-        Distances of the control points from the axis, four or more; for example
+        Distances of the points from the axis, four or more; for example
         `base + lift * (1 - np.cos(np.linspace(0, 2 * np.pi, 24, endpoint=False))) / 2`.
     height : float
         Along the axis.
@@ -304,9 +306,14 @@ def cam(radii: ArrayLike, height: float, bore: float) -> tuple[Face, ...]:
     count = distances.size
     angles = 2.0 * pi * np.arange(count) / count
     points = distances[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
-    # The control points begin and end one earlier than the curve, which begins beside the first.
-    around = np.concatenate([points[-1:], points, points[:2]])
-    step = float(np.linalg.norm(np.diff(around, axis=0), axis=1).mean())
+    # On a uniform cubic spline a knot's point is a sixth of two control points and four sixths of the one between.
+    row = np.arange(count)
+    sixths = np.zeros((count, count))
+    for shift, part in ((-1, 1.0), (0, 4.0), (1, 1.0)):
+        sixths[row, (row + shift) % count] += part / 6.0
+    control = np.linalg.solve(sixths, points)
+    around = np.concatenate([control[-1:], control, control[:2]])
+    step = float(np.linalg.norm(np.diff(points, axis=0, append=points[:1]), axis=1).mean())
     profile = NurbsCurve(around, step * np.arange(-3.0, count + 4.0), 3)
     nearest = float(np.linalg.norm(profile.evaluate(np.linspace(*profile.domain, 16 * count)), axis=1).min())
     if r >= nearest:

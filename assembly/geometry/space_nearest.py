@@ -10,17 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from assembly._kernel import kernel
-from assembly.geometry.spline import (
-    BREAKS_U,
-    BREAKS_V,
-    CLOSED_U,
-    CLOSED_V,
-    SPANS_U,
-    SPANS_V,
-    into_domain,
-    surface_point,
-)
-from assembly.geometry.trim import (
+from assembly.geometry.pieces import (
     BOUND_1,
     BOUND_2,
     BOUND_3,
@@ -38,6 +28,16 @@ from assembly.geometry.trim import (
     TRIM_PIECE_TABLE,
     TRIM_PIECES,
     piece_bend,
+)
+from assembly.geometry.spline import (
+    BREAKS_U,
+    BREAKS_V,
+    CLOSED_U,
+    CLOSED_V,
+    SPANS_U,
+    SPANS_V,
+    into_domain,
+    surface_point,
 )
 from assembly.geometry.vec import add, blend, dot, scale, sub
 

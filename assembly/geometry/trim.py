@@ -8,108 +8,56 @@ cell of the periods. Material is to the left of every piece. Below a point (u, v
 is 1 where there is material (the table is made so), 0 where there is none. A piece has to be solved for the point
 only inside its box. Everywhere else two comparisons decide.
 
-Nearest points are found by branch and bound. With F(t) = |C(t) - (u, v)|^2 / 2 around the middle m of an interval
-of half width h, and a bound L on |F'''|,
-
-    F(t) >= F(m) + F'(m) (t - m) + (F''(m) - L h / 3) (t - m)^2 / 2,
-
-and |C(t) - C(m) - C'(m) (t - m)| <= max |C''| h^2 / 2; an interval with F'' > L h is convex and left to Newton.
+Nearest points are found by branch and bound over the pieces (`geometry/pieces.py`).
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from assembly._kernel import kernel, lane, load_lanes
-
-# Fields of a trim record: boundary curves and where their records begin, pieces (all, then those of the boundary
-# alone), table and pool offsets of the pieces, table offset of the first piece of every curve, pool offset of the
-# frame, number and pool offset of the steps of w along the bottom.
-TRIM_CURVES, TRIM_FIRST, TRIM_ALL, TRIM_PIECES = 0, 1, 2, 3
-TRIM_PIECE_TABLE, TRIM_PIECE_POOL, TRIM_CURVE_PIECES, TRIM_FRAME, TRIM_STEPS, TRIM_STEP_POOL = 4, 5, 6, 7, 8, 9
-TRIM_RECORD = 10
-# The frame: cell or domain, periods (0: open), nearness that is "on", w at the bottom left, the size.
-LOW_U, LOW_V, HIGH_U, HIGH_V, PERIOD_U, PERIOD_V, ON, BOTTOM, SIZE, FRAME = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9
-# Integers of a piece: its curve, where its coefficients are, its degree, neighbors (-1: none), signs of u' and v',
-# and the coordinate that changes faster (0: u, 1: v).
-PIECE_CURVE, PIECE_COEFFICIENTS, PIECE_DEGREE, PIECE_BEFORE, PIECE_AFTER = 0, 1, 2, 3, 4
-PIECE_SIGN_U, PIECE_SIGN_V, PIECE_MAJOR, PIECE_INTS = 5, 6, 7, 8
-# Doubles of a piece: its box, its parameters, what moves its curve into the cell, the middle of its span, bounds on
-# |C'|, |C''|, |C'''|, and its ends.
-BOX, PIECE_T0, PIECE_T1, SHIFT_U, SHIFT_V, MIDDLE, BOUND_1, BOUND_2, BOUND_3, START, END = (
-    0,
-    4,
-    5,
-    6,
-    7,
-    8,
-    9,
-    10,
-    11,
-    12,
-    14,
+from assembly._kernel import kernel
+from assembly.geometry.pieces import (
+    BOTTOM,
+    BOUND_1,
+    BOUND_2,
+    BOUND_3,
+    END,
+    HIGH_U,
+    HIGH_V,
+    LOW_U,
+    LOW_V,
+    MIDDLE,
+    ON,
+    PERIOD_U,
+    PERIOD_V,
+    PIECE_AFTER,
+    PIECE_BEFORE,
+    PIECE_COEFFICIENTS,
+    PIECE_CURVE,
+    PIECE_DEGREE,
+    PIECE_DOUBLES,
+    PIECE_INTS,
+    PIECE_MAJOR,
+    PIECE_SIGN_U,
+    PIECE_SIGN_V,
+    PIECE_T0,
+    PIECE_T1,
+    SHIFT_U,
+    SHIFT_V,
+    SIZE,
+    START,
+    TRIM_ALL,
+    TRIM_CURVE_PIECES,
+    TRIM_FRAME,
+    TRIM_PIECE_POOL,
+    TRIM_PIECE_TABLE,
+    TRIM_PIECES,
+    TRIM_STEP_POOL,
+    TRIM_STEPS,
+    nearest_on_piece,
+    piece_at,
+    piece_line,
 )
-PIECE_DOUBLES = 16
-# Intervals that a query may look at on one piece before its bounds are taken as they are.
-_BUDGET = 4000
-
-
-@kernel(inline=True)
-def piece_line(pool, o, degree, s):
-    """u, v, u', v' of a rational piece."""
-    p = load_lanes(pool, o + 4 * degree)
-    d = 0.0 * p
-    for k in range(degree - 1, -1, -1):
-        d = p + s * d
-        p = load_lanes(pool, o + 4 * k) + s * p
-    i = 1.0 / lane(p, 3)
-    a = i * p
-    b = i * (d - lane(d, 3) * a)
-    return lane(a, 0), lane(a, 1), lane(b, 0), lane(b, 1)
-
-
-@kernel(inline=True)
-def piece_bend(pool, o, degree, s):
-    """u, v, u', v', u'', v'' of a rational piece."""
-    p = load_lanes(pool, o + 4 * degree)
-    d = 0.0 * p
-    h = 0.0 * p
-    for k in range(degree - 1, -1, -1):
-        h = d + s * h
-        d = p + s * d
-        p = load_lanes(pool, o + 4 * k) + s * p
-    i = 1.0 / lane(p, 3)
-    a = i * p
-    b = i * (d - lane(d, 3) * a)
-    c = i * (2.0 * h - (2.0 * lane(d, 3)) * b - (2.0 * lane(h, 3)) * a)
-    return lane(a, 0), lane(a, 1), lane(b, 0), lane(b, 1), lane(c, 0), lane(c, 1)
-
-
-@kernel(inner=True)
-def _where(pool, o, degree, middle, t0, t1, axis, target, start, end):
-    """The parameter at which a piece that runs one way has a coordinate, and its point and direction there."""
-    rising = end > start
-    low = t0
-    high = t1
-    t = t0 + (t1 - t0) * (target - start) / (end - start)
-    x, y, dx, dy = piece_line(pool, o, degree, t - middle)
-    for _ in range(80):
-        value = x - target if axis == 0 else y - target
-        slope = dx if axis == 0 else dy
-        if value == 0.0:
-            break
-        if (value > 0.0) == rising:
-            high = t
-        else:
-            low = t
-        step = t - value / slope if slope != 0.0 else low
-        if not low < step < high:
-            step = 0.5 * (low + high)
-        if abs(step - t) <= 3e-16 * abs(step):
-            break
-        t = step
-        x, y, dx, dy = piece_line(pool, o, degree, t - middle)
-    return t, x, y, dx, dy
 
 
 @kernel(inline=True)
@@ -166,7 +114,7 @@ def _below(table, pool, o, i, u, v, tolerance):
         inside = pool[i + 2] <= v <= pool[i + 3]
     if not inside:
         return sign_u if within and v > pool[i + 3] else 0, False
-    at, cu, cv, du, dv = _where(
+    at, cu, cv, du, dv = piece_at(
         pool,
         table[o + PIECE_COEFFICIENTS],
         table[o + PIECE_DEGREE],
@@ -234,101 +182,6 @@ def trim_side(table, pool, trim, u, v):
     if pool[frame + PERIOD_V] == 0.0 and not pool[frame + LOW_V] - slack <= v <= pool[frame + HIGH_V] + slack:
         return -1
     return 1 if w == 1.0 else -1
-
-
-@kernel(inner=True)
-def _newton(pool, o, degree, middle, a, b, t, qx, qy):
-    """The nearest point of an interval on which the distance is convex; half its square and its parameter."""
-    low = a
-    high = b
-    f = 0.0
-    for _ in range(60):
-        x, y, dx, dy, ddx, ddy = piece_bend(pool, o, degree, t - middle)
-        ex = x - qx
-        ey = y - qy
-        f = 0.5 * (ex * ex + ey * ey)
-        g = ex * dx + ey * dy
-        if g == 0.0:
-            break
-        if g > 0.0:
-            high = t
-            if t == a:
-                break
-        else:
-            low = t
-            if t == b:
-                break
-        curvature = dx * dx + dy * dy + ex * ddx + ey * ddy
-        step = t - g / curvature if curvature > 0.0 else 0.5 * (low + high)
-        if step <= a:
-            step = a
-        elif step >= b:
-            step = b
-        elif not low < step < high:
-            step = 0.5 * (low + high)
-        if abs(step - t) <= 2e-16 * max(abs(t), b - a):
-            break
-        t = step
-    return f, t
-
-
-@kernel(inner=True)
-def nearest_on_piece(pool, o, degree, middle, t0, t1, m1, m2, m3, qx, qy, best, slack):
-    """Half the squared distance and the parameter of the nearest point of a piece, where it beats `best`.
-
-    The second value is `t0 - 1` where it does not.
-    """
-    found = t0 - 1.0
-    level = 0
-    index = 0
-    h = t1 - t0
-    for _ in range(_BUDGET):
-        half = 0.5 * h
-        m = t0 + (index + 0.5) * h
-        x, y, dx, dy, ddx, ddy = piece_bend(pool, o, degree, m - middle)
-        ex = x - qx
-        ey = y - qy
-        f = 0.5 * (ex * ex + ey * ey)
-        if f < best:
-            best = f
-            found = m
-        g = ex * dx + ey * dy
-        speed = dx * dx + dy * dy
-        curvature = speed + ex * ddx + ey * ddy
-        third = 3.0 * m1 * m2 + (np.sqrt(2.0 * f) + m1 * half) * m3
-        bent = curvature - third * half / 3.0
-        reach = half
-        if bent > 0.0:
-            reach = min(half, abs(g) / bent)
-        low = f - abs(g) * reach + 0.5 * bent * reach * reach
-        if low < best:
-            # A tangent and how far the piece may be from it.
-            along = -half if g * half > speed * half * half else (half if -g * half > speed * half * half else 0.0)
-            if along == 0.0 and speed > 0.0:
-                along = -g / speed
-            apart = np.sqrt((ex + along * dx) ** 2 + (ey + along * dy) ** 2) - 0.5 * m2 * half * half
-            if apart > 0.0:
-                low = max(low, 0.5 * apart * apart)
-        if low < best - slack:
-            if curvature > third * half:
-                at_low = t0 + index * h
-                f, t = _newton(pool, o, degree, middle, at_low, min(at_low + h, t1), m, qx, qy)
-                if f < best:
-                    best = f
-                    found = t
-            elif level < 50:
-                level += 1
-                index *= 2
-                h = half
-                continue
-        index += 1
-        while level > 0 and index % 2 == 0:
-            index //= 2
-            level -= 1
-            h *= 2.0
-        if level == 0:
-            break
-    return best, found
 
 
 @kernel(inline=True)
@@ -517,17 +370,3 @@ def nearest_points(table, pool, trim, first, count, u, v, out):
         out[k, 4] = cv
         out[k, 5] = nu
         out[k, 6] = nv
-
-
-@kernel
-def ends_of_pieces(pool, coefficients, degrees, middles, t, out):
-    """Points of pieces at parameters."""
-    for k in range(t.size):
-        out[k, 0], out[k, 1], _du, _dv = piece_line(pool, coefficients[k], degrees[k], t[k] - middles[k])
-
-
-@kernel
-def cut_of_piece(pool, coefficients, degree, middle, t0, t1, axis, target, start, end):
-    """The parameter at which a piece has a coordinate, and its point there."""
-    t, x, y, _dx, _dy = _where(pool, coefficients, degree, middle, t0, t1, axis, target, start, end)
-    return t, x, y

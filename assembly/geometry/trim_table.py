@@ -9,11 +9,12 @@ from math import comb
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.geometry import trim
+from assembly.geometry import pieces as layout
 from assembly.geometry.crossing import first_crossing
 from assembly.geometry.curve import NurbsCurve
 from assembly.geometry.curve_packing import packed_curves
 from assembly.geometry.monotone import ROW, cut_curves
+from assembly.geometry.pieces import PIECE_DOUBLES, PIECE_INTS, TRIM_RECORD
 from assembly.geometry.spline import (
     CURVE_BREAKS,
     CURVE_COEFFICIENTS,
@@ -21,7 +22,7 @@ from assembly.geometry.spline import (
     CURVE_RECORD,
     CURVE_SPANS,
 )
-from assembly.geometry.trim import PIECE_DOUBLES, PIECE_INTS, TRIM_RECORD
+from assembly.geometry.trim import windings
 
 __all__ = ["TrimTable", "build"]
 
@@ -31,8 +32,8 @@ Ints = NDArray[np.int64]
 ON_BOUNDARY = 1e-12
 _BINOMIALS = np.array([[comb(n, k) for k in range(32)] for n in range(32)], dtype=float)
 # Fields that point into the table and into the pool.
-_TABLE_FIELDS = [trim.TRIM_FIRST, trim.TRIM_PIECE_TABLE, trim.TRIM_CURVE_PIECES]
-_POOL_FIELDS = [trim.TRIM_PIECE_POOL, trim.TRIM_FRAME, trim.TRIM_STEP_POOL]
+_TABLE_FIELDS = [layout.TRIM_FIRST, layout.TRIM_PIECE_TABLE, layout.TRIM_CURVE_PIECES]
+_POOL_FIELDS = [layout.TRIM_PIECE_POOL, layout.TRIM_FRAME, layout.TRIM_STEP_POOL]
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,35 +56,35 @@ class TrimTable:
         table[_POOL_FIELDS] += pool_at
         records = table[TRIM_RECORD : TRIM_RECORD + CURVE_RECORD * self.curves].reshape(-1, CURVE_RECORD)
         records[:, [CURVE_BREAKS, CURVE_COEFFICIENTS]] += pool_at
-        first = int(self.table[trim.TRIM_PIECE_TABLE])
-        table[first : first + PIECE_INTS * self.pieces].reshape(-1, PIECE_INTS)[:, trim.PIECE_COEFFICIENTS] += pool_at
+        first = int(self.table[layout.TRIM_PIECE_TABLE])
+        table[first : first + PIECE_INTS * self.pieces].reshape(-1, PIECE_INTS)[:, layout.PIECE_COEFFICIENTS] += pool_at
         return table, self.pool
 
     def crossing(self, tolerance: float) -> tuple[int, int, Array] | None:
         """Two boundary curves that cross, or come nearer than this part of the size, and where; None if none do."""
         record = self.table
-        count, first = int(record[trim.TRIM_PIECES]), int(record[trim.TRIM_PIECE_POOL])
-        frame = self.pool[record[trim.TRIM_FRAME] : record[trim.TRIM_FRAME] + trim.FRAME]
-        size = float(frame[trim.SIZE])
+        count, first = int(record[layout.TRIM_PIECES]), int(record[layout.TRIM_PIECE_POOL])
+        frame = self.pool[record[layout.TRIM_FRAME] : record[layout.TRIM_FRAME] + layout.FRAME]
+        size = float(frame[layout.SIZE])
         low = self.pool[first : first + PIECE_DOUBLES * count].reshape(-1, PIECE_DOUBLES)[:, [0, 2]]
         pieces, moves = np.arange(count), np.zeros((count, 2))
         for axis in range(2):
-            period = frame[trim.PERIOD_U + axis]
+            period = frame[layout.PERIOD_U + axis]
             if period:
                 # What touches the lower border of the cell meets what touches the upper one.
-                touches = low[pieces, axis] <= frame[trim.LOW_U + axis] + tolerance * size
+                touches = low[pieces, axis] <= frame[layout.LOW_U + axis] + tolerance * size
                 pieces = np.concatenate([pieces, pieces[touches]])
                 copies = moves[touches]
                 copies[:, axis] += period
                 moves = np.concatenate([moves, copies])
         order = np.argsort(low[pieces, 0] + moves[:, 0])
         where = np.empty(2)
-        places = int(record[trim.TRIM_PIECE_TABLE]), first
+        places = int(record[layout.TRIM_PIECE_TABLE]), first
         a, b = first_crossing(self.table, self.pool, *places, pieces, moves, order, tolerance * size, size, where)
         if a < 0:
             return None
         ints = self.table[places[0] : places[0] + PIECE_INTS * count].reshape(-1, PIECE_INTS)
-        return int(ints[a, trim.PIECE_CURVE]), int(ints[b, trim.PIECE_CURVE]), where
+        return int(ints[a, layout.PIECE_CURVE]), int(ints[b, layout.PIECE_CURVE]), where
 
 
 def _largest_gap(low: Array, high: Array, period: float) -> float:
@@ -122,7 +123,7 @@ class _Pieces:
         self.ends = np.empty((len(rows), 2, 2))
         for side in range(2):
             out = np.empty((len(rows), 2))
-            trim.ends_of_pieces(self.pool, self.coefficients, self.degree, self.middle, self.t[:, side].copy(), out)
+            layout.ends_of_pieces(self.pool, self.coefficients, self.degree, self.middle, self.t[:, side].copy(), out)
             self.ends[:, side] = out
         self._neighbors(chains, closing)
 
@@ -161,7 +162,7 @@ class _Pieces:
         crossed = np.arange(np.floor((lowest - low) / period) + 1.0, np.ceil((highest - low) / period)) * period + low
         times, points = [t0], [a]
         for level in crossed[::sign]:
-            t, x, y = trim.cut_of_piece(
+            t, x, y = layout.cut_of_piece(
                 self.pool, int(self.coefficients[piece]), int(self.degree[piece]), float(self.middle[piece]),
                 float(t0), float(t1), axis, float(level), float(a[axis]), float(b[axis]),
             )  # fmt: skip
@@ -279,10 +280,15 @@ def _table(
     piece_pool = pieces.pool.size
     frame_at = piece_pool + doubles.size
     frame = np.array([*cell[0], *cell[1], *periods, ON_BOUNDARY * size, 0.0, size])
-    record[[trim.TRIM_CURVES, trim.TRIM_FIRST, trim.TRIM_ALL, trim.TRIM_PIECES]] = count, TRIM_RECORD, total, first[-1]
-    record[[trim.TRIM_PIECE_TABLE, trim.TRIM_PIECE_POOL]] = piece_table, piece_pool
-    record[[trim.TRIM_CURVE_PIECES, trim.TRIM_FRAME]] = piece_table + ints.size, frame_at
-    record[[trim.TRIM_STEPS, trim.TRIM_STEP_POOL]] = len(walk), frame_at + frame.size
+    record[[layout.TRIM_CURVES, layout.TRIM_FIRST, layout.TRIM_ALL, layout.TRIM_PIECES]] = (
+        count,
+        TRIM_RECORD,
+        total,
+        first[-1],
+    )
+    record[[layout.TRIM_PIECE_TABLE, layout.TRIM_PIECE_POOL]] = piece_table, piece_pool
+    record[[layout.TRIM_CURVE_PIECES, layout.TRIM_FRAME]] = piece_table + ints.size, frame_at
+    record[[layout.TRIM_STEPS, layout.TRIM_STEP_POOL]] = len(walk), frame_at + frame.size
     table = np.concatenate([record, records.ravel(), ints.ravel(), first])
     pool = np.concatenate([pieces.pool, doubles.ravel(), frame, walk.ravel()])
     left, right = np.empty(len(chains)), np.empty(len(chains))
@@ -294,19 +300,19 @@ def _table(
         longest = np.array([b + int(np.argmax(lengths[b:s])) for b, s in zip(begins, stops, strict=True)])
         t = pieces.t[longest].mean(axis=1)
         point = np.empty((len(chains), 2))
-        trim.ends_of_pieces(
+        layout.ends_of_pieces(
             pool, pieces.coefficients[longest], pieces.degree[longest], pieces.middle[longest], t, point
         )
         point += pieces.shift[longest]
         across = np.column_stack([-extent[longest, 1], extent[longest, 0]])
         across *= 1e-10 * size / np.linalg.norm(across, axis=1, keepdims=True)
         for beside, out in ((point + across, left), (point - across, right)):
-            trim.windings(table, pool, 0, beside[:, 0].copy(), beside[:, 1].copy(), out)
+            windings(table, pool, 0, beside[:, 0].copy(), beside[:, 1].copy(), out)
         # w is to be 1 where there is material.
         bottom = 1.0 - left[0]
-        pool[frame_at + trim.BOTTOM] += bottom
+        pool[frame_at + layout.BOTTOM] += bottom
         pool[frame_at + frame.size + 1 :: 2] += bottom
         left, right = left + bottom, right + bottom
     else:
-        pool[frame_at + trim.BOTTOM] = 1.0
+        pool[frame_at + layout.BOTTOM] = 1.0
     return TrimTable(table, pool, count, total, left, right)

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.errors import InputError
+from assembly.geometry.curve import NurbsCurve
 from assembly.geometry.face import Face
-from assembly.geometry.loop import Loop
 from assembly.geometry.surface import NurbsSurface
 from assembly.step.occt import occt, parts
 from assembly.step.profiles import Unreadable
@@ -114,7 +114,8 @@ def read_face(face: Any, edges: Any, name: str | None, scale: float = 1.0) -> Re
         where = patch(surface, box)
         made_surface, factors = _scaled(where, scale)
         outermost = o.BRepTools.OuterWire_s(forward)
-        outer, holes = None, []
+        outer: list[NurbsCurve] | None = None
+        holes: list[list[NurbsCurve]] = []
         gap, deviation = 0.0, where.deviation
         for wire in parts(forward, o.TopAbs_WIRE):
             made = _loop(o.as_wire(wire), forward, where, edges)
@@ -122,7 +123,7 @@ def read_face(face: Any, edges: Any, name: str | None, scale: float = 1.0) -> Re
                 continue
             gap = max(gap, made[1])
             deviation = max(deviation, max(edge.deviation for edge in made[0]))
-            loop = Loop([edge.nurbs(factors) for edge in made[0]])
+            loop = [edge.nurbs(factors) for edge in made[0]]
             if wire.IsSame(outermost):
                 outer = loop
             else:

@@ -286,7 +286,14 @@ def profile(curve: Any, low: float, high: float, *, cut: bool) -> tuple[Spline, 
             made = _bspline(copy)
             return Spline(made.points, low + (high - low) * made.knots, made.degree), Straight(False), 0.0
         return _bspline(copy), Straight(False), 0.0
-    # Parabolas, hyperbolas, offsets: nothing but their smoothness is used.
+    if isinstance(curve, (o.Geom_Parabola, o.Geom2d_Parabola)):
+        # P(t) = origin + t^2 / (4 focal) x + t y; its blossom at both ends is the middle control point.
+        place, a, b = curve.Position(), low - slack, high + slack
+        squares, ways = np.array([a * a, a * b, b * b]), np.array([a, 0.5 * (a + b), b])
+        x, y = point(place.XDirection()) / (4.0 * curve.Focal()), point(place.YDirection())
+        net = point(place.Location()) + squares[:, None] * x + ways[:, None] * y
+        return spline(net, np.repeat([a, b], 3), 2), Straight(True), 0.0
+    # Hyperbolas, offsets: nothing but their smoothness is used.
     size = max(1e-300, float(np.abs(point(curve.Value(low)) - point(curve.Value(high))).max()))
     made, error = approximated(
         lambda t: np.array([point(curve.Value(float(x))) for x in t]), np.linspace(low, high, 9), 1e-9 * size
