@@ -1,0 +1,104 @@
+"""The nearest features of two shells for Python, and tracking of them, one call each."""
+
+from __future__ import annotations
+
+import math
+
+from assembly._kernel import kernel
+from assembly.geometry.vec import add, matvec, matvec_t
+from assembly.kinematics.motion import position, relative_pose, rotation
+from assembly.proximity.extremal import CONVERGED, SINGULAR
+from assembly.proximity.feature_pair import features_at
+from assembly.proximity.nearest import CROSSING
+from assembly.proximity.penetration import nearest_or_deepest
+from assembly.proximity.switching import feature_at, feature_kind, track_features
+
+# What is written of a pair: parameters (4), point of f, point of g, normal, gap, lower bound, pairs looked at, switches.
+PARAMETERS, POINT_F, POINT_G, NORMAL, GAP, LOWER, EFFORT, SWITCHES, PAIR = 0, 4, 7, 10, 13, 14, 15, 16, 17
+# The status of a tracked pair, beside those of a search.
+TRACKED = 4
+
+
+@kernel(inner=True)
+def write_pair(q, turn_f, x, pf, pg, n, gap, out):
+    """A pair in the axes of body f into `out`, in world axes."""
+    origin = position(q, 0)
+    a = add(matvec(turn_f, pf), origin)
+    b = add(matvec(turn_f, pg), origin)
+    normal = matvec(turn_f, n)
+    for k in range(4):
+        out[PARAMETERS + k] = x[k]
+    for k in range(3):
+        out[POINT_F + k] = a[k]
+        out[POINT_G + k] = b[k]
+        out[NORMAL + k] = normal[k]
+    out[GAP] = gap
+
+
+@kernel(inner=True, allocates=True)
+def search_anew(table, pool, shell_f, shell_g, q, size, codes, out):
+    """The global pair at the poses q into codes (2,) and out (PAIR,). Returns the status."""
+    turn_f = rotation(q, 0)
+    turn, shift = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
+    status, f, g, x, gap, lower, effort = nearest_or_deepest(table, pool, shell_f, shell_g, turn, shift, size)
+    none = (0.0, 0.0, 0.0)
+    if status != CROSSING:
+        # A pair on the border of two features is given to the one that holds it; the gap is the same.
+        found, cf, cg, y, frame, _switches = track_features(
+            table, pool, shell_f, shell_g, turn, shift, f, g, x, none, size, math.inf
+        )
+        if (found == CONVERGED or found == SINGULAR) and abs(abs(frame[5]) - abs(gap)) <= 1e-12 * size:
+            f = cf
+            g = cg
+            x = y
+            write_pair(q, turn_f, x, frame[3], frame[4], frame[0], frame[5], out)
+            codes[0] = f
+            codes[1] = g
+            out[LOWER] = lower
+            out[EFFORT] = effort
+            return status
+    frame = features_at(
+        table,
+        pool,
+        feature_kind(table, shell_f, f),
+        feature_at(table, shell_f, f),
+        feature_kind(table, shell_g, g),
+        feature_at(table, shell_g, g),
+        turn,
+        shift,
+        x,
+        none,
+        size,
+    )
+    write_pair(q, turn_f, x, frame[3], frame[4], frame[0], frame[5], out)
+    codes[0] = f
+    codes[1] = g
+    out[LOWER] = lower
+    out[EFFORT] = effort
+    return status
+
+
+@kernel
+def find_nearest(table, pool, shell_f, shell_g, q, size, codes, out):
+    """The nearest pair at the poses q (2, 7); its features into codes (2,), the pair into out. Returns the status."""
+    out[SWITCHES] = 0.0
+    return search_anew(table, pool, shell_f, shell_g, q, size, codes, out)
+
+
+@kernel
+def follow_nearest(table, pool, shell_f, shell_g, q, size, codes, out):
+    """The pair in codes and out carried to the poses q; searched anew where tracking fails. Returns the status."""
+    turn_f = rotation(q, 0)
+    turn, shift = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
+    n = matvec_t(turn_f, (out[NORMAL], out[NORMAL + 1], out[NORMAL + 2]))
+    x = (out[0], out[1], out[2], out[3])
+    status, f, g, y, frame, switches = track_features(
+        table, pool, shell_f, shell_g, turn, shift, codes[0], codes[1], x, n, size, 1.0
+    )
+    if status == CONVERGED or status == SINGULAR:
+        codes[0] = f
+        codes[1] = g
+        write_pair(q, turn_f, y, frame[3], frame[4], frame[0], frame[5], out)
+        out[SWITCHES] += switches
+        return TRACKED
+    return search_anew(table, pool, shell_f, shell_g, q, size, codes, out)
