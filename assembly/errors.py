@@ -110,7 +110,7 @@ def integer(name: str, value: Any, low: int, high: int) -> int:
     return result
 
 
-def checked_color(value: Sequence[float] | None) -> tuple[float, float, float] | None:
+def checked_color(value: Any) -> tuple[float, float, float] | None:
     """Red, green and blue from 0 to 1, or None."""
     if value is None:
         return None

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.errors import InputError
+from assembly.errors import InputError, checked_color
 from assembly.geometry.boundary import Boundary, LoopLike, make_boundary
 from assembly.geometry.curve import NurbsCurve, checked_name, flat, parameters
 from assembly.geometry.derivative_bounds import derivative_bounds
@@ -48,6 +48,8 @@ class Face:
         The surface's name by default.
     reversed : bool
         The outward normal is Su x Sv, or its negative when reversed.
+    color : (red, green, blue), optional
+        0 to 1 each; that of the body by default.
 
     Attributes
     ----------
@@ -73,6 +75,7 @@ class Face:
         *,
         name: str | None = None,
         reversed: bool = False,
+        color: Sequence[float] | None = None,
     ) -> None:
         if not isinstance(surface, NurbsSurface):
             raise TypeError(f"surface is {surface!r}; expected a NurbsSurface")
@@ -81,6 +84,7 @@ class Face:
         self.surface = surface
         self.name = surface.name if name is None else checked_name(name)
         self.reversed = bool(reversed)
+        self.color = color
         self._outer, self._holes = outer, tuple(holes)
         if outer is not None or self._holes:
             _ = self._boundary
@@ -89,6 +93,15 @@ class Face:
     def _boundary(self) -> Boundary:
         """Made at once where there are loops to be checked, else when it is first asked for."""
         return make_boundary(self.surface, self._outer, self._holes)
+
+    @property
+    def color(self) -> tuple[float, float, float] | None:
+        """Red, green and blue, 0 to 1; None for the color of the body. Settable."""
+        return self._color
+
+    @color.setter
+    def color(self, value: Sequence[float] | None) -> None:
+        self._color = checked_color(value)
 
     @property
     def outer(self) -> Loop | None:

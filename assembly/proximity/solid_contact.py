@@ -14,7 +14,7 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly.geometry.vec import add, dot, matvec, scale, sub
-from assembly.kinematics.motion import position, relative_pose, rotation
+from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.extremal import CONVERGED, SINGULAR, own_frame
 from assembly.proximity.feature_pair import feature_record
 from assembly.proximity.nearest import CROSSING, search
@@ -149,24 +149,3 @@ def search_solids(table, pool, shell_f, shell_g, i, j, q, tracked, r):
         found = draw_apart(table, pool, shell_f, shell_g, relative, shift, code_f, code_g, x, tracked, r)
         return 1 if found else 0
     return 1
-
-
-@kernel
-def solid_pair(table, pool, shell_f, shell_g, q, tracked, out):
-    """The pair tracked in row 0, for Python.
-
-    q : (2, 7), poses of f and g. out: point of f (3), point of g (3), normal (3), all in world axes, gap. Returns the
-    status.
-    """
-    turn = rotation(q, 0)
-    relative, shift = relative_pose(q, 0, turn, 1, rotation(q, 1))
-    status, feature_f, feature_g, x, frame, _switches = track_row(
-        table, pool, shell_f, shell_g, relative, shift, tracked, 0, math.inf
-    )
-    write_tracked(x, feature_f, feature_g, frame[0], tracked, 0)
-    origin = position(q, 0)
-    out[0], out[1], out[2] = add(matvec(turn, frame[3]), origin)
-    out[3], out[4], out[5] = add(matvec(turn, frame[4]), origin)
-    out[6], out[7], out[8] = matvec(turn, frame[0])
-    out[9] = frame[5]
-    return status

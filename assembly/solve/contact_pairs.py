@@ -10,7 +10,8 @@ from assembly.constraints.layout import ROW, ROW_TABLE, SHELL_F, SHELL_G
 from assembly.kinematics.body import Body, BodyFace
 from assembly.proximity.pairs import ContactPair, PairStatus, extremal_pair
 from assembly.proximity.solid import feature_name, solid_of
-from assembly.proximity.solid_contact import FEATURE_F, FEATURE_G, solid_pair
+from assembly.proximity.solid_contact import CONTACT_RECORD, FEATURE_F, FEATURE_G, search_solids, track_solids
+from assembly.proximity.velocity import ARM_F, GAP, NORMAL
 
 if TYPE_CHECKING:
     from assembly.solve.solution import Solution
@@ -44,18 +45,22 @@ def _solids(solution: Solution, k: int, places: list[int]) -> ContactPair:
     q = solution.q[places]
     q[:, :3] = (q[:, :3] - packed.reference) / packed.scale
     tracked = solution._parameters[k : k + 1].copy()
-    out = np.empty(10)
-    shells = packed.table[row + SHELL_F], packed.table[row + SHELL_G]
-    status = solid_pair(packed.table, packed.pool, *shells, q, tracked, out)
+    scene = (packed.table, packed.pool, packed.table[row + SHELL_F], packed.table[row + SHELL_G], 0, 1, q)
+    if np.isnan(tracked).any():
+        search_solids(*scene, tracked, 0)
+    records = np.zeros((1, CONTACT_RECORD))
+    status = track_solids(*scene, tracked, np.inf, records, tracked, 0)
+    gap, normal = records[0, GAP], records[0, NORMAL : NORMAL + 3]
+    there = q[0, :3] + records[0, ARM_F : ARM_F + 3]
     names = tuple(
         _feature_name(side, int(tracked[0, column]))
         for side, column in zip(solution._scene.sides[k], (FEATURE_F, FEATURE_G), strict=True)
     )
     return ContactPair(
         parameters=tracked[0, :4],
-        points=out[:6].reshape(2, 3) * packed.scale + packed.reference,
-        normal=out[6:9],
-        gap=float(out[9]) * packed.scale,
+        points=np.array([there - gap * normal, there]) * packed.scale + packed.reference,
+        normal=normal,
+        gap=float(gap) * packed.scale,
         status=_STATUSES[status],
         features=(names[0], names[1]),
     )

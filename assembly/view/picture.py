@@ -86,7 +86,7 @@ def _colors(bodies: Sequence[Body]) -> Iterator[Color]:
     free = [color for color in _PALETTE if color not in [_NAMED.get(name) for name in names]]
     turns = cycle(free or _PALETTE)
     for body, name in zip(bodies, names, strict=True):
-        if getattr(body, "color", None) is not None:
+        if body.color is not None:
             yield body.color
             continue
         if body.fixed and not body.faces and name not in _NAMED:
