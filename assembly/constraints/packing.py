@@ -26,9 +26,9 @@ from assembly.constraints.trim_rows import trim_rows, trim_terms
 from assembly.constraints.turns import Turns
 from assembly.errors import InputError
 from assembly.geometry.face import Face
+from assembly.geometry.pieces import TRIM_FIRST
 from assembly.geometry.spline import CURVE_RECORD, SURFACE_RECORD
 from assembly.geometry.surface import NurbsSurface
-from assembly.geometry.trim import TRIM_FIRST
 from assembly.kinematics.body import Body, BodyFace
 from assembly.proximity.pairs import OFFSETS
 from assembly.proximity.shell import EDGE_CURVE, EDGE_END, EDGE_RECORD, EDGE_START, EDGE_SURFACE

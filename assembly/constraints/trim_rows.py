@@ -42,8 +42,9 @@ from assembly.constraints.layout import (
     TRIM_SIDE,
     TRIMS,
 )
+from assembly.geometry.pieces import TRIM_CURVES
 from assembly.geometry.spline import curve_point, surface_point
-from assembly.geometry.trim import TRIM_CURVES, trim_nearest
+from assembly.geometry.trim import trim_nearest
 from assembly.geometry.vec import add, cross, dot, matvec, sub
 from assembly.kinematics.motion import position, relative_pose, rotation
 from assembly.proximity.extremal import CONVERGED, SINGULAR

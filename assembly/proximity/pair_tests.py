@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
+from assembly.geometry.pieces import TRIM_CURVES
 from assembly.geometry.spline import (
     BREAKS_U,
     BREAKS_V,
@@ -20,7 +21,7 @@ from assembly.geometry.spline import (
     SPANS_U,
     SPANS_V,
 )
-from assembly.geometry.trim import TRIM_CURVES, trim_nearest, trim_side
+from assembly.geometry.trim import trim_nearest, trim_side
 from assembly.geometry.vec import cross, dot, sub
 from assembly.proximity.box_model import (
     BEND,

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from assembly.errors import positive
 from assembly.geometry.face import Face
+from assembly.geometry.pieces import TRIM_FIRST
 from assembly.geometry.spline import CELLS, COEFFICIENTS, CURVE_RECORD
-from assembly.geometry.trim import TRIM_FIRST
 from assembly.proximity import shell
 from assembly.proximity.edge_cells import edge_cells, outside_cells
 from assembly.proximity.pairs import OFFSETS

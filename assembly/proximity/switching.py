@@ -17,6 +17,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
+from assembly.geometry.pieces import TRIM_CURVES, TRIM_FIRST
 from assembly.geometry.spline import (
     CURVE_BREAKS,
     CURVE_CLOSED,
@@ -26,7 +27,7 @@ from assembly.geometry.spline import (
     surface_point,
     xyz,
 )
-from assembly.geometry.trim import TRIM_CURVES, TRIM_FIRST, trim_nearest, trim_side
+from assembly.geometry.trim import trim_nearest, trim_side
 from assembly.geometry.vec import blend, cross, dot, matvec, matvec_t, neg, scale, sub
 from assembly.proximity.extremal import LEFT_PATCH, NOT_CONVERGED, into_domain
 from assembly.proximity.feature_pair import solve_features

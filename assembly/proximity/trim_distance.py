@@ -12,8 +12,9 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
+from assembly.geometry.pieces import TRIM_CURVES, TRIM_FIRST
 from assembly.geometry.spline import CURVE_RECORD, curve_point
-from assembly.geometry.trim import TRIM_CURVES, TRIM_FIRST, trim_nearest
+from assembly.geometry.trim import trim_nearest
 
 # Cosine between n and the tangent at the foot above which the foot is a corner.
 CORNER = 1e-6

@@ -9,6 +9,7 @@ from assembly.errors import InputError
 from assembly.geometry import shapes
 from assembly.geometry.curve import NurbsCurve
 from assembly.geometry.face import Face
+from assembly.geometry.pieces import TRIM_CURVES, TRIM_FIRST
 from assembly.geometry.spline import (
     CELL_COUNT,
     CELLS,
@@ -19,7 +20,7 @@ from assembly.geometry.spline import (
     curve_point,
     surface_point,
 )
-from assembly.geometry.trim import TRIM_CURVES, TRIM_FIRST, locate_points
+from assembly.geometry.trim import locate_points
 from assembly.proximity import shell
 from assembly.proximity.edge_cells import curve_boxes, edge_cells, first_cells
 from assembly.proximity.shell_packing import pack_shell
