@@ -17,6 +17,7 @@ from assembly.constraints.layout import (
     CONTACTS,
     COORDINATE,
     EXTRA_COLUMN,
+    FREE_COLUMN,
     JOINT_RECORD,
     JOINT_ROW,
     JOINT_TABLE,
@@ -320,23 +321,31 @@ def evaluate(table, pool, start, patience, loose, room, point):
     return -1
 
 
+@kernel(inline=True)
+def block_at(b):
+    """First column and width of block b of a row: twists of f and g, coordinates of a free pair, further twists."""
+    if b < 2:
+        return 6 * b, 6
+    return (FREE_COLUMN, EXTRA_COLUMN - FREE_COLUMN) if b == 2 else (EXTRA_COLUMN + 6 * (b - 3), 6)
+
+
 @kernel(inner=True)
 def add_gram(bases, jacobian, r, weight, hessian):
     """Upper triangle of hessian += weight J_r^T J_r, for row r of two bodies and more."""
     for b in range(bases.shape[1]):
         at = bases[r, b]
-        if at < 0 or b == 2:
+        if at < 0:
             continue
-        column = 6 * b if b < 2 else EXTRA_COLUMN + 6 * (b - 3)
+        column, width = block_at(b)
         for c in range(bases.shape[1]):
             other = bases[r, c]
-            if other < at or c == 2:
+            if other < at:
                 continue
-            across = 6 * c if c < 2 else EXTRA_COLUMN + 6 * (c - 3)
-            for i in range(6):
+            across, breadth = block_at(c)
+            for i in range(width):
                 s = weight * jacobian[r, column + i]
                 if s != 0.0:
-                    for j in range(6):
+                    for j in range(breadth):
                         hessian[at + i, other + j] += s * jacobian[r, across + j]
 
 
