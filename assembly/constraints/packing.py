@@ -54,7 +54,9 @@ class Packed:
     unit : float
         What one of the loop's objective counts in the user's units.
     sides : list of (Body or BodyFace, Body or BodyFace)
-        The sides of every contact; of a body whose only face has no boundary that face.
+        The sides of every contact; faces where it is one of whole surfaces.
+    whole : list of bool
+        Whether a contact is one of two whole surfaces, without edges.
     spans : list of slice
         The rows of every constraint.
     owners : (m,) int
@@ -80,7 +82,13 @@ class Packed:
         self.scale = _scene_size(bodies, constraints, objectives)
         self.reference = bodies[0].pose.position.copy()
         self.contacts = [constraint for constraint in constraints if isinstance(constraint, Contact)]
-        self.sides = [(_lone(contact.a), _lone(contact.b)) for contact in self.contacts]
+        # Of a contact with trims the surfaces take part without their own boundaries.
+        trimmed = {item.contact.name for item in constraints if isinstance(item, TrimContact)}
+        self.whole = [contact.name in trimmed or _needs_no_edges(contact) for contact in self.contacts]
+        self.sides = [
+            (_face(contact.a), _face(contact.b)) if whole else (contact.a, contact.b)
+            for contact, whole in zip(self.contacts, self.whole, strict=True)
+        ]
         self._targets: list[tuple[PointDistance | FrameDistance, int]] = []
         self._turns: list[tuple[FrameDistance, int]] = []
         self._values: list[tuple[Equation, int, float]] = []
@@ -139,12 +147,10 @@ class Packed:
         numbers = {id(constraint): k for k, constraint in enumerate(constraints)}
         records: dict[tuple[int, bool], int] = {}
         self.shells: dict[tuple[Face, ...], int] = {}
-        # Of a contact with trims the surfaces take part without their own boundaries.
-        trimmed = {item.contact.name for item in constraints if isinstance(item, TrimContact)}
-        for contact, sides in zip(self.contacts, self.sides, strict=True):
+        for contact, sides, whole in zip(self.contacts, self.sides, self.whole, strict=True):
             places = [self._places[id(body)] for body in contact.bodies]
             fields = [layout.CONTACT_ROW, *places, int(contact.unilateral), 0, 1]
-            if contact.name in trimmed or all(isinstance(s, BodyFace) and not s.face.boundary for s in sides):
+            if whole:
                 fields += [self._surface(records, _side_faces(side)[0]) for side in sides] + [-1, -1]
             else:
                 fields += [-1, -1] + [self._shell(_side_faces(side)) for side in sides]
@@ -503,11 +509,14 @@ def lone_surfaces(sides: tuple[Body | BodyFace, Body | BodyFace]) -> tuple[Nurbs
     return (f[0].surface, g[0].surface) if len(f) == len(g) == 1 else None
 
 
-def _lone(side: Body | BodyFace) -> Body | BodyFace:
-    """The face of a side that has one without boundary: its pairs need no edges. Else the side itself."""
-    faces = _side_faces(side)
-    if len(faces) > 1 or faces[0].boundary:
-        return side
+def _needs_no_edges(contact: Contact) -> bool:
+    """Whether both sides of a contact are single faces without boundary."""
+    sides = (_side_faces(contact.a), _side_faces(contact.b))
+    return all(len(faces) == 1 and not faces[0].boundary for faces in sides)
+
+
+def _face(side: Body | BodyFace) -> BodyFace:
+    """The only face of a side."""
     return side if isinstance(side, BodyFace) else side.faces[0]
 
 

@@ -224,11 +224,25 @@ def _check_apart(table: TrimTable, chains: Sequence[range], names: Sequence[str]
     found = table.crossing(TOLERANCE)
     if found is None:
         return
-    (k, a), (m, b) = ((n, c) for c in found[:2] for n, chain in enumerate(chains) if c in chain)
+    k, m = sorted(n for curve in found[:2] for n, chain in enumerate(chains) if curve in chain)
     place = f"near (u, v) = ({found[2][0]:.6g}, {found[2][1]:.6g})"
     if names[k] == names[m]:
         raise InputError(f"{names[k]} crosses or touches itself {place}; expected a loop without crossings")
     raise InputError(f"{names[m]} crosses or touches {names[k]} {place}; expected loops that are apart")
+
+
+def _check_ended(surface: NurbsSurface, table: TrimTable, names: Sequence[str]) -> None:
+    """Raise where a face would reach an end of the domain without a boundary there."""
+    poles = surface._pole_bits
+    for axis, (bit_low, bit_high) in ((1, (4, 8)), (0, (1, 2))):
+        if surface.closed[axis] or not surface.closed[1 - axis]:
+            continue
+        for bit, w, end in zip((bit_low, bit_high), table.beyond[axis], surface.domain[axis], strict=True):
+            if w != 0.0 and not poles & bit:
+                raise InputError(
+                    f"{names[0]} has material up to the end of the domain at {'uv'[axis]} = {end:g}; expected a "
+                    f"second loop around, or a loop along {'uv'[axis]} = {end:g}"
+                )
 
 
 def make_boundary(surface: NurbsSurface, outer: LoopLike | None, holes: Sequence[LoopLike]) -> Boundary:
@@ -271,7 +285,9 @@ def make_boundary(surface: NurbsSurface, outer: LoopLike | None, holes: Sequence
     for k, name in enumerate(names):
         if table.left[k] != 1.0 or table.right[k] != 0.0:
             raise InputError(
-                f"{name} does not bound the face: its left side has winding {table.left[k]:g} and its right "
-                f"{table.right[k]:g}; expected holes inside the outer loop, and none inside another"
+                f"{name} does not bound one face together with {names[0]}: on its left there is material "
+                f"{table.left[k]:g} times, on its right {table.right[k]:g} times; expected holes inside the outer "
+                "loop, none inside another, and rings with material on their left"
             )
+    _check_ended(surface, table, names)
     return Boundary(outer_loop, tuple(hole_loops), curves, ranges, table)

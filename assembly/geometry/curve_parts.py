@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from assembly.geometry import bezier
 from assembly.geometry.curve import NurbsCurve
 
-__all__ = ["CORNER", "between", "creases", "smooth_parts"]
+__all__ = ["CORNER", "between", "crease_knots", "smooth_parts"]
 
 Array = NDArray[np.float64]
 # A jump of the tangent by more than this makes a corner [rad].
@@ -54,34 +54,25 @@ def between(curve: NurbsCurve, low: float, high: float) -> NurbsCurve:
     return NurbsCurve(points[:, :-1] / points[:, -1:], knots, curve.degree, points[:, -1], name=curve.name)
 
 
-def creases(curve: NurbsCurve) -> tuple[Array, Array, Array]:
-    """Knots inside the domain where a curve need not be smooth.
-
-    Returns
-    -------
-    at : (n,)
-    before, after : (n, d)
-        The directions in which the curve arrives and leaves.
-    """
+def crease_knots(curve: NurbsCurve) -> Array:
+    """Knots inside the domain where a curve need not be smooth: those as often there as the degree."""
     low, high = curve.domain
     inner = curve.knots[(curve.knots > low) & (curve.knots < high)]
-    nothing = np.empty((2, 0, curve.control_points.shape[1]))
     if inner.size < curve.degree:
-        return np.empty(0), *nothing
-    # A knot that is there as often as the degree is itself so many places on.
+        return np.empty(0)
     last = inner[curve.degree - 1 :]
-    at = np.unique(last[last == inner[: last.size]])
-    if not at.size:
-        return at, *nothing
-    pieces = curve.bezier_pieces()
-    points = pieces[..., :-1] / pieces[..., -1:]
-    behind = np.searchsorted(curve.breaks(), at) - 1
-    return at, points[behind, -1] - points[behind, -2], points[behind + 1, 1] - points[behind + 1, 0]
+    return np.unique(last[last == inner[: last.size]])
 
 
 def smooth_parts(curve: NurbsCurve) -> list[NurbsCurve]:
     """A plane curve cut at its corners."""
-    at, before, after = creases(curve)
+    at = crease_knots(curve)
+    if not at.size:
+        return [curve]
+    pieces = curve.bezier_pieces()
+    points = pieces[..., :2] / pieces[..., 2:]
+    behind = np.searchsorted(curve.breaks(), at) - 1
+    before, after = points[behind, -1] - points[behind, -2], points[behind + 1, 1] - points[behind + 1, 0]
     turn = np.arctan2(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0], (before * after).sum(axis=1))
     at = at[np.abs(turn) > CORNER]
     if not at.size:

@@ -235,7 +235,6 @@ class Face:
             0,
             record.size,
             self._derivative_bounds,
-            self.surface.size,
             at_u,
             at_v,
             out,

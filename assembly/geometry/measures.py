@@ -73,7 +73,6 @@ def area_and_volume(surface: NurbsSurface, table: TrimTable) -> Array:
     """Area, and integral of S.(Su x Sv) / 3, of the part of a surface that a trim leaves: (2,)."""
     at = int(table.table[layout.TRIM_FRAME])
     frame = table.pool[at : at + layout.FRAME]
-    breaks = surface.breaks()
     low, high = frame[[layout.LOW_U, layout.LOW_V]], frame[[layout.HIGH_U, layout.HIGH_V]]
     period = frame[[layout.PERIOD_U, layout.PERIOD_V]]
     levels = tuple(_levels(*each) for each in zip(surface.breaks(), low, high, period, strict=True))

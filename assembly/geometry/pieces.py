@@ -28,20 +28,11 @@ PIECE_CURVE, PIECE_COEFFICIENTS, PIECE_DEGREE, PIECE_BEFORE, PIECE_AFTER = 0, 1,
 PIECE_SIGN_U, PIECE_SIGN_V, PIECE_MAJOR, PIECE_INTS = 5, 6, 7, 8
 # Doubles of a piece: its box, its parameters, what moves its curve into the cell, the middle of its span, bounds on
 # |C'|, |C''|, |C'''|, and its ends.
-BOX, PIECE_T0, PIECE_T1, SHIFT_U, SHIFT_V, MIDDLE, BOUND_1, BOUND_2, BOUND_3, START, END = (
-    0,
-    4,
-    5,
-    6,
-    7,
-    8,
-    9,
-    10,
-    11,
-    12,
-    14,
-)
+BOX, PIECE_T0, PIECE_T1, SHIFT_U, SHIFT_V, MIDDLE = 0, 4, 5, 6, 7, 8
+BOUND_1, BOUND_2, BOUND_3, START, END = 9, 10, 11, 12, 14
 PIECE_DOUBLES = 16
+# Where the distance hardly changes, as from the center of a circle, this part of its square is let go.
+LET_GO = 1e-10
 # Intervals that a query may look at on one piece before its bounds are taken as they are.
 _BUDGET = 4000
 
@@ -141,7 +132,7 @@ def _newton(pool, o, degree, middle, a, b, t, qx, qy):
 
 
 @kernel(inner=True)
-def nearest_on_piece(pool, o, degree, middle, t0, t1, m1, m2, m3, qx, qy, best, slack):
+def nearest_on_piece(pool, o, degree, middle, t0, t1, m1, m2, m3, qx, qy, best):
     """Half the squared distance and the parameter of the nearest point of a piece, where it beats `best`.
 
     The second value is `t0 - 1` where it does not.
@@ -171,20 +162,18 @@ def nearest_on_piece(pool, o, degree, middle, t0, t1, m1, m2, m3, qx, qy, best, 
         low = f - abs(g) * reach + 0.5 * bent * reach * reach
         if low < best:
             # A tangent and how far the piece may be from it.
-            along = -half if g * half > speed * half * half else (half if -g * half > speed * half * half else 0.0)
-            if along == 0.0 and speed > 0.0:
-                along = -g / speed
+            along = min(max(-g / speed, -half), half) if speed > 0.0 else 0.0
             apart = np.sqrt((ex + along * dx) ** 2 + (ey + along * dy) ** 2) - 0.5 * m2 * half * half
             if apart > 0.0:
                 low = max(low, 0.5 * apart * apart)
-        if low < best - slack:
+        if low < best:
             if curvature > third * half:
                 at_low = t0 + index * h
                 f, t = _newton(pool, o, degree, middle, at_low, min(at_low + h, t1), m, qx, qy)
                 if f < best:
                     best = f
                     found = t
-            elif level < 50:
+            elif low < best - LET_GO * best and level < 50:
                 level += 1
                 index *= 2
                 h = half
@@ -197,6 +186,32 @@ def nearest_on_piece(pool, o, degree, middle, t0, t1, m1, m2, m3, qx, qy, best, 
         if level == 0:
             break
     return best, found
+
+
+@kernel(inner=True)
+def polished(pool, o, degree, middle, t0, t1, t, qx, qy):
+    """A parameter near that of a nearest point, brought to it by Newton's method as long as that goes downhill."""
+    x, y, dx, dy, ddx, ddy = piece_bend(pool, o, degree, t - middle)
+    for _ in range(8):
+        ex = x - qx
+        ey = y - qy
+        speed = dx * dx + dy * dy
+        curvature = speed + ex * ddx + ey * ddy
+        if not curvature > 1e-3 * speed:
+            break
+        step = min(max(t - (ex * dx + ey * dy) / curvature, t0), t1)
+        if step == t:
+            break
+        x, y, dx, dy, ddx, ddy = piece_bend(pool, o, degree, step - middle)
+        ax = x - qx
+        ay = y - qy
+        if ax * ax + ay * ay > (ex * ex + ey * ey) * (1.0 + 4e-16):
+            break
+        near = abs(step - t) <= 4e-16 * max(abs(t), t1 - t0)
+        t = step
+        if near:
+            break
+    return t
 
 
 @kernel

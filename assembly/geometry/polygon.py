@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from assembly.errors import InputError, positive
-from assembly.geometry.border import Border, border, on_surface, pole_sides
+from assembly.geometry.border import Border, border, cross, on_surface, pole_sides
 from assembly.geometry.delaunay import inside, triangulated
 from assembly.geometry.face import Face
 from assembly.geometry.steps import Axis, axes, unit
@@ -66,7 +66,7 @@ class Facets:
     def area(self) -> float:
         """Of all triangles."""
         a, b, c = np.moveaxis(self.points[self.triangles], 1, 0)
-        return float(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+        return float(0.5 * np.linalg.norm(cross(b - a, c - a), axis=1).sum())
 
 
 def facets(face: Face, tolerance: float, *, angle: float = 0.25 * pi) -> Facets:
@@ -125,7 +125,7 @@ def _measured(
     at = np.concatenate([parameters[edges].mean(axis=1), parameters[triangles].mean(axis=1)])
     middle = np.concatenate([points[edges].mean(axis=1), corners.mean(axis=1)])
     there, su, sv = on_surface(face.surface, at, 1)
-    normal = unit(np.cross(su, sv))
+    normal = unit(cross(su, sv))
     apart = there - middle
     across = np.abs((apart * normal).sum(axis=1))
     along = np.linalg.norm(apart, axis=1)
@@ -145,7 +145,7 @@ def _measured(
     bad = (across > np.minimum(tolerance, arched)) | (along > np.maximum(_OBLIQUE * size, tolerance))
     wrong, hollow = bad[: len(edges)] & (length > 0.0), bad[len(edges) :]
     # Facets that look inward, other than by the width of a hair.
-    flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    flat = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     longest = length[number].max(axis=1)
     turned = (flat * normal[len(edges) :]).sum(axis=1) < -tolerance * longest
     rank = np.where(wrong[number], length[number], 0.0)

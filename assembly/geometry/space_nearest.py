@@ -14,6 +14,7 @@ from assembly.geometry.pieces import (
     BOUND_1,
     BOUND_2,
     BOUND_3,
+    LET_GO,
     MIDDLE,
     PIECE_COEFFICIENTS,
     PIECE_CURVE,
@@ -99,7 +100,7 @@ def _newton(table, pool, surface, o, i, a, b, t, q):
 
 
 @kernel(inner=True)
-def _search(table, pool, surface, o, i, q, m1, m2, m3, best, slack):
+def _search(table, pool, surface, o, i, q, m1, m2, m3, best):
     """As `trim.nearest_on_piece`, in space."""
     t0 = pool[i + PIECE_T0]
     t1 = pool[i + PIECE_T1]
@@ -128,14 +129,14 @@ def _search(table, pool, surface, o, i, q, m1, m2, m3, best, slack):
         apart = np.sqrt(dot(beside, beside)) - 0.5 * m2 * half * half
         if apart > 0.0:
             low = max(low, 0.5 * apart * apart)
-        if low < best - slack:
+        if low < best:
             if curvature > third * half:
                 begin = t0 + index * h
                 f, t = _newton(table, pool, surface, o, i, begin, min(begin + h, t1), m, q)
                 if f < best:
                     best = f
                     found = t
-            elif level < 50:
+            elif low < best - LET_GO * best and level < 50:
                 level += 1
                 index *= 2
                 h = half
@@ -151,10 +152,10 @@ def _search(table, pool, surface, o, i, q, m1, m2, m3, best, slack):
 
 
 @kernel
-def nearest_in_space(table, pool, surface, trim, bounds, size, u, v, out):
+def nearest_in_space(table, pool, surface, trim, bounds, u, v, out):
     """For flat parameters: distance in space to the boundary, index of the curve and its parameter, a row each.
 
-    `bounds` are g1, g2, g3 of the surface and `size` its size.
+    `bounds` are g1, g2, g3 of the surface.
     """
     count = table[trim + TRIM_PIECES]
     for n in range(u.size):
@@ -180,7 +181,7 @@ def nearest_in_space(table, pool, surface, trim, bounds, size, u, v, out):
             m1 = bounds[0] * c1
             m2 = bounds[1] * c1 * c1 + bounds[0] * c2
             m3 = bounds[2] * c1**3 + 3.0 * bounds[1] * c1 * c2 + bounds[0] * pool[i + BOUND_3]
-            best, t = _search(table, pool, surface, o, i, q, m1, m2, m3, best, 1e-15 * size * size)
+            best, t = _search(table, pool, surface, o, i, q, m1, m2, m3, best)
             if t >= pool[i + PIECE_T0]:
                 out[n, 1] = table[o + PIECE_CURVE]
                 out[n, 2] = t

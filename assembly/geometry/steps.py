@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.geometry.border import on_surface
+from assembly.geometry.border import cross, on_surface
 from assembly.geometry.surface import NurbsSurface
 
 __all__ = ["Axis", "axes", "unit"]
@@ -94,7 +94,7 @@ def _creases(surface: NurbsSurface, direction: int, low: float, high: float, acr
     beside = _BESIDE * period * np.array([-1.0, 1.0])
     grid = _grid(np.add.outer(at, beside).ravel(), across)
     _, su, sv = on_surface(surface, grid if direction == 0 else grid[:, ::-1], 1)
-    normals = unit(np.cross(su, sv)).reshape(len(at), 2, -1, 3)
+    normals = unit(cross(su, sv)).reshape(len(at), 2, -1, 3)
     turned = np.arccos(np.clip((normals[:, 0] * normals[:, 1]).sum(axis=-1), -1.0, 1.0))
     # Of two knots nearly the same, one.
     found = at[turned.max(axis=1) > _CREASE]
@@ -123,7 +123,7 @@ def axes(surface: NurbsSurface, box: Array, tolerance: float, angle: float) -> t
         few = _some(middles[1 - d])
         grid = _grid(middles[d], few)
         found = on_surface(surface, grid if d == 0 else grid[:, ::-1], 2)
-        normals = unit(np.cross(found[1], found[2]))
+        normals = unit(cross(found[1], found[2]))
         bend = np.abs((found[3 + 2 * d] * normals).sum(axis=1)).reshape(-1, len(few))
         bends.append(bend)
         speeds.append(np.linalg.norm(found[1 + d], axis=1).reshape(-1, len(few)))

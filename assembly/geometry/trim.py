@@ -57,7 +57,11 @@ from assembly.geometry.pieces import (
     nearest_on_piece,
     piece_at,
     piece_line,
+    polished,
 )
+
+# Neighbors whose directions differ by less [rad] are one smooth curve.
+_SMOOTH = 1e-6
 
 
 @kernel(inline=True)
@@ -146,8 +150,9 @@ def winding(table, pool, trim, u, v):
     y = _into_cell(v, pool[frame + LOW_V], pool[frame + HIGH_V], pool[frame + PERIOD_V])
     # A pole edge is no boundary: its points belong to the face, with those just inside.
     z = x
-    if pool[frame + PERIOD_U] == 0.0 and x >= pool[frame + HIGH_U]:
-        z = pool[frame + HIGH_U] - 1e-15 * (pool[frame + HIGH_U] - pool[frame + LOW_U])
+    extent = pool[frame + HIGH_U] - pool[frame + LOW_U]
+    if pool[frame + PERIOD_U] == 0.0 and 0.0 <= x - pool[frame + HIGH_U] <= 1e-14 * extent:
+        z = pool[frame + HIGH_U] - 1e-15 * extent
     w = _steps(pool, table[trim + TRIM_STEP_POOL], table[trim + TRIM_STEPS], pool[frame + BOTTOM], x)
     o = table[trim + TRIM_PIECE_TABLE]
     i = table[trim + TRIM_PIECE_POOL]
@@ -206,6 +211,57 @@ def _end_direction(table, pool, o, i, at_end):
 
 
 @kernel(inner=True)
+def _nearest_end(pool, doubles, begin, stop, x, y, best):
+    """Half the squared distance to the nearest end of pieces, the piece and the parameter, if it beats `best`."""
+    piece = begin
+    t = 0.0
+    for k in range(begin, stop):
+        i = doubles + PIECE_DOUBLES * k
+        f = 0.5 * ((x - pool[i + START]) ** 2 + (y - pool[i + START + 1]) ** 2)
+        if f < best:
+            best = f
+            piece = k
+            t = pool[i + PIECE_T0]
+        f = 0.5 * ((x - pool[i + END]) ** 2 + (y - pool[i + END + 1]) ** 2)
+        if f < best:
+            best = f
+            piece = k
+            t = pool[i + PIECE_T1]
+    return best, piece, t
+
+
+@kernel(inner=True)
+def _nearest_inside(table, pool, ints, doubles, begin, stop, x, y, best):
+    """The same for all points of pieces, those aside whose box is too far."""
+    piece = begin
+    t = 0.0
+    for k in range(begin, stop):
+        o = ints + PIECE_INTS * k
+        i = doubles + PIECE_DOUBLES * k
+        gap_u = _gap(x, pool[i], pool[i + 1])
+        gap_v = _gap(y, pool[i + 2], pool[i + 3])
+        if 0.5 * (gap_u * gap_u + gap_v * gap_v) < best:
+            best, at = nearest_on_piece(
+                pool,
+                table[o + PIECE_COEFFICIENTS],
+                table[o + PIECE_DEGREE],
+                pool[i + MIDDLE],
+                pool[i + PIECE_T0],
+                pool[i + PIECE_T1],
+                pool[i + BOUND_1],
+                pool[i + BOUND_2],
+                pool[i + BOUND_3],
+                x - pool[i + SHIFT_U],
+                y - pool[i + SHIFT_V],
+                best,
+            )
+            if at >= pool[i + PIECE_T0]:
+                piece = k
+                t = at
+    return best, piece, t
+
+
+@kernel(inner=True)
 def trim_nearest(table, pool, trim, first, count, u, v):
     """Signed distance to boundary curves, index and parameter of the foot, the foot, and its normal to material.
 
@@ -220,7 +276,6 @@ def trim_nearest(table, pool, trim, first, count, u, v):
     stop = table[table[trim + TRIM_CURVE_PIECES] + first + count]
     ints = table[trim + TRIM_PIECE_TABLE]
     doubles = table[trim + TRIM_PIECE_POOL]
-    slack = 1e-15 * pool[frame + SIZE] ** 2
     copies_u = 1 if period_u != 0.0 else 0
     copies_v = 1 if period_v != 0.0 else 0
     if begin == stop:
@@ -230,60 +285,41 @@ def trim_nearest(table, pool, trim, first, count, u, v):
     t = pool[doubles + PIECE_DOUBLES * begin + PIECE_T0]
     move_u = 0.0
     move_v = 0.0
-    # Ends of pieces first: near ones spare the search of most others.
-    for a in range(-copies_u, copies_u + 1):
-        for b in range(-copies_v, copies_v + 1):
-            x = qx - a * period_u
-            y = qy - b * period_v
-            i = doubles + PIECE_DOUBLES * begin
-            for k in range(begin, stop):
-                f = 0.5 * ((x - pool[i + START]) ** 2 + (y - pool[i + START + 1]) ** 2)
+    # Ends of pieces first: near ones spare the search of most others. Then the pieces; copies one period away last.
+    for search in range(2):
+        for copy_u in range(1 + 2 * copies_u):
+            move_a = (copy_u + 1) // 2 * (period_u if copy_u % 2 else -period_u)
+            x = qx - move_a
+            cell_u = _gap(x, pool[frame + LOW_U], pool[frame + HIGH_U]) if copy_u else 0.0
+            for copy_v in range(1 + 2 * copies_v):
+                move_b = (copy_v + 1) // 2 * (period_v if copy_v % 2 else -period_v)
+                y = qy - move_b
+                cell_v = _gap(y, pool[frame + LOW_V], pool[frame + HIGH_V]) if copy_v else 0.0
+                if 0.5 * (cell_u * cell_u + cell_v * cell_v) >= best:
+                    continue
+                if search == 0:
+                    f, k, at = _nearest_end(pool, doubles, begin, stop, x, y, best)
+                else:
+                    f, k, at = _nearest_inside(table, pool, ints, doubles, begin, stop, x, y, best)
                 if f < best:
                     best = f
                     piece = k
-                    t = pool[i + PIECE_T0]
-                    move_u = a * period_u
-                    move_v = b * period_v
-                f = 0.5 * ((x - pool[i + END]) ** 2 + (y - pool[i + END + 1]) ** 2)
-                if f < best:
-                    best = f
-                    piece = k
-                    t = pool[i + PIECE_T1]
-                    move_u = a * period_u
-                    move_v = b * period_v
-                i += PIECE_DOUBLES
-    for a in range(-copies_u, copies_u + 1):
-        for b in range(-copies_v, copies_v + 1):
-            x = qx - a * period_u
-            y = qy - b * period_v
-            o = ints + PIECE_INTS * begin
-            i = doubles + PIECE_DOUBLES * begin
-            for k in range(begin, stop):
-                gap_u = _gap(x, pool[i], pool[i + 1])
-                gap_v = _gap(y, pool[i + 2], pool[i + 3])
-                if 0.5 * (gap_u * gap_u + gap_v * gap_v) < best:
-                    best, at = nearest_on_piece(
-                        pool,
-                        table[o + PIECE_COEFFICIENTS],
-                        table[o + PIECE_DEGREE],
-                        pool[i + MIDDLE],
-                        pool[i + PIECE_T0],
-                        pool[i + PIECE_T1],
-                        pool[i + BOUND_1],
-                        pool[i + BOUND_2],
-                        pool[i + BOUND_3],
-                        x - pool[i + SHIFT_U],
-                        y - pool[i + SHIFT_V],
-                        best,
-                        slack,
-                    )
-                    if at >= pool[i + PIECE_T0]:
-                        piece = k
-                        t = at
-                        move_u = a * period_u
-                        move_v = b * period_v
-                o += PIECE_INTS
-                i += PIECE_DOUBLES
+                    t = at
+                    move_u = move_a
+                    move_v = move_b
+    o = ints + PIECE_INTS * piece
+    i = doubles + PIECE_DOUBLES * piece
+    t = polished(
+        pool,
+        table[o + PIECE_COEFFICIENTS],
+        table[o + PIECE_DEGREE],
+        pool[i + MIDDLE],
+        pool[i + PIECE_T0],
+        pool[i + PIECE_T1],
+        t,
+        qx - move_u - pool[i + SHIFT_U],
+        qy - move_v - pool[i + SHIFT_V],
+    )
     return _foot(table, pool, trim, begin, stop, piece, t, u, v, qx - move_u, qy - move_v)
 
 
@@ -321,7 +357,7 @@ def _foot(table, pool, trim, begin, stop, piece, t, u, v, qx, qy):
         # Positive for a corner that is convex: only points outside have it nearest.
         turn = dx * ay - dy * ax if at_end else ax * dy - ay * dx
         same_way = dx * ax + dy * ay > 0.0
-        if same_way and abs(turn) <= 1e-9:
+        if same_way and abs(turn) <= _SMOOTH:
             smooth = True
         elif same_way or abs(turn) > 1e-9:
             sign = -1.0 if turn > 0.0 else 1.0

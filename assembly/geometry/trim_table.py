@@ -38,7 +38,17 @@ _POOL_FIELDS = [layout.TRIM_PIECE_POOL, layout.TRIM_FRAME, layout.TRIM_STEP_POOL
 
 @dataclass(frozen=True, eq=False)
 class TrimTable:
-    """A trim for a table and a pool that begin with it; `left` is w just left of every chain."""
+    """A trim for a table and a pool that begin with it.
+
+    Attributes
+    ----------
+    table, pool : arrays
+    curves, pieces : int
+    left, right : (chains,)
+        w beside every chain: 1 and 0 if the chains bound one face.
+    beyond : two pairs
+        w beyond the low and the high end of u, and of v, each where the other direction is closed.
+    """
 
     table: Ints
     pool: Array
@@ -46,6 +56,7 @@ class TrimTable:
     pieces: int
     left: Array
     right: Array
+    beyond: tuple[tuple[float, float], tuple[float, float]]
 
     def at(self, table_at: int, pool_at: int) -> tuple[Ints, Array]:
         """The same for being appended to a table and a pool of these lengths."""
@@ -315,4 +326,8 @@ def _table(
         left, right = left + bottom, right + bottom
     else:
         pool[frame_at + layout.BOTTOM] = 1.0
-    return TrimTable(table, pool, count, total, left, right)
+    bottom = float(pool[frame_at + layout.BOTTOM])
+    across_u = float(pool[-1]) if len(walk) else bottom
+    # Once around, every u is passed by as many rings, net, as the whole way in u has periods.
+    rings = float(np.round(extent[:, 0].sum() / periods[0])) if periods[0] else 0.0
+    return TrimTable(table, pool, count, total, left, right, ((bottom, across_u), (bottom, bottom + rings)))

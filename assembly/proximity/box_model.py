@@ -34,8 +34,9 @@ from assembly.geometry.vec import add, cross, dot, matvec, scale, sub
 # A node: box, model (S0, then the vectors p, q, l, m, k and e), sphere, unit normal of the linear part.
 U0, V0, HALF_U, HALF_V, POINT, LINEAR_U, LINEAR_V = 0, 1, 2, 3, 4, 7, 10
 SQUARE_U, MIXED, SQUARE_V, REST, CENTER, RADIUS, NORMAL = 13, 16, 19, 22, 23, 26, 27
-# What of e is along that normal; how much it turns over the box, in radians, and how much curvatures change.
-REST_N, BEND, CHANGE, NODE = 30, 31, 32, 33
+# What of e is along that normal; the length of all terms but the linear ones; how much the normal turns over the box,
+# in radians, and how much curvatures change.
+REST_N, CURVED, BEND, CHANGE, NODE = 30, 31, 32, 33, 34
 # Where weights vary by more than this over a box it has no model: e is infinite and its sphere is what bounds it.
 LEAST_WEIGHT = 0.1
 # Roundings of coordinates in points and coefficients.
@@ -259,6 +260,7 @@ def place_model(turn, shift, s0, p, q, l, m, k, e, nodes, i):
     vv = dot(q, q)
     uv = dot(p, q)
     curved = math.sqrt(dot(l, l)) + math.sqrt(dot(m, m)) + math.sqrt(dot(k, k))
+    nodes[i, CURVED] = curved + e
     # The parallelogram of the linear part reaches as far as its longer diagonal; or as the ball known.
     radius = math.sqrt(max(uu + vv + 2.0 * abs(uv), 0.0)) + curved + e
     d = sub(get(nodes, i, CENTER), get(nodes, i, POINT))

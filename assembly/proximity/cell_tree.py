@@ -9,10 +9,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly.geometry.spline import (
-    CELL_COUNT,
-    CELLS,
-)
+from assembly.geometry.spline import BREAKS_U, BREAKS_V, CELL_COUNT, CELLS, CURVE_BREAKS, CURVE_SPANS, SPANS_U, SPANS_V
 from assembly.geometry.vec import add, dot, matvec, scale, sub
 from assembly.proximity.box_model import (
     CENTER,
@@ -34,6 +31,7 @@ from assembly.proximity.shell import (
     EDGE_CELL_COUNT,
     EDGE_CELL_SIZE,
     EDGE_CELLS,
+    EDGE_CURVE,
     EDGE_RECORD,
     EDGE_TABLE,
     EDGES,
@@ -63,6 +61,8 @@ UNKNOWN, INSIDE, OUTSIDE, MIXED_SIDE = 0, 1, 2, 3
 TOGETHER = 8
 # A box longer than this times its width is halved, not quartered.
 SLENDER = 1.5
+# Faces and edges of so many spans are looked at span by span; of more, by their cells.
+SPANS = 4
 # Room for parts of cells.
 PARTS = 8192
 
@@ -152,12 +152,31 @@ def plant(table, pool, shell, turn, shift, nodes, info):
             continue
         lo = (math.inf, math.inf, math.inf)
         hi = (-math.inf, -math.inf, -math.inf)
+        low_u = math.inf
+        low_v = math.inf
+        high_u = -math.inf
+        high_v = -math.inf
         for c in range(cells):
             if used_cell(table, pool, record, kind, c):
-                o = at + size * c + ball
+                o = at + size * c
+                if kind == FACE:
+                    low_u = min(low_u, pool[o] - pool[o + 9])
+                    high_u = max(high_u, pool[o] + pool[o + 9])
+                    low_v = min(low_v, pool[o + 1] - pool[o + 10])
+                    high_v = max(high_v, pool[o + 1] + pool[o + 10])
+                else:
+                    low_u = min(low_u, pool[o])
+                    high_u = max(high_u, pool[o + 1])
+                    low_v = 0.0
+                    high_v = 0.0
+                o += ball
                 r = pool[o + 3]
                 lo = (min(lo[0], pool[o] - r), min(lo[1], pool[o + 1] - r), min(lo[2], pool[o + 2] - r))
                 hi = (max(hi[0], pool[o] + r), max(hi[1], pool[o + 1] + r), max(hi[2], pool[o + 2] + r))
+        nodes[i, U0] = 0.5 * (low_u + high_u)
+        nodes[i, V0] = 0.5 * (low_v + high_v)
+        nodes[i, HALF_U] = 0.5 * (high_u - low_u)
+        nodes[i, HALF_V] = 0.5 * (high_v - low_v)
         x, y, z = scale(0.5, add(lo, hi))
         reach = 0.0
         for c in range(cells):
@@ -170,6 +189,58 @@ def plant(table, pool, shell, turn, shift, nodes, info):
         nodes[i, RADIUS] = reach + 4e-16 * (reach + abs(center[0]) + abs(center[1]) + abs(center[2]))
     ball_around(nodes, 0, 1, 1 + features)
     return 1 + features
+
+
+@kernel(inner=True)
+def open_spans(table, pool, turn, shift, nodes, info, i, count, work):
+    """Pieces of one span each as cells of a feature that has few spans. Returns the number of nodes."""
+    kind = info[i, KIND]
+    record = info[i, RECORD]
+    info[i, CHILD] = count
+    low_u = nodes[i, U0] - nodes[i, HALF_U]
+    high_u = nodes[i, U0] + nodes[i, HALF_U]
+    low_v = nodes[i, V0] - nodes[i, HALF_V]
+    high_v = nodes[i, V0] + nodes[i, HALF_V]
+    curve = table[record + EDGE_CURVE] if kind == EDGE else -1
+    r = table[record + FACE_SURFACE] if kind == FACE else -1
+    breaks_u = table[curve + CURVE_BREAKS] if kind == EDGE else table[r + BREAKS_U]
+    spans_u = table[curve + CURVE_SPANS] if kind == EDGE else table[r + SPANS_U]
+    spans_v = 1 if kind == EDGE else table[r + SPANS_V]
+    for iu in range(spans_u):
+        u0 = max(pool[breaks_u + iu], low_u)
+        u1 = min(pool[breaks_u + iu + 1], high_u)
+        if not u0 < u1:
+            continue
+        for iv in range(spans_v):
+            v0 = 0.0
+            v1 = 0.0
+            if kind == FACE:
+                at = table[r + BREAKS_V] + iv
+                v0 = max(pool[at], low_v)
+                v1 = min(pool[at + 1], high_v)
+                if not v0 < v1:
+                    continue
+            new_node(info, count, CELL, kind, info[i, FEATURE], record)
+            info[count, SIDE] = UNKNOWN if kind == FACE and table[record + FACE_TRIM] >= 0 else INSIDE
+            nodes[count, U0] = 0.5 * (u0 + u1)
+            nodes[count, V0] = 0.5 * (v0 + v1)
+            nodes[count, HALF_U] = 0.5 * (u1 - u0)
+            nodes[count, HALF_V] = 0.5 * (v1 - v0)
+            put(nodes, count, CENTER, get(nodes, i, CENTER))
+            nodes[count, RADIUS] = nodes[i, RADIUS]
+            give_model(table, pool, turn, shift, nodes, info, count, work)
+            count += 1
+    info[i, CHILDREN] = count - info[i, CHILD]
+    return count
+
+
+@kernel(inner=True)
+def span_count(table, kind, record):
+    """How many spans a face or an edge has."""
+    if kind == FACE:
+        r = table[record + FACE_SURFACE]
+        return table[r + SPANS_U] * table[r + SPANS_V]
+    return table[table[record + EDGE_CURVE] + CURVE_SPANS]
 
 
 @kernel(inner=True)
@@ -267,5 +338,7 @@ def grow(table, pool, shell, turn, shift, nodes, info, i, count, work):
     if info[i, CHILD] >= 0 or info[i, KIND] == VERTEX:
         return count
     if info[i, LEVEL] == PART:
+        if span_count(table, info[i, KIND], info[i, RECORD]) <= SPANS:
+            return open_spans(table, pool, turn, shift, nodes, info, i, count, work)
         return open_feature(table, pool, shell, turn, shift, nodes, info, i, count)
     return split_cell(table, pool, turn, shift, nodes, info, i, count, work)

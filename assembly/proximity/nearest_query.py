@@ -13,7 +13,8 @@ from assembly.proximity.nearest import CROSSING
 from assembly.proximity.penetration import nearest_or_deepest
 from assembly.proximity.switching import feature_at, feature_kind, track_features
 
-# What is written of a pair: parameters (4), point of f, point of g, normal, gap, lower bound, pairs looked at, switches.
+# What is written of a pair: parameters (4), point of f, point of g, normal, gap, lower bound, pairs of cells looked
+# at, switches.
 PARAMETERS, POINT_F, POINT_G, NORMAL, GAP, LOWER, EFFORT, SWITCHES, PAIR = 0, 4, 7, 10, 13, 14, 15, 16, 17
 # The status of a tracked pair, beside those of a search.
 TRACKED = 4

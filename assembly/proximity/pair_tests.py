@@ -26,6 +26,7 @@ from assembly.geometry.vec import cross, dot, sub
 from assembly.proximity.box_model import (
     BEND,
     CHANGE,
+    CURVED,
     HALF_U,
     HALF_V,
     LINEAR_U,
@@ -82,24 +83,31 @@ def side_of(table, pool, nodes, info, i):
 
 
 @kernel(inner=True)
-def monotone(a, i, kind, d, length, reach):
-    """Whether d.S_u or d.S_v cannot vanish over a node, d known to within `reach`."""
+def grows(a, i, p, q, first, second, b, j, d, length):
+    """Whether d.S_u, p = S_u over half a box and q = S_v so, cannot vanish over a node a[i] and another b[j].
+
+    `first` and `second` are half the derivatives of p along both directions.
+    """
+    pp = dot(p, p)
+    if pp == 0.0:
+        return False
+    long = math.sqrt(pp)
+    moves = pp + abs(dot(p, q)) + abs(dot(p, get(b, j, LINEAR_U))) + abs(dot(p, get(b, j, LINEAR_V)))
+    turn = 2.0 * math.sqrt(dot(first, first)) + math.sqrt(dot(second, second)) + 6.0 * a[i, REST]
+    return abs(dot(d, p)) > moves + long * (a[i, CURVED] + b[j, CURVED]) + (length + a[i, RADIUS] + b[j, RADIUS]) * turn
+
+
+@kernel(inner=True)
+def monotone(a, i, kind, b, j, d, length):
+    """Whether d.S_u or d.S_v cannot vanish over a node of one feature, and any point of one of another."""
     if kind == VERTEX:
         return False
     p = get(a, i, LINEAR_U)
-    m = get(a, i, MIXED)
-    mixed = math.sqrt(dot(m, m))
-    l = get(a, i, SQUARE_U)
-    rest = 6.0 * a[i, REST]
-    turn = 2.0 * math.sqrt(dot(l, l)) + mixed + rest
-    if abs(dot(d, p)) > reach * (math.sqrt(dot(p, p)) + turn) + length * turn:
-        return True
-    if kind == EDGE:
-        return False
     q = get(a, i, LINEAR_V)
-    k = get(a, i, SQUARE_V)
-    turn = 2.0 * math.sqrt(dot(k, k)) + mixed + rest
-    return abs(dot(d, q)) > reach * (math.sqrt(dot(q, q)) + turn) + length * turn
+    m = get(a, i, MIXED)
+    if grows(a, i, p, q, get(a, i, SQUARE_U), m, b, j, d, length):
+        return True
+    return kind == FACE and grows(a, i, q, p, get(a, i, SQUARE_V), m, b, j, d, length)
 
 
 @kernel(inner=True)
@@ -107,8 +115,7 @@ def excluded(a, i, kind_f, b, j, kind_g, are_apart):
     """Whether no extremum of two features, and no crossing, is in a pair of their cells."""
     d = sub(get(b, j, POINT), get(a, i, POINT))
     length = math.sqrt(dot(d, d))
-    reach = a[i, RADIUS] + b[j, RADIUS]
-    if monotone(a, i, kind_f, d, length, reach) or monotone(b, j, kind_g, d, length, reach):
+    if monotone(a, i, kind_f, b, j, d, length) or monotone(b, j, kind_g, a, i, d, length):
         return True
     bend = a[i, BEND] + b[j, BEND]
     # Where features cross, their normals need not be parallel.

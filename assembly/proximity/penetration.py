@@ -1,7 +1,7 @@
 """The pair of two shells that cross: how they would come apart, and where they are deepest in each other on that way.
 
-Nearest points say nothing where shells cross: all crossing points are at distance zero. The pair wanted has normals that
-oppose each other and a negative gap. Two faces without boundaries have it by `global_start`. Of other shells, g is
+Nearest points say nothing where shells cross: all crossing points are at distance zero. The pair wanted has normals
+that oppose each other and a negative gap. Two faces without boundaries have it by `global_start`. Of other shells, g is
 moved along the normal of the crossing until they are apart; from the nearest points there the pair is followed on the
 way back (`switching.py`), through touching, to a negative gap.
 """
@@ -81,7 +81,7 @@ def walk_back(table, pool, shell_f, shell_g, turn, shift, away, f, g, x, size):
 
 @kernel(inner=True, allocates=True)
 def deepest(table, pool, shell_f, shell_g, turn, shift, f, g, x, size):
-    """The pair of two shells that cross at coordinates x of features f and g: whether found, features, coordinates, gap."""
+    """The pair of two shells that cross at x of features f and g: whether found, features, coordinates, gap."""
     if has_one_face(table, shell_f) and has_one_face(table, shell_g):
         a = feature_at(table, shell_f, 0)
         b = feature_at(table, shell_g, 0)

@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
-from functools import cached_property
+from collections.abc import Iterable, Sequence
 from math import sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.geometry.curve import NurbsCurve
-from assembly.geometry.curve_parts import CORNER, between, creases
+from assembly.geometry.curve_parts import CORNER, between, crease_knots
 from assembly.geometry.face import Face
+from assembly.geometry.pieces import TRIM_FIRST
+from assembly.geometry.spline import BREAKS_U, BREAKS_V, COEFFICIENTS, CURVE_RECORD, SPANS_U, SPANS_V
+from assembly.proximity.rim_points import along_rims, nearest_on_rims
 
-__all__ = ["Rim", "corners", "cross", "turn"]
+__all__ = ["Batch", "Rim", "Survey", "cross", "turn"]
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 # Gauss points of an interval between samples; the middle one shows how far the curve bulges.
 _GAUSS = np.array([-sqrt(0.6), 0.0, sqrt(0.6)])
 _GAUSS_WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18.0
-_NEWTON_STEPS = 12
 # A place is good enough when it is known to this part of the tolerance.
 _CLOSE = 1e-3
 
@@ -38,157 +41,197 @@ def turn(a: Array, b: Array) -> Array:
 
 
 class Rim:
-    """One boundary curve of a face, in space.
+    """One boundary curve of a face, or a part of one, in space.
 
     Attributes
     ----------
-    face : Face
     number : int
-        Of the face among those of the topology.
+        Of the face among those of the body.
     index : int
-        Of the boundary curve of the face, as it was given, that it is or is a part of.
+        Of the boundary curve of the face that it is or is a part of.
     curve : NurbsCurve
         Plane curve in the parameters of the face.
-    tolerance : float
-        How far points of it may be apart and still be one.
     anchored : bool
         Whether its ends are vertices; False for a closed curve without corners.
+    samples : (n, 4)
+        Parameters and points along it, its ends among them.
+    balls : (n - 1, 4)
+        Centers and radii of balls between samples that it runs through, by samples.
+    middle : (3,)
+        The mean point along it.
+    length : float
+        In space.
     """
 
-    def __init__(self, face: Face, number: int, index: int, curve: NurbsCurve, tolerance: float) -> None:
-        self.face = face
+    def __init__(self, number: int, index: int, curve: NurbsCurve, tolerance: float) -> None:
         self.number = number
         self.index = index
         self.curve = curve
         self.tolerance = tolerance
         self.anchored = True
-
-    def evaluate(self, t: ArrayLike) -> tuple[Array, Array]:
-        """Points and derivatives, each of the shape of t + (3,)."""
-        uv, rate = self.curve.evaluate(t, 1)
-        point, su, sv = self.face.surface.evaluate(*self._inside(uv), 1)
-        return point, su * rate[..., :1] + sv * rate[..., 1:]
-
-    def tangents(self, t: ArrayLike) -> tuple[Array, Array]:
-        """Su and Sv of the surface along the curve, each of the shape of t + (3,)."""
-        _, su, sv = self.face.surface.evaluate(*self._inside(self.curve.evaluate(t)), 1)
-        return su, sv
-
-    def frames(self, t: ArrayLike) -> tuple[Array, Array, Array]:
-        """Points, outward normals and tangents with material on their left seen from outside; not normalized."""
-        uv, rate = self.curve.evaluate(t, 1)
-        point, su, sv = self.face.surface.evaluate(*self._inside(uv), 1)
-        tangent = su * rate[..., :1] + sv * rate[..., 1:]
-        return point, self.face.sign * cross(su, sv), self.face.sign * tangent
-
-    def _inside(self, uv: Array) -> tuple[Array, Array]:
-        """Parameters without the little by which a curve of a file runs out of an open direction."""
-        surface = self.face.surface
-        inside = []
-        for k in range(2):
-            x = uv[..., k]
-            inside.append(x if surface.closed[k] else np.clip(x, *surface.domain[k]))
-        return inside[0], inside[1]
-
-    @cached_property
-    def _measured(self) -> tuple[Array, Array, Array, Array]:
-        """Sample parameters, their points, half widths and lengths of the intervals between them."""
-        at = self.curve.breaks()
-        surface = self.face.surface
-        across = sum(spans.size - 1 for spans in surface.breaks())
-        each = max(4, -(-(12 + 4 * across) // (at.size - 1)))
-        steps = np.arange(each) / each
-        t = np.append((at[:-1, None] + np.diff(at)[:, None] * steps).ravel(), at[-1])
-        half = 0.5 * np.diff(t)
-        middle = t[:-1] + half
-        points, rates = self.evaluate(np.concatenate([t, (middle[:, None] + half[:, None] * _GAUSS).ravel()]))
-        inner = points[t.size :].reshape(-1, 3, 3)
-        speeds = np.linalg.norm(rates[t.size :], axis=1).reshape(-1, 3)
-        corners = points[: t.size]
-        center = 0.5 * (corners[:-1] + corners[1:])
-        spread = np.concatenate([inner, corners[:-1, None], corners[1:, None]], axis=1) - center[:, None]
-        # The curve between the five points of an interval strays little beyond them.
-        reach = 1.25 * np.sqrt((spread**2).sum(axis=2).max(axis=1))
-        return t, corners, reach, 2.0 * half * (speeds @ _GAUSS_WEIGHTS)
-
-    @property
-    def samples(self) -> tuple[Array, Array]:
-        """Parameters (n,) and points (n, 3) along the curve, its ends among them."""
-        return self._measured[0], self._measured[1]
-
-    @cached_property
-    def length(self) -> float:
-        """Length of the curve in space."""
-        return float(self._measured[3].sum())
-
-    @cached_property
-    def closed(self) -> bool:
-        """Whether the two ends are one point."""
-        first, last = self.ends
-        return bool(np.linalg.norm(last - first) <= self.tolerance)
+        self.samples: Array
+        self.balls: Array
+        self.middle: Array
+        self.length: float
 
     @property
     def ends(self) -> Array:
         """Where it begins and ends, (2, 3)."""
-        return self._measured[1][[0, -1]]
+        return self.samples[[0, -1], 1:]
 
-    @cached_property
-    def corner(self) -> bool:
-        """Whether the tangent jumps from its end to its beginning."""
-        _, tangents = self.evaluate(np.array(self.curve.domain))
-        return bool(turn(tangents[1], tangents[0]) > CORNER)
+    @property
+    def closed(self) -> bool:
+        """Whether the two ends are one point."""
+        gap = self.samples[-1, 1:] - self.samples[0, 1:]
+        return bool(gap @ gap <= self.tolerance**2)
+
+    @property
+    def is_point(self) -> bool:
+        """Whether it is too short to be an edge."""
+        return self.length <= self.tolerance
 
     def parts(self, at: ArrayLike) -> list[Rim]:
-        """The rims that it falls into when it is cut at increasing parameters."""
+        """The rims, not yet measured, that it falls into when it is cut at increasing parameters."""
         cuts = np.concatenate([self.curve.domain[:1], np.asarray(at, dtype=float), self.curve.domain[1:]])
         curves = [between(self.curve, low, high) for low, high in zip(cuts[:-1], cuts[1:], strict=True)]
-        return [Rim(self.face, self.number, self.index, curve, self.tolerance) for curve in curves]
-
-    def balls(self) -> tuple[Array, Array]:
-        """Centers (n, 3) and radii (n,) of balls that the curve runs through, by samples."""
-        points, reach = self._measured[1], self._measured[2]
-        return 0.5 * (points[:-1] + points[1:]), reach
-
-    def middle(self) -> Array:
-        """The mean point along the curve, (3,)."""
-        points, lengths = self._measured[1], self._measured[3]
-        return np.asarray(lengths @ (0.5 * (points[:-1] + points[1:])) / lengths.sum())
-
-    def nearest(self, points: Array, guess: Array | None = None) -> tuple[Array, Array]:
-        """Parameters (m,) of the nearest points of the curve and distances (m,) of points (m, 3) near it.
-
-        Gauss and Newton's iteration: it converges quadratically for points on the curve. It starts from the given
-        parameters, or where they are far off or missing from the nearest sample.
-        """
-        samples, at = self.samples
-        low, high = self.curve.domain
-        if guess is not None:
-            place, _ = self.evaluate(guess)
-            if (np.abs(points - place) <= _CLOSE * self.tolerance).all():
-                return guess, np.sqrt(((points - place) ** 2).sum(axis=1))
-        t = samples[((points[:, None] - at) ** 2).sum(axis=2).argmin(axis=1)]
-        best, least = t, np.full(len(points), np.inf)
-        for _ in range(_NEWTON_STEPS):
-            place, rate = self.evaluate(t)
-            offset = points - place
-            distance = np.sqrt((offset**2).sum(axis=1))
-            speed = np.maximum((rate**2).sum(axis=1), 1e-300)
-            step = (offset * rate).sum(axis=1) / speed
-            t = t + step
-            t = low + (t - low) % (high - low) if self.closed else np.clip(t, low, high)
-            nearer = distance < least
-            # One step further than what has been measured: the last one, if small, leaves rounding alone.
-            best, least = np.where(nearer, t, best), np.where(nearer, distance, least)
-            if not nearer.any() or (np.abs(step) * np.sqrt(speed) <= _CLOSE * self.tolerance).all():
-                break
-        return best, least
+        return [Rim(self.number, self.index, curve, self.tolerance) for curve in curves]
 
 
-def corners(rim: Rim) -> Array:
-    """Parameters inside a curve's domain where its tangent in space jumps."""
-    at, before, after = creases(rim.curve)
-    if not at.size:
-        return at
-    su, sv = rim.tangents(at)
-    tangents = (su * d[:, :1] + sv * d[:, 1:] for d in (before, after))
-    return np.asarray(at[turn(*tangents) > CORNER])
+class Survey:
+    """The faces of a body packed for evaluation along their boundary curves.
+
+    Parts of a boundary curve are evaluated from the whole one: they keep its parameter.
+    """
+
+    def __init__(self, faces: Sequence[Face], tolerance: float) -> None:
+        self.tolerance = tolerance
+        tables: list[Indices] = [np.empty(0, dtype=np.int64)]
+        pools: list[Array] = [np.empty(0)]
+        at = [0, 0]
+
+        def add(table: Indices, pool: Array) -> None:
+            tables.append(table)
+            pools.append(pool)
+            at[0] += table.size
+            at[1] += pool.size
+
+        self.surfaces: list[int] = []
+        self.curves: list[int] = []
+        self.spans: list[int] = []
+        for face in faces:
+            if not face.boundary:
+                self.surfaces.append(-1)
+                self.curves.append(-1)
+                self.spans.append(0)
+                continue
+            record, pool = face.surface._tables
+            record = record.copy()
+            record[[BREAKS_U, BREAKS_V, COEFFICIENTS]] += at[1]
+            self.surfaces.append(at[0])
+            self.spans.append(int(record[SPANS_U] + record[SPANS_V]))
+            add(record, pool)
+            table, pool = face.packed_trim(at[0], at[1])
+            self.curves.append(int(table[TRIM_FIRST]))
+            add(table, pool)
+        self.table, self.pool = np.concatenate(tables), np.concatenate(pools)
+
+    def measure(self, rims: Iterable[Rim]) -> None:
+        """Sample rims and find their lengths."""
+        fresh = list(rims)
+        if not fresh:
+            return
+        stations, counts = [], []
+        for rim in fresh:
+            at = rim.curve.breaks()
+            each = max(4, -(-(12 + 4 * self.spans[rim.number]) // (at.size - 1)))
+            t = np.append((at[:-1, None] + np.diff(at)[:, None] * (np.arange(each) / each)).ravel(), at[-1])
+            stations.append(t)
+            counts.append(t.size)
+        t = np.concatenate(stations)
+        stops = np.cumsum(counts)
+        rows = np.repeat(np.arange(len(fresh)), counts)
+        # Intervals between samples of one rim.
+        first = np.delete(np.arange(t.size), stops - 1)
+        half = 0.5 * (t[first + 1] - t[first])
+        nodes = (t[first] + half)[:, None] + half[:, None] * _GAUSS
+        batch = Batch(self, fresh)
+        points, _, _ = batch.along(rows, t)
+        inner, rates, _ = batch.along(np.repeat(rows[first], 3), nodes.ravel())
+        inner = inner.reshape(-1, 3, 3)
+        lengths = 2.0 * half * (np.sqrt((rates**2).sum(axis=1)).reshape(-1, 3) @ _GAUSS_WEIGHTS)
+        centers = 0.5 * (points[first] + points[first + 1])
+        spread = np.concatenate([inner, points[first][:, None]], axis=1) - centers[:, None]
+        # The curve between the five points of an interval strays little beyond them.
+        reach = 1.25 * np.sqrt((spread**2).sum(axis=2).max(axis=1))
+        samples, balls = np.column_stack([t, points]), np.column_stack([centers, reach])
+        begins = np.cumsum([0, *(count - 1 for count in counts)])[:-1]
+        totals = np.add.reduceat(lengths, begins)
+        moments = np.add.reduceat(lengths[:, None] * centers, begins)
+        middles = moments / np.maximum(totals, 1e-300)[:, None]
+        for k, (rim, count) in enumerate(zip(fresh, counts, strict=True)):
+            rim.samples = samples[stops[k] - count : stops[k]]
+            rim.balls = balls[begins[k] : begins[k] + count - 1]
+            rim.length = float(totals[k])
+            rim.middle = middles[k]
+
+    def corners(self, rims: Sequence[Rim]) -> dict[Rim, Array]:
+        """Parameters inside the domains of rims where the tangent in space jumps."""
+        knots = [crease_knots(rim.curve) for rim in rims]
+        rows = np.repeat(np.arange(len(rims)), [at.size for at in knots])
+        if not rows.size:
+            return {}
+        at = np.concatenate(knots)
+        batch = Batch(self, rims)
+        _, before, _ = batch.along(rows, np.nextafter(at, -np.inf))
+        _, after, _ = batch.along(rows, at)
+        bent = turn(before, after) > CORNER
+        return {rims[k]: at[bent & (rows == k)] for k in np.unique(rows[bent]).tolist()}
+
+    def close_with_corners(self, rims: Sequence[Rim]) -> NDArray[np.bool_]:
+        """Whether the tangents of closed rims jump from their ends to their beginnings."""
+        batch = Batch(self, rims)
+        domains = np.array([rim.curve.domain for rim in rims]).reshape(-1, 2)
+        rows = np.arange(len(rims))
+        _, starts, _ = batch.along(rows, domains[:, 0])
+        _, ends, _ = batch.along(rows, domains[:, 1])
+        return np.asarray(turn(ends, starts) > CORNER)
+
+
+class Batch:
+    """Several rims of a survey, by their place in a sequence."""
+
+    def __init__(self, survey: Survey, rims: Sequence[Rim]) -> None:
+        self.survey = survey
+        self.rims = rims
+        numbers = np.array([rim.number for rim in rims], dtype=np.int64)
+        self.surfaces = np.array(survey.surfaces, dtype=np.int64)[numbers]
+        first = np.array(survey.curves, dtype=np.int64)[numbers]
+        self.curves = first + CURVE_RECORD * np.array([rim.index for rim in rims], dtype=np.int64)
+
+    def along(self, which: Indices, t: Array) -> tuple[Array, Array, Array]:
+        """Points, derivatives and Su x Sv at parameters (m,) of rims (m,), each (m, 3)."""
+        out = np.empty((t.size, 9))
+        along_rims(self.survey.table, self.survey.pool, self.surfaces, self.curves, which, t, out)
+        return out[:, :3], out[:, 3:6], out[:, 6:]
+
+    def nearest(self, which: Indices, points: Array, guess: Array) -> tuple[Array, Array]:
+        """Parameters (m,) of the nearest points of rims (m,), and distances of points (m, 3) near them."""
+        closed = np.array([rim.closed for rim in self.rims])
+        begins = np.cumsum([0, *(len(rim.samples) for rim in self.rims)])
+        samples = np.concatenate([rim.samples for rim in self.rims])
+        out = np.empty((which.size, 2))
+        nearest_on_rims(
+            self.survey.table,
+            self.survey.pool,
+            self.surfaces,
+            self.curves,
+            closed,
+            begins,
+            samples,
+            which,
+            np.ascontiguousarray(points),
+            guess,
+            _CLOSE * self.survey.tolerance,
+            out,
+        )
+        return out[:, 0], out[:, 1]

@@ -236,4 +236,4 @@ def body_mesh(body: Body, budget: int = 20_000) -> Mesh | None:
     share = max(budget // len(body.faces), 100)
     faces = [side.face for side in body.faces]
     size, angle = extent(faces), turning(len(faces))
-    return joined([_colored(_face_mesh(face, share, size, angle), getattr(face, "color", None)) for face in faces])
+    return joined([_colored(_face_mesh(face, share, size, angle), face.color) for face in faces])

@@ -8,7 +8,7 @@ import pytest
 from assembly.errors import InputError
 from assembly.geometry import shapes
 from assembly.geometry.curve import NurbsCurve
-from assembly.geometry.curve_parts import between, creases, smooth_parts
+from assembly.geometry.curve_parts import between, crease_knots, smooth_parts
 from assembly.geometry.face import Face
 from assembly.geometry.loop import Loop
 from tests.solids import FALL_X, FALL_Y, HALF_X, HALF_Y, roof_height, tiled_solid
@@ -295,10 +295,10 @@ def test_parts_of_a_curve(degree):
 
 def test_corners_of_a_curve():
     bent = polygon(np.array([[0, 0], [1, 0], [2, 0], [2, 2.0]]))
-    at, before, after = creases(bent)
-    np.testing.assert_array_equal(at, [1, 2, 3])
-    np.testing.assert_allclose(before, [[1, 0], [1, 0], [0, 2]])
-    np.testing.assert_allclose(after, [[1, 0], [0, 2], [-2, -2]])
+    np.testing.assert_array_equal(crease_knots(bent), [1, 2, 3])
+    np.testing.assert_array_equal(crease_knots(circle((0, 0), 1)), [1, 2, 3])
+    assert not crease_knots(bent.elevate(2).insert_knot(0.5)).tolist() == []
+    assert crease_knots(NurbsCurve([[0, 0], [1, 0], [2, 1], [3, 3.0]], [0, 0, 0, 1, 2, 2, 2], 2)).size == 0
     parts = smooth_parts(bent)
     assert [part.domain for part in parts] == [(0, 2), (2, 3), (3, 4)]
     round_one = circle((0, 0), 1)

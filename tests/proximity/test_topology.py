@@ -255,6 +255,45 @@ def test_rings_meet_however_they_are_divided(top, bottom):
             np.testing.assert_allclose(np.hypot(points[:, 0], points[:, 1]), 2.0, rtol=1e-13)
 
 
+def walls():
+    """The wall of a cylinder with its boundary given in many ways."""
+    tube = shapes.cylinder(2.0, 3.0)
+    around = tube.domain[0][1]
+
+    def rectangle(start):
+        corners = [(start, 0.0), (start + around, 0.0), (start + around, 3.0), (start, 3.0)]
+        return [line(corners[k], corners[(k + 1) % 4]) for k in range(4)]
+
+    rings = [line((1.0, 0.0), (1.0 + around, 0.0)), line((around, 3.0), (0.0, 3.0))]
+    window = arc((5.0, 1.5), 0.5, 0.0, 2 * pi, 4)
+    return {
+        "whole": Face(tube),
+        "with its seam": Face(tube, rectangle(0.0)),
+        "with a seam elsewhere": Face(tube, rectangle(4.0)),
+        "with a seam on another sheet": Face(tube, rectangle(-9.0)),
+        "turned and from the middle": Face(tube, [curve.reversed() for curve in rectangle(1.0)[::-1]][2:] +
+                                           [curve.reversed() for curve in rectangle(1.0)[::-1]][:2]),
+        "rings": Face(tube, rings[0], [rings[1]]),
+        "with a window": Face(tube, rectangle(2.0), [window]),
+        "whole with a window": Face(tube, holes=[window]),
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("name", walls())
+def test_walls_are_cut_however_their_loops_are_given(name):
+    wall = walls()[name]
+    window = len(wall.boundary) - 2
+    faces = [wall, disc(2.0, 1.5, True, RINGS["four arcs"]), disc(2.0, -1.5, False, RINGS["two halves"])]
+    topology = topology_of(faces)
+    assert topology.is_closed == (window == 0)
+    assert (len(topology.edges), len(topology.vertices)) == (8 + window, 8) and topology.chi == 2 - window
+    assert len(topology.faces[0].boundary) == 8 + window
+    assert topology.faces[0].area() == pytest.approx(wall.area(), rel=1e-12)
+    check(topology, 0.5)
+    u, v = np.random.default_rng(0).uniform(0, [[4 * pi], [3.0]], (2, 500))
+    np.testing.assert_array_equal(topology.faces[0].locate(u, v), wall.locate(u, v))
+
+
 def test_a_gap_within_the_tolerance_is_closed_and_a_wider_one_is_not():
     faces = list(shapes.box(1, 2, 3))
     size = sqrt(14.0)
@@ -266,6 +305,22 @@ def test_a_gap_within_the_tolerance_is_closed_and_a_wider_one_is_not():
     assert sum(edge.face_b is None for edge in topology.edges) == 8 and len(topology.vertices) == 12
     assert "open" in repr(topology)
     assert topology_of(far, tolerance=1e-5 * size).is_closed
+
+
+@pytest.mark.parametrize(("bulge", "joins"), [(0.0, True), (5e-6, True), (5e-5, False)])
+def test_curves_between_common_ends_may_be_a_little_off(bulge, joins):
+    """Two faces of a folded sheet whose common side is a line on one and an arch on the other."""
+    size = 10.0 * sqrt(2.0)
+    arch = NurbsCurve([[0, 0], [0.5, -2.0 * bulge * size], [1, 0.0]], [0, 0, 0, 1, 1, 1], 2)
+    rest = [line((1, 0), (1, 1)), line((1, 1), (0, 1)), line((0, 1), (0, 0))]
+    knots = np.array([-5.0, -5.0, 5.0, 5.0])
+    flat = [[[a, b, 0.0] for b in (-5, 5)] for a in (-5, 5)]
+    folded = Face(NurbsSurface(flat, (knots, knots), (1, 1)), [arch, *rest])
+    upright = [[[a, 0.0, -b] for b in (-5, 5)] for a in (-5, 5)]
+    other = Face(NurbsSurface(upright, (knots, knots), (1, 1)), [line((0, 0), (1, 0)), *rest], reversed=True)
+    topology = topology_of([folded, other], tolerance=1e-6 * size)
+    assert len(topology.vertices) == 6
+    assert len(topology.edges) == (7 if joins else 8)
 
 
 def test_faces_with_contradicting_sides_do_not_join():

@@ -162,3 +162,22 @@ def test_trimmed_faces_of_bodies_that_do_not_fit_a_budget():
 def test_a_scene_of_trimmed_faces_draws_the_same_again(pinned):
     first, second = (list(commands(draw(pinned))) for _ in range(2))
     assert first == second
+
+
+def test_colors_of_bodies_and_faces(pinned, monkeypatch):
+    plate, pin = pinned.bodies
+    monkeypatch.setattr(pin, "color", (0.1, 0.2, 0.3), raising=False)
+    top = plate.face("top").face
+    monkeypatch.setattr(top, "color", (1.0, 0.5, 0.0), raising=False)
+    first, second = draw(pinned).items
+    assert second.color == (0.1, 0.2, 0.3) and second.mesh.colors is None
+    own = ~np.isnan(first.mesh.colors).any(axis=1)
+    # The upper cap and nothing else.
+    assert (first.mesh.normals[own] == [0.0, 0.0, 1.0]).all()
+    assert own.sum() == len(face_mesh(top).vertices)
+    plate_object, *_ = (c["object"] for c in commands(draw(pinned)) if c["type"] == "set_object")
+    assert plate_object["materials"][0]["vertexColors"] and plate_object["materials"][0]["color"] == 0xFFFFFF
+    colors = array(plate_object["geometries"][0]["data"]["attributes"]["color"]).reshape(-1, 3)
+    # Single precision is the browser's.
+    assert colors[own] == pytest.approx(np.tile([1.0, 0.5, 0.0], (own.sum(), 1)), abs=1e-6)
+    assert colors[~own] == pytest.approx(np.tile(first.color, ((~own).sum(), 1)), abs=1e-6)

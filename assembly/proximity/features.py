@@ -1,0 +1,282 @@
+"""Which faces, edges or vertices of two bodies are closest, from Python: found globally, and tracked as bodies move.
+
+A body is its faces with the edges and vertices they share. Everything returned is in world axes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from enum import Enum
+from functools import lru_cache
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.errors import InputError, vector
+from assembly.geometry.face import Face
+from assembly.geometry.surface import NurbsSurface
+from assembly.kinematics.body import Body, BodyFace
+from assembly.kinematics.pose import nonzero_quaternion
+from assembly.proximity.nearest_query import (
+    GAP,
+    LOWER,
+    NORMAL,
+    PAIR,
+    PARAMETERS,
+    POINT_F,
+    SWITCHES,
+    find_nearest,
+    follow_nearest,
+)
+from assembly.proximity.shell_packing import pack_shell
+from assembly.proximity.topology import Topology, topology_of
+
+__all__ = ["Feature", "FeaturePair", "FeatureStatus", "FeatureTracker", "closest_features"]
+
+Array = NDArray[np.float64]
+Table = NDArray[np.int64]
+Shape = Body | BodyFace | Face | NurbsSurface | Iterable[Face | NurbsSurface]
+Faces = tuple[Face, ...]
+_IDENTITY = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+
+
+class FeatureStatus(Enum):
+    """What a pair of features is; the value says it in a sentence."""
+
+    APART = "nearest points of all features: every other pair is excluded"
+    CROSSING = "the bodies cross at this point; no pair of a penetration was found, move them apart to see one"
+    UNPROVEN = "the nearest pair found; the search ran out of room before every other pair was excluded"
+    PENETRATING = "the bodies cross; where they are deepest in each other on their way apart"
+    TRACKED = "followed from the pair before; no feature beside it is closer"
+
+
+_STATUSES = tuple(FeatureStatus)
+
+
+@dataclass(frozen=True)
+class Feature:
+    """A face, an edge or a vertex of a body.
+
+    Attributes
+    ----------
+    kind : "face", "edge" or "vertex"
+    index : int
+        Among those of its kind.
+    name : str
+        To be read: the face's name, or the faces an edge is between.
+    """
+
+    kind: Literal["face", "edge", "vertex"]
+    index: int
+    name: str
+
+    def __repr__(self) -> str:
+        return self.name
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class FeaturePair:
+    """The closest features of two bodies a and b, and their points.
+
+    Attributes
+    ----------
+    features : (Feature, Feature)
+    parameters : (2, 2)
+        (u, v) on a face, (t, 0) on an edge, in the parameter of its curve on its first face, (0, 0) at a vertex.
+    points : (2, 3)
+        The point of a and the point of b, world coordinates.
+    normal : (3,)
+        Unit vector from a towards b; the outward normal of a, of b reversed, where one of the features is a face.
+    gap : float
+        normal . (b - a): positive apart, negative interpenetrating.
+    lower : float
+        No points of the two are nearer than this; 0 where the bodies cross. Of a tracked pair, NaN.
+    status : FeatureStatus
+    """
+
+    features: tuple[Feature, Feature]
+    parameters: Array = field(repr=False)
+    points: Array
+    normal: Array
+    gap: float
+    lower: float = field(repr=False)
+    status: FeatureStatus
+
+
+@lru_cache(maxsize=256)
+def _face_of(surface: NurbsSurface) -> Face:
+    return Face(surface)
+
+
+def _faces(name: str, shape: Shape) -> Faces:
+    """The faces of a shape."""
+    if isinstance(shape, Body):
+        if not shape.faces:
+            raise InputError(f"{name} is {shape!r}, a body without a shape; expected one with faces")
+        return tuple(face.face for face in shape.faces)
+    if isinstance(shape, BodyFace):
+        return (shape.face,)
+    if isinstance(shape, NurbsSurface):
+        return (_face_of(shape),)
+    if isinstance(shape, Face):
+        return (shape,)
+    if not isinstance(shape, Iterable):
+        raise TypeError(f"{name} is {shape!r}; expected a Body, a Face, a NurbsSurface, or several faces")
+    faces: list[Face] = []
+    for k, part in enumerate(shape):
+        if not isinstance(part, (Face, NurbsSurface)):
+            raise TypeError(f"{name}[{k}] is {part!r}; expected a Face or a NurbsSurface")
+        faces.append(part if isinstance(part, Face) else _face_of(part))
+    if not faces:
+        raise InputError(f"{name} is empty; expected at least one face")
+    return tuple(faces)
+
+
+def _pose(name: str, shape: Shape, q: ArrayLike | None) -> Array:
+    if q is None:
+        if isinstance(shape, BodyFace):
+            shape = shape.body
+        return np.asarray(shape.q) if isinstance(shape, Body) else np.array(_IDENTITY)
+    row = vector(name, q, 7)
+    if not float(np.abs(row[3:]).max()) > 1e-100:
+        nonzero_quaternion(f"{name}[3:]", row[3:])
+    return row
+
+
+@lru_cache(maxsize=128)
+def _topology(faces: Faces) -> Topology:
+    return topology_of(faces)
+
+
+@lru_cache(maxsize=128)
+def _features(faces: Faces) -> tuple[Feature, ...]:
+    """All features of a body by number."""
+    topology = _topology(faces)
+    names = [face.name or f"face {k + 1}" for k, face in enumerate(topology.faces)]
+    result = [Feature("face", k, f"face {name!r}") for k, name in enumerate(names)]
+    for k, edge in enumerate(topology.edges):
+        other = "free" if edge.face_b is None else repr(names[edge.face_b])
+        result.append(Feature("edge", k, f"edge {k} ({names[edge.face_a]!r} | {other})"))
+    return (*result, *(Feature("vertex", k, f"vertex {k}") for k in range(len(topology.vertices))))
+
+
+def _extent(faces: Faces) -> float:
+    boxes = [face.surface.bounding_box() for face in faces]
+    low, high = np.min([box[0] for box in boxes], axis=0), np.max([box[1] for box in boxes], axis=0)
+    return float(np.linalg.norm(high - low))
+
+
+@lru_cache(maxsize=64)
+def _packed(a: Faces, b: Faces) -> tuple[Table, Array, int, int, float]:
+    """Two shells as one table and one pool, where they begin, and the larger size."""
+    table_a, pool_a, shell_a = pack_shell(_topology(a), 1.0)
+    table_b, pool_b, shell_b = pack_shell(_topology(b), 1.0, table_a.size, pool_a.size)
+    size = max(_extent(a), _extent(b))
+    return np.concatenate([table_a, table_b]), np.concatenate([pool_a, pool_b]), shell_a, shell_b, size
+
+
+def _pair(faces: tuple[Faces, Faces], codes: Table, out: Array, status: int) -> FeaturePair:
+    f, g = codes.tolist()
+    return FeaturePair(
+        (_features(faces[0])[f], _features(faces[1])[g]),
+        out[PARAMETERS:POINT_F].reshape(2, 2),
+        out[POINT_F:NORMAL].reshape(2, 3),
+        out[NORMAL:GAP],
+        float(out[GAP]),
+        float(out[LOWER]),
+        _STATUSES[status],
+    )
+
+
+def closest_features(a: Shape, b: Shape, q_a: ArrayLike | None = None, q_b: ArrayLike | None = None) -> FeaturePair:
+    """The closest points of two bodies over all their faces, edges and vertices.
+
+    Parameters
+    ----------
+    a, b : Body, Face, NurbsSurface, or several faces
+        Faces given together share their edges and vertices.
+    q_a, q_b : (7,), optional
+        Poses; a body's own by default, else the identity.
+
+    Returns
+    -------
+    FeaturePair
+        Where the bodies are apart, their nearest points. Where they cross, a pair with normals that oppose each other
+        and a negative gap: one that closes as the bodies come apart along the normal of a crossing.
+
+    Raises
+    ------
+    InputError, TypeError
+        Shapes without faces, wrong poses.
+
+    Notes
+    -----
+    Branch and bound over pairs of cells with bounds that are rounded outward but for the last digits
+    (`proximity/box_model.py`); a cell is given up, too, where an extremum that is known is the only one in reach,
+    which is decided by how much curvatures change over it. The point of `FeatureStatus.APART` is that nothing else
+    ends the search.
+    """
+    faces = _faces("a", a), _faces("b", b)
+    q = np.stack([_pose("q_a", a, q_a), _pose("q_b", b, q_b)])
+    table, pool, shell_a, shell_b, size = _packed(*faces)
+    codes, out = np.zeros(2, dtype=np.int64), np.empty(PAIR)
+    status = find_nearest(table, pool, shell_a, shell_b, q, size, codes, out)
+    return _pair(faces, codes, out, status)
+
+
+class FeatureTracker:
+    """The closest features of two bodies that move, each step from the last one.
+
+    A step that is small against the bodies' own size switches from faces to edges to vertices and back as the closest
+    point leaves one feature for another. Where that fails, the pair is searched anew.
+
+    Parameters
+    ----------
+    a, b : Body, Face, NurbsSurface, or several faces
+
+    Attributes
+    ----------
+    switches : int
+        How often a feature took over from another one since the start.
+    searches : int
+        How often the pair was searched globally, the first step included.
+    """
+
+    def __init__(self, a: Shape, b: Shape) -> None:
+        self._shapes = a, b
+        self._faces = _faces("a", a), _faces("b", b)
+        self._packed = _packed(*self._faces)
+        self._names = _features(self._faces[0]), _features(self._faces[1])
+        self._q = np.empty((2, 7))
+        self._codes = np.zeros(2, dtype=np.int64)
+        self._out = np.empty(PAIR)
+        self._out[SWITCHES] = 0.0
+        self.searches = 0
+
+    @property
+    def switches(self) -> int:
+        """How often a feature took over from another one since the start."""
+        return int(self._out[SWITCHES])
+
+    def step(self, q_a: ArrayLike | None = None, q_b: ArrayLike | None = None) -> FeaturePair:
+        """The pair at new poses, (7,) each; a body's own by default, else the identity.
+
+        Raises
+        ------
+        InputError
+            Wrong poses.
+        """
+        self._q[0] = _pose("q_a", self._shapes[0], q_a)
+        self._q[1] = _pose("q_b", self._shapes[1], q_b)
+        table, pool, shell_a, shell_b, size = self._packed
+        if self.searches:
+            status = follow_nearest(table, pool, shell_a, shell_b, self._q, size, self._codes, self._out)
+        else:
+            status = find_nearest(table, pool, shell_a, shell_b, self._q, size, self._codes, self._out)
+        if _STATUSES[status] is FeatureStatus.TRACKED:
+            self._out[LOWER] = np.nan
+        else:
+            self.searches += 1
+        return _pair(self._faces, self._codes, self._out.copy(), status)
