@@ -174,7 +174,5 @@ class FreePoint:
     def row_terms(self, y, weights):
         """Second derivative of y . rows + J^T diag(weights) J, (n, n)."""
         hessian = np.zeros((self.n, self.n))
-        program.add_row_terms(
-            self.table, self.pool, self.loose, self.room, self.bases, self.point, y, weights, hessian
-        )
+        program.add_row_terms(self.table, self.pool, self.loose, self.room, self.bases, self.point, y, weights, hessian)
         return np.triu(hessian) + np.triu(hessian, 1).T
