@@ -35,7 +35,6 @@ from assembly.constraints.layout import (
     SECOND,
     SHELL_F,
     SHELL_G,
-    SIGNED,
     SLOTS,
     SURFACE_F,
     SURFACE_G,
@@ -51,8 +50,6 @@ from assembly.constraints.layout import (
     TAPES,
     TRACK_AT,
     TRACKED,
-    TRIM_FORM,
-    TRIM_PAIR,
     TRIM_ROWS_AT,
     TRIM_TERMS_AT,
     TRIMS,
@@ -425,14 +422,13 @@ def add_row_terms(table, pool, loose, room, bases, point, y, weights, hessian):
         elif y[r] != 0.0 or weights[r] != 0.0:
             add_gap_terms(records, r, jacobian, r, y[r], weights[r], hessian, bases[r, 0], bases[r, 1])
     for r in range(pairs, pairs + table[TRIMS]):
-        row = table[ROW_TABLE] + ROW * r
-        if table[row + TRIM_FORM] == SIGNED and loose[0][table[row + TRIM_PAIR]] >= 0:
+        if weights[r] != 0.0:
+            add_gram(bases, jacobian, r, weights[r], hessian)
+        if y[r] != 0.0:
             call_address(
                 table[TRIM_TERMS_AT],
-                (table, pool, r, loose[0], loose[1], point[1], jacobian, y[r], weights[r], hessian),
+                (table, pool, r, loose[0], loose[1], bases, point[1], records, jacobian, y[r], hessian),
             )
-        elif weights[r] != 0.0:
-            add_gram(bases, jacobian, r, weights[r], hessian)
     for r in range(pairs + table[TRIMS], table[ROWS]):
         if weights[r] != 0.0:
             add_gram(bases, jacobian, r, weights[r], hessian)

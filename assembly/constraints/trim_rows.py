@@ -9,13 +9,16 @@ a curve (appendix A, corrected):
     "between"     g(u_g) - f(c)    g_q - f_u c' t_q,
 
 in the axes of the face's body, where f(u) and f(c) have no rates of their own. At a solution they depend on one
-another (the loop's extremum is then the contact's), and of their second derivatives nothing is kept. One-sided ones
-are zero on the right side of the loop. The loop of a solve calls the two kernels at the end by their addresses.
+another (the loop's extremum is then the contact's), each a multiple of s; so are their second derivatives taken to
+be. One-sided ones are zero on the right side of the loop. The loop of a solve calls the two kernels at the end by
+their addresses.
 """
 
 from __future__ import annotations
 
 import math
+
+import numpy as np
 
 from assembly._kernel import kernel
 from assembly.constraints.layout import (
@@ -25,7 +28,6 @@ from assembly.constraints.layout import (
     CONTACTS,
     FREE_COLUMN,
     JOINTS,
-    MOVING,
     PARAMETRIC,
     ROW,
     ROW_TABLE,
@@ -42,6 +44,7 @@ from assembly.constraints.layout import (
     TRIM_SIDE,
     TRIMS,
 )
+from assembly.constraints.program import add_gram
 from assembly.geometry.pieces import TRIM_CURVES
 from assembly.geometry.spline import curve_point, surface_point
 from assembly.geometry.trim import trim_nearest
@@ -230,18 +233,34 @@ def trim_rows(table, pool, free, lengths, q, tracked, records, residual, jacobia
 
 
 @kernel
-def trim_terms(table, pool, r, free, lengths, tracked, jacobian, y, weight, hessian):
-    """Upper triangle of hessian += y (second derivative) + weight (gradient gradient^T), of a signed row."""
+def trim_terms(table, pool, r, free, lengths, bases, tracked, records, jacobian, y, hessian):
+    """Upper triangle of hessian += y (second derivative of row r).
+
+    Of a signed row of a free contact that is all; else what the change of u_q adds is left out. A vector's row counts
+    as the signed distance, times what its gradient has of that one's: at a solution it has nothing else.
+    """
     row = table[ROW_TABLE] + ROW * r
     k = table[row + TRIM_PAIR]
     o = 2 * table[row + TRIM_SIDE]
+    loose = (free, lengths)
     _s, n, bend = trim_distance(table, pool, table[row + TRIM_LOOP], tracked[k, o], tracked[k, o + 1])
-    bend *= y * pool[table[row + TRIM_FACTOR]]
-    at = 6 * table[MOVING] + 4 * free[k] + o
-    for i in range(2):
-        for j in range(i, 2):
-            flat = (1.0 if i == j else 0.0) - n[i] * n[j]
-            hessian[at + i, at + j] += weight * jacobian[r, FREE_COLUMN + o + i] * jacobian[
-                r, FREE_COLUMN + o + j
-            ] + bend * flat / (lengths[k, o + i] * lengths[k, o + j])
+    places = np.empty((1, bases.shape[1]), np.int64)
+    for b in range(bases.shape[1]):
+        places[0, b] = bases[r, b]
+    rates = np.zeros((1, jacobian.shape[1]))
+    factor = pool[table[row + TRIM_FACTOR]]
+    if table[row + TRIM_FORM] != SIGNED:
+        add_coordinate(loose, records, k, o, n[0], rates, 0)
+        add_coordinate(loose, records, k, o + 1, n[1], rates, 0)
+        square = 0.0
+        factor = 0.0
+        for j in range(FREE_COLUMN + 4):
+            square += rates[0, j] * rates[0, j]
+            factor += jacobian[r, j] * rates[0, j]
+        factor = factor / square if square > 0.0 else 0.0
+        clear(rates, 0)
+    # s_uu = bend t t^T, t along the loop.
+    add_coordinate(loose, records, k, o, -n[1], rates, 0)
+    add_coordinate(loose, records, k, o + 1, n[0], rates, 0)
+    add_gram(places, rates, 0, y * factor * bend, hessian)
     return 0

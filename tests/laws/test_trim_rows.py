@@ -9,7 +9,7 @@ import assembly as asm
 from assembly.constraints import layout
 from assembly.constraints.trim_contact import FORMS
 from tests.laws.curve_witness import CurveStack, SurfaceCurve
-from tests.laws.loop_point import moved
+from tests.laws.loop_point import LoopPoint, moved
 from tests.laws.trim_scenes import LOOPS, SURFACES, FreePoint, TrimScene, circle, polygon, spline, trim_scene
 from tests.laws.witness import OFFSETS, SLOPE, STEP, Pairs, Stack, rotated
 from tests.laws.witness import moved as pair_moved
@@ -319,3 +319,32 @@ def test_a_row_has_the_unit_of_a_length():
     trim = asm.TrimContact(contact, circle(np.mean(plane.domain, axis=1), 1.5), "inside")
     scene.constrain(contact, trim)
     assert trim.stretch == pytest.approx(np.linalg.norm(at[1]), rel=1e-12)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_the_hessian_of_a_row_whose_contact_cannot_be_freed(form):
+    """A ball standing on its pole, where its coordinates are none: on a plane the contact moves as its center does."""
+    plane = asm.Face(asm.shapes.plane(10.0, 10.0))
+    bodies = [asm.Body("ground", plane, fixed=True), asm.Body("ball", asm.shapes.sphere(1.0), position=(1.5, 0.4, 1.0))]
+    scene = asm.Assembly(bodies)
+    contact = asm.Contact(*bodies)
+    trim = asm.TrimContact(contact, circle((0.0, 0.0), 1.6), "on", form)
+    scene.constrain(contact, trim)
+    point = LoopPoint(scene, scene.q)
+    y = np.zeros(point.rows)
+    y[1:] = [0.7, -0.4, 0.3][: point.rows - 1]
+    found = point.row_terms(y)
+
+    def slopes(steps):
+        return LoopPoint(scene, moved(scene, scene.q, steps), point.tracked).jacobian().T @ y
+
+    expected = differences(slopes, 6, 1e-3)
+    if form == "signed":
+        assert np.abs(found).max() > 0.1
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-8)
+        return
+    # Of vectors along the loop, where the signed distance is zero: a step there leaves it by the loop's curvature.
+    way = np.array([-0.4, 1.5, 0.0, 0.0, 0.0, 0.0]) / np.hypot(0.4, 1.5)
+    outward = np.array([1.5, 0.4, 0.0, 0.0, 0.0, 0.0]) / np.hypot(0.4, 1.5)
+    slope = float(y @ point.jacobian() @ outward)
+    assert way @ found @ way == pytest.approx(slope * scene.packed().scale / np.hypot(0.4, 1.5), rel=1e-9)
