@@ -232,12 +232,30 @@ def trim_rows(table, pool, free, lengths, q, tracked, records, residual, jacobia
     return 0
 
 
+@kernel(inner=True)
+def part_of(jacobian, r, rates, k):
+    """The number a with row r = a rates + b row k, by least squares."""
+    ss = 0.0
+    sg = 0.0
+    gg = 0.0
+    rs = 0.0
+    rg = 0.0
+    for j in range(FREE_COLUMN + 4):
+        ss += rates[0, j] * rates[0, j]
+        sg += rates[0, j] * jacobian[k, j]
+        gg += jacobian[k, j] * jacobian[k, j]
+        rs += jacobian[r, j] * rates[0, j]
+        rg += jacobian[r, j] * jacobian[k, j]
+    det = ss * gg - sg * sg
+    return (rs * gg - rg * sg) / det if det > 1e-12 * ss * gg else 0.0
+
+
 @kernel
 def trim_terms(table, pool, r, free, lengths, bases, tracked, records, jacobian, y, hessian):
     """Upper triangle of hessian += y (second derivative of row r).
 
     Of a signed row of a free contact that is all; else what the change of u_q adds is left out. A vector's row counts
-    as the signed distance, times what its gradient has of that one's: at a solution it has nothing else.
+    as the signed distance, times what its gradient has of that one's: at a solution all else in it is the gap's.
     """
     row = table[ROW_TABLE] + ROW * r
     k = table[row + TRIM_PAIR]
@@ -252,12 +270,7 @@ def trim_terms(table, pool, r, free, lengths, bases, tracked, records, jacobian,
     if table[row + TRIM_FORM] != SIGNED:
         add_coordinate(loose, records, k, o, n[0], rates, 0)
         add_coordinate(loose, records, k, o + 1, n[1], rates, 0)
-        square = 0.0
-        factor = 0.0
-        for j in range(FREE_COLUMN + 4):
-            square += rates[0, j] * rates[0, j]
-            factor += jacobian[r, j] * rates[0, j]
-        factor = factor / square if square > 0.0 else 0.0
+        factor = part_of(jacobian, r, rates, k)
         clear(rates, 0)
     # s_uu = bend t t^T, t along the loop.
     add_coordinate(loose, records, k, o, -n[1], rates, 0)
