@@ -22,6 +22,7 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly.constraints.layout import (
+    BETWEEN,
     BODY_F,
     BODY_G,
     CARTESIAN,
@@ -48,14 +49,14 @@ from assembly.constraints.program import add_gram
 from assembly.geometry.pieces import TRIM_CURVES
 from assembly.geometry.spline import curve_point, surface_point
 from assembly.geometry.trim import trim_nearest
-from assembly.geometry.vec import add, cross, dot, matvec, sub
+from assembly.geometry.vec import add, cross, dot, matvec, matvec_t, scale, sub
 from assembly.kinematics.motion import position, relative_pose, rotation
 from assembly.proximity.extremal import CONVERGED, SINGULAR
 from assembly.proximity.feature_pair import feature_record, solve_features
 from assembly.proximity.shell import EDGE, EDGE_CURVE, EDGE_RECORD, FACE
 from assembly.proximity.switching import on_surface
 from assembly.proximity.trim_distance import trim_distance
-from assembly.proximity.velocity import RATES, ZED
+from assembly.proximity.velocity import GAP, NORMAL, RATES, ZED
 
 
 @kernel(inner=True)
@@ -157,6 +158,21 @@ def material_rates(axis, arm_f, arm_g, sign, jacobian, r):
 
 
 @kernel(inner=True)
+def offset_tangents(pu, pv, puu, puv, pvv, n, beta):
+    """Derivatives of p + beta n, n the unit normal on one side of the surface."""
+    normal = cross(pu, pv)
+    length = math.sqrt(dot(normal, normal))
+    if not length > 0.0:
+        return pu, pv
+    factor = (beta if dot(normal, n) > 0.0 else -beta) / length
+    u = add(cross(puu, pv), cross(pu, puv))
+    v = add(cross(puv, pv), cross(pu, pvv))
+    u = sub(u, scale(dot(u, n), n))
+    v = sub(v, scale(dot(v, n), n))
+    return add(pu, scale(factor, u)), add(pv, scale(factor, v))
+
+
+@kernel(inner=True)
 def vector_rows(table, pool, first, loose, point):
     """The rows of a trim from `first` on, in one of the paper's forms."""
     q, tracked, records, residual, jacobian = point
@@ -180,7 +196,7 @@ def vector_rows(table, pool, first, loose, point):
     surface = own_surface(table, row)
     at, rate, _bend = curve_point(table, pool, curve, t)
     _u, _v, c, along, _normal = on_surface(table, pool, surface, curve, t)
-    p, pu, pv, _uu, _uv, _vv = surface_point(table, pool, surface, x[o], x[o + 1])
+    p, pu, pv, puu, puv, pvv = surface_point(table, pool, surface, x[o], x[o + 1])
     there, du, dv, _uu, _uv, _vv = surface_point(table, pool, other_surface(table, row), x[2 - o], x[3 - o])
     away = turn_g if side == 0 else turn_f
     origin = position(q, j if side == 0 else i)
@@ -189,6 +205,13 @@ def vector_rows(table, pool, first, loose, point):
     arm_g = sub(point_w, position(q, j))
     du = matvec(away, du)
     dv = matvec(away, dv)
+    free = loose[0][k] >= 0
+    # Seen from the side of the loop the other point is p + beta n.
+    toward = (0.0, 0.0, 0.0)
+    if form == BETWEEN and not free:
+        n = (records[k, NORMAL], records[k, NORMAL + 1], records[k, NORMAL + 2])
+        toward = scale(1.0 - 2.0 * side, matvec_t(turn, n))
+        pu, pv = offset_tangents(pu, pv, puu, puv, pvv, toward, records[k, GAP])
     for l in range(table[row + TRIM_COUNT]):
         r = first + l
         clear(jacobian, r)
@@ -209,6 +232,15 @@ def vector_rows(table, pool, first, loose, point):
             arm = arm_f if side == 0 else arm_g
             residual[r] = dot(axis, arm) - c[l]
             slope = along[l]
+            if not free:
+                # The other side's own coordinates have no rates at its poles.
+                add_coordinate(loose, records, k, o, pu[l], jacobian, r)
+                add_coordinate(loose, records, k, o + 1, pv[l], jacobian, r)
+                for j in range(FREE_COLUMN):
+                    jacobian[r, j] += toward[l] * jacobian[k, j]
+                if moves:
+                    add_rate(records, scratch, o, -slope, jacobian, r)
+                continue
             material_rates(axis, arm_f, arm_g, 1.0 - 2.0 * side, jacobian, r)
             add_coordinate(loose, records, k, 2 - o, dot(axis, du), jacobian, r)
             add_coordinate(loose, records, k, 3 - o, dot(axis, dv), jacobian, r)

@@ -328,7 +328,7 @@ def test_the_hessian_of_a_row_whose_contact_cannot_be_freed(form):
     bodies = [asm.Body("ground", plane, fixed=True), asm.Body("ball", asm.shapes.sphere(1.0), position=(1.5, 0.4, 1.0))]
     scene = asm.Assembly(bodies)
     contact = asm.Contact(*bodies)
-    trim = asm.TrimContact(contact, circle((0.0, 0.0), 1.6), "on", form)
+    trim = asm.TrimContact(contact, circle((0.0, 0.0), np.hypot(1.5, 0.4)), "on", form)
     scene.constrain(contact, trim)
     point = LoopPoint(scene, scene.q)
     y = np.zeros(point.rows)
