@@ -231,7 +231,7 @@ class Packed:
         if header[layout.TRIMS]:
             header[layout.TRIM_ROWS_AT] = address_of(trim_rows, *packed, places, block, block, block, block, row, block)
             header[layout.TRIM_TERMS_AT] = address_of(
-                trim_terms, *packed, i8, places, block, block, block, f8, f8, block
+                trim_terms, *packed, i8, places, block, np.zeros((1, 1), dtype=np.int64), block, block, block, f8, block
             )
 
     def _gathering(self, bodies: Sequence[Body], rows: list[list[int]]) -> int:
