@@ -60,6 +60,8 @@ from assembly.proximity.tips import LEAN, from_tip, tip_near, unit
 
 # Switches in a row that no motion of a pair needs.
 ROUNDS = 64
+# Cosine between the normals before and after switches below which the pair is another one.
+ACROSS = 0.3
 
 
 @kernel(inline=True)
@@ -274,7 +276,8 @@ def track_features(table, pool, shell_f, shell_g, rotation, shift, code_f, code_
     """Newton's method on a pair of features, and switching until no other feature beside them is closer.
 
     Poses, `size` and `turn` as in `solve_pair`: g relative to f, everything in the axes of f. `n` is a normal near the
-    pair's, from f towards g, zero where unknown.
+    pair's, from f towards g, zero where unknown. Where features switch, `turn` bounds the way from feature to feature
+    no more, but the normal at the end must not be across the one at the start.
 
     Returns
     -------
@@ -282,6 +285,7 @@ def track_features(table, pool, shell_f, shell_g, rotation, shift, code_f, code_
     the pair is the closest one of its neighborhood.
     """
     switches = 0
+    before = n
     while True:
         kind_f = feature_kind(table, shell_f, code_f)
         kind_g = feature_kind(table, shell_g, code_g)
@@ -299,7 +303,7 @@ def track_features(table, pool, shell_f, shell_g, rotation, shift, code_f, code_
             x,
             n,
             size,
-            turn,
+            turn if switches == 0 else math.inf,
         )
         if switches >= ROUNDS:
             status = NOT_CONVERGED
@@ -323,4 +327,6 @@ def track_features(table, pool, shell_f, shell_g, rotation, shift, code_f, code_
             break
         x = (at_f[0], at_f[1], at_g[0], at_g[1])
         switches += 1
+    if switches > 0 and turn < math.inf and dot(before, before) > 0.25 and dot(before, n) < ACROSS:
+        status = NOT_CONVERGED
     return status, code_f, code_g, x, frame, switches

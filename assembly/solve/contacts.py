@@ -87,7 +87,9 @@ def free_folds(table, pool, records, contacts, active, free, lengths, below, los
     for k in range(table[CONTACTS]):
         row = table[ROW_TABLE] + ROW * k
         idle = table[row + ONE_SIDED] == 1 and active[k] == 0.0
-        if free[k] < 0 and not idle and (abs(records[k, FOLD]) < below or k == lost):
+        # Solids switch features where a surface's pair ends: only folds ask for coordinates of theirs.
+        near = abs(records[k, FOLD]) < below or (k == lost and table[row + SHELL_F] < 0)
+        if free[k] < 0 and not idle and near:
             free_pair(table, pool, row, k, contacts, free, lengths)
         if free[k] >= 0:
             free[k] = count
