@@ -27,6 +27,8 @@ from assembly.proximity.nearest_query import (
     PARAMETERS,
     POINT_F,
     SWITCHES,
+    TRACKED,
+    find_deepest,
     find_nearest,
     follow_nearest,
 )
@@ -177,16 +179,27 @@ def _packed(a: Faces, b: Faces) -> tuple[Table, Array, int, int, float]:
     return np.concatenate([table_a, table_b]), np.concatenate([pool_a, pool_b]), shell_a, shell_b, size
 
 
-def _pair(faces: tuple[Faces, Faces], codes: Table, out: Array, status: int) -> FeaturePair:
+def _search(packed: tuple[Table, Array, int, int, float], q: Array, codes: Table, out: Array) -> FeatureStatus:
+    """The pair at poses (2, 7) into codes (2,) and out (PAIR,)."""
+    table, pool, shell_a, shell_b, size = packed
+    status = _STATUSES[find_nearest(table, pool, shell_a, shell_b, q, size, codes, out)]
+    if status is FeatureStatus.CROSSING:
+        status = _STATUSES[find_deepest(table, pool, shell_a, shell_b, q, size, codes, out)]
+    return status
+
+
+def _pair(
+    names: tuple[tuple[Feature, ...], tuple[Feature, ...]], codes: Table, out: Array, status: FeatureStatus
+) -> FeaturePair:
     f, g = codes.tolist()
     return FeaturePair(
-        (_features(faces[0])[f], _features(faces[1])[g]),
+        (names[0][f], names[1][g]),
         out[PARAMETERS:POINT_F].reshape(2, 2),
         out[POINT_F:NORMAL].reshape(2, 3),
         out[NORMAL:GAP],
         float(out[GAP]),
         float(out[LOWER]),
-        _STATUSES[status],
+        status,
     )
 
 
@@ -220,10 +233,9 @@ def closest_features(a: Shape, b: Shape, q_a: ArrayLike | None = None, q_b: Arra
     """
     faces = _faces("a", a), _faces("b", b)
     q = np.stack([_pose("q_a", a, q_a), _pose("q_b", b, q_b)])
-    table, pool, shell_a, shell_b, size = _packed(*faces)
     codes, out = np.zeros(2, dtype=np.int64), np.empty(PAIR)
-    status = find_nearest(table, pool, shell_a, shell_b, q, size, codes, out)
-    return _pair(faces, codes, out, status)
+    status = _search(_packed(*faces), q, codes, out)
+    return _pair((_features(faces[0]), _features(faces[1])), codes, out, status)
 
 
 class FeatureTracker:
@@ -246,9 +258,9 @@ class FeatureTracker:
 
     def __init__(self, a: Shape, b: Shape) -> None:
         self._shapes = a, b
-        self._faces = _faces("a", a), _faces("b", b)
-        self._packed = _packed(*self._faces)
-        self._names = _features(self._faces[0]), _features(self._faces[1])
+        faces = _faces("a", a), _faces("b", b)
+        self._packed = _packed(*faces)
+        self._names = _features(faces[0]), _features(faces[1])
         self._q = np.empty((2, 7))
         self._codes = np.zeros(2, dtype=np.int64)
         self._out = np.empty(PAIR)
@@ -270,13 +282,12 @@ class FeatureTracker:
         """
         self._q[0] = _pose("q_a", self._shapes[0], q_a)
         self._q[1] = _pose("q_b", self._shapes[1], q_b)
-        table, pool, shell_a, shell_b, size = self._packed
+        status = None
         if self.searches:
-            status = follow_nearest(table, pool, shell_a, shell_b, self._q, size, self._codes, self._out)
-        else:
-            status = find_nearest(table, pool, shell_a, shell_b, self._q, size, self._codes, self._out)
-        if _STATUSES[status] is FeatureStatus.TRACKED:
-            self._out[LOWER] = np.nan
-        else:
+            table, pool, shell_a, shell_b, size = self._packed
+            if follow_nearest(table, pool, shell_a, shell_b, self._q, size, self._codes, self._out) == TRACKED:
+                status = FeatureStatus.TRACKED
+        if status is None:
+            status = _search(self._packed, self._q, self._codes, self._out)
             self.searches += 1
-        return _pair(self._faces, self._codes, self._out.copy(), status)
+        return _pair(self._names, self._codes, self._out.copy(), status)

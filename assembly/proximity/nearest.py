@@ -207,6 +207,8 @@ def search(table, pool, shell_f, shell_g, turn, shift, size, upper):
                 if dot(d, d) < nearest:
                     nearest = dot(d, d)
                     j = k
+    first_f = i
+    first_g = j
     pairs[0, 0] = i
     pairs[0, 1] = j
     pairs[0, 2] = 2
@@ -356,4 +358,8 @@ def search(table, pool, shell_f, shell_g, turn, shift, size, upper):
             waiting += 1
     if status == APART:
         lower = upper - tolerance
+    elif best[0] < 0 and upper == math.inf:
+        # Out of room before any point inside the trims: where the search began.
+        best = (ai[first_f, FEATURE], bi[first_g, FEATURE])
+        at = (a[first_f, U0], a[first_f, V0], b[first_g, U0], b[first_g, V0])
     return status, best[0], best[1], at, gap, max(lower, 0.0), effort

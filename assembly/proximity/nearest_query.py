@@ -9,15 +9,15 @@ from assembly.geometry.vec import add, matvec, matvec_t
 from assembly.kinematics.motion import position, relative_pose, rotation
 from assembly.proximity.extremal import CONVERGED, SINGULAR
 from assembly.proximity.feature_pair import features_at
-from assembly.proximity.nearest import CROSSING
-from assembly.proximity.penetration import nearest_or_deepest
+from assembly.proximity.nearest import CROSSING, search
+from assembly.proximity.penetration import PENETRATING, deepest
 from assembly.proximity.switching import feature_at, feature_kind, track_features
 
 # What is written of a pair: parameters (4), point of f, point of g, normal, gap, lower bound, pairs of cells looked
 # at, switches.
 PARAMETERS, POINT_F, POINT_G, NORMAL, GAP, LOWER, EFFORT, SWITCHES, PAIR = 0, 4, 7, 10, 13, 14, 15, 16, 17
-# The status of a tracked pair, beside those of a search.
-TRACKED = 4
+# Statuses of a tracked pair, beside those of a search.
+TRACKED, LOST = 4, 5
 
 
 @kernel(inner=True)
@@ -36,28 +36,9 @@ def write_pair(q, turn_f, x, pf, pg, n, gap, out):
     out[GAP] = gap
 
 
-@kernel(inner=True, allocates=True)
-def search_anew(table, pool, shell_f, shell_g, q, size, codes, out):
-    """The global pair at the poses q into codes (2,) and out (PAIR,). Returns the status."""
-    turn_f = rotation(q, 0)
-    turn, shift = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
-    status, f, g, x, gap, lower, effort = nearest_or_deepest(table, pool, shell_f, shell_g, turn, shift, size)
-    none = (0.0, 0.0, 0.0)
-    if status != CROSSING:
-        # A pair on the border of two features is given to the one that holds it; the gap is the same.
-        found, cf, cg, y, frame, _switches = track_features(
-            table, pool, shell_f, shell_g, turn, shift, f, g, x, none, size, math.inf
-        )
-        if (found == CONVERGED or found == SINGULAR) and abs(abs(frame[5]) - abs(gap)) <= 1e-12 * size:
-            f = cf
-            g = cg
-            x = y
-            write_pair(q, turn_f, x, frame[3], frame[4], frame[0], frame[5], out)
-            codes[0] = f
-            codes[1] = g
-            out[LOWER] = lower
-            out[EFFORT] = effort
-            return status
+@kernel(inner=True)
+def write_features(table, pool, shell_f, shell_g, q, turn_f, turn, shift, f, g, x, n, size, codes, out):
+    """The pair of features f and g at x into codes (2,) and out (PAIR,)."""
     frame = features_at(
         table,
         pool,
@@ -68,27 +49,43 @@ def search_anew(table, pool, shell_f, shell_g, q, size, codes, out):
         turn,
         shift,
         x,
-        none,
+        n,
         size,
     )
     write_pair(q, turn_f, x, frame[3], frame[4], frame[0], frame[5], out)
     codes[0] = f
     codes[1] = g
+
+
+@kernel
+def find_nearest(table, pool, shell_f, shell_g, q, size, codes, out):
+    """The nearest pair at the poses q (2, 7); its features into codes (2,), the pair into out. Returns the status."""
+    turn_f = rotation(q, 0)
+    turn, shift = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
+    status, f, g, x, _gap, lower, effort = search(table, pool, shell_f, shell_g, turn, shift, size, math.inf)
+    none = (0.0, 0.0, 0.0)
+    write_features(table, pool, shell_f, shell_g, q, turn_f, turn, shift, f, g, x, none, size, codes, out)
     out[LOWER] = lower
     out[EFFORT] = effort
     return status
 
 
 @kernel
-def find_nearest(table, pool, shell_f, shell_g, q, size, codes, out):
-    """The nearest pair at the poses q (2, 7); its features into codes (2,), the pair into out. Returns the status."""
-    out[SWITCHES] = 0.0
-    return search_anew(table, pool, shell_f, shell_g, q, size, codes, out)
+def find_deepest(table, pool, shell_f, shell_g, q, size, codes, out):
+    """The pair of two shells that cross at the features and coordinates in codes and out. Returns the status."""
+    turn_f = rotation(q, 0)
+    turn, shift = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
+    x = (out[0], out[1], out[2], out[3])
+    found, f, g, y, n, _gap = deepest(table, pool, shell_f, shell_g, turn, shift, codes[0], codes[1], x, size)
+    if not found:
+        return CROSSING
+    write_features(table, pool, shell_f, shell_g, q, turn_f, turn, shift, f, g, y, n, size, codes, out)
+    return PENETRATING
 
 
 @kernel
 def follow_nearest(table, pool, shell_f, shell_g, q, size, codes, out):
-    """The pair in codes and out carried to the poses q; searched anew where tracking fails. Returns the status."""
+    """The pair in codes and out carried to the poses q. Returns TRACKED, or LOST and leaves the pair."""
     turn_f = rotation(q, 0)
     turn, shift = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
     n = matvec_t(turn_f, (out[NORMAL], out[NORMAL + 1], out[NORMAL + 2]))
@@ -96,10 +93,11 @@ def follow_nearest(table, pool, shell_f, shell_g, q, size, codes, out):
     status, f, g, y, frame, switches = track_features(
         table, pool, shell_f, shell_g, turn, shift, codes[0], codes[1], x, n, size, 1.0
     )
-    if status == CONVERGED or status == SINGULAR:
-        codes[0] = f
-        codes[1] = g
-        write_pair(q, turn_f, y, frame[3], frame[4], frame[0], frame[5], out)
-        out[SWITCHES] += switches
-        return TRACKED
-    return search_anew(table, pool, shell_f, shell_g, q, size, codes, out)
+    if status != CONVERGED and status != SINGULAR:
+        return LOST
+    codes[0] = f
+    codes[1] = g
+    write_pair(q, turn_f, y, frame[3], frame[4], frame[0], frame[5], out)
+    out[LOWER] = math.nan
+    out[SWITCHES] += switches
+    return TRACKED

@@ -51,7 +51,7 @@ def face_normal(table, pool, shell, code, turn, u, v):
 
 @kernel(inner=True)
 def walk_back(table, pool, shell_f, shell_g, turn, shift, away, f, g, x, size):
-    """The pair of g moved by `away`, followed until g is back: status, features, coordinates, gap."""
+    """The pair of g moved by `away`, followed until g is back: status, features, coordinates, normal, gap."""
     none = (0.0, 0.0, 0.0)
     done = 0.0
     step = 1.0 / STEPS
@@ -66,7 +66,7 @@ def walk_back(table, pool, shell_f, shell_g, turn, shift, away, f, g, x, size):
         )
         if status != CONVERGED and status != SINGULAR:
             if halved == HALVINGS:
-                return NOT_CONVERGED, f, g, x, gap
+                return NOT_CONVERGED, f, g, x, n, gap
             halved += 1
             step *= 0.5
             continue
@@ -76,21 +76,27 @@ def walk_back(table, pool, shell_f, shell_g, turn, shift, away, f, g, x, size):
         n = frame[0]
         gap = frame[5]
         done = part
-    return CONVERGED, f, g, x, gap
+    return CONVERGED, f, g, x, n, gap
 
 
 @kernel(inner=True, allocates=True)
 def deepest(table, pool, shell_f, shell_g, turn, shift, f, g, x, size):
-    """The pair of two shells that cross at x of features f and g: whether found, features, coordinates, gap."""
+    """The pair of two shells that cross at x of features f and g.
+
+    Returns
+    -------
+    Whether it was found, features, coordinates, a normal near that of the pair (zero: none), gap.
+    """
+    none = (0.0, 0.0, 0.0)
     if has_one_face(table, shell_f) and has_one_face(table, shell_g):
         a = feature_at(table, shell_f, 0)
         b = feature_at(table, shell_g, 0)
         status, y, gap = global_start(table, pool, a, b, turn, shift, size)
-        return status == CONVERGED or status == SINGULAR, 0, 0, y, gap
+        return status == CONVERGED or status == SINGULAR, 0, 0, y, none, gap
     same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-    best = (False, f, g, x, -math.inf)
+    best = (False, f, g, x, none, -math.inf)
     for attempt in range(3):
-        m = (0.0, 0.0, 0.0)
+        m = none
         if attempt == 0 and feature_kind(table, shell_f, f) == FACE:
             m = face_normal(table, pool, shell_f, f, same, x[0], x[1])
         elif attempt == 1 and feature_kind(table, shell_g, g) == FACE:
@@ -108,9 +114,9 @@ def deepest(table, pool, shell_f, shell_g, turn, shift, f, g, x, size):
                 table, pool, shell_f, shell_g, turn, add(shift, away), size, math.inf
             )
             if status == APART:
-                found, cf, cg, y, gap = walk_back(table, pool, shell_f, shell_g, turn, shift, away, cf, cg, y, size)
-                if found == CONVERGED and 0.0 >= gap > best[4]:
-                    best = (True, cf, cg, y, gap)
+                found, cf, cg, y, n, gap = walk_back(table, pool, shell_f, shell_g, turn, shift, away, cf, cg, y, size)
+                if found == CONVERGED and 0.0 >= gap > best[5]:
+                    best = (True, cf, cg, y, n, gap)
                 break
             reach *= 2.0
     return best
@@ -125,7 +131,7 @@ def nearest_or_deepest(table, pool, shell_f, shell_g, turn, shift, size):
     """
     status, f, g, x, gap, lower, effort = search(table, pool, shell_f, shell_g, turn, shift, size, math.inf)
     if status == CROSSING:
-        found, cf, cg, y, depth = deepest(table, pool, shell_f, shell_g, turn, shift, f, g, x, size)
+        found, cf, cg, y, _n, depth = deepest(table, pool, shell_f, shell_g, turn, shift, f, g, x, size)
         if found:
             return PENETRATING, cf, cg, y, depth, 0.0, effort
     return status, f, g, x, gap, lower, effort
