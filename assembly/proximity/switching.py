@@ -14,6 +14,8 @@ Leaving an edge or a vertex asks for more than rounding, entering one does not: 
 
 from __future__ import annotations
 
+import math
+
 from assembly._kernel import kernel
 from assembly.geometry.pieces import TRIM_CURVES, TRIM_FIRST
 from assembly.geometry.spline import (
