@@ -20,7 +20,15 @@ from assembly.kinematics.body import Body
 from assembly.kinematics.pose import pose_rows
 from assembly.proximity.pairs import inside
 from assembly.proximity.solid_contact import TRACK
-from assembly.solve.augmented_lagrangian import GATHER, HISTORY, ITERATIONS, RESULTS, SCATTER, solve_program
+from assembly.solve.augmented_lagrangian import (
+    CONTACT_LOST,
+    GATHER,
+    HISTORY,
+    ITERATIONS,
+    RESULTS,
+    SCATTER,
+    solve_program,
+)
 from assembly.solve.options import Options
 from assembly.solve.solution import Scene, Solution, Status
 
@@ -216,6 +224,10 @@ class Assembly:
             settings[GATHER] = 1.0
         begin = perf_counter()
         code = solve_program(*arguments, settings, state, history, tips)
+        if code == CONTACT_LOST and packed.seek_penetration():
+            # Perhaps solids cross at the start.
+            state = self._start(packed, q0, starts)
+            code = solve_program(*arguments, settings, state, history, tips)
         if code != 0 and not gathers and state[packed.results_at + SCATTER] == 1.0:
             # What the start itself did not lead to may be reached from gathered bodies.
             settings = settings.copy()

@@ -25,7 +25,7 @@ IMPLICIT, DEXTERITIES = 16, 17
 # Rows of trims follow those of contacts; whether some are vectors, which take a record of their own.
 TRIMS, VECTOR_TRIMS = 18, 19
 # Addresses of kernels that few scenes need (`_kernel.call_address`).
-TRACK_AT, SEARCH_AT, TRIM_ROWS_AT, TRIM_TERMS_AT, HEADER = 20, 21, 22, 23, 24
+TRACK_AT, SEARCH_AT, NEAREST_AT, DEEPEST_AT, TRIM_ROWS_AT, TRIM_TERMS_AT, HEADER = 20, 21, 22, 23, 24, 25, 26
 # A row: kind, its two bodies (-1: none), whether it is one-sided (residual >= 0), whether it prescribes a freedom, and
 # whether its residual is a length. Row k is that of contact k.
 ROW = 14

@@ -30,6 +30,7 @@ from assembly.geometry.pieces import TRIM_FIRST
 from assembly.geometry.spline import CURVE_RECORD, SURFACE_RECORD
 from assembly.geometry.surface import NurbsSurface
 from assembly.kinematics.body import Body, BodyFace
+from assembly.proximity.nearest_query import find_deepest, find_nearest
 from assembly.proximity.pairs import OFFSETS
 from assembly.proximity.shell import EDGE_CURVE, EDGE_END, EDGE_RECORD, EDGE_START, EDGE_SURFACE
 from assembly.proximity.shell_packing import pack_shell
@@ -227,12 +228,26 @@ class Packed:
         packed = (places, row)
         if self.shells:
             header[layout.TRACK_AT] = address_of(track_solids, *packed, *[i8] * 4, block, block, f8, block, block, i8)
-            header[layout.SEARCH_AT] = address_of(search_solids, *packed, i8, i8, i8, i8, block, block, i8)
+            header[layout.SEARCH_AT] = address_of(search_solids, *packed, *[i8] * 4, block, i8, i8, block, i8)
+            header[layout.NEAREST_AT] = address_of(find_nearest, *packed, i8, i8, block, f8, places, row)
         if header[layout.TRIMS]:
             header[layout.TRIM_ROWS_AT] = address_of(trim_rows, *packed, places, block, block, block, block, row, block)
             header[layout.TRIM_TERMS_AT] = address_of(
                 trim_terms, *packed, i8, places, block, np.zeros((1, 1), dtype=np.int64), block, block, block, f8, block
             )
+
+    def seek_penetration(self) -> bool:
+        """From now on contacts of solids that cross at the start are looked for; whether that is new.
+
+        The kernel for it is large, and few scenes need it.
+        """
+        if not self.shells or self.table[layout.DEEPEST_AT]:
+            return False
+        i8, row, places = np.int64(0), np.zeros(1), np.zeros(1, dtype=np.int64)
+        self.table[layout.DEEPEST_AT] = address_of(
+            find_deepest, places, row, i8, i8, np.zeros((1, 1)), 0.0, places, row
+        )
+        return True
 
     def _gathering(self, bodies: Sequence[Body], rows: list[list[int]]) -> int:
         """Pack the order in which scattered bodies are put together; where it begins."""

@@ -16,6 +16,7 @@ from assembly.constraints.layout import (
     BODY_G,
     CONTACTS,
     COORDINATE,
+    DEEPEST_AT,
     EXTRA_COLUMN,
     FREE_COLUMN,
     JOINT_RECORD,
@@ -24,6 +25,7 @@ from assembly.constraints.layout import (
     JOINTS,
     KIND,
     MOVING,
+    NEAREST_AT,
     ONE_SIDED,
     PARAMETERS,
     REFERENCE,
@@ -108,7 +110,10 @@ def search_row(table, pool, row, q, tracked, r):
     shell_g = table[row + SHELL_G]
     i = table[row + BODY_F]
     j = table[row + BODY_G]
-    return call_address(table[SEARCH_AT], (table, pool, shell_f, shell_g, i, j, q, tracked, r)) == 1
+    nearest = table[NEAREST_AT]
+    deepest = table[DEEPEST_AT]
+    found = call_address(table[SEARCH_AT], (table, pool, shell_f, shell_g, i, j, q, nearest, deepest, tracked, r))
+    return found == 1
 
 
 @kernel(inner=True)

@@ -15,7 +15,7 @@ from assembly.geometry.spline import SIGN
 from assembly.geometry.vec import add, blend, cross, dot, neg, scale
 from assembly.proximity.crossing import tangents
 from assembly.proximity.extremal import CONVERGED, NOT_CONVERGED, SINGULAR
-from assembly.proximity.nearest import APART, CROSSING, search
+from assembly.proximity.nearest import APART, search
 from assembly.proximity.shell import EDGES, FACE, FACE_RECORD, FACE_SURFACE, FACE_TABLE, FACE_TRIM, FACES, VERTICES
 from assembly.proximity.start import global_start
 from assembly.proximity.switching import feature_at, feature_kind, track_features
@@ -120,25 +120,3 @@ def deepest(table, pool, shell_f, shell_g, turn, shift, f, g, x, size):
                 break
             reach *= 2.0
     return best
-
-
-@kernel(inner=True, allocates=True)
-def nearest_or_deepest(table, pool, shell_f, shell_g, turn, shift, size):
-    """`search`, and where shells cross the pair of their penetration. Returns what `search` does.
-
-    Status PENETRATING: the pair's normals oppose each other and its gap is negative. CROSSING: no such pair was found,
-    a crossing point is returned.
-    """
-    status, f, g, x, gap, lower, effort = search(table, pool, shell_f, shell_g, turn, shift, size, math.inf)
-    if status == CROSSING:
-        found, cf, cg, y, _n, depth = deepest(table, pool, shell_f, shell_g, turn, shift, f, g, x, size)
-        if found:
-            return PENETRATING, cf, cg, y, depth, 0.0, effort
-    return status, f, g, x, gap, lower, effort
-
-
-@kernel
-def nearest_features(table, pool, shell_f, shell_g, rotation, shift, size):
-    """The pair of two shells, g seen from f: status, features, coordinates (u_f, v_f, u_g, v_g) and gap."""
-    status, f, g, x, gap, _lower, _effort = nearest_or_deepest(table, pool, shell_f, shell_g, rotation, shift, size)
-    return status, f, g, x, gap

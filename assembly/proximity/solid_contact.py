@@ -8,25 +8,21 @@ The kernels here are large, and few scenes need them: loops call them by address
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
-from assembly._kernel import kernel
-from assembly.geometry.vec import add, dot, matvec, scale, sub
+from assembly._kernel import call_address, kernel
+from assembly.geometry.vec import matvec_t
 from assembly.kinematics.motion import relative_pose, rotation
-from assembly.proximity.extremal import CONVERGED, SINGULAR, own_frame
+from assembly.proximity.extremal import CONVERGED, SINGULAR
 from assembly.proximity.feature_pair import feature_record
-from assembly.proximity.nearest import CROSSING, search
-from assembly.proximity.shell import EDGE, EDGE_CURVE, EDGE_SURFACE, FACE
-from assembly.proximity.switching import feature_at, feature_kind, on_surface, track_features
+from assembly.proximity.nearest import CROSSING
+from assembly.proximity.nearest_query import NORMAL, PAIR
+from assembly.proximity.switching import track_features
 from assembly.proximity.velocity import RECORD
 
 FEATURE_F, FEATURE_G, PAIR_NORMAL, TRACK = 4, 5, 6, 9
 # Behind a record: whether surfaces do not cross at the pair, and how far it is from a fold.
 PROPER, FOLD, CONTACT_RECORD = RECORD, RECORD + 1, RECORD + 2
-# How far crossing solids are drawn apart at first, and at most; the shortest step back.
-FIRST, FARTHEST, SHORTEST = 0.03125, 64.0, 1e-4
 
 
 @kernel(inline=True)
@@ -77,75 +73,29 @@ def track_solids(table, pool, shell_f, shell_g, i, j, q, start, patience, record
     return status
 
 
-@kernel(inner=True)
-def outward(table, pool, shell, code, u, v):
-    """The outward normal at a point of a face; of an edge, that of its first face."""
-    if feature_kind(table, shell, code) == FACE:
-        return own_frame(table, pool, feature_at(table, shell, code), u, v)[1]
-    if feature_kind(table, shell, code) == EDGE:
-        edge = feature_at(table, shell, code)
-        surface = table[edge + EDGE_SURFACE]
-        u, v, _p, _along, _normal = on_surface(table, pool, surface, table[edge + EDGE_CURVE], u)
-        return own_frame(table, pool, surface, u, v)[1]
-    return (0.0, 0.0, 0.0)
-
-
-@kernel(inner=True)
-def draw_apart(table, pool, shell_f, shell_g, relative, shift, code_f, code_g, x, tracked, r):
-    """The pair of solids that cross at a point: g is drawn out along the normals there, and led back.
-
-    Led back in steps that may be halved, the closest pair passes through touching and says how deep the solids are in
-    each other. Returns whether it could be followed all the way.
-    """
-    n = sub(
-        outward(table, pool, shell_f, code_f, x[0], x[1]),
-        matvec(relative, outward(table, pool, shell_g, code_g, x[2], x[3])),
-    )
-    length = math.sqrt(dot(n, n))
-    if not length > 1e-6:
-        return False
-    n = scale(1.0 / length, n)
-    away = FIRST
-    while away <= FARTHEST:
-        status, f, g, y, gap, _lower, _effort = search(
-            table, pool, shell_f, shell_g, relative, add(shift, scale(away, n)), 1.0, math.inf
-        )
-        if status != CROSSING:
-            break
-        away *= 2.0
-    if away > FARTHEST or f < 0:
-        return False
-    write_tracked(y, f, g, (0.0, 0.0, 0.0), tracked, r)
-    step = 0.125 * away
-    while away > 0.0:
-        there = max(away - step, 0.0)
-        status, f, g, y, frame, _switches = track_row(
-            table, pool, shell_f, shell_g, relative, add(shift, scale(there, n)), tracked, r, math.inf
-        )
-        # The gap changes by no more than the step: a pair that jumps is another one.
-        if (status == CONVERGED or status == SINGULAR) and abs(frame[5] - gap) <= 1.001 * (away - there) + 1e-12:
-            away = there
-            gap = frame[5]
-            write_tracked(y, f, g, frame[0], tracked, r)
-        else:
-            step *= 0.5
-            if step < SHORTEST:
-                return False
-    return True
-
-
 @kernel
-def search_solids(table, pool, shell_f, shell_g, i, j, q, tracked, r):
-    """The closest features wherever they are, into tracked[r]. Returns whether there are any."""
-    relative, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
-    status, code_f, code_g, x, _gap, _lower, _effort = search(
-        table, pool, shell_f, shell_g, relative, shift, 1.0, math.inf
-    )
-    if code_f < 0:
+def search_solids(table, pool, shell_f, shell_g, i, j, q, nearest_at, deepest_at, tracked, r):
+    """The closest features wherever they are, into tracked[r]. Returns 1, or 0 where there are none.
+
+    `nearest_at` and `deepest_at` are the addresses of `nearest_query.find_nearest` and `find_deepest`, the latter 0
+    where it is not wanted: then solids that cross have no pair.
+    """
+    poses = np.empty((2, 7))
+    for k in range(7):
+        poses[0, k] = q[i, k]
+        poses[1, k] = q[j, k]
+    codes = np.zeros(2, np.int64)
+    out = np.zeros(PAIR)
+    status = call_address(nearest_at, (table, pool, shell_f, shell_g, poses, 1.0, codes, out))
+    if codes[0] < 0:
         return 0
-    # The normal is not known before the pair is tracked.
-    write_tracked(x, code_f, code_g, (0.0, 0.0, 0.0), tracked, r)
+    n = (0.0, 0.0, 0.0)
     if status == CROSSING:
-        found = draw_apart(table, pool, shell_f, shell_g, relative, shift, code_f, code_g, x, tracked, r)
-        return 1 if found else 0
+        if deepest_at == 0:
+            return 0
+        status = call_address(deepest_at, (table, pool, shell_f, shell_g, poses, 1.0, codes, out))
+        if status == CROSSING:
+            return 0
+        n = matvec_t(rotation(q, i), (out[NORMAL], out[NORMAL + 1], out[NORMAL + 2]))
+    write_tracked((out[0], out[1], out[2], out[3]), codes[0], codes[1], n, tracked, r)
     return 1

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from assembly.constraints.layout import ROW, ROW_TABLE, SHELL_F, SHELL_G
+from assembly.constraints.layout import DEEPEST_AT, NEAREST_AT, ROW, ROW_TABLE, SHELL_F, SHELL_G
 from assembly.kinematics.body import Body, BodyFace
 from assembly.proximity.pairs import ContactPair, PairStatus, extremal_pair
 from assembly.proximity.solid import feature_name, solid_of
@@ -47,7 +47,8 @@ def _solids(solution: Solution, k: int, places: list[int]) -> ContactPair:
     tracked = solution._parameters[k : k + 1].copy()
     scene = (packed.table, packed.pool, packed.table[row + SHELL_F], packed.table[row + SHELL_G], 0, 1, q)
     if np.isnan(tracked).any():
-        search_solids(*scene, tracked, 0)
+        nearest, deepest = packed.table[NEAREST_AT], packed.table[DEEPEST_AT]
+        search_solids(*scene, nearest, deepest, tracked, 0)
     records = np.zeros((1, CONTACT_RECORD))
     status = track_solids(*scene, tracked, np.inf, records, tracked, 0)
     gap, normal = records[0, GAP], records[0, NORMAL : NORMAL + 3]
