@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from functools import cached_property
 from typing import Literal, get_args
@@ -16,7 +17,7 @@ from assembly.geometry.face import Face
 from assembly.geometry.loop import Loop
 from assembly.kinematics.body import Body, BodyFace
 
-__all__ = ["FORMS", "Form", "Keep", "TrimContact"]
+__all__ = ["FORMS", "Form", "Keep", "TrimContact", "single_face"]
 
 Keep = Literal["on", "inside", "outside"]
 Form = Literal["signed", "parametric", "cartesian", "between"]
@@ -71,12 +72,15 @@ class TrimContact(Constraint):
                 raise InputError(f"{word} is {value!r}; expected one of {', '.join(map(repr, known))}")
         if side not in (None, "a", "b"):
             raise InputError(f"side is {side!r}; expected 'a', 'b' or None")
-        self._faces = (_single_face("a", contact.a), _single_face("b", contact.b))
+        self._faces = (single_face("a", contact.a), single_face("b", contact.b))
         self._contact = contact
         self._loop = loop if isinstance(loop, Loop) else Loop(loop)
         self._side = (0 if side == "a" else 1) if side is not None else self._owner()
         # A face of its own checks the loop against the surface.
-        self._region = Face(self._faces[self._side].surface, self._loop)
+        try:
+            self._region = Face(self._faces[self._side].surface, self._loop)
+        except InputError as error:
+            raise InputError(re.sub(r"\bouter\b", "loop", str(error))) from None
         self._keep: Keep = keep
         self._form: Form = form
         super().__init__(contact.bodies, f"trim {contact.name}" if name is None else name)
@@ -114,6 +118,11 @@ class TrimContact(Constraint):
         return self._side
 
     @property
+    def face(self) -> Face:
+        """The contact's face that the loop is on."""
+        return self._faces[self._side]
+
+    @property
     def region(self) -> Face:
         """The surface with the loop as its boundary."""
         return self._region
@@ -139,7 +148,7 @@ class TrimContact(Constraint):
         return f"TrimContact({self._contact.name!r}, keep={self._keep!r}, form={self._form!r}, name={self.name!r})"
 
 
-def _single_face(label: str, side: Body | BodyFace) -> Face:
+def single_face(label: str, side: Body | BodyFace) -> Face:
     """The only face of a side of a contact."""
     if isinstance(side, BodyFace):
         return side.face
