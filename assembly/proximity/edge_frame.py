@@ -89,6 +89,13 @@ def edge_held(table, pool, edge, t, dt):
     return not endless and ((t <= lo and dt < 0.0) or (t >= hi and dt > 0.0))
 
 
+@kernel(inner=True)
+def edge_stride(table, pool, edge):
+    """How far in t a straight part may be passed at once: one span with ends is straight all along, others in part."""
+    lo, hi, endless = edge_limits(table, pool, edge)
+    return hi - lo if table[table[edge + EDGE_CURVE] + CURVE_SPANS] == 1 and not endless else 0.0625 * (hi - lo)
+
+
 @kernel(inline=True)
 def face_side(a):
     """(X, Y) row by row of a face with shape operator a (11, 12, 22)."""

@@ -25,8 +25,8 @@ from assembly.proximity.edge_frame import (
     SLACK,
     edge_advance,
     edge_held,
-    edge_limits,
     edge_side,
+    edge_stride,
     face_side,
     fold_of,
     inverse,
@@ -133,11 +133,9 @@ def solve_on_face(table, pool, face, kind, other, rotation, shift, x, size, turn
             dt = (c0 * bx + c1 * by) / speed
             slide = limit > 0 and (steep or (not fine and abs(tilt) >= LEVEL))
             if slide:
-                # No point of the edge is extremal: on to the end where the gap is less.
-                lo, hi, endless = edge_limits(table, pool, other)
-                if endless:
-                    break
-                dt = lo - hi if slope > 0.0 else hi - lo
+                # The gap falls along all of this: on to where the edge bends or ends.
+                dt = edge_stride(table, pool, other)
+                dt = -dt if slope > 0.0 else dt
             # Held too where the step leads beyond the end: the slope may be that of a face not solved yet.
             point = limit > 0 and abs(dt) * speed > BEYOND * size and edge_held(table, pool, other, x[2], dt)
         if point:
@@ -161,7 +159,8 @@ def solve_on_face(table, pool, face, kind, other, rotation, shift, x, size, turn
         off = max(abs(r0), abs(r1))
         level = ROUNDING if fine else SLACK
         small = off <= level * size and abs(tilt) <= level
-        if small or (step <= tolerance and bend < 1e-9) or (bend < STAGNANT and step > 0.25 * previous):
+        settled = (step <= tolerance and bend < 1e-9) or (bend < STAGNANT and step > 0.25 * previous)
+        if not slide and (small or settled):
             _i, isolated = inverse(h, unit * (1.0 + abs(beta) * unit), RANK)
             done = abs(tilt) < LEVEL and off < LEVEL * size
             if point and kind == EDGE:

@@ -14,8 +14,6 @@ Leaving an edge or a vertex asks for more than rounding, entering one does not: 
 
 from __future__ import annotations
 
-import math
-
 from assembly._kernel import kernel
 from assembly.geometry.pieces import TRIM_CURVES, TRIM_FIRST
 from assembly.geometry.spline import (
@@ -28,7 +26,7 @@ from assembly.geometry.spline import (
     xyz,
 )
 from assembly.geometry.trim import trim_nearest, trim_side
-from assembly.geometry.vec import blend, cross, dot, matvec, matvec_t, neg, scale, sub
+from assembly.geometry.vec import blend, cross, dot, matvec, matvec_t, neg, sub
 from assembly.proximity.extremal import LEFT_PATCH, NOT_CONVERGED, into_domain
 from assembly.proximity.feature_pair import solve_features
 from assembly.proximity.shell import (
@@ -58,11 +56,10 @@ from assembly.proximity.shell import (
     VERTEX_RECORD,
     VERTEX_TABLE,
 )
+from assembly.proximity.tips import LEAN, from_tip, tip_near, unit
 
 # Switches in a row that no motion of a pair needs.
 ROUNDS = 64
-# Sine of the angle by which a normal must lean over a face or along an edge before that takes over.
-LEAN = 1e-9
 
 
 @kernel(inline=True)
@@ -94,13 +91,6 @@ def on_surface(table, pool, surface, curve, t):
     u, v, _held = into_domain(table, pool, surface, at[0], at[1])
     p, su, sv, _uu, _uv, _vv = surface_point(table, pool, surface, u, v)
     return u, v, p, blend(along[0], su, along[1], sv), cross(su, sv)
-
-
-@kernel(inline=True)
-def unit(a):
-    """A vector of length one, or zero."""
-    length = math.sqrt(dot(a, a))
-    return scale(1.0 / length, a) if length > 0.0 else a
 
 
 @kernel(inline=True)
@@ -206,6 +196,8 @@ def from_vertex(table, pool, shell, code, n):
             best = lean
             code = faces + table[at]
             found = (t, 0.0)
+    if table[vertex + VERTEX_EDGES] == 0:
+        return from_tip(table, pool, shell, vertex, code, n)
     return code, found
 
 
@@ -309,9 +301,18 @@ def track_features(table, pool, shell_f, shell_g, rotation, shift, code_f, code_
             size,
             turn,
         )
-        if status == NOT_CONVERGED or switches >= ROUNDS:
+        if switches >= ROUNDS:
             status = NOT_CONVERGED
             break
+        if status == NOT_CONVERGED:
+            tip_f = tip_near(table, pool, shell_f, code_f, x[0], x[1])
+            tip_g = tip_near(table, pool, shell_g, code_g, x[2], x[3]) if tip_f == code_f else code_g
+            if tip_f == code_f and tip_g == code_g:
+                break
+            code_f = tip_f
+            code_g = tip_g
+            switches += 1
+            continue
         n = frame[0]
         held = status == LEFT_PATCH
         code_f, at_f, switched = checked(table, pool, shell_f, code_f, x[0], x[1], held, n)

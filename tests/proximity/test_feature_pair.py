@@ -305,6 +305,31 @@ def test_line_inclined_to_a_plane_has_its_lower_end():
             close(out[:2], [(2.0 * low - 1.0) * direction[0], 0.0])
 
 
+def test_straight_parts_are_passed():
+    """A stadium, two lines and two half circles, inclined along its lines: its lowest point is on an arc."""
+    corners = [[1, -1], [2, -1], [2, 0], [2, 1], [1, 1], [-1, 1], [-2, 1], [-2, 0], [-2, -1], [-1, -1], [1, -1]]
+    points = np.insert(np.pad(np.array(corners, float), ((0, 0), (0, 1))), 5, [0.0, 1.0, 0.0], axis=0)
+    points = np.insert(points, 11, [0.0, -1.0, 0.0], axis=0)
+    weights = np.array([1, HALF, 1, HALF, 1, 1, 1, HALF, 1, HALF, 1, 1, 1])
+    knots = np.r_[0, np.repeat(np.arange(7), 2), 6]
+    stadium = NurbsCurve(points, knots, 2, weights)
+    close(stadium.evaluate(2.5), [0.0, 1.0, 0.0])
+    for endless in (False, True):
+        edge = Feature(EDGE, curve=stadium, endless=endless)
+        for tilt in (0.2, 1.4):
+            q = pose(0.0, 0.0, 3.0, turn(1, tilt))
+            for start in (2.1, 2.5, 2.9, 5.5):
+                status, out = both(PLANE, edge, HOME, q, [0.0, 0.5, start, 0.0])
+                if start == 5.5 and not endless:
+                    # Down to the end of the curve, in the middle of nothing.
+                    assert status == "LEFT_PATCH" and out[2] == 6.0
+                    close(out[GAP], 3.0 - np.sin(tilt))
+                    continue
+                assert status == "CONVERGED"
+                close(out[GAP], 3.0 - 2.0 * np.sin(tilt))
+                close(out[2], 1.0)
+
+
 def test_an_extremum_at_the_very_end_is_one():
     status, out = both(LINE, POINT, HOME, pose(1.0, 0.3, 0.4), [0.4, 0.0, 0.0, 0.0])
     assert status == "CONVERGED"
