@@ -199,6 +199,8 @@ CASES = {
     "constraint name": (["constraints", 1, "name"], 'base-"link"\n', r"constraints\[1\]: constraint name .* is taken"),
     "empty constraint name": (["constraints", 1, "name"], "", r"constraints\[1\].name is ''; expected a nonempty"),
     "unilateral": (["constraints", 1, "unilateral"], None, r"constraints\[1\].unilateral is null; expected true or"),
+    "edges": (["constraints", 0, "edges"], None, r"constraints\[0\].edges is null; expected true or false"),
+    "no edges": (["constraints", 1, "edges"], False, r"constraints\[1\].edges is False for a body with several"),
     "side": (["constraints", 0, "a"], "base", r"constraints\[0\].a is \"base\"; expected an object with the fields"),
     "stranger": (["constraints", 0, "a", "body"], "bose", r"constraints\[0\].a.body: name is 'bose'; expected one of"),
     "shapeless": (["constraints", 0, "a", "body"], "hand", r"constraints\[0\].a is body 'hand' without a shape"),

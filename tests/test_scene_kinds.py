@@ -73,7 +73,7 @@ def every_constraint():
         asm.Angle(here, wheel, 0.1),
         asm.Angle(there, wheel, name="between", limits=(0.2, 0.3)),
     ]
-    touch = asm.Contact(ground, crank, "touch")
+    touch = asm.Contact(ground, crank, "touch", edges=True)
     corners = np.array([[0.1, 0.2], [THIRD, 0.2], [0.3, 0.7], [0.1, 0.2]])
     loop = asm.NurbsCurve(corners, [0, 0, 1, 2, 3, 3], 1)
     scene = asm.Assembly([ground, crank, wheel])
@@ -132,7 +132,7 @@ def assert_same_frame(came, expected):
 def assert_same_constraint(came, expected):
     assert type(came) is type(expected) and came.name == expected.name and repr(came) == repr(expected)
     assert [body.name for body in came.bodies] == [body.name for body in expected.bodies]
-    for name in ("offset", "pitch", "axes", "ratio", "radius", "unilateral", "scale", "weight"):
+    for name in ("offset", "pitch", "axes", "ratio", "radius", "unilateral", "edges", "scale", "weight"):
         assert getattr(came, name, None) == getattr(expected, name, None)
     if isinstance(expected, Joint):
         assert_same_frame(came.frame_a, expected.frame_a)

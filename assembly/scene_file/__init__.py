@@ -12,7 +12,7 @@ A file is one object, and every field must be there:
 
 Fields of a constraint by its type:
 
-    contact         a {body, face}, b {body, face}, unilateral
+    contact         a {body, face}, b {body, face}, unilateral, edges
     fixed           frame_a, frame_b, axes
     revolute        frame_a, frame_b, axes, angle, limits
     prismatic       frame_a, frame_b, axes, slide, limits
@@ -52,7 +52,7 @@ without limits; angles are in radians. A coupling refers to joints of the same f
 `function` of an expression is the text of `Expression.document()`. A sign is 1 (minimized) or -1 (maximized). Numbers
 are the shortest decimals that give back the same doubles.
 
-Version 1 had no faces, colors, loops and trims; a `shape` was [{surface, name, reversed}]. Its files are read, too.
+Version 1, which is read, too, had no faces, colors, loops, edges and trims; a `shape` was [{surface, name, reversed}].
 """
 
 from __future__ import annotations

@@ -319,7 +319,9 @@ EXPRESSION = Record(
 
 CONSTRAINTS = OneOf(
     {
-        "contact": Record(Contact, NAME, Field("a", SIDE), Field("b", SIDE), UNILATERAL),
+        "contact": Record(
+            Contact, NAME, Field("a", SIDE), Field("b", SIDE), UNILATERAL, Field("edges", Plain(flag), since=2)
+        ),
         "fixed": Record(Fixed, NAME, *FRAMES, AXES),
         "revolute": Record(Revolute, NAME, *FRAMES, AXES, *_free("angle")),
         "prismatic": Record(Prismatic, NAME, *FRAMES, AXES, *_free("slide")),
