@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from assembly.geometry import shapes as shapes
     from assembly.geometry.curve import NurbsCurve as NurbsCurve
     from assembly.geometry.face import Face as Face
+    from assembly.geometry.loop import Loop as Loop
     from assembly.geometry.surface import NurbsSurface as NurbsSurface
     from assembly.kinematics.body import Body as Body
     from assembly.kinematics.ellipsoid import Ellipsoid as Ellipsoid
@@ -77,6 +78,7 @@ else:
             "Fixed": "assembly.constraints.joints",
             "FrameDistance": "assembly.constraints.objectives",
             "Gear": "assembly.constraints.couplings",
+            "Loop": "assembly.geometry.loop",
             "Mobility": "assembly.solve.mobility",
             "NurbsCurve": "assembly.geometry.curve",
             "NurbsSurface": "assembly.geometry.surface",

@@ -348,11 +348,10 @@ class Packed:
         places = [self._places[id(body)] for body in trim.bodies]
         form = FORMS.index(trim.form)
         count = (1, 2, 3, 3)[form]
-        # A form of several rows is one-sided as a whole: its rows vanish on the right side.
         side = int(trim.unilateral)
         edges = -1 if form == 0 else self._loop_edges(trim, loop, rows[pair][layout.SURFACE_F + trim.side])
         self._header[layout.VECTOR_TRIMS] |= int(form > 0)
-        fields = [layout.TRIM_ROW, *places, side if form == 0 else 0, 0, 1, pair, trim.side, loop, at, form]
+        fields = [layout.TRIM_ROW, *places, side, 0, 1, pair, trim.side, loop, at, form]
         return [[*fields, count, edges, side] for _ in range(count)]
 
     def _loop_edges(self, trim: TrimContact, loop: int, surface: int) -> int:

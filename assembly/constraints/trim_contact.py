@@ -41,8 +41,8 @@ class TrimContact(Constraint):
         The rows. "signed": the signed distance of the contact from the loop in (u, v), times the mean stretch of the
         surface over the loop, one row. The others are those of paper 001, section 3.4, with c the point of the
         loop's own extremum against the other surface: u_f - c (2 rows), f(u_f) - f(c) (3) and g(u_g) - f(c)
-        (3). At a solution they depend on one another, which the loop of the solve bears; one-sided ones are
-        idle on the right side.
+        (3). At a solution they depend on one another, which the loop of the solve bears. One-sided, the length of the
+        vector counts, negative on the wrong side; "between" contains the gap, and is for "on" alone.
     side : "a" or "b", optional
         Which of the contact's faces the loop is on; by default the one that has it, else "a".
     name : str, optional
@@ -69,6 +69,8 @@ class TrimContact(Constraint):
         for word, value, known in (("keep", keep, get_args(Keep)), ("form", form, FORMS)):
             if value not in known:
                 raise InputError(f"{word} is {value!r}; expected one of {', '.join(map(repr, known))}")
+        if form == "between" and keep != "on":
+            raise InputError(f"keep is {keep!r} with form 'between', which contains the gap; expected 'on'")
         if side not in (None, "a", "b"):
             raise InputError(f"side is {side!r}; expected 'a', 'b' or None")
         self._faces = (single_face("a", contact.a), single_face("b", contact.b))

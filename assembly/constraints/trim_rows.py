@@ -10,8 +10,8 @@ a curve (appendix A, corrected):
 
 in the axes of the face's body, where f(u) and f(c) have no rates of their own. At a solution they depend on one
 another (the loop's extremum is then the contact's), each a multiple of s; so are their second derivatives taken to
-be. One-sided ones are zero on the right side of the loop. The loop of a solve calls the two kernels at the end by
-their addresses.
+be. One-sided, a vector counts by its length, positive on the right side of the loop. The loop of a solve calls the two
+kernels at the end by their addresses.
 """
 
 from __future__ import annotations
@@ -57,6 +57,9 @@ from assembly.proximity.shell import EDGE, EDGE_CURVE, EDGE_RECORD, FACE
 from assembly.proximity.switching import on_surface
 from assembly.proximity.trim_distance import trim_distance
 from assembly.proximity.velocity import GAP, NORMAL, RATES, ZED
+
+# A vector shorter than this has no direction of its own.
+NO_LENGTH = 1e-9
 
 
 @kernel(inner=True)
@@ -190,7 +193,7 @@ def vector_rows(table, pool, first, loose, point):
     scratch = table[CONTACTS] + table[JOINTS]
     curve, t, moves, s = loop_extremum(table, pool, row, x, o, turn_f, relative, shift, records, scratch)
     factor = pool[table[row + TRIM_FACTOR]]
-    idle = table[row + TRIM_ONE_SIDED] == 1 and factor * s >= 0.0
+    kept = 1.0 if factor >= 0.0 else -1.0
     factor = abs(factor)
     turn = turn_f if side == 0 else turn_g
     surface = own_surface(table, row)
@@ -215,9 +218,6 @@ def vector_rows(table, pool, first, loose, point):
     for l in range(table[row + TRIM_COUNT]):
         r = first + l
         clear(jacobian, r)
-        residual[r] = 0.0
-        if idle:
-            continue
         if form == PARAMETRIC:
             residual[r] = factor * (x[o + l] - at[l])
             slope = factor * rate[l]
@@ -246,6 +246,76 @@ def vector_rows(table, pool, first, loose, point):
             add_coordinate(loose, records, k, 3 - o, dot(axis, dv), jacobian, r)
         if moves:
             add_rate(records, scratch, o, -slope, jacobian, r)
+    if table[row + TRIM_ONE_SIDED] == 1:
+        signed_length(table, pool, first, table[row + TRIM_COUNT], 1.0 if kept * s >= 0.0 else -1.0, loose, point)
+
+
+@kernel(inner=True)
+def signed_length(table, pool, first, count, side, loose, point):
+    """One row of a vector's rows: its length, positive on the right side of the loop. The others become zero.
+
+    The length is smooth through zero, but its gradient is 0 / 0 there: as all columns of the rows are then along one
+    line, that of the greatest stands for the direction, and the signed distance says which way is positive.
+    """
+    residual = point[3]
+    jacobian = point[4]
+    square = 0.0
+    for l in range(count):
+        square += residual[first + l] * residual[first + l]
+    length = math.sqrt(square)
+    best = -1
+    most = 0.0
+    for j in range(FREE_COLUMN + 4):
+        column = 0.0
+        for l in range(count):
+            column += jacobian[first + l, j] * jacobian[first + l, j]
+        if column > most:
+            most = column
+            best = j
+    sign = side
+    if length < NO_LENGTH and best >= 0:
+        sign = 1.0
+        reach = math.sqrt(most)
+        for l in range(count):
+            residual[first + l] = jacobian[first + l, best] / reach
+        column = reach
+    else:
+        column = 0.0
+        for l in range(count):
+            residual[first + l] /= max(length, 1e-300)
+    for j in range(FREE_COLUMN + 4):
+        slope = 0.0
+        for l in range(count):
+            slope += residual[first + l] * jacobian[first + l, j]
+            if l > 0:
+                jacobian[first + l, j] = 0.0
+        jacobian[first, j] = sign * slope
+    for l in range(1, count):
+        residual[first + l] = 0.0
+    residual[first] = side * length
+    if column > 0.0 and growth(table, pool, first, best, loose, point) < 0.0:
+        for j in range(FREE_COLUMN + 4):
+            jacobian[first, j] = -jacobian[first, j]
+
+
+@kernel(inner=True)
+def growth(table, pool, r, j, loose, point):
+    """The derivative along column j of the signed distance, positive on the right side of the loop."""
+    tracked = point[1]
+    records = point[2]
+    row = table[ROW_TABLE] + ROW * r
+    k = table[row + TRIM_PAIR]
+    o = 2 * table[row + TRIM_SIDE]
+    factor = pool[table[row + TRIM_FACTOR]]
+    _s, n, _bend = trim_distance(table, pool, table[row + TRIM_LOOP], tracked[k, o], tracked[k, o + 1])
+    value = 0.0
+    for i in range(2):
+        if loose[0][k] >= 0:
+            value += n[i] if j == FREE_COLUMN + o + i else 0.0
+        elif j < FREE_COLUMN:
+            for l in range(4):
+                value += n[i] * records[k, RATES + 4 * (o + i) + l] * records[k, ZED + 12 * l + j]
+    return factor * value
 
 
 @kernel

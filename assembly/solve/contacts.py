@@ -14,19 +14,15 @@ from assembly.constraints.layout import (
     ROW_TABLE,
     SHELL_F,
     SHELL_G,
-    SIGNED,
     SURFACE_F,
     SURFACE_G,
-    TRIM_FORM,
-    TRIM_PAIR,
-    TRIMS,
 )
 from assembly.constraints.program import search_row, surface_of, track_row
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.extremal import CONVERGED, SINGULAR, pair_frame
 from assembly.proximity.free_pair import coordinate_lengths
 from assembly.proximity.shell import FACE
-from assembly.proximity.solid_contact import FEATURE_F, FEATURE_G, FOLD
+from assembly.proximity.solid_contact import FEATURE_F, FEATURE_G, FOLD, TRACK
 from assembly.proximity.start import global_start
 from assembly.proximity.switching import feature_kind
 
@@ -73,6 +69,8 @@ def start_contacts(table, pool, q, contacts, free, lengths):
         turn, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
         status, x, _gap = global_start(table, pool, table[row + SURFACE_F], table[row + SURFACE_G], turn, shift, 1.0)
         contacts[k, 0], contacts[k, 1], contacts[k, 2], contacts[k, 3] = x
+        for l in range(FEATURE_F, TRACK):
+            contacts[k, l] = 0.0
         if status != CONVERGED and status != SINGULAR:
             if not free_pair(table, pool, row, k, contacts, free, lengths):
                 return k
@@ -86,13 +84,6 @@ def free_folds(table, pool, records, contacts, active, free, lengths, below, los
     An idle one-sided row asks nothing of its pair.
     """
     count = 0
-    for r in range(table[CONTACTS], table[CONTACTS] + table[TRIMS]):
-        # The second derivative of a trim that counts is known in the coordinates alone.
-        row = table[ROW_TABLE] + ROW * r
-        k = table[row + TRIM_PAIR]
-        counts = table[row + TRIM_FORM] == SIGNED
-        if free[k] < 0 and counts and not (table[row + ONE_SIDED] == 1 and active[r] == 0.0):
-            free_pair(table, pool, table[ROW_TABLE] + ROW * k, k, contacts, free, lengths)
     for k in range(table[CONTACTS]):
         row = table[ROW_TABLE] + ROW * k
         idle = table[row + ONE_SIDED] == 1 and active[k] == 0.0

@@ -27,12 +27,12 @@ def touching(shape_a, shape_b, position, quaternion, **options):
 
 def holds(scene, solution):
     """Whether every contact is found again, by a search that knows nothing of the loop's unknowns, with its gap."""
-    for k, (f, g) in enumerate(scene.packed().faces):
+    for k, (f, g) in enumerate(scene.packed().sides):
         q_f, q_g = (solution.q[[body.name for body in scene.bodies].index(side.body.name)] for side in (f, g))
-        pair = asm.proximity.extremal_pair(f, q_f, g, q_g, solution._parameters[k])
+        pair = asm.proximity.extremal_pair(f, q_f, g, q_g, solution._parameters[k, :4])
         if abs(pair.gap) > 1e-9 * scene.packed().scale:
             return False
-        if pair.status not in FOUND and not flush(f, q_f, g, q_g, solution._parameters[k]):
+        if pair.status not in FOUND and not flush(f, q_f, g, q_g, solution._parameters[k, :4]):
             return False
     return True
 

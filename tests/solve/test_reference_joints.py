@@ -10,6 +10,7 @@ import assembly as asm
 from assembly.constraints.constraint import Constraint
 from assembly.constraints.objectives import Objective
 from assembly.kinematics.pose import retract
+from assembly.proximity.solid_contact import TRACK
 from assembly.solve import reference
 from assembly.solve.reference import ReferenceSolver
 from assembly.solve.reference_rows import Poses, Rows
@@ -301,7 +302,7 @@ def test_driven_values_limits_and_targets_change_without_building_again():
         check_poses(ours, theirs, 3.0)
         assert difference(asm.reference.solve(scene, last).q, theirs.q).max() <= 1e-8
         last = theirs
-    value = last._state[scene.packed().angles_at : scene.packed().multipliers_at : 4]
+    value = last._state[scene.packed().angles_at : scene.packed().multipliers_at : TRACK]
     assert 7.0 == pytest.approx(value[0], abs=1e-9)
     assert reference._built.cache_info().misses == built
     drive.angle = None
@@ -311,7 +312,7 @@ def test_driven_values_limits_and_targets_change_without_building_again():
     assert reference._built.cache_info().misses == built + 1
     check_poses(scene.solve(), free, 3.0)
     number = scene.packed()._angles.index(pivot.freedom().coordinate)
-    where = free._state[scene.packed().angles_at + 4 * number]
+    where = free._state[scene.packed().angles_at + TRACK * number]
     pivot.limits = (where + 0.1, where + 1.0)
     ours, theirs = scene.solve(free), asm.reference.solve(scene, free)
     assert reference._built.cache_info().misses == built + 1
@@ -328,7 +329,7 @@ def test_offsets_change_without_building_again():
     mesh.offset = 0.3
     last = solver.solve()
     check_poses(scene.solve(), last, 2.0)
-    angles = last._state[scene.packed().angles_at : scene.packed().multipliers_at : 4]
+    angles = last._state[scene.packed().angles_at : scene.packed().multipliers_at : TRACK]
     # 2, then -2.5 * 2 + 0.1, then -2.5 * -4.9 + 0.3: angles go on past whole turns.
     np.testing.assert_allclose(angles, [2.0, -4.9, 12.55], rtol=0, atol=1e-9)
 
