@@ -81,7 +81,7 @@ def every_constraint():
         *couplings,
         touch,
         *joints,
-        asm.TrimContact(touch, loop, "inside", "between", side="b", name="kept"),
+        asm.TrimContact(touch, loop, "inside", "cartesian", side="b", name="kept"),
         asm.Expression(mixed(3, 2), [wheel, ground, crank], unilateral=True, scale=0.1, weight=THIRD),
     )
     scene.minimize(
