@@ -9,6 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import casadi as ca
+import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -21,19 +22,26 @@ from assembly.scene_file.kinds import CONSTRAINTS, OBJECTIVES
 def small_document():
     """Every kind of thing, and as little of it as there can be, so that changes hit every kind of field."""
     patch = asm.NurbsSurface([[[0, 0, 0], [0, 1, 0]], [[1, 0, 0], [1, 1, 0]]], [[0, 0, 1, 1]] * 2, (1, 1))
-    a, b, c = (asm.Body(name, asm.Face(patch, name="top"), fixed=name == "a") for name in "abc")
+    corners = np.array([[0, 0], [1, 0], [0, 1], [0, 0]])
+    outer, inner = (
+        asm.NurbsCurve(size * corners + at, [0, 0, 1, 2, 3, 3], 1) for size, at in ((0.75, 0.125), (0.25, 0.25))
+    )
+    trimmed = asm.Face(patch, outer, [inner], name="top", color=(0.5, 0, 1))
+    shapes = {"a": trimmed, "b": asm.Face(patch, name="top"), "c": [trimmed]}
+    a, b, c = (asm.Body(name, shape, fixed=name == "a", color=(1, 0, 0.5)) for name, shape in shapes.items())
     pose = ca.SX.sym("pose", 7)
     f = ca.Function("f", [pose], [ca.fmax(pose[0] * pose[1], 2.5) + ca.sin(pose[2])])
     hinge, slider = asm.Revolute(a, b, "h", angle=0.5, limits=(0, 1)), asm.Prismatic(a, c, "s", limits=(None, 1))
     screw = asm.Screw(a, c, 2.0, angle_limits=(None, 1))
     scene = asm.Assembly([a, b, c])
+    touch = asm.Contact(a, b.face("top"))
     scene.constrain(
         asm.Gear(hinge, screw.freedom("angle"), 2.0),
         asm.RackPinion(hinge, slider, 2.0),
         hinge,
         slider,
         screw,
-        asm.Contact(a, b.face("top")),
+        touch,
         asm.Fixed(a, b, axes="opposed"),
         asm.Cylindrical(a, b, slide=0.5),
         asm.Planar(a, b, offset=1.0),
@@ -45,6 +53,9 @@ def small_document():
         asm.PointOnPlane(a, b),
         asm.Distance(a, b, 1.0),
         asm.Angle(a, b, limits=(0.5, None)),
+        asm.TrimContact(touch, a.face().face.outer, "outside", name="t"),
+        asm.TrimContact(touch, a.face().face.holes[0], name="n"),
+        asm.TrimContact(touch, inner, form="cartesian", side="b"),
         asm.Expression(f, [b]),
     )
     scene.minimize(
@@ -68,7 +79,8 @@ def places(value, path=()):
         yield from places(item, (*path, key))
 
 
-WORDS = ["a", "b", "top", "h", "s", "angle", "slide", "aligned", "opposed", *CONSTRAINTS.kinds, *OBJECTIVES.kinds]
+WORDS = ["a", "b", "top", "h", "s", "a-b", "outer", "inside", "signed", "angle", "slide", "aligned", "opposed"]
+WORDS += [*CONSTRAINTS.kinds, *OBJECTIVES.kinds]
 SCALARS = st.one_of(
     st.none(),
     st.booleans(),
@@ -150,7 +162,7 @@ def test_a_changed_document_loads_or_raises_input_error(tmp_path_factory, docume
 
 
 @settings(max_examples=150)
-@given(changed_documents(within=("constraints", len(CONSTRAINTS.kinds) - 1, "function")))
+@given(changed_documents(within=("constraints", len(CONSTRAINTS.kinds) + 1, "function")))
 def test_a_changed_function_loads_or_raises_input_error(tmp_path_factory, document):
     check(tmp_path_factory.getbasetemp() / "function.json", document)
 

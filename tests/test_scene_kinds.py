@@ -73,11 +73,15 @@ def every_constraint():
         asm.Angle(here, wheel, 0.1),
         asm.Angle(there, wheel, name="between", limits=(0.2, 0.3)),
     ]
+    touch = asm.Contact(ground, crank, "touch", edges=True)
+    corners = np.array([[0.1, 0.2], [THIRD, 0.2], [0.3, 0.7], [0.1, 0.2]])
+    loop = asm.NurbsCurve(corners, [0, 0, 1, 2, 3, 3], 1)
     scene = asm.Assembly([ground, crank, wheel])
     scene.constrain(
         *couplings,
-        asm.Contact(ground, crank, "touch"),
+        touch,
         *joints,
+        asm.TrimContact(touch, loop, "inside", "cartesian", side="b", name="kept"),
         asm.Expression(mixed(3, 2), [wheel, ground, crank], unilateral=True, scale=0.1, weight=THIRD),
     )
     scene.minimize(
@@ -128,7 +132,7 @@ def assert_same_frame(came, expected):
 def assert_same_constraint(came, expected):
     assert type(came) is type(expected) and came.name == expected.name and repr(came) == repr(expected)
     assert [body.name for body in came.bodies] == [body.name for body in expected.bodies]
-    for name in ("offset", "pitch", "axes", "ratio", "radius", "unilateral", "scale", "weight"):
+    for name in ("offset", "pitch", "axes", "ratio", "radius", "unilateral", "edges", "scale", "weight"):
         assert getattr(came, name, None) == getattr(expected, name, None)
     if isinstance(expected, Joint):
         assert_same_frame(came.frame_a, expected.frame_a)
@@ -326,7 +330,7 @@ CASES = {
     "type": (
         [HINGE, "type"],
         "hinge",
-        r'.type is "hinge"; expected one of contact, fixed, .*, rack_pinion, expression$',
+        r'.type is "hinge"; expected one of contact, fixed, .*, rack_pinion, trim_contact, expression$',
     ),
     "type of a term": ([HINGE, "type"], "posture", r'.type is "posture"; expected one of contact'),
     "missing": ([HINGE, "limits"], MISSING, " has no field 'limits'; expected the fields type, name, frame_a, frame_b"),

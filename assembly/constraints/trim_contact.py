@@ -16,7 +16,7 @@ from assembly.geometry.face import Face
 from assembly.geometry.loop import Loop
 from assembly.kinematics.body import Body, BodyFace
 
-__all__ = ["FORMS", "Form", "Keep", "TrimContact"]
+__all__ = ["FORMS", "Form", "Keep", "TrimContact", "single_face"]
 
 Keep = Literal["on", "inside", "outside"]
 Form = Literal["signed", "parametric", "cartesian", "between"]
@@ -73,7 +73,7 @@ class TrimContact(Constraint):
             raise InputError(f"keep is {keep!r} with form 'between', which contains the gap; expected 'on'")
         if side not in (None, "a", "b"):
             raise InputError(f"side is {side!r}; expected 'a', 'b' or None")
-        self._faces = (_single_face("a", contact.a), _single_face("b", contact.b))
+        self._faces = (single_face("a", contact.a), single_face("b", contact.b))
         self._contact = contact
         if not isinstance(loop, (Loop, NurbsCurve, Iterable)):
             raise TypeError(f"loop is {loop!r}; expected a Loop, a closed NurbsCurve, or several that close")
@@ -121,6 +121,11 @@ class TrimContact(Constraint):
         return self._side
 
     @property
+    def face(self) -> Face:
+        """The contact's face that the loop is on."""
+        return self._faces[self._side]
+
+    @property
     def region(self) -> Face:
         """The surface with the loop as its boundary."""
         return self._region
@@ -146,7 +151,7 @@ class TrimContact(Constraint):
         return f"TrimContact({self._contact.name!r}, keep={self._keep!r}, form={self._form!r}, name={self.name!r})"
 
 
-def _single_face(label: str, side: Body | BodyFace) -> Face:
+def single_face(label: str, side: Body | BodyFace) -> Face:
     """The only face of a side of a contact."""
     if isinstance(side, BodyFace):
         return side.face

@@ -104,7 +104,7 @@ class Loop:
 
     @classmethod
     def unchecked(
-        cls, curves: NurbsCurve | Iterable[NurbsCurve], tolerance: float, period: Sequence[float], name: str
+        cls, curves: NurbsCurve | Iterable[NurbsCurve], tolerance: float, period: Sequence[float] | None, name: str
     ) -> Loop:
         """A loop by its name in messages; whether it crosses itself is looked at later, with all loops of a face."""
         loop = object.__new__(cls)
@@ -174,9 +174,12 @@ class Loop:
         before = np.roll(ends[:, 1], 1, axis=0)
         before[0] -= snapped
         exact = ends[:, 0] == before
-        corners = np.where(exact, before, 0.5 * (before + ends[:, 0]))
+        # A turn is exact if either end follows from the other, so that to join once more moves nothing.
+        turns = (turn == snapped) | (ends[0, 0] + snapped == ends[-1, 1])
+        exact[0] |= turns
+        corners = np.where(exact, ends[:, 0], 0.5 * (before + ends[:, 0]))
         after = np.roll(corners, -1, axis=0)
-        after[-1] += snapped
+        after[-1] = np.where(turns, ends[-1, 1], corners[0] + snapped)
         differs = (ends[:, 0] != corners).any(axis=1) | (ends[:, 1] != after).any(axis=1)
         for k in np.flatnonzero(differs).tolist():
             parts[k] = _with_ends(parts[k], corners[k], after[k])

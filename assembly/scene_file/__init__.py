@@ -3,15 +3,16 @@
 A file is one object, and every field must be there:
 
     format       "assembly-scene"
-    version      1
+    version      2
     surfaces     [{name, degree [p, q], knots [U, V], control_points [n_u][n_v][3], weights [n_u][n_v]}]
-    bodies       [{name, fixed, position [3], quaternion [w, x, y, z], shape [{surface, name, reversed}]}]
+    faces        [{surface, name, reversed, color [red, green, blue], outer (a loop), holes [loops]}]
+    bodies       [{name, fixed, position [3], quaternion [w, x, y, z], color [red, green, blue], shape [faces]}]
     constraints  [{type, name, and the fields of the type}]
     objective    [{type, sign, and the fields of the type}]
 
 Fields of a constraint by its type:
 
-    contact         a {body, face}, b {body, face}, unilateral
+    contact         a {body, face}, b {body, face}, unilateral, edges
     fixed           frame_a, frame_b, axes
     revolute        frame_a, frame_b, axes, angle, limits
     prismatic       frame_a, frame_b, axes, slide, limits
@@ -28,6 +29,7 @@ Fields of a constraint by its type:
     angle           frame_a, frame_b, value, limits
     gear            a {joint, freedom}, b {joint, freedom}, ratio, offset
     rack_pinion     pinion {joint, freedom}, rack {joint, freedom}, radius, offset
+    trim_contact    contact, side, loop, keep, form
     expression      bodies [names], function [lines], unilateral, scale, weight
 
 Fields of a term of the objective by its type:
@@ -38,14 +40,19 @@ Fields of a term of the objective by its type:
     posture         weight, reference [n][7] or null
     expression      name, bodies [names], function [lines], unilateral, scale, weight
 
-A face's `surface` is an index into `surfaces`, so that a surface many bodies share is there once. The name of a
-surface is null where none was given; the face of a contact's side is null where the nearest is to be found. Frames,
-and the points of joints, are {body, origin [3], axes [x, y, z]} in body coordinates, the axes unit vectors at right
-angles. The `axes` of a joint are "aligned" or "opposed". A driven value is a number, or null where the freedom is
-free; limits are [lower, upper], null for a side without limit, or null without limits; angles are in radians. A
-coupling refers to joints of the same file, which may stand after it. The `function` of an expression is the text of
-`Expression.document()`. A sign is 1 (minimized) or -1 (maximized). Numbers are the shortest decimals that give back
-the same doubles.
+A loop is {tolerance, curves [{name, degree, knots, control_points [n][2], weights [n]}]}, as `Loop` takes them. A
+face's `surface` is an index into `surfaces`, and a body's `shape` are indices into `faces`, so that what many bodies
+share is there once. Names of surfaces, faces and curves, and colors, are null where none were given, `outer` where the
+edge of the surface is meant; the face of a contact's side is null where the nearest is to be found. A trim refers to a
+contact of the same file that stands before it; its `side` is "a" or "b", its `loop` "outer" or the index of a hole of
+that side's face, or a loop of its own. Frames, and the points of joints, are {body, origin [3], axes [x, y, z]} in
+body coordinates, the axes unit vectors at right angles. The `axes` of a joint are "aligned" or "opposed". A driven
+value is a number, or null where the freedom is free; limits are [lower, upper], null for a side without limit, or null
+without limits; angles are in radians. A coupling refers to joints of the same file, which may stand after it. The
+`function` of an expression is the text of `Expression.document()`. A sign is 1 (minimized) or -1 (maximized). Numbers
+are the shortest decimals that give back the same doubles.
+
+Version 1, which is read, too, had no faces, colors, loops, edges and trims; a `shape` was [{surface, name, reversed}].
 """
 
 from __future__ import annotations

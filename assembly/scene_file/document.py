@@ -9,16 +9,15 @@ from typing import Any
 
 from assembly.assembly import Assembly
 from assembly.constraints.constraint import Constraint
-from assembly.constraints.joint import Joint
 from assembly.errors import InputError
 from assembly.scene_file.fields import at, bad, each, members, whole, written
-from assembly.scene_file.kinds import BODY, CONSTRAINTS, OBJECTIVES, SURFACE, refers_to_joints
+from assembly.scene_file.kinds import BODY, CONSTRAINTS, FACE, OBJECTIVES, SURFACE, refers_to_others
 from assembly.scene_file.records import Listed, Parts
 
 __all__ = ["load", "save"]
 
 FORMAT = "assembly-scene"
-VERSION = 1
+VERSION = 2
 _SIGNS = {1: "minimized", -1: "maximized"}
 
 
@@ -47,13 +46,15 @@ def save(scene: Assembly, path: str | PathLike[str]) -> None:
 
 
 def _document(scene: Assembly) -> dict[str, Any]:
-    parts = Parts(scene, {item.name: item for item in scene.constraints if isinstance(item, Joint)})
-    # Bodies first: surfaces are numbered as their faces come.
+    parts = Parts(scene, VERSION, {item.name: item for item in scene.constraints})
+    # Bodies first, then their faces: both tables are numbered as their entries come.
     bodies = Listed(BODY).write("bodies", scene.bodies, parts)
+    faces = Listed(FACE).write("faces", parts.faces, parts)
     return {
         "format": FORMAT,
         "version": VERSION,
         "surfaces": Listed(SURFACE).write("surfaces", parts.surfaces, parts),
+        "faces": faces,
         "bodies": bodies,
         "constraints": Listed(CONSTRAINTS).write("constraints", scene.constraints, parts),
         "objective": [
@@ -78,7 +79,7 @@ def load(path: str | PathLike[str]) -> Assembly:
     Raises
     ------
     InputError
-        Not a scene file of this version; the text names the field by its path, for example
+        Not a scene file of this version or an older one; the text names the field by its path, for example
         `surfaces[0].knots[1] has 3 values; expected 4 ...`.
     OSError
         The file cannot be read.
@@ -115,14 +116,17 @@ def _scene(document: Any) -> Assembly:
         found = document.get("format") if isinstance(document, dict) else document
         raise bad("format" if isinstance(document, dict) else "document", found, f"a scene of format {FORMAT!r}")
     version = whole("version", document.get("version"))
-    if version != VERSION:
+    if not 1 <= version <= VERSION:
         newer = "; a newer version of this library wrote the file" if version > VERSION else ""
-        raise bad("version", version, f"{VERSION}{newer}")
-    names = ("format", "version", "surfaces", "bodies", "constraints", "objective")
-    _, _, surfaces, bodies, constraints, objective = members("document", document, names)
+        raise bad("version", version, f"1 to {VERSION}{newer}")
+    tables = ("surfaces",) if version == 1 else ("surfaces", "faces")
+    names = ("format", "version", *tables, "bodies", "constraints", "objective")
+    _, _, surfaces, *faces, bodies, constraints, objective = members("document", document, names)
     scene = Assembly()
-    parts = Parts(scene)
+    parts = Parts(scene, version)
     parts.surfaces = Listed(SURFACE).read("surfaces", surfaces, parts)
+    if faces:
+        parts.faces = Listed(FACE).read("faces", faces[0], parts)
 
     def body(path: str, value: Any) -> None:
         read = BODY.read(path, value, parts)
@@ -144,14 +148,13 @@ def _scene(document: Any) -> Assembly:
 
 
 def _read_constraints(value: Any, parts: Parts) -> None:
-    """Constraints in their order, which decides the order of rows; those that refer to joints are made after them."""
+    """Constraints in their order, which decides the order of rows; those that refer to others are made after them."""
     records = each("constraints", value, CONSTRAINTS.record)
     made: dict[int, Constraint] = {}
-    for k in sorted(range(len(records)), key=lambda k: refers_to_joints(records[k])):
+    for k in sorted(range(len(records)), key=lambda k: refers_to_others(records[k])):
         made[k] = item = CONSTRAINTS.read(f"constraints[{k}]", value[k], parts)
-        if isinstance(item, Joint):
-            # A name that is taken is reported below.
-            parts.joints.setdefault(item.name, item)
+        # A name that is taken is reported below.
+        parts.constraints.setdefault(item.name, item)
     for k in range(len(records)):
         with at(f"constraints[{k}]"):
             parts.scene.constrain(made[k])

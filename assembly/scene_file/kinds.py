@@ -14,6 +14,7 @@ from assembly.constraints.contact import Contact
 from assembly.constraints.couplings import Gear, RackPinion
 from assembly.constraints.dexterity import Dexterity
 from assembly.constraints.expression import Expression
+from assembly.constraints.joint import Joint
 from assembly.constraints.joints import (
     Cylindrical,
     Fixed,
@@ -28,31 +29,46 @@ from assembly.constraints.joints import (
 )
 from assembly.constraints.objectives import FrameDistance, PointDistance, Posture
 from assembly.constraints.placements import Angle, Distance, PointOnLine, PointOnPlane
+from assembly.constraints.trim_contact import TrimContact, single_face
 from assembly.errors import InputError
+from assembly.geometry.curve import NurbsCurve
 from assembly.geometry.face import Face
+from assembly.geometry.loop import Loop
 from assembly.geometry.surface import NurbsSurface
 from assembly.kinematics.body import Body, BodyFace, Frame, Point
 from assembly.kinematics.pose import Pose
 from assembly.scene_file.fields import at, bad, each, flag, members, number, or_null, table, text, vector, whole
-from assembly.scene_file.records import Field, Listed, OneOf, Parts, Plain, Record
+from assembly.scene_file.records import Field, Listed, OneOf, OrNull, Parts, Plain, Record
 
-__all__ = ["BODY", "CONSTRAINTS", "OBJECTIVES", "SURFACE", "refers_to_joints"]
+__all__ = ["BODY", "CONSTRAINTS", "FACE", "OBJECTIVES", "SURFACE", "refers_to_others"]
 
 # Axes of a frame are unit vectors at right angles to this; nine digits of a decimal do.
 RIGHT_ANGLES = 1e-9
 
 
-class _Surface:
-    """The index of a surface, so that one that many faces share is there once."""
+class _Index:
+    """The index in a table of the file, so that a surface or a face that many things share is there once."""
 
-    def write(self, path: str, value: NurbsSurface, parts: Parts) -> int:
-        return parts.index(value)
+    def __init__(self, table: str) -> None:
+        self._table = table
 
-    def read(self, path: str, value: Any, parts: Parts) -> NurbsSurface:
+    def write(self, path: str, value: Any, parts: Parts) -> int:
+        return parts.index(getattr(parts, self._table), value)
+
+    def read(self, path: str, value: Any, parts: Parts) -> Any:
+        table: list[Any] = getattr(parts, self._table)
         index = whole(path, value)
-        if not 0 <= index < len(parts.surfaces):
-            raise bad(path, index, f"an index of one of {len(parts.surfaces)} surfaces")
-        return parts.surfaces[index]
+        if not 0 <= index < len(table):
+            raise bad(path, index, f"an index of one of {len(table)} {self._table}")
+        return table[index]
+
+
+class _BodyFace(_Index):
+    """The index of a face; files of version 1 have the face itself."""
+
+    def read(self, path: str, value: Any, parts: Parts) -> Face:
+        face: Face = FACE.read(path, value, parts) if parts.version == 1 else super().read(path, value, parts)
+        return face
 
 
 class _BodyName:
@@ -90,7 +106,7 @@ class _Freedom:
 
     def write(self, path: str, value: Freedom, parts: Parts) -> dict[str, Any]:
         joint = value.joint
-        if parts.joints.get(joint.name) is not joint:
+        if parts.constraints.get(joint.name) is not joint:
             raise InputError(
                 f"{path} is freedom {value.name!r} of joint {joint.name!r}, which is not in the assembly; "
                 "expected a joint that scene.constrain was given, for files refer to joints by name"
@@ -99,13 +115,68 @@ class _Freedom:
 
     def read(self, path: str, value: Any, parts: Parts) -> Freedom:
         joint_name, freedom_name = members(path, value, ("joint", "freedom"))
-        name = text(f"{path}.joint", joint_name)
-        if name not in parts.joints:
-            known = ", ".join(map(repr, parts.joints)) or "none, the file has no joints"
-            raise bad(f"{path}.joint", name, f"a joint of the file: {known}")
+        joint: Joint = _of_the_file(Joint, "joint", f"{path}.joint", joint_name, parts)
         label = text(f"{path}.freedom", freedom_name)
         with at(f"{path}.freedom"):
-            return parts.joints[name].freedom(label)
+            return joint.freedom(label)
+
+
+class _ContactName:
+    """A contact of the same file by its name."""
+
+    def write(self, path: str, value: Contact, parts: Parts) -> str:
+        return value.name
+
+    def read(self, path: str, value: Any, parts: Parts) -> Contact:
+        contact: Contact = _of_the_file(Contact, "contact", path, value, parts)
+        return contact
+
+
+class _TrimLoop:
+    """The loop of a trim: one of its face, "outer" or the index of a hole, or a loop of its own."""
+
+    def write(self, path: str, value: TrimContact, parts: Parts) -> Any:
+        if value.loop is value.face.outer:
+            return "outer"
+        for k, hole in enumerate(value.face.holes):
+            if value.loop is hole:
+                return k
+        return LOOP.write(path, value.loop, parts)
+
+    def read(self, path: str, value: Any, parts: Parts) -> Any:
+        if isinstance(value, dict):
+            return LOOP.read(path, value, parts)
+        if value == "outer":
+            return value
+        if isinstance(value, bool) or not isinstance(value, int):
+            raise bad(path, value, '"outer", the index of a hole, or an object with the fields tolerance, curves')
+        return value
+
+
+def _of_the_file(kind: type, word: str, path: str, value: Any, parts: Parts) -> Any:
+    """A constraint of a kind by its name."""
+    name = text(path, value)
+    found = parts.constraints.get(name)
+    if not isinstance(found, kind):
+        names = [repr(known) for known, item in parts.constraints.items() if isinstance(item, kind)]
+        known = ", ".join(names) or f"none, the file has no {word}s"
+        raise bad(path, name, f"a {word} of the file: {known}")
+    return found
+
+
+def _trim(contact: Contact, side: str, loop: Loop | str | int, **others: Any) -> TrimContact:
+    """A trim; a loop of the face is the face's own, by which it is known."""
+    if not isinstance(loop, Loop):
+        face = single_face(side, contact.a if side == "a" else contact.b)
+        if loop == "outer":
+            if face.outer is None:
+                raise InputError('loop is "outer"; expected another, for that of the face is the edge of its surface')
+            loop = face.outer
+        elif isinstance(loop, int) and 0 <= loop < len(face.holes):
+            loop = face.holes[loop]
+        else:
+            raise InputError(f"loop is {loop}; expected an index of one of {len(face.holes)} holes of the face")
+    return TrimContact(contact, loop, side=side, **others)  # type: ignore[arg-type]  # words are checked there
 
 
 def _array(values: Sequence[Any]) -> NDArray[np.float64]:
@@ -134,6 +205,13 @@ def _read_limits(path: str, value: Any) -> list[float | None]:
     return each(path, value, or_null(number), 2)
 
 
+def _read_side(path: str, value: Any) -> str:
+    side = text(path, value)
+    if side not in ("a", "b"):
+        raise bad(path, side, '"a" or "b"')
+    return side
+
+
 def _free(*names: str) -> tuple[Field, ...]:
     """Driven values and limits of freedoms; with one freedom its limits have no name of their own."""
     limits = ["limits"] if len(names) == 1 else [f"{name}_limits" for name in names]
@@ -149,10 +227,11 @@ def _point_distance(body: Body, point: list[float], target: list[float], weight:
 NUMBER = Plain(number)
 NUMBERS = Plain(table(1), _to_list)
 VECTOR = Plain(vector, _to_list)
-SURFACE_INDEX = _Surface()
+SURFACE_INDEX = _Index("surfaces")
 BODY_NAME = _BodyName()
 SIDE = _Side()
 FREEDOM = _Freedom()
+CONTACT_NAME = _ContactName()
 DRIVEN = Plain(or_null(number))
 LIMITS = Plain(or_null(_read_limits), lambda limits: None if limits is None else list(limits))
 FRAME = Record(
@@ -189,11 +268,32 @@ SURFACE = Record(
     Field("control_points", Plain(table(3), _to_list)),
     Field("weights", Plain(table(2), _to_list)),
 )
-BODY_FACE = Record(
+CURVE = Record(
+    NurbsCurve,
+    Field("name", Plain(or_null(text))),
+    Field("degree", Plain(whole)),
+    Field("knots", NUMBERS),
+    Field(
+        "control_points",
+        Plain(lambda path, value: each(path, value, lambda at, pair: each(at, pair, number, 2)), _to_list),
+    ),
+    Field("weights", NUMBERS),
+)
+LOOP = Record(
+    Loop,
+    Field("tolerance", NUMBER),
+    Field("curves", Listed(CURVE)),
+    make=lambda tolerance, curves: Loop.unchecked(curves, tolerance, None, "curves"),
+)
+COLOR = Field("color", Plain(or_null(vector), lambda color: None if color is None else list(color)), since=2)
+FACE = Record(
     Face,
-    Field("surface", SURFACE_INDEX, "face.surface"),
-    NAME,
-    Field("reversed", Plain(flag), "face.reversed"),
+    Field("surface", SURFACE_INDEX),
+    Field("name", Plain(or_null(text))),
+    Field("reversed", Plain(flag)),
+    COLOR,
+    Field("outer", OrNull(LOOP), since=2),
+    Field("holes", Listed(LOOP), since=2),
 )
 BODY = Record(
     Body,
@@ -201,7 +301,8 @@ BODY = Record(
     Field("fixed", Plain(flag)),
     Field("position", NUMBERS, "pose.position"),
     Field("quaternion", NUMBERS, "pose.quaternion"),
-    Field("shape", Listed(BODY_FACE), "faces"),
+    COLOR,
+    Field("shape", Listed(_BodyFace("faces")), lambda body: [side.face for side in body.faces]),
     make=lambda shape, **others: Body(shape=shape or None, **others),
 )
 EXPRESSION = Record(
@@ -218,7 +319,9 @@ EXPRESSION = Record(
 
 CONSTRAINTS = OneOf(
     {
-        "contact": Record(Contact, NAME, Field("a", SIDE), Field("b", SIDE), UNILATERAL),
+        "contact": Record(
+            Contact, NAME, Field("a", SIDE), Field("b", SIDE), UNILATERAL, Field("edges", Plain(flag), since=2)
+        ),
         "fixed": Record(Fixed, NAME, *FRAMES, AXES),
         "revolute": Record(Revolute, NAME, *FRAMES, AXES, *_free("angle")),
         "prismatic": Record(Prismatic, NAME, *FRAMES, AXES, *_free("slide")),
@@ -243,6 +346,16 @@ CONSTRAINTS = OneOf(
             Field("rack", FREEDOM, "follower"),
             Field("radius", NUMBER),
             OFFSET,
+        ),
+        "trim_contact": Record(
+            TrimContact,
+            NAME,
+            Field("contact", CONTACT_NAME),
+            Field("side", Plain(_read_side), lambda trim: "ab"[trim.side]),
+            Field("loop", _TrimLoop(), lambda trim: trim),
+            Field("keep", Plain(text)),
+            Field("form", Plain(text)),
+            make=_trim,
         ),
         "expression": EXPRESSION,
     }
@@ -288,6 +401,6 @@ OBJECTIVES = OneOf(
 )
 
 
-def refers_to_joints(record: Record) -> bool:
-    """Whether a thing can only be made when the joints are there."""
-    return any(item.form is FREEDOM for item in record.fields)
+def refers_to_others(record: Record) -> bool:
+    """Whether a thing can only be made when joints and contacts are there."""
+    return any(item.form is FREEDOM or item.form is CONTACT_NAME for item in record.fields)

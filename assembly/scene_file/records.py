@@ -8,28 +8,31 @@ from operator import attrgetter
 from typing import Any, Protocol
 
 from assembly.assembly import Assembly
-from assembly.constraints.joint import Joint
+from assembly.constraints.constraint import Constraint
 from assembly.errors import InputError
+from assembly.geometry.face import Face
 from assembly.geometry.surface import NurbsSurface
 from assembly.scene_file.fields import at, bad, each, members
 
-__all__ = ["Field", "Form", "Listed", "OneOf", "Parts", "Plain", "Record"]
+__all__ = ["Field", "Form", "Listed", "OneOf", "OrNull", "Parts", "Plain", "Record"]
 
 
 @dataclass
 class Parts:
-    """What values refer to: bodies and joints by name, surfaces by index."""
+    """The format's version, and what values refer to: bodies and constraints by name, faces and surfaces by index."""
 
     scene: Assembly
-    joints: dict[str, Joint] = field(default_factory=dict)
+    version: int
+    constraints: dict[str, Constraint] = field(default_factory=dict)
+    faces: list[Face] = field(default_factory=list)
     surfaces: list[NurbsSurface] = field(default_factory=list)
     _indices: dict[int, int] = field(default_factory=dict)
 
-    def index(self, surface: NurbsSurface) -> int:
-        """The index of a surface, which is added where it is new."""
-        index = self._indices.setdefault(id(surface), len(self.surfaces))
-        if index == len(self.surfaces):
-            self.surfaces.append(surface)
+    def index(self, table: list[Any], value: Any) -> int:
+        """The index of a value in one of the tables, to which it is added where it is new."""
+        index = self._indices.setdefault(id(value), len(table))
+        if index == len(table):
+            table.append(value)
         return index
 
 
@@ -82,6 +85,21 @@ class Listed:
         return each(path, value, lambda where, item: self._form.read(where, item, parts))
 
 
+class OrNull:
+    """A value of a form, or none."""
+
+    def __init__(self, form: Form) -> None:
+        self._form = form
+
+    def write(self, path: str, value: Any, parts: Parts) -> Any:
+        """See `Form`."""
+        return None if value is None else self._form.write(path, value, parts)
+
+    def read(self, path: str, value: Any, parts: Parts) -> Any:
+        """See `Form`."""
+        return None if value is None else self._form.read(path, value, parts)
+
+
 class Field:
     """A value of a thing, by name.
 
@@ -94,15 +112,23 @@ class Field:
         The thing's attribute, dotted perhaps, or what finds the value; the name by default.
     argument : str, optional
         The constructor's; the name by default.
+    since : int
+        The first version of the format that has the field; older files mean the constructor's default.
     """
 
     def __init__(
-        self, name: str, form: Form, of: str | Callable[[Any], Any] | None = None, argument: str | None = None
+        self,
+        name: str,
+        form: Form,
+        of: str | Callable[[Any], Any] | None = None,
+        argument: str | None = None,
+        since: int = 1,
     ) -> None:
         self.name = name
         self.form = form
         self.of: Callable[[Any], Any] = of if callable(of) else attrgetter(of or name)
         self.argument = argument or name
+        self.since = since
 
 
 class Record:
@@ -129,12 +155,13 @@ class Record:
 
     def read(self, path: str, value: Any, parts: Parts, before: Sequence[str] = ()) -> Any:
         """See `Form`; `before` are fields that the caller reads."""
-        came = members(path, value, [*before, *(item.name for item in self.fields)])[len(before) :]
+        fields = [item for item in self.fields if item.since <= parts.version]
+        came = members(path, value, [*before, *(item.name for item in fields)])[len(before) :]
         arguments = {
             item.argument: item.form.read(f"{path}.{item.name}", part, parts)
-            for item, part in zip(self.fields, came, strict=True)
+            for item, part in zip(fields, came, strict=True)
         }
-        with at(path, {item.argument: item.name for item in self.fields}):
+        with at(path, {item.argument: item.name for item in fields}):
             return self.make(**arguments)
 
 

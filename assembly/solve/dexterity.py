@@ -24,7 +24,6 @@ from assembly._kernel import kernel
 from assembly.constraints.layout import (
     CONTACTS,
     DRIVE,
-    JOINTS,
     ONE_SIDED,
     ROW,
     ROW_TABLE,
@@ -37,7 +36,6 @@ from assembly.constraints.program import add_row_terms, evaluate
 from assembly.constraints.terms import DEXTERITY, TERM, TERM_BODY, TERM_KIND, TERM_PARAMETERS, TERM_TAPE, load
 from assembly.geometry.vec import add, cross, matvec, scale
 from assembly.kinematics.motion import rotation
-from assembly.proximity.solid_contact import CONTACT_RECORD
 from assembly.solve.rates import rate_system, settle
 from assembly.solve.rows import carry, move, slot, times
 from assembly.solve.singular_values import measure_jacobian
@@ -327,7 +325,7 @@ def add_dexterities(table, pool, shape, rows, loose, room, here, order, gradient
         beside = (
             here[0].copy(),
             here[1].copy(),
-            np.empty((table[CONTACTS] + table[JOINTS], CONTACT_RECORD)),
+            np.empty(here[2].shape),
             np.empty(here[3].size),
             np.empty(here[4].shape),
         )
