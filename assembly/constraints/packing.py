@@ -8,8 +8,7 @@ from math import prod, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly._kernel import address_of
-from assembly.constraints import layout, tape, terms
+from assembly.constraints import addresses, layout, tape, terms
 from assembly.constraints.constraint import Constraint, Coordinate, Equation, FramePair, structure_changes
 from assembly.constraints.contact import Contact
 from assembly.constraints.couplings import Coupling
@@ -22,7 +21,6 @@ from assembly.constraints.primitives import AZIMUTH, TURN, place_frames
 from assembly.constraints.primitives import RECORD as JOINT_FRAMES
 from assembly.constraints.primitives import coordinate as coordinate_value
 from assembly.constraints.trim_contact import FORMS, TrimContact
-from assembly.constraints.trim_rows import trim_rows, trim_terms
 from assembly.constraints.turns import Turns
 from assembly.errors import InputError
 from assembly.geometry.face import Face
@@ -30,12 +28,11 @@ from assembly.geometry.pieces import TRIM_FIRST
 from assembly.geometry.spline import CURVE_RECORD, SURFACE_RECORD
 from assembly.geometry.surface import NurbsSurface
 from assembly.kinematics.body import Body, BodyFace
-from assembly.proximity.nearest_query import find_deepest, find_nearest
 from assembly.proximity.pairs import OFFSETS
 from assembly.proximity.shell import EDGE_CURVE, EDGE_END, EDGE_RECORD, EDGE_START, EDGE_SURFACE
 from assembly.proximity.shell_packing import pack_shell
 from assembly.proximity.solid import solid_of
-from assembly.proximity.solid_contact import TRACK, search_solids, track_solids
+from assembly.proximity.solid_contact import TRACK
 
 __all__ = ["Packed", "pack", "structure_of"]
 
@@ -208,7 +205,10 @@ class Packed:
         header[layout.EXTRA] = extra
         header[layout.TERMS] = len(terms_)
         header[layout.DEXTERITIES] = sum(term[0] == terms.DEXTERITY for term in terms_)
-        self._addresses(header)
+        if self.shells:
+            header[[layout.TRACK_AT, layout.SEARCH_AT, layout.NEAREST_AT]] = addresses.solids()
+        if header[layout.TRIMS]:
+            header[[layout.TRIM_ROWS_AT, layout.TRIM_TERMS_AT]] = addresses.trims()
         self._table[0] = header
         table = np.array([row[:6] for row in rows], dtype=np.int64).reshape(-1, 6)
         self.owners = np.array(owners, dtype=np.int64)
@@ -221,21 +221,6 @@ class Packed:
         self.pairs[trims] = [rows[r][layout.TRIM_PAIR] for r in trims]
         self.spans = [np.flatnonzero(self.owners == k) for k in range(len(constraints))]
 
-    def _addresses(self, header: Table) -> None:
-        """Where the kernels are that only contacts of solids, or trims, ask for."""
-        i8, f8, row, block = np.int64(0), 0.0, np.zeros(1), np.zeros((1, 1))
-        places = np.zeros(1, dtype=np.int64)
-        packed = (places, row)
-        if self.shells:
-            header[layout.TRACK_AT] = address_of(track_solids, *packed, *[i8] * 4, block, block, f8, block, block, i8)
-            header[layout.SEARCH_AT] = address_of(search_solids, *packed, *[i8] * 4, block, i8, i8, block, i8)
-            header[layout.NEAREST_AT] = address_of(find_nearest, *packed, i8, i8, block, f8, places, row)
-        if header[layout.TRIMS]:
-            header[layout.TRIM_ROWS_AT] = address_of(trim_rows, *packed, places, block, block, block, block, row, block)
-            header[layout.TRIM_TERMS_AT] = address_of(
-                trim_terms, *packed, i8, places, block, np.zeros((1, 1), dtype=np.int64), block, block, block, f8, block
-            )
-
     def seek_penetration(self) -> bool:
         """From now on contacts of solids that cross at the start are looked for; whether that is new.
 
@@ -243,10 +228,7 @@ class Packed:
         """
         if not self.shells or self.table[layout.DEEPEST_AT]:
             return False
-        i8, row, places = np.int64(0), np.zeros(1), np.zeros(1, dtype=np.int64)
-        self.table[layout.DEEPEST_AT] = address_of(
-            find_deepest, places, row, i8, i8, np.zeros((1, 1)), 0.0, places, row
-        )
+        self.table[layout.DEEPEST_AT] = addresses.deepest()
         return True
 
     def _gathering(self, bodies: Sequence[Body], rows: list[list[int]]) -> int:
