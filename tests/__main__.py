@@ -1,4 +1,7 @@
-"""All checks of the project: ``python -m tests [arguments for pytest]``."""
+"""All checks of the project: ``python -m tests [arguments for pytest]``.
+
+The large kernels are compiled meanwhile, once, for all processes that run tests.
+"""
 
 from __future__ import annotations
 
@@ -12,15 +15,19 @@ CHECKS = (
     ["-m", "ruff", "check", "."],
     ["-m", "mypy"],
     ["-c", "from importlinter.cli import lint_imports_command as lint_imports; lint_imports()"],
-    ["-m", "pytest"],
+    ["-m", "pytest", "-n", "auto", "--dist", "loadfile"],
 )
 
 
 def main(arguments: list[str]) -> int:
     """Run every check, the tests last; the number of those that failed."""
     failed = 0
+    warming = subprocess.Popen([sys.executable, "-m", "tests.warm"], cwd=ROOT)
     for check in CHECKS:
-        command = [*check, *arguments] if check[-1] == "pytest" else check
+        command = check
+        if "pytest" in check:
+            command = [*check, *arguments]
+            failed += warming.wait() != 0
         print(f"\n$ python {shlex.join(command)}", flush=True)
         failed += subprocess.run([sys.executable, *command], cwd=ROOT, check=False).returncode != 0
     return failed

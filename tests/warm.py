@@ -1,0 +1,23 @@
+"""Compiles the kernels that most tests ask for, so that test processes find them: ``python -m tests.warm``."""
+
+from __future__ import annotations
+
+import assembly as asm
+
+
+def main() -> None:
+    """Solve a scene of solids, and one of a contact with a trim."""
+    floor = asm.Body("floor", asm.shapes.plate(4.0, 4.0, 1.0, holes=[(0.0, 0.0, 0.5)]), fixed=True)
+    ball = asm.Body("ball", asm.shapes.sphere(0.5), position=(1.2, 0.2, 2.0))
+    solids = asm.Assembly([floor, ball])
+    solids.constrain(asm.Contact(floor, ball))
+    assert solids.solve().success
+    top = floor.face("top")
+    trimmed = asm.Assembly([floor, ball])
+    touch = asm.Contact(top, ball)
+    trimmed.constrain(touch, asm.TrimContact(touch, top.face.holes[0], keep="outside"))
+    assert trimmed.solve().success
+
+
+if __name__ == "__main__":
+    main()
