@@ -140,5 +140,6 @@ def test_type_checking_leaves_out_the_kernel_files_only():
 def test_readme_commands_are_what_ci_runs():
     readme = (ROOT / "README.md").read_text()
     commands = [line for line in readme.splitlines() if line.startswith("pip install")]
-    assert commands == ["pip install . && python examples/paper_clips.py", 'pip install ".[step,test]" && python -m tests']
+    tests = 'pip install ".[step,test]" && python -m tests'
+    assert commands == ["pip install . && python examples/paper_clips.py", tests]
     assert "^pip install" in (ROOT / ".ci/run").read_text()

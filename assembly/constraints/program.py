@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from assembly._kernel import call_address, kernel
 from assembly.constraints.layout import (
     BODY_F,
@@ -64,7 +62,6 @@ from assembly.proximity.extremal import CLOSE, CONVERGED, LEFT_PATCH, SINGULAR, 
 from assembly.proximity.free_pair import VARIABLES, free_hessian, free_rows
 from assembly.proximity.solid_contact import CONTACT_RECORD, FEATURE_F, FOLD, PROPER, TRACK
 from assembly.proximity.start import global_start
-from assembly.proximity.switching import feature_at
 from assembly.proximity.velocity import GAP, add_gap_terms, gradient_row, store_record
 
 
@@ -149,15 +146,6 @@ def solids_row(table, pool, r, start, patience, point):
     return found
 
 
-@kernel(inline=True)
-def surface_of(table, row, side, tracked, r):
-    """The surface that takes part in row r: that of a lone face, or of the face of a solid that is tracked now."""
-    shell = table[row + SHELL_F + side]
-    if shell < 0:
-        return table[row + SURFACE_F + side]
-    return feature_at(table, shell, np.int64(tracked[r, FEATURE_F + side]))
-
-
 @kernel(inner=True)
 def contact_row(table, pool, r, start, patience, loose, point):
     """Row r, of contact r. Returns whether its pair was found.
@@ -172,10 +160,9 @@ def contact_row(table, pool, r, start, patience, loose, point):
     lengths = loose[1]
     row = table[ROW_TABLE] + ROW * r
     if table[row + SHELL_F] >= 0:
-        if free[r] < 0:
-            return solids_row(table, pool, r, start, patience, point)
-        for i in range(FEATURE_F, TRACK):
-            tracked[r, i] = start[r, i]
+        return solids_row(table, pool, r, start, patience, point)
+    for i in range(FEATURE_F, TRACK):
+        tracked[r, i] = start[r, i]
     x = (start[r, 0], start[r, 1], start[r, 2], start[r, 3])
     if free[r] < 0:
         status, x, distance = track_contact(table, pool, row, q, x, patience, records, r)
@@ -202,8 +189,8 @@ def contact_row(table, pool, r, start, patience, loose, point):
         free_rows(
             table,
             pool,
-            surface_of(table, row, 0, tracked, r),
-            surface_of(table, row, 1, tracked, r),
+            table[row + SURFACE_F],
+            table[row + SURFACE_G],
             table[row + BODY_F],
             table[row + BODY_G],
             q,
@@ -364,8 +351,8 @@ def add_free_terms(table, pool, r, loose, point, y, weights, hessian):
     free_hessian(
         table,
         pool,
-        surface_of(table, row, 0, tracked, r),
-        surface_of(table, row, 1, tracked, r),
+        table[row + SURFACE_F],
+        table[row + SURFACE_G],
         table[row + BODY_F],
         table[row + BODY_G],
         q,

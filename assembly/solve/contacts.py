@@ -13,37 +13,27 @@ from assembly.constraints.layout import (
     ROW,
     ROW_TABLE,
     SHELL_F,
-    SHELL_G,
     SURFACE_F,
     SURFACE_G,
 )
-from assembly.constraints.program import search_row, surface_of, track_row
+from assembly.constraints.program import search_row
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.extremal import CONVERGED, SINGULAR, pair_frame
 from assembly.proximity.free_pair import coordinate_lengths
-from assembly.proximity.shell import FACE
-from assembly.proximity.solid_contact import FEATURE_F, FEATURE_G, FOLD, TRACK
+from assembly.proximity.solid_contact import FEATURE_F, FOLD, TRACK
 from assembly.proximity.start import global_start
-from assembly.proximity.switching import feature_kind
-
-
-@kernel(inner=True)
-def on_faces(table, row, contacts, k):
-    """Whether both features of contact k are faces."""
-    kind_f = feature_kind(table, table[row + SHELL_F], contacts[k, FEATURE_F])
-    kind_g = feature_kind(table, table[row + SHELL_G], contacts[k, FEATURE_G])
-    return kind_f == FACE and kind_g == FACE
 
 
 @kernel(inner=True)
 def free_pair(table, pool, row, k, contacts, free, lengths):
-    """Make the coordinates of contact k unknowns; False where they cannot be: at a pole, and of edges and vertices."""
+    """Make the coordinates of contact k unknowns; False where they cannot be: at a pole, and of solids.
+
+    Solids switch features where a pair ends, which coordinates of two fixed faces would not know.
+    """
     x = (contacts[k, 0], contacts[k, 1], contacts[k, 2], contacts[k, 3])
-    if table[row + SHELL_F] >= 0 and not on_faces(table, row, contacts, k):
+    if table[row + SHELL_F] >= 0:
         return False
-    f = surface_of(table, row, 0, contacts, k)
-    g = surface_of(table, row, 1, contacts, k)
-    coordinate_lengths(table, pool, f, g, x, lengths, k)
+    coordinate_lengths(table, pool, table[row + SURFACE_F], table[row + SURFACE_G], x, lengths, k)
     if min(min(lengths[k, 0], lengths[k, 1]), min(lengths[k, 2], lengths[k, 3])) < 1e-6:
         return False
     free[k] = 0
@@ -87,9 +77,7 @@ def free_folds(table, pool, records, contacts, active, free, lengths, below, los
     for k in range(table[CONTACTS]):
         row = table[ROW_TABLE] + ROW * k
         idle = table[row + ONE_SIDED] == 1 and active[k] == 0.0
-        # Solids switch features where a surface's pair ends: only folds ask for coordinates of theirs.
-        near = abs(records[k, FOLD]) < below or (k == lost and table[row + SHELL_F] < 0)
-        if free[k] < 0 and not idle and near:
+        if free[k] < 0 and not idle and (abs(records[k, FOLD]) < below or k == lost):
             free_pair(table, pool, row, k, contacts, free, lengths)
         if free[k] >= 0:
             free[k] = count
@@ -98,11 +86,10 @@ def free_folds(table, pool, records, contacts, active, free, lengths, below, los
 
 
 @kernel(inner=True)
-def free_pairs_hold(table, pool, q, contacts, free, tolerance, records, spare):
+def free_pairs_hold(table, pool, q, contacts, free, tolerance):
     """Whether every free pair is extremal by the frames of tracked pairs, which know poles.
 
-    Its own rows do not tell at a pole or an apex: there a tangent vanishes, and its row with it. Writes into `records`
-    and `spare` tracked values.
+    Its own rows do not tell at a pole or an apex: there a tangent vanishes, and its row with it.
     """
     for k in range(table[CONTACTS]):
         row = table[ROW_TABLE] + ROW * k
@@ -112,17 +99,9 @@ def free_pairs_hold(table, pool, q, contacts, free, tolerance, records, spare):
         j = table[row + BODY_G]
         turn, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
         x = (contacts[k, 0], contacts[k, 1], contacts[k, 2], contacts[k, 3])
-        f = surface_of(table, row, 0, contacts, k)
-        g = surface_of(table, row, 1, contacts, k)
-        frame = pair_frame(table, pool, f, g, turn, shift, x)
+        frame = pair_frame(table, pool, table[row + SURFACE_F], table[row + SURFACE_G], turn, shift, x)
         residual = frame[9]
         tilt = max(abs(residual[2]), abs(residual[3]))
         if not frame[11] or not tilt <= 1e-9 or not max(abs(residual[0]), abs(residual[1])) <= tolerance:
             return False
-        if table[row + SHELL_F] >= 0:
-            # On solids the pair must not have left its faces.
-            if not track_row(table, pool, row, q, contacts, math.inf, records, spare, k):
-                return False
-            if spare[k, FEATURE_F] != contacts[k, FEATURE_F] or spare[k, FEATURE_G] != contacts[k, FEATURE_G]:
-                return False
     return True

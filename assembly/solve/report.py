@@ -56,7 +56,7 @@ def judge(table, pool, state, loose, room, shape, rows, here, trial, bound):
     for r in range(rows):
         here[3][r] = trial[3][r]
     violation = violation_of(trial[3], shape[1], rows)
-    holds = free_pairs_hold(table, pool, q, here[1], loose[0], 1e-9, trial[2], loose[4])
+    holds = free_pairs_hold(table, pool, q, here[1], loose[0], 1e-9)
     return holds and violation <= bound, violation
 
 
