@@ -62,7 +62,7 @@ from assembly.proximity.tips import LEAN, from_tip, tip_near, unit
 
 # Switches in a row that no motion of a pair needs.
 ROUNDS = 64
-# Cosine between the normals before and after switches below which the pair is another one.
+# Cosine between the normals before and after below which the pair is another one.
 ACROSS = 0.3
 
 
@@ -279,7 +279,7 @@ def track_features(table, pool, shell_f, shell_g, rotation, shift, code_f, code_
 
     Poses, `size` and `turn` as in `solve_pair`: g relative to f, everything in the axes of f. `n` is a normal near the
     pair's, from f towards g, zero where unknown. Where features switch, `turn` bounds the way from feature to feature
-    no more, but the normal at the end must not be across the one at the start.
+    no more; the normal at the end must not be across the one at the start, which would be the far side's.
 
     Returns
     -------
@@ -329,6 +329,6 @@ def track_features(table, pool, shell_f, shell_g, rotation, shift, code_f, code_
             break
         x = (at_f[0], at_f[1], at_g[0], at_g[1])
         switches += 1
-    if switches > 0 and turn < math.inf and dot(before, before) > 0.25 and dot(before, n) < ACROSS:
+    if turn < math.inf and dot(before, before) > 0.25 and dot(before, n) < ACROSS:
         status = NOT_CONVERGED
     return status, code_f, code_g, x, frame, switches

@@ -44,7 +44,7 @@ from assembly.constraints.program import add_row_terms, evaluate
 from assembly.constraints.terms import objective, recenter
 from assembly.proximity.free_pair import VARIABLES, VECTORS
 from assembly.proximity.solid_contact import CONTACT_RECORD, FOLD, TRACK
-from assembly.solve.contacts import free_folds, start_contacts
+from assembly.solve.contacts import free_folds, is_of_surfaces, start_contacts
 from assembly.solve.gather import gather, scattered
 from assembly.solve.linear import factorize_shifted
 from assembly.solve.multipliers import choose_multipliers, curve_rows, least_multipliers, strongest, weigh_rows
@@ -370,9 +370,9 @@ def solve_program(table, pool, settings, state, history, tips):
                 # Perhaps a fold is near enough to matter; else nothing moves any more.
                 below = 0.3
                 for k in range(pairs):
-                    if free[k] < 0 and abs(here[2][k, FOLD]) < below:
+                    if free[k] < 0 and abs(here[2][k, FOLD]) < below and is_of_surfaces(table, k):
                         lost = np.int64(k)
-            if lost >= 0 and free[lost] < 0:
+            if lost >= 0 and free[lost] < 0 and is_of_surfaces(table, lost):
                 continue
             lost = np.int64(-1)
             if not restoring and violation > feasible and restorations < RESTORATIONS:

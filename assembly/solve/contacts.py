@@ -24,11 +24,17 @@ from assembly.proximity.solid_contact import FEATURE_F, FOLD, TRACK
 from assembly.proximity.start import global_start
 
 
+@kernel(inline=True)
+def is_of_surfaces(table, k):
+    """Whether contact k is of two surfaces; else it is of solids, whose features switch where a pair ends."""
+    return table[table[ROW_TABLE] + ROW * k + SHELL_F] < 0
+
+
 @kernel(inner=True)
 def free_pair(table, pool, row, k, contacts, free, lengths):
     """Make the coordinates of contact k unknowns; False where they cannot be: at a pole, and of solids.
 
-    Solids switch features where a pair ends, which coordinates of two fixed faces would not know.
+    Features of solids switch, which coordinates on two fixed faces would not know.
     """
     x = (contacts[k, 0], contacts[k, 1], contacts[k, 2], contacts[k, 3])
     if table[row + SHELL_F] >= 0:

@@ -144,14 +144,16 @@ def test_rows_and_their_sides(form):
     ground, ball, contact = ball_on(asm.shapes.plane(10.0, 10.0))
     scene = asm.Assembly([ground, ball])
     scene.constrain(contact)
-    scene.constrain(*(asm.TrimContact(contact, circle((0.0, 0.0), 2.0), k, form, name=k) for k in ("on", "outside")))
+    sides = ("on", "on" if form == "between" else "outside")
+    trims = [asm.TrimContact(contact, circle((0.0, 0.0), 2.0), k, form, name=f"{n} {k}") for n, k in enumerate(sides)]
+    scene.constrain(*trims)
     packed = scene.packed()
     each = {"signed": 1, "parametric": 2, "cartesian": 3, "between": 3}[form]
     assert packed.rows == 1 + 2 * each and packed.table[layout.TRIMS] == 2 * each
     assert [len(rows) for rows in packed.spans] == [1, each, each]
     assert packed.lengths.all()
-    # Vectors are one-sided as a whole: on the right side they vanish.
-    assert packed.one_sided.tolist() == [False] * (1 + each) + [form == "signed"] * each
+    # Of a vector that is one-sided the first row counts, the others are zero.
+    assert packed.one_sided.tolist() == [False] * (1 + each) + [form != "between"] * each
     assert packed.pairs.tolist() == [0] * packed.rows
     assert packed.table[layout.VECTOR_TRIMS] == int(form != "signed")
     # The contact is of the surfaces, without the boundary of the plane.

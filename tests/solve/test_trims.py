@@ -47,17 +47,20 @@ def rim(target):
     return RADIUS * np.asarray(target) / np.linalg.norm(target)
 
 
+ONE_SIDED = [form for form in FORMS if form != "between"]
+CASES = {
+    "outside": ((0.3, 0.1), (3.0, 0.6, 1.2)),
+    "inside": ((4.0, 1.0), (0.4, 0.2, 1.2)),
+    "on": ((0.5, -0.7), (2.5, 0.0, 1.1)),
+}
+# A vector that contains the gap cannot be one-sided; started far off it moves the ball into the plate and stays there.
+STOPS = [(keep, form) for keep in CASES for form in FORMS if form != "between"]
+
+
 @pytest.mark.parametrize("swapped", [False, True])
-@pytest.mark.parametrize("form", FORMS)
-@pytest.mark.parametrize(
-    ("keep", "target", "start"),
-    [
-        ("outside", (0.3, 0.1), (3.0, 0.6, 1.2)),
-        ("inside", (4.0, 1.0), (0.4, 0.2, 1.2)),
-        ("on", (0.5, -0.7), (2.5, 0.0, 1.1)),
-    ],
-)
-def test_a_ball_stops_at_the_loop(keep, target, start, form, swapped):
+@pytest.mark.parametrize(("keep", "form"), STOPS)
+def test_a_ball_stops_at_the_loop(keep, form, swapped):
+    target, start = CASES[keep]
     case = Plate(target, start, swapped=swapped)
     trim = case.keep(circle((0.0, 0.0), RADIUS), keep, form)
     solution = case.scene.solve()
@@ -77,7 +80,7 @@ def test_a_ball_stops_at_the_loop(keep, target, start, form, swapped):
         assert keep == "on" or expected < 0.0
 
 
-@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("form", ONE_SIDED)
 def test_far_from_the_loop_nothing_changes(form):
     free, kept = Plate((-1.0, 3.0)), Plate((-1.0, 3.0))
     kept.keep(circle((0.0, 0.0), RADIUS), "outside", form)
@@ -100,7 +103,7 @@ def test_from_the_middle_of_the_hole():
     np.testing.assert_allclose(case.place(solution), [*rim((0.5, 0.2)), 1.0], rtol=0, atol=HELD)
 
 
-@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("form", ONE_SIDED)
 def test_a_corner_holds_the_contact(form):
     """Inside a square with a target beyond a corner: the contact stops in the corner, where no edge is smooth."""
     case = Plate((3.0, 2.5), start=(0.2, 0.1, 1.1))
@@ -133,7 +136,8 @@ def test_a_warm_start_follows_the_target():
         solution = case.scene.solve(solution)
         assert solution.success, solution.message
         np.testing.assert_allclose(case.place(solution), [*(RADIUS * way), 1.0], rtol=0, atol=HELD)
-        assert solution.iterations <= 12
+        # The first one leaves a start whose penalty is spent; the others are near.
+        assert solution.iterations <= (80 if k == 1 else 12)
     # Away from the hole, and back: the row goes idle and comes back.
     for target, expected in (((0.0, 3.0), (0.0, 3.0)), ((0.1, 0.5), rim((0.1, 0.5)))):
         case.wish.target = np.array([*target, 1.0])
@@ -194,6 +198,8 @@ def test_rows_that_a_joint_says_already(form):
 @pytest.mark.parametrize("form", FORMS)
 def test_degrees_of_freedom(form):
     for keep, dof in (("on", 4), ("inside", 5)):
+        if keep == "inside" and form not in ONE_SIDED:
+            continue
         case = Plate((4.0, 1.0), (0.4, 0.2, 1.2))
         case.keep(circle((0.0, 0.0), RADIUS), keep, form)
         solution = case.scene.solve()
@@ -201,8 +207,9 @@ def test_degrees_of_freedom(form):
         mobility = solution.mobility
         # On the loop the ball rolls along it, spins about its normal, and slides: a one-sided row counts for nothing.
         assert mobility.dof == dof
-        # Forms of several rows repeat themselves.
-        assert mobility.redundant == ([] if form == "signed" or keep != "on" else ["trim"])
+        # Forms of several rows repeat themselves, and "between" the gap, too.
+        repeated = {"signed": [], "between": ["rests", "trim"]}.get(form, ["trim"])
+        assert mobility.redundant == (repeated if keep == "on" else [])
     case.keep(circle((0.0, 0.0), RADIUS), "on", name="again")
     case.keep(circle((0.0, 0.0), RADIUS), "on", name="once more")
     assert set(case.scene.solve().mobility.redundant) >= {"again", "once more"}
