@@ -31,6 +31,8 @@ Array = NDArray[np.float64]
 def part_of(curve: NurbsCurve, cuts: list[float]) -> list[NurbsCurve]:
     """The parts of a clamped curve between parameters."""
     p = curve.degree
+    level = np.ptp(curve.control_points, axis=0) == 0.0
+    value = curve.control_points[0]
     for cut in cuts:
         present = int(np.count_nonzero(curve.knots == cut))
         if present < p:
@@ -42,7 +44,9 @@ def part_of(curve: NurbsCurve, cuts: list[float]) -> list[NurbsCurve]:
         last = int(np.searchsorted(curve.knots, b, side="left"))
         inner = curve.knots[(curve.knots > a) & (curve.knots < b)]
         knots = np.concatenate([np.full(p + 1, a), inner, np.full(p + 1, b)])
-        parts.append(NurbsCurve(curve.control_points[first:last], knots, p, curve.weights[first:last], name=curve.name))
+        # What is constant stays so to the last bit.
+        points = np.where(level, value, curve.control_points[first:last])
+        parts.append(NurbsCurve(points, knots, p, curve.weights[first:last], name=curve.name))
     return parts
 
 
@@ -51,8 +55,8 @@ class _Axis:
 
     def __init__(self, surface: NurbsSurface, axis: int) -> None:
         self.axis, self.other = axis, 1 - axis
-        self.low, high = surface.domain[axis]
-        self.period = high - self.low
+        self.low, self.high = surface.domain[axis]
+        self.period = self.high - self.low
         # u, v itself; for v, s = v and h = -u.
         self.sign = 1.0 if axis == 0 else -1.0
         ends = sorted(self.sign * x for x in surface.domain[self.other])
@@ -130,15 +134,15 @@ def _strip(piece: Piece, axis: _Axis) -> int:
 
 
 def _moved(piece: Piece, axis: _Axis, strips: int) -> None:
-    """Move a piece by whole periods."""
-    if strips:
-        points = piece.curve.control_points.copy()
-        points[:, axis.axis] -= strips * axis.period
-        points[:, axis.axis] = np.where(
-            np.abs(points[:, axis.axis] - axis.low) < 1e-12 * axis.period, axis.low, points[:, axis.axis]
-        )
-        old = piece.curve
-        piece.curve = NurbsCurve(points, old.knots, old.degree, old.weights, name=old.name)
+    """Move a piece by whole periods into the domain."""
+    points = piece.curve.control_points.copy()
+    at = points[:, axis.axis] - strips * axis.period
+    # The two sides of the domain are a period apart to rounding only.
+    for side in (axis.low, axis.high):
+        at[np.abs(at - side) < 1e-12 * axis.period] = side
+    points[:, axis.axis] = at
+    old = piece.curve
+    piece.curve = NurbsCurve(points, old.knots, old.degree, old.weights, name=old.name)
 
 
 @dataclass
@@ -212,9 +216,8 @@ def _cut(chains: list[list[Piece]], axis: _Axis) -> list[list[Piece]]:
         for piece, number in zip(row, strips, strict=True):
             _moved(piece, axis, number)
         pieces += row
-    high = axis.low + axis.period
     for start, end, bottom, top in _stretches(crossings, axis, inside):
-        up = Piece(segment(axis.point(high, bottom), axis.point(high, top)), SEAM)
+        up = Piece(segment(axis.point(axis.high, bottom), axis.point(axis.high, top)), SEAM)
         down = Piece(segment(axis.point(axis.low, top), axis.point(axis.low, bottom)), SEAM)
         pieces += [up, down]
         if start is None and end is None and axis.around:

@@ -43,6 +43,8 @@ class Edge:
         Edges of two faces that are one edge of the solid have one name.
     deviation : float
         Of its interpolation in (u, v).
+    seam : bool
+        Whether the face has it on both sides.
     """
 
     curve: Spline
@@ -50,6 +52,7 @@ class Edge:
     tolerance: float
     name: str
     deviation: float
+    seam: bool = False
 
     @property
     def ends(self) -> Array:
@@ -162,7 +165,7 @@ def edge_curve(edge: Any, face: Any, patch: Patch, name: str) -> Edge:
     for vertex in (o.TopExp.FirstVertex_s(edge), o.TopExp.LastVertex_s(edge)):
         if not vertex.IsNull():
             tolerance = max(tolerance, o.BRep_Tool.Tolerance_s(vertex))
-    return Edge(made, (bool(level[0]), bool(level[1])), tolerance, name, deviation)
+    return Edge(made, (bool(level[0]), bool(level[1])), tolerance, name, deviation, o.BRep_Tool.IsClosed_s(edge, face))
 
 
 def _period(patch: Patch) -> Array:
@@ -218,26 +221,45 @@ def chained(edges: list[Edge], patch: Patch) -> tuple[list[Edge], float]:
     # A ring closes up to a period, and so does its joint.
     closing = rows[0].ends[0] - rows[-1].ends[1]
     ring = np.where(open_, 0.0, np.round(closing / np.where(open_, 1.0, period))) * np.where(open_, 0.0, period)
-    ends = np.array([edge.ends for edge in rows])
-    made = ends.copy()
+    # Joint k is where edge k begins.
+    joints = np.empty((len(rows), 2))
     worst = 0.0
-    (u0, u1), (v0, v1) = patch.surface.domain
     for k, first in enumerate(rows):
         last = rows[k - 1]
-        across = ring if k == 0 else np.zeros(2)
-        a, b = ends[k - 1, 1] + across, ends[k, 0]
-        at = _meeting(last, first, a, b)
+        a, b = last.ends[1] + (ring if k == 0 else 0.0), first.ends[0]
+        joints[k] = _meeting(last, first, a, b)
         if (a != b).any():
-            inside = np.array([a, b])
-            for axis, (low, high) in enumerate(((u0, u1), (v0, v1))):
-                if open_[axis]:
-                    inside[:, axis] = np.clip(inside[:, axis], low, high)
-                else:
-                    inside[:, axis] = low + np.mod(inside[:, axis] - low, high - low)
-            spread = patch.surface.evaluate(inside[:, 0], inside[:, 1])
-            gap = float(np.linalg.norm(spread[0] - spread[1]))
+            gap = _apart(a, b, patch)
             if gap > 2.0 * (last.tolerance + first.tolerance):
                 raise Unreadable(f"two edges that should meet are {gap:.2g} mm apart")
             worst = max(worst, gap)
-        made[k, 0], made[k - 1, 1] = at, at - across
-    return [edge.moved(pair) for edge, pair in zip(rows, made, strict=True)], worst
+    _match_seams(rows, joints, period)
+    after = np.roll(joints, -1, axis=0)
+    after[-1] -= ring
+    made = [edge.moved(np.array(pair)) for edge, *pair in zip(rows, joints, after, strict=True)]
+    return made, worst
+
+
+def _apart(a: Array, b: Array, patch: Patch) -> float:
+    """Distance in space of two points of (u, v), which may lie beyond the domain."""
+    at = np.array([a, b])
+    for axis, ((low, high), closed) in enumerate(zip(patch.surface.domain, patch.surface.closed, strict=True)):
+        at[:, axis] = low + np.mod(at[:, axis] - low, high - low) if closed else np.clip(at[:, axis], low, high)
+    points = patch.surface.evaluate(at[:, 0], at[:, 1])
+    return float(np.linalg.norm(points[0] - points[1]))
+
+
+def _match_seams(rows: list[Edge], joints: Array, period: Array) -> None:
+    """Make both sides of a seam, which is one edge run to and fro, end at the same places up to a period."""
+    whole = np.where(np.isfinite(period), period, 1.0)
+    for i, edge in enumerate(rows):
+        for j in range(i + 1, len(rows)):
+            if not edge.seam or rows[j].name != edge.name:
+                continue
+            for here, there in ((i, (j + 1) % len(rows)), ((i + 1) % len(rows), j)):
+                if here == there:
+                    continue
+                off = joints[here] - joints[there]
+                off -= np.where(np.isfinite(period), np.round(off / whole) * whole, 0.0)
+                joints[here] -= 0.5 * off
+                joints[there] += 0.5 * off

@@ -11,7 +11,9 @@ import assembly as asm
 from assembly.geometry.bezier import full_knots
 from assembly.step.cuts import cut_open, part_of
 from assembly.step.pieces import EDGE, POLE, SEAM, Uncut
-from assembly.step.profiles import Turning, Unreadable, approximated, arc
+from assembly.step.profiles import Straight, Turning, Unreadable, approximated, arc, spline
+from assembly.step.surfaces import Patch
+from assembly.step.trims import Edge, chained
 from assembly.step.unrolled import strip
 
 
@@ -45,6 +47,13 @@ CASES = {
     "two at the seam": (
         lambda: asm.Face(TUBE, holes=[circle((0.1, 1.0), 0.5, True), circle((U, 3.0), 0.5, True)]),
         4 * U - pi / 2,
+        1,
+        6,
+        0,
+    ),
+    "cut twice": (
+        lambda: asm.Face(asm.shapes.torus(1.5891826, 0.6356730), holes=[circle((9.9, 1.1), 0.5, True)]),
+        U * 1.5891826 * U * 0.6356730 - pi / 4,
         1,
         6,
         0,
@@ -95,7 +104,12 @@ def test_chains_close_in_the_domain_around_the_region(name):
             assert (at >= low - 1e-12).all() and (at <= high + 1e-12).all()
     # Of polygons with thousands of corners.
     assert sum(map(polygon_area, found)) == pytest.approx(area, rel=1e-6)
-    # The two sides of a seam run against each other.
+    # Seams are lines to the last bit, however often they are cut, and their two sides run against each other.
+    sides = {axis: set(surface.domain[axis]) for axis in (0, 1)}
+    for piece in pieces:
+        if piece.kind == SEAM:
+            axis = int(np.ptp(piece.ends[:, 1]) == 0.0)
+            assert set(piece.ends[:, axis].tolist()) <= sides[axis] and np.ptp(piece.ends[:, axis]) == 0.0
     along = np.array([piece.ends[1] - piece.ends[0] for piece in pieces if piece.kind == SEAM]).reshape(-1, 2)
     np.testing.assert_allclose(along.sum(axis=0), 0.0, atol=1e-12)
 
@@ -185,3 +199,30 @@ def test_approximations_say_how_far_off_they_are():
     np.testing.assert_array_equal(curve.control_points[[0, -1]], helix(np.array([0.0, 2.0])))
     with pytest.raises(Unreadable, match="too sharply"):
         approximated(lambda t: np.abs(t[:, None] - 0.3), np.array([0.0, 1.0]), 1e-12)
+
+
+def test_both_sides_of_a_seam_end_at_the_same_places():
+    # A cylinder whose lower edge comes back 1e-8 beside and above where it began.
+    turn = Turning.over(0.0, U, 1.0)
+    where = Patch(TUBE, turn, Straight(True))
+
+    def edge(name, a, b, level):
+        made = spline(np.array([a, b]), np.array([0.0, 0.0, 1.0, 1.0]), 1)
+        return Edge(made, level, 1e-7, name, 0.0, seam=name == "edge 1")
+
+    rows = [
+        edge("edge 1", (U, 1.0), (U, 3.0), (True, False)),
+        edge("edge 2", (U, 3.0), (0.0, 3.0), (False, True)),
+        edge("edge 1", (0.0, 3.0), (0.0, 1.0), (True, False)),
+        edge("edge 3", (0.0, 1.0), (U - 1e-8, 1.0 + 2e-8), (False, False)),
+    ]
+    made, gap = chained(rows, where)
+    # A unit of the parameter is within a tenth of a unit of length.
+    assert gap == pytest.approx(np.sqrt(5.0) * 1e-8, rel=0.1)
+    np.testing.assert_array_equal(made[0].ends + [-U, 0.0], made[2].ends[::-1])
+    for before, after in zip(made[-1:] + made[:-1], made, strict=True):
+        np.testing.assert_array_equal(before.ends[1], after.ends[0])
+    # Half of the gap each, and half of that again for the other side of the seam.
+    assert made[0].ends[0, 1] == pytest.approx(1.0 + 0.5e-8, abs=1e-15)
+    face = asm.Face(TUBE, [row.nurbs(np.ones(2)) for row in made])
+    assert len(face.boundary) == 2
