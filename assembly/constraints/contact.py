@@ -6,6 +6,7 @@ import numpy as np
 
 from assembly.constraints.constraint import Constraint
 from assembly.errors import InputError
+from assembly.geometry.face import Face
 from assembly.kinematics.body import Body, BodyFace
 
 __all__ = ["Contact"]
@@ -14,17 +15,21 @@ __all__ = ["Contact"]
 class Contact(Constraint):
     """The extremal gap of two faces is zero (or, one-sided, not negative).
 
-    The gap is that of the pair of points the solve tracks from its start; where it lies on the faces is free.
+    The gap is that of the pair of points the solve tracks from its start; where it lies on the faces is free. With
+    edges the pair is one of features, faces, edges or vertices, and switches between them as the bodies move; without,
+    it is one of two surfaces, flush where both are flat.
 
     Parameters
     ----------
     a, b : Body or BodyFace
-        Of a body with several faces, the face nearest to the other side at the first solve takes part; say
-        `body.face(name)` to choose.
+        All faces of a body, or one of them.
     name : str, optional
         "a-b" of the bodies' names by default.
     unilateral : bool
         gap >= 0 instead of gap = 0.
+    edges : bool, optional
+        Whether the faces' edges and vertices take part. By default where a side has several faces, or one with loops;
+        without them a contact that would have to leave a surface is lost.
 
     Raises
     ------
@@ -38,6 +43,8 @@ class Contact(Constraint):
         b: Body | BodyFace,
         name: str | None = None,
         unilateral: bool = False,
+        *,
+        edges: bool | None = None,
     ) -> None:
         for label, side in (("a", a), ("b", b)):
             if not isinstance(side, (Body, BodyFace)):
@@ -52,6 +59,13 @@ class Contact(Constraint):
         if not isinstance(unilateral, (bool, np.bool_)):
             raise InputError(f"unilateral is {unilateral!r}; expected True or False")
         self._unilateral = bool(unilateral)
+        if edges is not None and not isinstance(edges, (bool, np.bool_)):
+            raise InputError(f"edges is {edges!r}; expected True, False or None")
+        sides = [(side.face,) if isinstance(side, BodyFace) else tuple(f.face for f in side.faces) for side in (a, b)]
+        several = any(len(faces) > 1 for faces in sides)
+        if several and edges is not None and not edges:
+            raise InputError("edges is False for a body with several faces; expected a contact of two single faces")
+        self._edges = bool(edges) if edges is not None else several or any(_has_loops(faces[0]) for faces in sides)
 
     @property
     def a(self) -> Body | BodyFace:
@@ -69,6 +83,11 @@ class Contact(Constraint):
         return self._unilateral
 
     @property
+    def edges(self) -> bool:
+        """Whether edges and vertices take part."""
+        return self._edges
+
+    @property
     def body_a(self) -> Body:
         """The body of side a."""
         return self.a if isinstance(self.a, Body) else self.a.body
@@ -80,3 +99,8 @@ class Contact(Constraint):
 
     def __repr__(self) -> str:
         return f"Contact({self.a!r}, {self.b!r}, name={self.name!r}{', unilateral=True' if self.unilateral else ''})"
+
+
+def _has_loops(face: Face) -> bool:
+    """Whether a face was given loops."""
+    return face.outer is not None or bool(face.holes)

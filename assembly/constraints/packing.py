@@ -84,7 +84,7 @@ class Packed:
         self.contacts = [constraint for constraint in constraints if isinstance(constraint, Contact)]
         # Of a contact with trims the surfaces take part without their own boundaries.
         trimmed = {item.contact.name for item in constraints if isinstance(item, TrimContact)}
-        self.whole = [contact.name in trimmed or _needs_no_edges(contact) for contact in self.contacts]
+        self.whole = [contact.name in trimmed or not contact.edges for contact in self.contacts]
         self.sides = [
             (_face(contact.a), _face(contact.b)) if whole else (contact.a, contact.b)
             for contact, whole in zip(self.contacts, self.whole, strict=True)
@@ -231,7 +231,7 @@ class Packed:
         if header[layout.TRIMS]:
             header[layout.TRIM_ROWS_AT] = address_of(trim_rows, *packed, places, block, block, block, block, row, block)
             header[layout.TRIM_TERMS_AT] = address_of(
-                trim_terms, *packed, i8, places, block, block, block, f8, f8, block
+                trim_terms, *packed, i8, places, block, np.zeros((1, 1), dtype=np.int64), block, block, block, f8, block
             )
 
     def _gathering(self, bodies: Sequence[Body], rows: list[list[int]]) -> int:
@@ -507,12 +507,6 @@ def lone_surfaces(sides: tuple[Body | BodyFace, Body | BodyFace]) -> tuple[Nurbs
     """The two surfaces of a contact, if each of its sides has one face."""
     f, g = (_side_faces(side) for side in sides)
     return (f[0].surface, g[0].surface) if len(f) == len(g) == 1 else None
-
-
-def _needs_no_edges(contact: Contact) -> bool:
-    """Whether both sides of a contact are single faces without boundary."""
-    sides = (_side_faces(contact.a), _side_faces(contact.b))
-    return all(len(faces) == 1 and not faces[0].boundary for faces in sides)
 
 
 def _face(side: Body | BodyFace) -> BodyFace:

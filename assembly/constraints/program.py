@@ -17,6 +17,7 @@ from assembly.constraints.layout import (
     CONTACTS,
     COORDINATE,
     EXTRA_COLUMN,
+    FREE_COLUMN,
     JOINT_RECORD,
     JOINT_ROW,
     JOINT_TABLE,
@@ -34,7 +35,6 @@ from assembly.constraints.layout import (
     SECOND,
     SHELL_F,
     SHELL_G,
-    SIGNED,
     SLOTS,
     SURFACE_F,
     SURFACE_G,
@@ -50,8 +50,6 @@ from assembly.constraints.layout import (
     TAPES,
     TRACK_AT,
     TRACKED,
-    TRIM_FORM,
-    TRIM_PAIR,
     TRIM_ROWS_AT,
     TRIM_TERMS_AT,
     TRIMS,
@@ -320,23 +318,31 @@ def evaluate(table, pool, start, patience, loose, room, point):
     return -1
 
 
+@kernel(inline=True)
+def block_at(b):
+    """First column and width of block b of a row: twists of f and g, coordinates of a free pair, further twists."""
+    if b < 2:
+        return 6 * b, 6
+    return (FREE_COLUMN, EXTRA_COLUMN - FREE_COLUMN) if b == 2 else (EXTRA_COLUMN + 6 * (b - 3), 6)
+
+
 @kernel(inner=True)
 def add_gram(bases, jacobian, r, weight, hessian):
     """Upper triangle of hessian += weight J_r^T J_r, for row r of two bodies and more."""
     for b in range(bases.shape[1]):
         at = bases[r, b]
-        if at < 0 or b == 2:
+        if at < 0:
             continue
-        column = 6 * b if b < 2 else EXTRA_COLUMN + 6 * (b - 3)
+        column, width = block_at(b)
         for c in range(bases.shape[1]):
             other = bases[r, c]
-            if other < at or c == 2:
+            if other < at:
                 continue
-            across = 6 * c if c < 2 else EXTRA_COLUMN + 6 * (c - 3)
-            for i in range(6):
+            across, breadth = block_at(c)
+            for i in range(width):
                 s = weight * jacobian[r, column + i]
                 if s != 0.0:
-                    for j in range(6):
+                    for j in range(breadth):
                         hessian[at + i, other + j] += s * jacobian[r, across + j]
 
 
@@ -416,14 +422,13 @@ def add_row_terms(table, pool, loose, room, bases, point, y, weights, hessian):
         elif y[r] != 0.0 or weights[r] != 0.0:
             add_gap_terms(records, r, jacobian, r, y[r], weights[r], hessian, bases[r, 0], bases[r, 1])
     for r in range(pairs, pairs + table[TRIMS]):
-        row = table[ROW_TABLE] + ROW * r
-        if table[row + TRIM_FORM] == SIGNED and loose[0][table[row + TRIM_PAIR]] >= 0:
+        if weights[r] != 0.0:
+            add_gram(bases, jacobian, r, weights[r], hessian)
+        if y[r] != 0.0:
             call_address(
                 table[TRIM_TERMS_AT],
-                (table, pool, r, loose[0], loose[1], point[1], jacobian, y[r], weights[r], hessian),
+                (table, pool, r, loose[0], loose[1], bases, point[1], records, jacobian, y[r], hessian),
             )
-        elif weights[r] != 0.0:
-            add_gram(bases, jacobian, r, weights[r], hessian)
     for r in range(pairs + table[TRIMS], table[ROWS]):
         if weights[r] != 0.0:
             add_gram(bases, jacobian, r, weights[r], hessian)

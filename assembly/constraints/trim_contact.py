@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 from typing import Literal, get_args
 
@@ -73,10 +73,15 @@ class TrimContact(Constraint):
             raise InputError(f"side is {side!r}; expected 'a', 'b' or None")
         self._faces = (_single_face("a", contact.a), _single_face("b", contact.b))
         self._contact = contact
+        if not isinstance(loop, (Loop, NurbsCurve, Iterable)):
+            raise TypeError(f"loop is {loop!r}; expected a Loop, a closed NurbsCurve, or several that close")
         self._loop = loop if isinstance(loop, Loop) else Loop(loop)
         self._side = (0 if side == "a" else 1) if side is not None else self._owner()
-        # A face of its own checks the loop against the surface.
-        self._region = Face(self._faces[self._side].surface, self._loop)
+        # A face of its own checks the loop against the surface, whose outer loop it is there.
+        try:
+            self._region = Face(self._faces[self._side].surface, self._loop)
+        except InputError as error:
+            raise InputError(str(error).replace("outer", "loop", 1)) from None
         self._keep: Keep = keep
         self._form: Form = form
         super().__init__(contact.bodies, f"trim {contact.name}" if name is None else name)

@@ -9,23 +9,26 @@ a curve (appendix A, corrected):
     "between"     g(u_g) - f(c)    g_q - f_u c' t_q,
 
 in the axes of the face's body, where f(u) and f(c) have no rates of their own. At a solution they depend on one
-another (the loop's extremum is then the contact's), and of their second derivatives nothing is kept. One-sided ones
-are zero on the right side of the loop. The loop of a solve calls the two kernels at the end by their addresses.
+another (the loop's extremum is then the contact's), each a multiple of s; so are their second derivatives taken to
+be. One-sided ones are zero on the right side of the loop. The loop of a solve calls the two kernels at the end by
+their addresses.
 """
 
 from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from assembly._kernel import kernel
 from assembly.constraints.layout import (
+    BETWEEN,
     BODY_F,
     BODY_G,
     CARTESIAN,
     CONTACTS,
     FREE_COLUMN,
     JOINTS,
-    MOVING,
     PARAMETRIC,
     ROW,
     ROW_TABLE,
@@ -42,17 +45,18 @@ from assembly.constraints.layout import (
     TRIM_SIDE,
     TRIMS,
 )
+from assembly.constraints.program import add_gram
 from assembly.geometry.pieces import TRIM_CURVES
 from assembly.geometry.spline import curve_point, surface_point
 from assembly.geometry.trim import trim_nearest
-from assembly.geometry.vec import add, cross, dot, matvec, sub
+from assembly.geometry.vec import add, cross, dot, matvec, matvec_t, scale, sub
 from assembly.kinematics.motion import position, relative_pose, rotation
 from assembly.proximity.extremal import CONVERGED, SINGULAR
 from assembly.proximity.feature_pair import feature_record, solve_features
 from assembly.proximity.shell import EDGE, EDGE_CURVE, EDGE_RECORD, FACE
 from assembly.proximity.switching import on_surface
 from assembly.proximity.trim_distance import trim_distance
-from assembly.proximity.velocity import RATES, ZED
+from assembly.proximity.velocity import GAP, NORMAL, RATES, ZED
 
 
 @kernel(inner=True)
@@ -154,6 +158,21 @@ def material_rates(axis, arm_f, arm_g, sign, jacobian, r):
 
 
 @kernel(inner=True)
+def offset_tangents(pu, pv, puu, puv, pvv, n, beta):
+    """Derivatives of p + beta n, n the unit normal on one side of the surface."""
+    normal = cross(pu, pv)
+    length = math.sqrt(dot(normal, normal))
+    if not length > 0.0:
+        return pu, pv
+    factor = (beta if dot(normal, n) > 0.0 else -beta) / length
+    u = add(cross(puu, pv), cross(pu, puv))
+    v = add(cross(puv, pv), cross(pu, pvv))
+    u = sub(u, scale(dot(u, n), n))
+    v = sub(v, scale(dot(v, n), n))
+    return add(pu, scale(factor, u)), add(pv, scale(factor, v))
+
+
+@kernel(inner=True)
 def vector_rows(table, pool, first, loose, point):
     """The rows of a trim from `first` on, in one of the paper's forms."""
     q, tracked, records, residual, jacobian = point
@@ -177,7 +196,7 @@ def vector_rows(table, pool, first, loose, point):
     surface = own_surface(table, row)
     at, rate, _bend = curve_point(table, pool, curve, t)
     _u, _v, c, along, _normal = on_surface(table, pool, surface, curve, t)
-    p, pu, pv, _uu, _uv, _vv = surface_point(table, pool, surface, x[o], x[o + 1])
+    p, pu, pv, puu, puv, pvv = surface_point(table, pool, surface, x[o], x[o + 1])
     there, du, dv, _uu, _uv, _vv = surface_point(table, pool, other_surface(table, row), x[2 - o], x[3 - o])
     away = turn_g if side == 0 else turn_f
     origin = position(q, j if side == 0 else i)
@@ -186,6 +205,13 @@ def vector_rows(table, pool, first, loose, point):
     arm_g = sub(point_w, position(q, j))
     du = matvec(away, du)
     dv = matvec(away, dv)
+    free = loose[0][k] >= 0
+    # Seen from the side of the loop the other point is p + beta n.
+    toward = (0.0, 0.0, 0.0)
+    if form == BETWEEN and not free:
+        n = (records[k, NORMAL], records[k, NORMAL + 1], records[k, NORMAL + 2])
+        toward = scale(1.0 - 2.0 * side, matvec_t(turn, n))
+        pu, pv = offset_tangents(pu, pv, puu, puv, pvv, toward, records[k, GAP])
     for l in range(table[row + TRIM_COUNT]):
         r = first + l
         clear(jacobian, r)
@@ -206,6 +232,15 @@ def vector_rows(table, pool, first, loose, point):
             arm = arm_f if side == 0 else arm_g
             residual[r] = dot(axis, arm) - c[l]
             slope = along[l]
+            if not free:
+                # The other side's own coordinates have no rates at its poles.
+                add_coordinate(loose, records, k, o, pu[l], jacobian, r)
+                add_coordinate(loose, records, k, o + 1, pv[l], jacobian, r)
+                for j in range(FREE_COLUMN):
+                    jacobian[r, j] += toward[l] * jacobian[k, j]
+                if moves:
+                    add_rate(records, scratch, o, -slope, jacobian, r)
+                continue
             material_rates(axis, arm_f, arm_g, 1.0 - 2.0 * side, jacobian, r)
             add_coordinate(loose, records, k, 2 - o, dot(axis, du), jacobian, r)
             add_coordinate(loose, records, k, 3 - o, dot(axis, dv), jacobian, r)
@@ -229,19 +264,48 @@ def trim_rows(table, pool, free, lengths, q, tracked, records, residual, jacobia
     return 0
 
 
+@kernel(inner=True)
+def part_of(jacobian, r, rates, k):
+    """The number a with row r = a rates + b row k, by least squares."""
+    ss = 0.0
+    sg = 0.0
+    gg = 0.0
+    rs = 0.0
+    rg = 0.0
+    for j in range(FREE_COLUMN + 4):
+        ss += rates[0, j] * rates[0, j]
+        sg += rates[0, j] * jacobian[k, j]
+        gg += jacobian[k, j] * jacobian[k, j]
+        rs += jacobian[r, j] * rates[0, j]
+        rg += jacobian[r, j] * jacobian[k, j]
+    det = ss * gg - sg * sg
+    return (rs * gg - rg * sg) / det if det > 1e-12 * ss * gg else 0.0
+
+
 @kernel
-def trim_terms(table, pool, r, free, lengths, tracked, jacobian, y, weight, hessian):
-    """Upper triangle of hessian += y (second derivative) + weight (gradient gradient^T), of a signed row."""
+def trim_terms(table, pool, r, free, lengths, bases, tracked, records, jacobian, y, hessian):
+    """Upper triangle of hessian += y (second derivative of row r).
+
+    Of a signed row of a free contact that is all; else what the change of u_q adds is left out. A vector's row counts
+    as the signed distance, times what its gradient has of that one's: at a solution all else in it is the gap's.
+    """
     row = table[ROW_TABLE] + ROW * r
     k = table[row + TRIM_PAIR]
     o = 2 * table[row + TRIM_SIDE]
+    loose = (free, lengths)
     _s, n, bend = trim_distance(table, pool, table[row + TRIM_LOOP], tracked[k, o], tracked[k, o + 1])
-    bend *= y * pool[table[row + TRIM_FACTOR]]
-    at = 6 * table[MOVING] + 4 * free[k] + o
-    for i in range(2):
-        for j in range(i, 2):
-            flat = (1.0 if i == j else 0.0) - n[i] * n[j]
-            hessian[at + i, at + j] += weight * jacobian[r, FREE_COLUMN + o + i] * jacobian[
-                r, FREE_COLUMN + o + j
-            ] + bend * flat / (lengths[k, o + i] * lengths[k, o + j])
+    places = np.empty((1, bases.shape[1]), np.int64)
+    for b in range(bases.shape[1]):
+        places[0, b] = bases[r, b]
+    rates = np.zeros((1, jacobian.shape[1]))
+    factor = pool[table[row + TRIM_FACTOR]]
+    if table[row + TRIM_FORM] != SIGNED:
+        add_coordinate(loose, records, k, o, n[0], rates, 0)
+        add_coordinate(loose, records, k, o + 1, n[1], rates, 0)
+        factor = part_of(jacobian, r, rates, k)
+        clear(rates, 0)
+    # s_uu = bend t t^T, t along the loop.
+    add_coordinate(loose, records, k, o, -n[1], rates, 0)
+    add_coordinate(loose, records, k, o + 1, n[0], rates, 0)
+    add_gram(places, rates, 0, y * factor * bend, hessian)
     return 0

@@ -240,7 +240,8 @@ def solve_program(table, pool, settings, state, history, tips):
         descent, step, straight = lines
         violation = violation_of(residual, one_sided, rows)
         value = goal(table, pool, shape, rows, loose, room, tips, here, 1, gradient, lagrangian)
-        shortened = iteration > 0 and alpha < 1.0
+        # Rows of vectors depend on one another: their multipliers drift where nothing keeps them short.
+        shortened = iteration > 0 and (alpha < 1.0 or table[VECTOR_TRIMS] == 1)
         # At the start both are the same; later a tenth of the last residual is good.
         good = math.inf if iteration == 0 else 0.1 * last_dual
         dual = choose_multipliers(shape, rows, here, shortened, good, active, gradient, descent, gram, y, better_y)

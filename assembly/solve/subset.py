@@ -145,7 +145,7 @@ class Snapshot:
             source = None if equation.source is None else (_Value(value), "value")
             kept = Equation(equation.terms, source, equation.one_sided, equation.is_drive)
             self._equations.setdefault(int(packed.owners[r]), []).append(kept)
-        self._sides = {contact.name: packed.sides[k] for k, contact in enumerate(packed.contacts)}
+        self._sides = {contact.name: (packed.sides[k], packed.whole[k]) for k, contact in enumerate(packed.contacts)}
 
     def problem(self, which: Iterable[int] | None = None, one_sided: bool = True, drives: bool = True) -> Problem:
         """The problem of some of the constraints, by their places; of all by default.
@@ -170,7 +170,8 @@ class Snapshot:
         if isinstance(constraint, Contact):
             if constraint.unilateral and not one_sided:
                 return None
-            return Contact(*self._sides[constraint.name], constraint.name, constraint.unilateral)
+            sides, whole = self._sides[constraint.name]
+            return Contact(*sides, constraint.name, constraint.unilateral, edges=not whole)
         if isinstance(constraint, TrimContact):
             return None if constraint.unilateral and not one_sided else constraint
         if isinstance(constraint, Expression):

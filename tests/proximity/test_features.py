@@ -1,0 +1,114 @@
+"""The public side of features: names, poses, tracking against the search, penetration, bad input."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from assembly.errors import InputError
+from assembly.geometry import shapes, solids
+from assembly.geometry.face import Face
+from assembly.kinematics.body import Body
+from assembly.proximity import Feature, FeaturePair, FeatureStatus, FeatureTracker, closest_features
+from tests.laws.scenes import random_quaternion
+
+
+def test_features_say_what_they_are():
+    plate = Body("plate", solids.plate(2.0, 1.5, 0.3))
+    ball = Body("ball", shapes.sphere(0.2, name="shell"), position=(0.1, 0.2, 1.0))
+    pair = closest_features(plate, ball)
+    assert isinstance(pair, FeaturePair) and pair.status is FeatureStatus.APART
+    assert pair.features == (Feature("face", pair.features[0].index, "face 'top'"), Feature("face", 0, "face 'shell'"))
+    np.testing.assert_allclose(pair.points, [[0.1, 0.2, 0.15], [0.1, 0.2, 0.8]], atol=1e-13)
+    np.testing.assert_allclose(pair.normal, [0.0, 0.0, 1.0], atol=1e-13)
+    assert pair.parameters.shape == (2, 2)
+    assert abs(pair.gap - 0.65) < 1e-13 and 0.65 - 1e-11 < pair.lower <= 0.65 + 1e-13
+    beside = closest_features(plate, ball, q_b=[2.0, 0.1, 1.0, 1.0, 0.0, 0.0, 0.0])
+    edge = beside.features[0]
+    assert edge.kind == "edge" and edge.name.startswith("edge ") and "'top'" in edge.name and "'right'" in edge.name
+    # The point of the edge is where its parameter says: (t, 0).
+    assert beside.parameters[0, 1] == 0.0
+    corner = closest_features(plate, ball, q_b=[2.0, 2.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+    assert corner.features[0].kind == "vertex" and corner.features[0].name == f"vertex {corner.features[0].index}"
+    np.testing.assert_allclose(corner.points[0], [1.0, 0.75, 0.15], atol=1e-14)
+    assert repr(corner.features[0]) == corner.features[0].name
+
+
+def test_poses_are_the_bodies_own_and_swap():
+    rng = np.random.default_rng(1)
+    q_a, q_b = (np.concatenate([3.0 * k + rng.normal(size=3), random_quaternion(rng)]) for k in range(2))
+    faces_a, faces_b = shapes.box(1.0, 2.0, 0.5), solids.solid_cylinder(0.4, 1.0)
+    a, b = Body("a", faces_a, q_a[:3], q_a[3:]), Body("b", faces_b, q_b[:3], q_b[3:])
+    own, given, swapped = closest_features(a, b), closest_features(faces_a, faces_b, q_a, -q_b), closest_features(b, a)
+    minus = closest_features(faces_a, faces_b, q_a, np.concatenate([q_b[:3], -q_b[3:]]))
+    assert abs(own.gap - minus.gap) < 1e-13 and given.gap != own.gap
+    assert abs(own.gap - swapped.gap) < 1e-12
+    np.testing.assert_allclose(own.points, swapped.points[::-1], atol=1e-9)
+    np.testing.assert_allclose(own.normal, -swapped.normal, atol=1e-9)
+    # Moved together by much, and in other units.
+    far = np.array([1e3, -2e3, 5e2, 0, 0, 0, 0])
+    assert abs(closest_features(a, b, q_a + far, q_b + far).gap - own.gap) < 1e-10
+    small = [tuple(Face(f.surface.transformed(scale=1e-3), f.outer) for f in faces) for faces in (faces_a, faces_b)]
+    scale = np.array([1e-3] * 3 + [1.0] * 4)
+    assert abs(1e3 * closest_features(*small, scale * q_a, scale * q_b).gap - own.gap) < 1e-11
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_tracking_gives_what_a_search_gives(seed):
+    rng = np.random.default_rng(seed)
+    a, b = solids.plate(2.0, 1.4, 0.4), [shapes.box(0.6, 0.8, 0.5), solids.solid_cylinder(0.3, 0.9)][seed % 2]
+    tracker = FeatureTracker(a, b)
+    turn, offset = random_quaternion(rng), rng.uniform(-0.3, 0.3, 2)
+    kinds, before = set(), None
+    for k in range(300):
+        x = -2.0 + 4.0 * k / 299
+        q = np.concatenate([[x, offset[0] + 0.3 * x, 1.0 + 0.1 * np.sin(5.0 * x)], turn + 0.05 * np.sin(3.0 * x)])
+        pair = tracker.step(None, q)
+        kinds.add(tuple(feature.kind for feature in pair.features))
+        assert pair.gap > 0.0
+        if k % 10 == 0:
+            assert abs(pair.gap - closest_features(a, b, q_b=q).gap) < 1e-12
+        # No jumps: the gap changes by no more than points of the moving body do.
+        assert before is None or abs(pair.gap - before) < 0.03
+        before = pair.gap
+    assert tracker.searches == 1 and tracker.switches >= 2 and len(kinds) >= 2
+
+
+def test_through_touching_and_apart_again():
+    plate, ball = solids.plate(2.0, 1.5, 0.3), shapes.sphere(0.2)
+    tracker = FeatureTracker(plate, ball)
+    for z in np.concatenate([np.linspace(0.6, 0.3, 31), np.linspace(0.3, 0.6, 31)]):
+        q = [0.1, 0.2, z, 1.0, 0.0, 0.0, 0.0]
+        wanted = z - 0.2 - 0.15
+        assert abs(tracker.step(None, q).gap - wanted) < 1e-13
+        pair = closest_features(plate, ball, q_b=q)
+        # Without a past: the same pair, the one by which they come apart along the normal of their crossing.
+        assert pair.gap <= 0.0 if wanted < -1e-9 else abs(pair.gap - wanted) < 1e-12
+        assert pair.status is (FeatureStatus.PENETRATING if wanted < -1e-9 else FeatureStatus.APART)
+
+
+def test_two_boxes_in_each_other():
+    box = shapes.box(1.0, 1.0, 1.0)
+    pair = closest_features(box, box, q_b=[0.1, 0.05, 0.9, 1.0, 0.02, 0.03, 0.0])
+    assert pair.status is FeatureStatus.PENETRATING
+    assert -0.2 < pair.gap < -0.05
+    d = pair.points[1] - pair.points[0]
+    assert abs(d @ pair.normal - pair.gap) < 1e-13 and np.linalg.norm(np.cross(d, pair.normal)) < 1e-12
+
+
+def test_bad_input_is_named():
+    box, ball = shapes.box(1.0, 1.0, 1.0), shapes.sphere(1.0)
+    with pytest.raises(TypeError, match="a is 3"):
+        closest_features(3, ball)
+    with pytest.raises(TypeError, match=r"b\[1\] is 'x'"):
+        closest_features(ball, [ball, "x"])
+    with pytest.raises(InputError, match="b is empty"):
+        closest_features(ball, [])
+    with pytest.raises(InputError, match="without a shape"):
+        closest_features(Body("none"), ball)
+    with pytest.raises(InputError, match="q_a"):
+        closest_features(box, ball, q_a=[0.0] * 6)
+    with pytest.raises(InputError, match="q_b"):
+        closest_features(box, ball, q_b=[np.nan] * 7)
+    with pytest.raises(InputError, match=r"q_b\[3:\]"):
+        FeatureTracker(box, ball).step(None, [1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 0.0])
