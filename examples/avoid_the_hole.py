@@ -30,7 +30,7 @@ def egg_on_plate() -> tuple[asm.Assembly, asm.FrameDistance]:
     plate = asm.Body("plate", curved_plate(), fixed=True)
     egg = asm.Body("egg", asm.shapes.ellipsoid(9.0, 6.0, 5.0), position=(-36.0, 0.0, 8.0))
     touch = asm.Contact(plate, egg, "touch")
-    hand = asm.FrameDistance(egg.frame(), asm.Pose((-36.0, 0.0, 5.0)), length=10.0)
+    hand = asm.FrameDistance(egg.frame(), asm.Pose((-36.0, 0.0, 5.0)), length=20.0)
     scene = asm.Assembly([plate, egg])
     scene.constrain(touch, asm.TrimContact(touch, plate.face().face.holes[0], keep="outside", name="around the hole"))
     scene.minimize(hand)

@@ -1,8 +1,8 @@
 """A cam turns once, and a roller that touches it rises and falls: found by contact, and by the cam's offset curve.
 
-The cam is on a driven hinge, the roller on a stem in a guide; one contact of the cam's face with the roller's wall ties
-them. The axis of the roller runs on the curve that is one roller radius outside of the cam's profile: where this crosses
-the guide is computed from the profile's points alone, with another library's spline.
+The cam is on a driven hinge, the roller on a stem in a guide; a contact of the cam's face with the roller's wall ties
+them. The roller's axis runs on the curve that is one roller radius outside of the profile: where this crosses the guide
+is computed from the profile's points alone, with another library's spline.
 Prints both, and writes cam_follower.html, which plays the turn: open it in any browser.
 """
 
@@ -37,15 +37,13 @@ def heights(angles: np.ndarray) -> np.ndarray:
     points = RADII * np.exp(1j * AROUND)
     profile = CubicSpline(np.arange(25), np.append(points, points[0]), bc_type="periodic")
 
-    def offset(t: float) -> complex:
-        tangent = profile(t, 1)
-        return complex(profile(t) - 1j * ROLLER * tangent / abs(tangent))
+    def turned(t: float, angle: float) -> complex:
+        """A point of the offset curve, seen from the guide."""
+        return complex(profile(t) - 1j * ROLLER * profile(t, 1) / abs(profile(t, 1))) * np.exp(1j * angle)
 
     def height(angle: float) -> float:
-        turn, middle = 1j * np.exp(-1j * angle), 6.0 - 12.0 * angle / np.pi
-        # The offset point whose direction, turned with the cam, is that of the guide.
-        t = brentq(lambda t: (offset(t) / turn).imag, middle - 4.0, middle + 4.0, xtol=1e-14)
-        return abs(offset(t))
+        guess = 6.0 - 12.0 * angle / np.pi
+        return turned(brentq(lambda t: turned(t, angle).real, guess - 4.0, guess + 4.0, xtol=1e-14), angle).imag
 
     return np.array([height(angle) for angle in angles])
 

@@ -1,8 +1,9 @@
-"""A pin is lowered into a slot, led along it, and stops at the round end, however far the hand goes on.
+"""A pin is lowered into a slot and led along it; at the round end it stops, wherever the hand goes.
 
-The pin stays upright. Its wall may touch each of the four walls of the slot and go through none: one-sided contacts of
-faces with their edges. Within the slot the pin's axis can be in a narrower slot: the place there that is nearest to the
-hand is known, and printed beside the one that was found.
+The pin stays upright. Its wall may touch each of the four walls of the slot and run through none: one-sided contacts of
+faces that end at edges. The pin's axis is kept in a slot that is narrower by the pin: the place there that is nearest
+to the hand is known, and printed beside the one that was found. The fit is close, so that the hand goes in small steps:
+where the pin moves by some, the point at which it touches the round end moves by eight times as much.
 Prints both and what touches, and writes pin_in_slot.html, which plays the motion: open it in any browser.
 """
 
@@ -23,7 +24,7 @@ def pin_and_plate() -> tuple[asm.Assembly, asm.PointDistance]:
     scene = asm.Assembly([plate, pin])
     scene.constrain(asm.Parallel(plate.frame(), pin.frame(), "upright", angle=0.0))
     for wall in WALLS:
-        scene.constrain(asm.Contact(plate.face(wall), pin.face("wall"), wall, unilateral=True))
+        scene.constrain(asm.Contact(plate.face(wall), pin.face("wall"), wall, unilateral=True, edges=True))
     hand = asm.PointDistance(pin.point(0, 0, 0), target=(0, 0, 30))
     scene.minimize(hand)
     return scene, hand
@@ -40,13 +41,13 @@ def nearest(target: np.ndarray) -> np.ndarray:
 def main() -> tuple[np.ndarray, list[asm.Solution]]:
     scene, hand = pin_and_plate()
     down = [(0.0, 0.0, z) for z in np.linspace(30.0, 2.0, 15)]
-    out = [(*(x * ALONG + 6.0 * np.sin(0.15 * x) * LEFT), 2.0) for x in np.linspace(0.0, 40.0, 41)]
+    out = [(*(x * ALONG + 6.0 * np.sin(0.15 * x) * LEFT), 2.0) for x in np.linspace(0.0, 40.0, 161)]
     targets, solutions = np.array(down + out), []
     print("hand                        pin                         nearest place          touching")
     for k, target in enumerate(targets):
         hand.target = target
         solutions.append(scene.solve(solutions[-1] if solutions else None))
-        if k % 4 == 2:
+        if k % 10 == 5:
             place, exact = solutions[-1].pose("pin").position, nearest(target[:2])
             touching = ", ".join(wall for wall in WALLS if abs(solutions[-1].contacts[wall].gap) < 1e-9)
             print(*(f"{x:8.3f}" for x in (*target, *place)), *(f"{x:10.6f}" for x in exact), touching, sep=" ")

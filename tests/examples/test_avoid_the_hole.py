@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from tests.examples.running import run_example
 
 AXES = np.array([9.0, 6.0, 5.0])
-LENGTH = 10.0  # by which a turn counts
+LENGTH = 20.0  # by which a turn counts
 
 
 @pytest.fixture(scope="module")
@@ -64,9 +64,7 @@ def test_beside_the_hole_it_is_the_minimum_over_all_contacts(run, k):
     (u, v, *spin), cost = least(lambda y: wishes(surface, y[0], y[1], y[2:], x), start)
     # Minima by differences of residuals are good to some 1e-8.
     assert solution.contacts["touch"].parameters[:2] == pytest.approx([u, v], abs=1e-6)
-    assert solution.pose("egg").position == pytest.approx(
-        touching(surface, u, v, Rotation.from_rotvec(spin)), abs=1e-6
-    )
+    assert solution.pose("egg").position == pytest.approx(touching(surface, u, v, Rotation.from_rotvec(spin)), abs=1e-6)
     assert solution.objective == pytest.approx(cost, rel=1e-9, abs=1e-12)
 
 
