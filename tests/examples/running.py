@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import redirect_stdout
 from importlib.util import module_from_spec, spec_from_file_location
 from io import StringIO
@@ -13,14 +14,14 @@ import pytest
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 
-def run_example(name: str, folder: Path) -> SimpleNamespace:
-    """The example's module, what its main returned, the lines it printed, and the page it wrote."""
+def run_example(name: str, folder: Path, also: Sequence[str] = ()) -> SimpleNamespace:
+    """The example's module, what its main returned, the lines it printed, and the page it wrote, beside other files."""
     spec = spec_from_file_location(name, EXAMPLES / f"{name}.py")
     module = module_from_spec(spec)
     spec.loader.exec_module(module)
     with pytest.MonkeyPatch.context() as patch, redirect_stdout(StringIO()) as printed:
         patch.chdir(folder)
         result = module.main()
-    assert [path.name for path in folder.iterdir()] == [f"{name}.html"]
+    assert sorted(path.name for path in folder.iterdir()) == sorted([f"{name}.html", *also])
     page = (folder / f"{name}.html").read_text(encoding="utf-8")
     return SimpleNamespace(module=module, result=result, lines=printed.getvalue().splitlines(), page=page)
