@@ -100,7 +100,7 @@ def test_solids():
         # Whole families of nearest points: faces that are parallel, axes that coincide, spheres in spheres.
         (shapes.box(1, 1, 1), shapes.box(1, 1, 1), [0.3, 0.2, 1.5, 1, 0, 0, 0], 0.5),
         (shapes.box(1, 1, 1), shapes.box(1, 1, 1), [0.3, 2.0, 1.0, 1, 0, 0, 0], 1.0),
-        (solids.solid_cylinder(0.5, 2.0), shapes.box(4, 4, 1), [0, 0, 1.25, np.sqrt(0.5), np.sqrt(0.5), 0, 0], 0.0),
+        (shapes.box(4, 4, 1), solids.solid_cylinder(0.5, 2.0), [0, 0, 1.0, np.sqrt(0.5), np.sqrt(0.5), 0, 0], 0.0),
         (solids.solid_cylinder(0.5, 2.0), solids.solid_cylinder(0.5, 2.0), [1.5, 0.1, 0, 1, 0, 0, 0], None),
         (shapes.torus(3.0, 0.5), shapes.torus(1.0, 0.5), [0, 0, 0, 1, 0, 0, 0], 1.0),
         (shapes.torus(3.0, 0.5), shapes.torus(3.0, 0.5), [0, 0, 2.5, 1, 0, 0, 0], 1.5),
