@@ -68,7 +68,7 @@ PARTS = 8192
 
 
 @kernel(inner=True)
-def feature_cells(table, pool, shell, k):
+def feature_cells(table, shell, k):
     """Kind and record of feature k, how many cells it has, where in the pool, how long a row, and where its ball is."""
     faces = table[shell + FACES]
     edges = table[shell + EDGES]
@@ -89,7 +89,7 @@ def room(table, pool, shell):
     features = table[shell + FACES] + table[shell + EDGES] + table[shell + VERTICES]
     count = 1 + features + PARTS
     for k in range(features):
-        cells = feature_cells(table, pool, shell, k)[2]
+        cells = feature_cells(table, shell, k)[2]
         count += cells + cells // TOGETHER + 1
     return count
 
@@ -141,7 +141,7 @@ def plant(table, pool, shell, turn, shift, nodes, info):
     info[0, CHILD] = 1
     info[0, CHILDREN] = features
     for k in range(features):
-        kind, record, cells, at, size, ball = feature_cells(table, pool, shell, k)
+        kind, record, cells, at, size, ball = feature_cells(table, shell, k)
         i = 1 + k
         new_node(info, i, PART, kind, k, record)
         if kind == VERTEX:
@@ -192,7 +192,7 @@ def plant(table, pool, shell, turn, shift, nodes, info):
 
 
 @kernel(inner=True)
-def open_spans(table, pool, turn, shift, nodes, info, i, count, work):
+def open_spans(table, pool, nodes, info, i, count):
     """Pieces of one span each as cells of a feature that has few spans. Returns the number of nodes."""
     kind = info[i, KIND]
     record = info[i, RECORD]
@@ -228,7 +228,6 @@ def open_spans(table, pool, turn, shift, nodes, info, i, count, work):
             nodes[count, HALF_V] = 0.5 * (v1 - v0)
             put(nodes, count, CENTER, get(nodes, i, CENTER))
             nodes[count, RADIUS] = nodes[i, RADIUS]
-            give_model(table, pool, turn, shift, nodes, info, count, work)
             count += 1
     info[i, CHILDREN] = count - info[i, CHILD]
     return count
@@ -246,7 +245,7 @@ def span_count(table, kind, record):
 @kernel(inner=True)
 def open_feature(table, pool, shell, turn, shift, nodes, info, i, count):
     """Groups and cells of a feature. Returns the number of nodes."""
-    kind, record, cells, at, size, ball = feature_cells(table, pool, shell, info[i, FEATURE])
+    kind, record, cells, at, size, ball = feature_cells(table, shell, info[i, FEATURE])
     used = 0
     for c in range(cells):
         if used_cell(table, pool, record, kind, c):
@@ -302,7 +301,7 @@ def give_model(table, pool, turn, shift, nodes, info, i, work):
 
 
 @kernel(inner=True)
-def split_cell(table, pool, turn, shift, nodes, info, i, count, work):
+def split_cell(nodes, info, i, count):
     """Two or four parts of a cell that has its model. Returns the number of nodes."""
     p = get(nodes, i, LINEAR_U)
     q = get(nodes, i, LINEAR_V)
@@ -326,19 +325,18 @@ def split_cell(table, pool, turn, shift, nodes, info, i, count, work):
             nodes[count, HALF_V] = half_v
             put(nodes, count, CENTER, get(nodes, i, CENTER))
             nodes[count, RADIUS] = nodes[i, RADIUS]
-            give_model(table, pool, turn, shift, nodes, info, count, work)
             count += 1
     info[i, CHILDREN] = parts_u * parts_v
     return count
 
 
 @kernel(inner=True)
-def grow(table, pool, shell, turn, shift, nodes, info, i, count, work):
-    """See to it that a node has children. Returns the number of nodes."""
+def grow(table, pool, shell, turn, shift, nodes, info, i, count):
+    """See to it that a node has children, cells yet without their models. Returns the number of nodes."""
     if info[i, CHILD] >= 0 or info[i, KIND] == VERTEX:
         return count
     if info[i, LEVEL] == PART:
         if span_count(table, info[i, KIND], info[i, RECORD]) <= SPANS:
-            return open_spans(table, pool, turn, shift, nodes, info, i, count, work)
+            return open_spans(table, pool, nodes, info, i, count)
         return open_feature(table, pool, shell, turn, shift, nodes, info, i, count)
-    return split_cell(table, pool, turn, shift, nodes, info, i, count, work)
+    return split_cell(nodes, info, i, count)

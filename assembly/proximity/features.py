@@ -182,7 +182,7 @@ def _packed(a: Faces, b: Faces) -> tuple[Table, Array, int, int, float]:
 def _search(packed: tuple[Table, Array, int, int, float], q: Array, codes: Table, out: Array) -> FeatureStatus:
     """The pair at poses (2, 7) into codes (2,) and out (PAIR,)."""
     table, pool, shell_a, shell_b, size = packed
-    status = _STATUSES[find_nearest(table, pool, shell_a, shell_b, q, size, codes, out)]
+    status: FeatureStatus = _STATUSES[find_nearest(table, pool, shell_a, shell_b, q, size, codes, out)]
     if status is FeatureStatus.CROSSING:
         status = _STATUSES[find_deepest(table, pool, shell_a, shell_b, q, size, codes, out)]
     return status

@@ -190,7 +190,7 @@ def search(table, pool, shell_f, shell_g, turn, shift, size, upper):
     j = 0
     while ai[i, LEVEL] != CELL or bi[j, LEVEL] != CELL:
         if larger_first(a, ai, i, b, bi, j):
-            count_f = grow(table, pool, shell_f, same, origin, a, ai, i, count_f, work)
+            count_f = grow(table, pool, shell_f, same, origin, a, ai, i, count_f)
             nearest = math.inf
             first = ai[i, CHILD]
             for k in range(first, first + ai[i, CHILDREN]):
@@ -199,7 +199,7 @@ def search(table, pool, shell_f, shell_g, turn, shift, size, upper):
                     nearest = dot(d, d)
                     i = k
         else:
-            count_g = grow(table, pool, shell_g, turn, shift, b, bi, j, count_g, work)
+            count_g = grow(table, pool, shell_g, turn, shift, b, bi, j, count_g)
             nearest = math.inf
             first = bi[j, CHILD]
             for k in range(first, first + bi[j, CHILDREN]):
@@ -323,12 +323,12 @@ def search(table, pool, shell_f, shell_g, turn, shift, size, upper):
             if max(a[i, RADIUS], b[j, RADIUS]) < 1e-9 * size:
                 continue
         if larger_first(a, ai, i, b, bi, j):
-            count_f = grow(table, pool, shell_f, same, origin, a, ai, i, count_f, work)
+            count_f = grow(table, pool, shell_f, same, origin, a, ai, i, count_f)
             first = ai[i, CHILD]
             last = first + ai[i, CHILDREN]
             down_f = True
         else:
-            count_g = grow(table, pool, shell_g, turn, shift, b, bi, j, count_g, work)
+            count_g = grow(table, pool, shell_g, turn, shift, b, bi, j, count_g)
             first = bi[j, CHILD]
             last = first + bi[j, CHILDREN]
             down_f = False
@@ -336,6 +336,10 @@ def search(table, pool, shell_f, shell_g, turn, shift, size, upper):
             p = k if down_f else i
             q = j if down_f else k
             if are_cells:
+                if down_f:
+                    give_model(table, pool, same, origin, a, ai, p, work)
+                else:
+                    give_model(table, pool, turn, shift, b, bi, q, work)
                 key, m = pair_bound(a, p, b, q, n, upper)
             else:
                 key = ball_bound(a, p, b, q)

@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly.geometry.vec import add, matvec, matvec_t
+from assembly.geometry.vec import add, dot, matvec, matvec_t, scale, sub
 from assembly.kinematics.motion import position, relative_pose, rotation
+from assembly.proximity.cell_tree import feature_cells
+from assembly.proximity.crossing import tangents
 from assembly.proximity.extremal import CONVERGED, SINGULAR
-from assembly.proximity.feature_pair import features_at
+from assembly.proximity.feature_pair import solve_features
 from assembly.proximity.nearest import CROSSING, search
 from assembly.proximity.penetration import PENETRATING, deepest
 from assembly.proximity.switching import feature_at, feature_kind, track_features
@@ -37,24 +39,26 @@ def write_pair(q, turn_f, x, pf, pg, n, gap, out):
 
 
 @kernel(inner=True)
-def write_features(table, pool, shell_f, shell_g, q, turn_f, turn, shift, f, g, x, n, size, codes, out):
-    """The pair of features f and g at x into codes (2,) and out (PAIR,)."""
-    frame = features_at(
-        table,
-        pool,
-        feature_kind(table, shell_f, f),
-        feature_at(table, shell_f, f),
-        feature_kind(table, shell_g, g),
-        feature_at(table, shell_g, g),
-        turn,
-        shift,
-        x,
-        n,
-        size,
-    )
-    write_pair(q, turn_f, x, frame[3], frame[4], frame[0], frame[5], out)
+def write_features(table, pool, shell_f, shell_g, q, turn_f, turn, shift, f, g, x, n, gap, size, codes, out):
+    """The pair of features f and g at x into codes (2,) and out (PAIR,); n a normal near its own, or zero."""
+    kind_f = feature_kind(table, shell_f, f)
+    kind_g = feature_kind(table, shell_g, g)
+    a = feature_at(table, shell_f, f)
+    b = feature_at(table, shell_g, g)
+    status, y, frame = solve_features(table, pool, kind_f, a, kind_g, b, turn, shift, x, n, size, math.inf)
     codes[0] = f
     codes[1] = g
+    if (status == CONVERGED or status == SINGULAR) and abs(abs(frame[5]) - abs(gap)) <= 1e-12 * size:
+        write_pair(q, turn_f, y, frame[3], frame[4], frame[0], frame[5], out)
+        return
+    # A crossing, or an apex where Newton's method has no tangent to go on: the points themselves.
+    same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+    none = (0.0, 0.0, 0.0)
+    pf = tangents(table, pool, kind_f, feature_cells(table, shell_f, f)[1], same, none, x[0], x[1])[0]
+    pg = tangents(table, pool, kind_g, feature_cells(table, shell_g, g)[1], turn, shift, x[2], x[3])[0]
+    d = sub(pg, pf)
+    length = math.sqrt(dot(d, d))
+    write_pair(q, turn_f, x, pf, pg, scale(1.0 / length, d) if length > 1e-9 * size else frame[0], length, out)
 
 
 @kernel
@@ -62,9 +66,9 @@ def find_nearest(table, pool, shell_f, shell_g, q, size, codes, out):
     """The nearest pair at the poses q (2, 7); its features into codes (2,), the pair into out. Returns the status."""
     turn_f = rotation(q, 0)
     turn, shift = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
-    status, f, g, x, _gap, lower, effort = search(table, pool, shell_f, shell_g, turn, shift, size, math.inf)
+    status, f, g, x, gap, lower, effort = search(table, pool, shell_f, shell_g, turn, shift, size, math.inf)
     none = (0.0, 0.0, 0.0)
-    write_features(table, pool, shell_f, shell_g, q, turn_f, turn, shift, f, g, x, none, size, codes, out)
+    write_features(table, pool, shell_f, shell_g, q, turn_f, turn, shift, f, g, x, none, gap, size, codes, out)
     out[LOWER] = lower
     out[EFFORT] = effort
     return status
@@ -76,10 +80,10 @@ def find_deepest(table, pool, shell_f, shell_g, q, size, codes, out):
     turn_f = rotation(q, 0)
     turn, shift = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
     x = (out[0], out[1], out[2], out[3])
-    found, f, g, y, n, _gap = deepest(table, pool, shell_f, shell_g, turn, shift, codes[0], codes[1], x, size)
+    found, f, g, y, n, gap = deepest(table, pool, shell_f, shell_g, turn, shift, codes[0], codes[1], x, size)
     if not found:
         return CROSSING
-    write_features(table, pool, shell_f, shell_g, q, turn_f, turn, shift, f, g, y, n, size, codes, out)
+    write_features(table, pool, shell_f, shell_g, q, turn_f, turn, shift, f, g, y, n, gap, size, codes, out)
     return PENETRATING
 
 

@@ -63,7 +63,7 @@ def fill(table, pool, turn, shift, nodes, info, i, work):
 def open_all(table, pool, shell, turn, shift, nodes, info, work):
     used = plant(table, pool, shell, turn, shift, nodes, info)
     for i in range(1, used):
-        used = grow(table, pool, shell, turn, shift, nodes, info, i, used, work)
+        used = grow(table, pool, shell, turn, shift, nodes, info, i, used)
     return used
 
 

@@ -6,15 +6,25 @@ the distance itself where the samples are dense enough for every minimum that ma
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.spatial import cKDTree
+
+from assembly.geometry.face import Face
+from assembly.geometry.surface import NurbsSurface
+
+__all__ = ["Sampled", "circle_distance", "least_distance"]
+
+Array = NDArray[np.float64]
 
 
 class Sampled:
     """Samples of faces: of their insides and of their boundary curves, with a tree over them."""
 
-    def __init__(self, faces, count=30000):
+    def __init__(self, faces: Iterable[Face], count: int = 30000) -> None:
         self.faces = list(faces)
         per = int(np.sqrt(count / len(self.faces)))
         rows, points = [], []
@@ -32,7 +42,7 @@ class Sampled:
         self.size = float(np.linalg.norm(np.ptp(self.points, axis=0)))
         self.spacing = 1.5 * self.size / per
 
-    def limits(self, row):
+    def limits(self, row: Array) -> list[tuple[float | None, float | None]]:
         """The domain of a sample's coordinates."""
         face, curve = self.faces[int(row[0])], int(row[1])
         if curve >= 0:
@@ -40,7 +50,7 @@ class Sampled:
         closed = face.surface.closed
         return [(None, None) if closed[k] else face.surface.domain[k] for k in range(2)]
 
-    def at(self, row, c):
+    def at(self, row: Array, c: Array) -> tuple[Array, Array]:
         """Point and its derivatives (3, coordinates) where a sample has coordinates c."""
         face, curve = self.faces[int(row[0])], int(row[1])
         if curve < 0:
@@ -52,13 +62,13 @@ class Sampled:
         p, su, sv = face.surface.evaluate(u, v, 1)
         return p, (su * along[0] + sv * along[1])[:, None]
 
-    def holds(self, row, c):
+    def holds(self, row: Array, c: Array) -> bool:
         """Whether a point of a face is inside its trim."""
         face = self.faces[int(row[0])]
         return row[1] >= 0 or bool(face.contains(*into(face.surface, np.asarray(c)[None])[0]))
 
 
-def into(surface, points):
+def into(surface: NurbsSurface, points: Array) -> Array:
     """Parameters (n, 2) wrapped, and held at the ends."""
     columns = []
     for k in range(2):
@@ -68,16 +78,16 @@ def into(surface, points):
     return np.column_stack(columns)
 
 
-def polished(a, row_a, b, row_b, turn, shift):
+def polished(a: Sampled, row_a: Array, b: Sampled, row_b: Array, turn: Array, shift: Array) -> float:
     """The least distance near two samples, or infinity where the minimum is outside a trim."""
     limits = a.limits(row_a) + b.limits(row_b)
     split = len(a.limits(row_a))
 
-    def square(c):
+    def square(c: Array) -> tuple[float, Array]:
         p, dp = a.at(row_a, c[:split])
         q, dq = b.at(row_b, c[split:])
         d = turn @ q + shift - p
-        return 0.5 * d @ d, np.concatenate([-d @ dp, d @ (turn @ dq)])
+        return 0.5 * float(d @ d), np.concatenate([-d @ dp, d @ (turn @ dq)])
 
     c = np.concatenate([row_a[2 : 2 + split], row_b[2 : 2 + len(limits) - split]])
     for _ in range(3):
@@ -89,11 +99,11 @@ def polished(a, row_a, b, row_b, turn, shift):
     return float(np.sqrt(2.0 * found.fun))
 
 
-def least_distance(a, b, turn, shift, candidates=16):
+def least_distance(a: Sampled, b: Sampled, turn: Array, shift: Array, candidates: int = 16) -> float:
     """The distance of two sampled bodies, the second one turned and shifted."""
     points = b.points @ turn.T + shift
     distance, nearest = a.tree.query(points)
-    best = distance.min()
+    best = float(distance.min())
     left, slack = distance.copy(), a.spacing + b.spacing
     kinds = np.column_stack([b.rows[:, :2], a.rows[nearest, :2]])
     for _ in range(candidates):
@@ -104,3 +114,26 @@ def least_distance(a, b, turn, shift, candidates=16):
         same = (kinds == kinds[j]).all(axis=1)
         left[same & (np.linalg.norm(points - points[j], axis=1) < 4.0 * b.spacing)] = np.inf
     return best
+
+
+def circle_distance(first: float, second: float, turn: Array, shift: Array) -> float:
+    """The distance of two circles of these radii around z axes: a dense search, then golden sections.
+
+    From a point of the first circle to the second one there is a closed form.
+    """
+
+    def distance(angle: Array) -> Array:
+        p = first * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=-1)
+        local = (p - shift) @ turn
+        return np.hypot(np.hypot(local[..., 0], local[..., 1]) - second, local[..., 2])
+
+    angles = np.linspace(0.0, 2.0 * np.pi, 3000, endpoint=False)
+    values = distance(angles)
+    lowest = angles[(values <= np.roll(values, 1)) & (values <= np.roll(values, -1))]
+    low, high = lowest - angles[1], lowest + angles[1]
+    part = 0.5 * (np.sqrt(5.0) - 1.0)
+    for _ in range(80):
+        a, b = high - part * (high - low), low + part * (high - low)
+        left = distance(a) < distance(b)
+        low, high = np.where(left, low, a), np.where(left, b, high)
+    return float(distance(0.5 * (low + high)).min())
