@@ -33,7 +33,7 @@ from assembly.proximity.nearest_query import (
     follow_nearest,
 )
 from assembly.proximity.shell_packing import pack_shell
-from assembly.proximity.topology import Topology, topology_of
+from assembly.proximity.solid import solid_of
 
 __all__ = ["Feature", "FeaturePair", "FeatureStatus", "FeatureTracker", "closest_features"]
 
@@ -148,14 +148,9 @@ def _pose(name: str, shape: Shape, q: ArrayLike | None) -> Array:
 
 
 @lru_cache(maxsize=128)
-def _topology(faces: Faces) -> Topology:
-    return topology_of(faces)
-
-
-@lru_cache(maxsize=128)
-def _features(faces: Faces) -> tuple[Feature, ...]:
+def features_of(faces: Faces) -> tuple[Feature, ...]:
     """All features of a body by number."""
-    topology = _topology(faces)
+    topology = solid_of(faces)
     names = [face.name or f"face {k + 1}" for k, face in enumerate(topology.faces)]
     result = [Feature("face", k, f"face {name!r}") for k, name in enumerate(names)]
     for k, edge in enumerate(topology.edges):
@@ -173,8 +168,8 @@ def _extent(faces: Faces) -> float:
 @lru_cache(maxsize=64)
 def _packed(a: Faces, b: Faces) -> tuple[Table, Array, int, int, float]:
     """Two shells as one table and one pool, where they begin, and the larger size."""
-    table_a, pool_a, shell_a = pack_shell(_topology(a), 1.0)
-    table_b, pool_b, shell_b = pack_shell(_topology(b), 1.0, table_a.size, pool_a.size)
+    table_a, pool_a, shell_a = pack_shell(solid_of(a), 1.0)
+    table_b, pool_b, shell_b = pack_shell(solid_of(b), 1.0, table_a.size, pool_a.size)
     size = max(_extent(a), _extent(b))
     return np.concatenate([table_a, table_b]), np.concatenate([pool_a, pool_b]), shell_a, shell_b, size
 
@@ -235,7 +230,7 @@ def closest_features(a: Shape, b: Shape, q_a: ArrayLike | None = None, q_b: Arra
     q = np.stack([_pose("q_a", a, q_a), _pose("q_b", b, q_b)])
     codes, out = np.zeros(2, dtype=np.int64), np.empty(PAIR)
     status = _search(_packed(*faces), q, codes, out)
-    return _pair((_features(faces[0]), _features(faces[1])), codes, out, status)
+    return _pair((features_of(faces[0]), features_of(faces[1])), codes, out, status)
 
 
 class FeatureTracker:
@@ -260,7 +255,7 @@ class FeatureTracker:
         self._shapes = a, b
         faces = _faces("a", a), _faces("b", b)
         self._packed = _packed(*faces)
-        self._names = _features(faces[0]), _features(faces[1])
+        self._names = features_of(faces[0]), features_of(faces[1])
         self._q = np.empty((2, 7))
         self._codes = np.zeros(2, dtype=np.int64)
         self._out = np.empty(PAIR)

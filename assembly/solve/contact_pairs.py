@@ -8,8 +8,8 @@ import numpy as np
 
 from assembly.constraints.layout import DEEPEST_AT, NEAREST_AT, ROW, ROW_TABLE, SHELL_F, SHELL_G
 from assembly.kinematics.body import Body, BodyFace
+from assembly.proximity.features import features_of
 from assembly.proximity.pairs import ContactPair, PairStatus, extremal_pair
-from assembly.proximity.solid import feature_name, solid_of
 from assembly.proximity.solid_contact import CONTACT_RECORD, FEATURE_F, FEATURE_G, search_solids, track_solids
 from assembly.proximity.velocity import ARM_F, GAP, NORMAL
 
@@ -70,4 +70,4 @@ def _solids(solution: Solution, k: int, places: list[int]) -> ContactPair:
 def _feature_name(side: Body | BodyFace, number: int) -> str:
     """What a feature of a side is called."""
     faces = (side.face,) if isinstance(side, BodyFace) else tuple(part.face for part in side.faces)
-    return feature_name(solid_of(faces), number)
+    return features_of(faces)[number].name
