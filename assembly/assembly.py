@@ -22,6 +22,7 @@ from assembly.proximity.pairs import inside
 from assembly.proximity.solid_contact import TRACK
 from assembly.solve.augmented_lagrangian import (
     CONTACT_LOST,
+    FREE_TRIMS,
     GATHER,
     HISTORY,
     ITERATIONS,
@@ -114,7 +115,7 @@ class Assembly:
         for constraint in constraints:
             if not isinstance(constraint, Constraint):
                 raise TypeError(
-                    f"constraint is {constraint!r}; expected a contact or a trim of one, a joint, a coupling or an "
+                    f"constraint is {constraint!r}; expected a Contact or a trim of one, a joint, a coupling or an "
                     "Expression"
                 )
             self._check_bodies(constraint.name, constraint.bodies)
@@ -228,6 +229,13 @@ class Assembly:
             # Perhaps solids cross at the start.
             state = self._start(packed, q0, starts)
             code = solve_program(*arguments, settings, state, history, tips)
+        if code != 0 and packed.trims:
+            # With the coordinates of contacts as unknowns trims have exact second derivatives, except at poles.
+            settings = settings.copy()
+            settings[FREE_TRIMS] = 1.0
+            other, rows = self._start(packed, q0, starts), np.empty_like(history)
+            if solve_program(*arguments, settings, other, rows, tips) == 0:
+                code, state, history = 0, other, rows
         if code != 0 and not gathers and state[packed.results_at + SCATTER] == 1.0:
             # What the start itself did not lead to may be reached from gathered bodies.
             settings = settings.copy()

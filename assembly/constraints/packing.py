@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import prod, sqrt
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,6 +62,8 @@ class Packed:
         The constraint of every row.
     drives : (m,) bool
         Whether a driven value or a limit asks for the row.
+    trims : int
+        Rows of trims.
     pairs : (m,) int
         The contact whose pair a row is of, or -1.
     one_sided, lengths : (m,) bool
@@ -159,7 +162,7 @@ class Packed:
                 new = self._trim(trim, rows)
                 rows += new
                 owners += [numbers[id(trim)]] * len(new)
-        header[layout.TRIMS] = len(rows) - len(self.contacts)
+        header[layout.TRIMS] = self.trims = len(rows) - len(self.contacts)
         # Rows in the order of their bodies: then the envelope of J J^T is narrow, too.
         others = [item for item in constraints if isinstance(item, (Joint, Coupling))]
         others.sort(key=lambda item: max(slots[self._places[id(body)]] for body in item.bodies))
@@ -205,10 +208,7 @@ class Packed:
         header[layout.EXTRA] = extra
         header[layout.TERMS] = len(terms_)
         header[layout.DEXTERITIES] = sum(term[0] == terms.DEXTERITY for term in terms_)
-        if self.shells:
-            header[[layout.TRACK_AT, layout.SEARCH_AT, layout.NEAREST_AT]] = addresses.solids()
-        if header[layout.TRIMS]:
-            header[[layout.TRIM_ROWS_AT, layout.TRIM_TERMS_AT]] = addresses.trims()
+        self._take_addresses(header)
         self._table[0] = header
         table = np.array([row[:6] for row in rows], dtype=np.int64).reshape(-1, 6)
         self.owners = np.array(owners, dtype=np.int64)
@@ -220,6 +220,20 @@ class Packed:
         trims = np.flatnonzero(kinds == layout.TRIM_ROW)
         self.pairs[trims] = [rows[r][layout.TRIM_PAIR] for r in trims]
         self.spans = [np.flatnonzero(self.owners == k) for k in range(len(constraints))]
+
+    def _take_addresses(self, header: Table) -> None:
+        """Where the kernels are that only contacts of solids, or trims, ask for."""
+        if self.shells:
+            header[[layout.TRACK_AT, layout.SEARCH_AT, layout.NEAREST_AT]] = addresses.solids()
+        if header[layout.TRIMS]:
+            header[[layout.TRIM_ROWS_AT, layout.TRIM_TERMS_AT]] = addresses.trims()
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        # Addresses are those of one process; a copy, or what another process wrote, takes its own.
+        self.__dict__.update(state)
+        self.table = self.table.copy()
+        self.table[layout.DEEPEST_AT] = 0
+        self._take_addresses(self.table)
 
     def seek_penetration(self) -> bool:
         """From now on contacts of solids that cross at the start are looked for; whether that is new.

@@ -29,7 +29,7 @@ from assembly.geometry.spline import (
 )
 from assembly.geometry.trim import trim_nearest, trim_side
 from assembly.geometry.vec import blend, cross, dot, matvec, matvec_t, neg, sub
-from assembly.proximity.extremal import LEFT_PATCH, NOT_CONVERGED, into_domain
+from assembly.proximity.extremal import LEFT_PATCH, NOT_CONVERGED, into_domain, own_frame
 from assembly.proximity.feature_pair import solve_features
 from assembly.proximity.shell import (
     EDGE,
@@ -284,7 +284,7 @@ def track_features(table, pool, shell_f, shell_g, rotation, shift, code_f, code_
     Returns
     -------
     status, the two features, x (4), the frame of `solve_features`, how often it switched. CONVERGED or SINGULAR where
-    the pair is the closest one of its neighborhood.
+    the pair is the closest one of its neighborhood, and neither solid is inside the other there.
     """
     switches = 0
     before = n
@@ -331,4 +331,9 @@ def track_features(table, pool, shell_f, shell_g, rotation, shift, code_f, code_
         switches += 1
     if turn < math.inf and dot(before, before) > 0.25 and dot(before, n) < ACROSS:
         status = NOT_CONVERGED
+    if kind_f == FACE and kind_g == FACE and status != NOT_CONVERGED:
+        # Of solids that touch, outward normals oppose each other; else one is inside the other.
+        normal = own_frame(table, pool, feature_at(table, shell_g, code_g), x[2], x[3])[1]
+        if dot(normal, matvec_t(rotation, n)) > 0.0:
+            status = NOT_CONVERGED
     return status, code_f, code_g, x, frame, switches

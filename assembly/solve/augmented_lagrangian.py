@@ -64,7 +64,17 @@ from assembly.solve.search import SHORTEST, damped_step, goal, search
 # Outcomes; `solution.Status` gives each a sentence. RUNNING is none of them.
 SOLVED, INFEASIBLE, STALLED, ITERATION_LIMIT, CONTACT_LOST, RUNNING = 0, 1, 2, 3, 4, 5
 # Settings, in scaled lengths.
-FEASIBILITY, STATIONARITY, ITERATIONS, PENALTY, PENALTY_FLOOR, RADIUS, GATHER, SETTINGS = 0, 1, 2, 3, 4, 5, 6, 8
+FEASIBILITY, STATIONARITY, ITERATIONS, PENALTY, PENALTY_FLOOR, RADIUS, GATHER, FREE_TRIMS, SETTINGS = (
+    0,
+    1,
+    2,
+    3,
+    4,
+    5,
+    6,
+    7,
+    8,
+)
 # Results at the end of the state.
 STATUS, COUNT, OBJECTIVE, VIOLATION, DUAL, CULPRIT, IMPROPER, SCATTER, RESULTS = 0, 1, 2, 3, 4, 5, 6, 7, 8
 HISTORY = 7  # figures an iteration: objective, feasibility, stationarity, mu, regularization, step length, radius
@@ -187,8 +197,9 @@ def solve_program(table, pool, settings, state, history, tips):
     status = RUNNING
     results[CULPRIT] = -1.0
 
+    free_trims = settings[FREE_TRIMS] == 1.0
     lost = start_contacts(table, pool, here[0], here[1], free, loose[1])
-    count = free_folds(table, pool, here[2], here[1], active, free, loose[1], -1.0, -1)
+    count = free_folds(table, pool, here[2], here[1], active, free, loose[1], -1.0, -1, free_trims)
     if lost < 0 and count == 0:
         lost = evaluate(table, pool, here[1], math.inf, loose, room, here)
     if lost >= 0:
@@ -215,7 +226,7 @@ def solve_program(table, pool, settings, state, history, tips):
     while status == RUNNING:
         weigh_rows(rows, one_sided, here[3], y, mu, forces, active)
         if pairs > 0:
-            count = free_folds(table, pool, here[2], here[1], active, free, loose[1], below, lost)
+            count = free_folds(table, pool, here[2], here[1], active, free, loose[1], below, lost, free_trims)
         if m + 4 * count != rows:
             for r in range(rows, most):
                 # New rows of tangency say nothing yet: least squares leave them out.

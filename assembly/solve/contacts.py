@@ -13,8 +13,12 @@ from assembly.constraints.layout import (
     ROW,
     ROW_TABLE,
     SHELL_F,
+    SIGNED,
     SURFACE_F,
     SURFACE_G,
+    TRIM_FORM,
+    TRIM_PAIR,
+    TRIMS,
 )
 from assembly.constraints.program import search_row
 from assembly.kinematics.motion import relative_pose, rotation
@@ -74,12 +78,20 @@ def start_contacts(table, pool, q, contacts, free, lengths):
 
 
 @kernel(inner=True)
-def free_folds(table, pool, records, contacts, active, free, lengths, below, lost):
+def free_folds(table, pool, records, contacts, active, free, lengths, below, lost, trims):
     """Mark the pairs near a fold, and the lost one, as free. Returns how many are free now.
 
-    An idle one-sided row asks nothing of its pair.
+    An idle one-sided row asks nothing of its pair. With `trims`, pairs whose trims count are freed as well: the second
+    derivative of a trim is known in the coordinates alone.
     """
     count = 0
+    if trims:
+        for r in range(table[CONTACTS], table[CONTACTS] + table[TRIMS]):
+            row = table[ROW_TABLE] + ROW * r
+            k = table[row + TRIM_PAIR]
+            counts = table[row + TRIM_FORM] == SIGNED and not (table[row + ONE_SIDED] == 1 and active[r] == 0.0)
+            if free[k] < 0 and counts:
+                free_pair(table, pool, table[ROW_TABLE] + ROW * k, k, contacts, free, lengths)
     for k in range(table[CONTACTS]):
         row = table[ROW_TABLE] + ROW * k
         idle = table[row + ONE_SIDED] == 1 and active[k] == 0.0

@@ -149,7 +149,7 @@ def point_at(table, pool, state, free):
     if lost < 0:
         # Every contact counts here, also one that pushes nothing.
         active = np.ones(most)
-        count = free_folds(table, pool, records, tracked, active, free, loose[1], -1.0, -1)
+        count = free_folds(table, pool, records, tracked, active, free, loose[1], -1.0, -1, False)
         before = -1
         while count != before:
             for k in range(tracks):
@@ -157,7 +157,7 @@ def point_at(table, pool, state, free):
                     start[k, i] = tracked[k, i]
             lost = evaluate(table, pool, start, math.inf, loose, room, point)
             before = count
-            count = free_folds(table, pool, records, tracked, active, free, loose[1], FREE_BELOW, lost)
+            count = free_folds(table, pool, records, tracked, active, free, loose[1], FREE_BELOW, lost, False)
     return lost, count, point, loose, room
 
 

@@ -28,6 +28,10 @@ def touching(shape_a, shape_b, position, quaternion, **options):
 def holds(scene, solution):
     """Whether every contact is found again, by a search that knows nothing of the loop's unknowns, with its gap."""
     for k, (f, g) in enumerate(scene.packed().sides):
+        if not scene.packed().whole[k]:
+            if abs(asm.proximity.closest_features(f, g, *solution.q).gap) > 1e-9 * scene.packed().scale:
+                return False
+            continue
         q_f, q_g = (solution.q[[body.name for body in scene.bodies].index(side.body.name)] for side in (f, g))
         pair = asm.proximity.extremal_pair(f, q_f, g, q_g, solution._parameters[k, :4])
         if abs(pair.gap) > 1e-9 * scene.packed().scale:
