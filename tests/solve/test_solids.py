@@ -120,7 +120,7 @@ def test_a_cylinder_rolls_off_the_edge():
     ground = box(fixed=True)
     roller = asm.Body("roller", asm.shapes.solid_cylinder(R, 1.0), (0.4, 0.1, 1.7), about((1, 0, 0), 0.5 * np.pi))
     scene = asm.Assembly([ground, roller])
-    guide = asm.Planar(ground.frame(z=(0, 1, 0)), roller.frame(z=(0, 0, 1)), "guide")
+    guide = asm.Planar(ground.frame(z=(0, 1, 0)), roller.frame(z=(0, 0, -1)), "guide")
     scene.constrain(asm.Contact(ground, roller, "touch"), guide)
     wish = asm.PointDistance(roller.point(0.0, 0.0, 0.0), (0.5, 0.0, 1.7))
     scene.minimize(wish)
