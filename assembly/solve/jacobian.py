@@ -79,6 +79,8 @@ def rows_of(packed: Packed, state: Array) -> Rows:
     free = np.empty(pairs, dtype=np.int64)
     residual, jacobian = np.empty(m + 4 * pairs), np.empty((m + 4 * pairs, 6 * n + 4 * pairs))
     lost = rows_at(packed.table, packed.pool, state, free, residual, jacobian)
+    if lost >= 0 and packed.seek_penetration():
+        lost = rows_at(packed.table, packed.pool, state, free, residual, jacobian)
     if lost >= 0:
         raise NoPairError(lost, packed.contacts[lost].name)
     finite = np.isfinite(residual[:m]) & np.isfinite(jacobian[:m, : 6 * n]).all(axis=1)

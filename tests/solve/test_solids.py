@@ -118,7 +118,7 @@ def test_a_one_sided_contact_binds_and_lets_go():
 def test_a_cylinder_rolls_off_the_edge():
     """A lying roller: its wall on the top, then on the edge, then on the side."""
     ground = box(fixed=True)
-    roller = asm.Body("roller", asm.shapes.solid_cylinder(R, 1.0), (0.4, 0.1, 1.7), about((1, 0, 0), 0.5 * np.pi))
+    roller = asm.Body("roller", asm.shapes.solid_cylinder(R, 1.0), (1.5, 0.0, Z + R), about((1, 0, 0), 0.5 * np.pi))
     scene = asm.Assembly([ground, roller])
     guide = asm.Planar(ground.frame(z=(0, 1, 0)), roller.frame(z=(0, 0, -1)), "guide")
     scene.constrain(asm.Contact(ground, roller, "touch"), guide)
@@ -205,4 +205,5 @@ def test_the_gap_and_its_derivatives(place, kind):
     curves = ways.T @ differences(lambda d: at(d).jacobian()[0], 12, 4e-4)
     # The gradient in twists turns with the bodies: its derivative's symmetric part is the second derivative.
     hessian = ways.T @ point.row_terms([1.0]) @ ways
-    np.testing.assert_allclose(hessian, 0.5 * (curves + curves.T), rtol=0, atol=1e-8)
+    # Differences of gradients over 4e-4 leave about 1e-8 where the egg is most curved.
+    np.testing.assert_allclose(hessian, 0.5 * (curves + curves.T), rtol=0, atol=2e-8)
