@@ -94,8 +94,8 @@ def search_solids(table, pool, shell_f, shell_g, i, j, q, nearest_at, deepest_at
         if deepest_at == 0:
             return 0
         status = call_address(deepest_at, (table, pool, shell_f, shell_g, poses, 1.0, codes, out))
-        if status == CROSSING:
-            return 0
-        n = matvec_t(rotation(q, i), (out[NORMAL], out[NORMAL + 1], out[NORMAL + 2]))
+        # Solids that only touch have no depth: their crossing point is where the pair is.
+        if status != CROSSING:
+            n = matvec_t(rotation(q, i), (out[NORMAL], out[NORMAL + 1], out[NORMAL + 2]))
     write_tracked((out[0], out[1], out[2], out[3]), codes[0], codes[1], n, tracked, r)
     return 1

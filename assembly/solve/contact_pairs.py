@@ -8,7 +8,7 @@ import numpy as np
 
 from assembly.constraints.layout import DEEPEST_AT, NEAREST_AT, ROW, ROW_TABLE, SHELL_F, SHELL_G
 from assembly.kinematics.body import Body, BodyFace
-from assembly.proximity.features import features_of
+from assembly.proximity.features import closest_features, features_of
 from assembly.proximity.pairs import ContactPair, PairStatus, extremal_pair
 from assembly.proximity.solid_contact import CONTACT_RECORD, FEATURE_F, FEATURE_G, search_solids, track_solids
 from assembly.proximity.velocity import ARM_F, GAP, NORMAL
@@ -48,7 +48,8 @@ def _solids(solution: Solution, k: int, places: list[int]) -> ContactPair:
     scene = (packed.table, packed.pool, packed.table[row + SHELL_F], packed.table[row + SHELL_G], 0, 1, q)
     if np.isnan(tracked).any():
         nearest, deepest = packed.table[NEAREST_AT], packed.table[DEEPEST_AT]
-        search_solids(*scene, nearest, deepest, tracked, 0)
+        if search_solids(*scene, nearest, deepest, tracked, 0) == 0:
+            return _crossing(solution, k, places)
     records = np.zeros((1, CONTACT_RECORD))
     status = track_solids(*scene, tracked, np.inf, records, tracked, 0)
     gap, normal = records[0, GAP], records[0, NORMAL : NORMAL + 3]
@@ -64,6 +65,19 @@ def _solids(solution: Solution, k: int, places: list[int]) -> ContactPair:
         gap=float(gap) * packed.scale,
         status=_STATUSES[status],
         features=(names[0], names[1]),
+    )
+
+
+def _crossing(solution: Solution, k: int, places: list[int]) -> ContactPair:
+    """What there is to say of contact k, of solids that cross without a pair that the loop could track."""
+    pair = closest_features(*solution._scene.sides[k], *solution.q[places])
+    return ContactPair(
+        parameters=pair.parameters.ravel(),
+        points=pair.points,
+        normal=pair.normal,
+        gap=pair.gap,
+        status=PairStatus.NOT_CONVERGED,
+        features=(pair.features[0].name, pair.features[1].name),
     )
 
 
