@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from assembly import proximity as proximity
     from assembly import view as view
     from assembly.assembly import Assembly as Assembly
+    from assembly.constraints.clearance import Clearance as Clearance
     from assembly.constraints.contact import Contact as Contact
     from assembly.constraints.couplings import Gear as Gear
     from assembly.constraints.couplings import RackPinion as RackPinion
@@ -67,6 +68,7 @@ else:
             "Angle": "assembly.constraints.placements",
             "Assembly": "assembly.assembly",
             "Body": "assembly.kinematics.body",
+            "Clearance": "assembly.constraints.clearance",
             "Contact": "assembly.constraints.contact",
             "ContactPair": "assembly.proximity.pairs",
             "Cylindrical": "assembly.constraints.joints",

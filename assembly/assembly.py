@@ -16,7 +16,7 @@ from assembly.constraints.objectives import Objective
 from assembly.constraints.packing import Packed, lone_surfaces, pack, structure_of
 from assembly.constraints.trim_contact import TrimContact
 from assembly.errors import InputError, vector
-from assembly.kinematics.body import Body
+from assembly.kinematics.body import Body, Frame, Point
 from assembly.kinematics.pose import pose_rows
 from assembly.proximity.pairs import inside
 from assembly.proximity.solid_contact import TRACK
@@ -26,7 +26,6 @@ from assembly.solve.augmented_lagrangian import (
     GATHER,
     HISTORY,
     ITERATIONS,
-    RESULTS,
     SCATTER,
     solve_program,
 )
@@ -35,6 +34,7 @@ from assembly.solve.solution import Scene, Solution, Status
 
 if TYPE_CHECKING:
     from assembly.solve.mobility import Mobility
+    from assembly.tracking.tracker import Tracker
 
 __all__ = ["Assembly"]
 
@@ -126,7 +126,7 @@ class Assembly:
                     f"constraint {constraint.name!r} keeps contact {constraint.contact.name!r}, which is not in the "
                     "assembly; expected its contact to be constrained before it"
                 )
-            if all(body.fixed for body in constraint.bodies):
+            if constraint.bodies and all(body.fixed for body in constraint.bodies):
                 raise InputError(f"constraint {constraint.name!r} is between two fixed bodies; expected one that moves")
             self._constraints.append(constraint)
             self._packed = None
@@ -278,7 +278,7 @@ class Assembly:
             state = self._own("q0", packed, q0)._state.copy()
             q = state[: packed.contacts_at].reshape(-1, 7)
         else:
-            state = np.zeros(packed.results_at + RESULTS)
+            state = packed.new_state()
             q = state[: packed.contacts_at].reshape(-1, 7)
             q[:] = self.q if q0 is None else pose_rows("q0", q0, len(self._bodies))
             state[packed.contacts_at : packed.angles_at] = np.nan
@@ -312,6 +312,19 @@ class Assembly:
                 raise InputError(f"{what} is of solids with several faces; expected a contact of two faces")
             state[at : at + 4] = inside(what, vector(what, value, 4), surfaces)
             state[at + 4 : at + TRACK] = 0.0
+
+    def tracker(self, follow: Point | Frame | Body, **options: Any) -> Tracker:
+        """What follows a hand that holds a point or a frame of a body.
+
+        Parameters
+        ----------
+        follow : Point, Frame or Body
+        **options
+            See `Tracker`.
+        """
+        from assembly.tracking.tracker import Tracker
+
+        return Tracker(self, follow, **options)
 
     def mobility(
         self, q: ArrayLike | Solution | None = None, *, drives: bool = True, tolerance: float | None = None

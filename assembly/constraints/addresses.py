@@ -8,8 +8,9 @@ from assembly._kernel import address_of
 from assembly.constraints.trim_rows import trim_rows, trim_terms
 from assembly.proximity.nearest_query import find_deepest, find_nearest
 from assembly.proximity.solid_contact import search_solids, track_solids
+from assembly.proximity.watch import look
 
-__all__ = ["deepest", "solids", "trims"]
+__all__ = ["deepest", "solids", "trims", "watch"]
 
 # Examples of arguments, for their types: a count, a number, and arrays of both.
 _I, _F = np.int64(0), 0.0
@@ -38,3 +39,8 @@ def trims() -> tuple[int, int]:
         address_of(trim_rows, *_PACKED, _INTEGERS, _BLOCK, _BLOCK, _BLOCK, _BLOCK, _ROW, _BLOCK),
         address_of(trim_terms, *_PACKED, _I, _INTEGERS, _BLOCK, _PLACES, _BLOCK, _BLOCK, _BLOCK, _F, _BLOCK),
     )
+
+
+def watch() -> int:
+    """Of `look`."""
+    return address_of(look, *_PACKED, _I, _ROW, _BLOCK, _BLOCK, _I)

@@ -5,7 +5,7 @@ every body (-1: fixed), then a record a row (contacts first, then trims), a join
 loop works on
 
     configuration  (n, 7)       poses, scaled, positions relative to a reference
-    tracked        (k, 9)       of every contact parameters, features and normal of its pair
+    tracked        (k, 10)      of every contact parameters, features, normal and gap of its pair
                                 (`proximity/solid_contact.py`), then (first column) unwrapped angles of joints
     records        (k + j, R)   what the derivatives of gaps need (see `track_contact`), then frames of joints, then
                                 one of trims that are vectors
@@ -25,14 +25,20 @@ IMPLICIT, DEXTERITIES = 16, 17
 # Rows of trims follow those of contacts; whether some are vectors, which take a record of their own.
 TRIMS, VECTOR_TRIMS = 18, 19
 # Addresses of kernels that few scenes need (`_kernel.call_address`).
-TRACK_AT, SEARCH_AT, NEAREST_AT, DEEPEST_AT, TRIM_ROWS_AT, TRIM_TERMS_AT, HEADER = 20, 21, 22, 23, 24, 25, 26
+TRACK_AT, SEARCH_AT, NEAREST_AT, DEEPEST_AT, TRIM_ROWS_AT, TRIM_TERMS_AT = 20, 21, 22, 23, 24, 25
+# Rows of clearances stand behind those of given contacts and among them: where the first one is, and how many. A row
+# without bodies is idle. The record of the watch (`proximity/watch.py`; -1: no clearance), and its kernel's address.
+FIRST_GUARD, GUARDS, WATCH, LOOK_AT = 26, 27, 28, 29
+# What tells the time in nanoseconds (0: nothing does).
+CLOCK_AT, HEADER = 30, 31
 # A row: kind, its two bodies (-1: none), whether it is one-sided (residual >= 0), whether it prescribes a freedom, and
 # whether its residual is a length. Row k is that of contact k.
 ROW = 14
 KIND, BODY_F, BODY_G, ONE_SIDED, DRIVE, IS_LENGTH = 0, 1, 2, 3, 4, 5
 CONTACT_ROW, JOINT_ROW, TAPE_ROW, TRIM_ROW = 0, 1, 2, 3
-# Of a contact: its surfaces, or else (-1: none) its shells.
-SURFACE_F, SURFACE_G, SHELL_F, SHELL_G = 6, 7, 8, 9
+# Of a contact: its surfaces, or else (-1: none) its shells; where the gap that counts as none is in the
+# pool; of a clearance's the number of the contact it has now (0: none).
+SURFACE_F, SURFACE_G, SHELL_F, SHELL_G, MINIMUM, GUARD_NUMBER = 6, 7, 8, 9, 10, 11
 # Of a trim: its contact, on which of its sides, the loop, where the factor is in the pool, the form, how many rows it
 # has (its first one says), the records of the loop's curves as edges, whether rows of vectors are one-sided.
 TRIM_PAIR, TRIM_SIDE, TRIM_LOOP, TRIM_FACTOR = 6, 7, 8, 9
@@ -55,5 +61,7 @@ TAPE_FIRST, TAPE_SECOND, TAPE_VALUES, TAPE_BODIES, TAPE_LIST, TAPE_ROW_AT, TAPE_
 # Columns of the Jacobian: twists of f and g, a free pair's coordinates, further bodies.
 FREE_COLUMN, EXTRA_COLUMN = 12, 16
 # Header of the pool.
-# length scale, reference point (1 to 3), unit of the objective: what its scaled value counts in the user's units.
-SCALE, REFERENCE, UNIT, POOL_HEADER = 0, 1, 4, 8
+# length scale, reference point (1 to 3), unit of the objective: what its scaled value counts in the user's units; zero.
+SCALE, REFERENCE, UNIT, ZERO, POOL_HEADER = 0, 1, 4, 5, 8
+# Figures that a solve leaves in its state, behind poses, tracked values, multipliers and residuals.
+RESULTS = 10

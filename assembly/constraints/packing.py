@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from assembly.constraints import addresses, layout, tape, terms
 from assembly.constraints.constraint import Constraint, Coordinate, Equation, FramePair, structure_changes
+from assembly.constraints.clearance import Clearance
 from assembly.constraints.contact import Contact
 from assembly.constraints.couplings import Coupling
 from assembly.constraints.dexterity import MEASURES, TASKS, Dexterity
@@ -31,14 +32,20 @@ from assembly.geometry.surface import NurbsSurface
 from assembly.kinematics.body import Body, BodyFace
 from assembly.proximity.pairs import OFFSETS
 from assembly.proximity.shell import EDGE_CURVE, EDGE_END, EDGE_RECORD, EDGE_START, EDGE_SURFACE
+from assembly.proximity import watch
+from assembly.proximity.events import fresh_memory
+from assembly.proximity.facet_packing import pack_tree
+from assembly.proximity.facet_tree import FacetTree
 from assembly.proximity.shell_packing import pack_shell
-from assembly.proximity.solid import solid_of
+from assembly.proximity.solid import is_one_smooth, solid_of
 from assembly.proximity.solid_contact import TRACK
 
 __all__ = ["Packed", "pack", "structure_of"]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
+# Of a watch, in parts of the scene's size: how far its first look at a pair of bodies reaches, and any at most.
+FIRST_REACH, LAST_REACH = 0.03, 100.0
 
 
 class Packed:
@@ -56,6 +63,11 @@ class Packed:
         The sides of every contact; faces where it is one of whole surfaces.
     whole : list of bool
         Whether a contact is one of two whole surfaces, without edges.
+    clearances : list of Clearance
+    guarded : list of list of (Body, Body)
+        The pairs of bodies of every clearance.
+    guards : int
+        Rows of clearances, behind those of contacts.
     spans : list of slice
         The rows of every constraint.
     owners : (m,) int
@@ -90,6 +102,10 @@ class Packed:
             (_face(contact.a), _face(contact.b)) if whole else (contact.a, contact.b)
             for contact, whole in zip(self.contacts, self.whole, strict=True)
         ]
+        self.clearances = [constraint for constraint in constraints if isinstance(constraint, Clearance)]
+        self.guarded = guarded_pairs(self.clearances, bodies)
+        self.places = [_places(clearance, pairs) for clearance, pairs in zip(self.clearances, self.guarded, strict=True)]
+        self.guards = sum(self.places)
         self._targets: list[tuple[PointDistance | FrameDistance, int]] = []
         self._turns: list[tuple[FrameDistance, int]] = []
         self._values: list[tuple[Equation, int, float]] = []
@@ -106,17 +122,34 @@ class Packed:
         # What the loop is compiled for: None without a dexterity.
         self.tips = 1 if self._header[layout.DEXTERITIES] else None
         self.table = np.concatenate(self._table)
+        if self.guards:
+            self.table[self.table[layout.WATCH] + watch.TRACK_SOLIDS] = self.table[layout.TRACK_AT]
         self.pool = np.concatenate(self._pool)
         self._sources = [item for item in self._values if item[0].source is not None]
         self._turned = Turns(self._angles, [(equation, at) for equation, at, _ in self._values])
         self.rows = int(self._header[layout.ROWS])
-        self.tracked = len(self.contacts) + len(self._angles)
+        self.tracked = self.pair_rows + len(self._angles)
         # Where the parts of a state begin: tracked values, multipliers, residuals, results.
         self.contacts_at = 7 * self.count
-        self.angles_at = self.contacts_at + TRACK * len(self.contacts)
+        self.angles_at = self.contacts_at + TRACK * self.pair_rows
         self.multipliers_at = self.contacts_at + TRACK * self.tracked
         self.residuals_at = self.multipliers_at + self.rows
         self.results_at = self.residuals_at + self.rows
+        self.memory_at = self.results_at + layout.RESULTS
+        self._memory = np.empty(0)
+        if self.guards:
+            self._memory = fresh_memory(len(bodies), sum(map(len, self.guarded)), self.guards, FIRST_REACH)
+
+    @property
+    def pair_rows(self) -> int:
+        """Rows of contacts, given ones and those of clearances."""
+        return len(self.contacts) + self.guards
+
+    def new_state(self) -> Array:
+        """The state of a solve that knows nothing yet."""
+        state = np.zeros(self.memory_at + self._memory.size)
+        state[self.memory_at :] = self._memory
+        return state
 
     def _add(self, table: Sequence[int] | Table = (), pool: Sequence[float] | Array = ()) -> tuple[int, int]:
         """Append; returns where the parts begin."""
@@ -152,17 +185,22 @@ class Packed:
             places = [self._places[id(body)] for body in contact.bodies]
             fields = [layout.CONTACT_ROW, *places, int(contact.unilateral), 0, 1]
             if whole:
-                fields += [self._surface(records, _side_faces(side)[0]) for side in sides] + [-1, -1]
+                fields += [self._surface(records, _side_faces(side)[0]) for side in sides] + [-1, -1, layout.ZERO]
             else:
-                fields += [-1, -1] + [self._shell(_side_faces(side)) for side in sides]
+                fields += [-1, -1] + [self._shell(_side_faces(side)) for side in sides] + [layout.ZERO]
             rows.append(fields)
             owners.append(numbers[id(contact)])
+        for clearance, count in zip(self.clearances, self.places, strict=True):
+            rows += [[layout.CONTACT_ROW, -1, -1, 1, 0, 1, -1, -1, -1, -1, layout.ZERO, 0] for _ in range(count)]
+            owners += [numbers[id(clearance)]] * count
+        header[layout.FIRST_GUARD], header[layout.GUARDS] = len(self.contacts), self.guards
+        header[layout.WATCH] = self._watch(bodies) if self.guards else -1
         for trim in constraints:
             if isinstance(trim, TrimContact):
                 new = self._trim(trim, rows)
                 rows += new
                 owners += [numbers[id(trim)]] * len(new)
-        header[layout.TRIMS] = self.trims = len(rows) - len(self.contacts)
+        header[layout.TRIMS] = self.trims = len(rows) - self.pair_rows
         # Rows in the order of their bodies: then the envelope of J J^T is narrow, too.
         others = [item for item in constraints if isinstance(item, (Joint, Coupling))]
         others.sort(key=lambda item: max(slots[self._places[id(body)]] for body in item.bodies))
@@ -201,8 +239,8 @@ class Packed:
         header[layout.TAPE_ROOM], _ = self._add(self._room)
         header[layout.BODIES] = len(bodies)
         header[layout.MOVING] = int(slots.max()) + 1
-        header[layout.CONTACTS] = len(self.contacts)
-        header[layout.TRACKED] = len(self.contacts) + len(self._angles)
+        header[layout.CONTACTS] = self.pair_rows
+        header[layout.TRACKED] = self.pair_rows + len(self._angles)
         header[layout.JOINTS] = len(self._frames)
         header[layout.ROWS] = len(rows)
         header[layout.EXTRA] = extra
@@ -227,6 +265,8 @@ class Packed:
             header[[layout.TRACK_AT, layout.SEARCH_AT, layout.NEAREST_AT]] = addresses.solids()
         if header[layout.TRIMS]:
             header[[layout.TRIM_ROWS_AT, layout.TRIM_TERMS_AT]] = addresses.trims()
+        if self.guards:
+            header[layout.LOOK_AT] = addresses.watch()
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         # Addresses are those of one process; a copy, or what another process wrote, takes its own.
@@ -234,6 +274,8 @@ class Packed:
         self.table = self.table.copy()
         self.table[layout.DEEPEST_AT] = 0
         self._take_addresses(self.table)
+        if self.guards:
+            self.table[self.table[layout.WATCH] + watch.TRACK_SOLIDS] = self.table[layout.TRACK_AT]
 
     def seek_penetration(self) -> bool:
         """From now on contacts of solids that cross at the start are looked for; whether that is new.
@@ -284,7 +326,7 @@ class Packed:
         if coordinate.kind in (TURN, AZIMUTH):
             if not any(other is coordinate for other in self._angles):
                 self._angles.append(coordinate)
-            angle = len(self.contacts) + next(k for k, other in enumerate(self._angles) if other is coordinate)
+            angle = self.pair_rows + next(k for k, other in enumerate(self._angles) if other is coordinate)
         bodies = [self._places[id(frame.body)] for frame in (frames.frame_a, frames.frame_b)]
         return [coordinate.kind, coordinate.component, number, angle], bodies
 
@@ -348,6 +390,53 @@ class Packed:
             self._add(table, pool)
             self.shells[faces] = shell
         return self.shells[faces]
+
+    def _watch(self, bodies: Sequence[Body]) -> int:
+        """Pack what clearances watch; where its record begins."""
+        trees = {}
+        radii = np.zeros(len(bodies))
+        for body in {id(body): body for pairs in self.guarded for pair in pairs for body in pair}.values():
+            faces = _side_faces(body)
+            tree = FacetTree.of(faces)
+            far = np.maximum(np.abs(tree.low), np.abs(tree.high)).max(axis=0)
+            radii[self._places[id(body)]] = np.linalg.norm(far) / self.scale
+            if faces not in trees:
+                table, pool, trees[faces] = pack_tree(tree, self.scale, self._table_size, self._pool_size)
+                self._add(table, pool)
+        surfaces: dict[tuple[int, bool], int] = {}
+        records: list[int] = []
+        listed: list[int] = []
+        first = 0
+        for clearance, pairs, count in zip(self.clearances, self.guarded, self.places, strict=True):
+            _, minimum = self._add(pool=[clearance.minimum / self.scale])
+            for pair in pairs:
+                f, g = (_side_faces(body) for body in pair)
+                if is_one_smooth(f) and is_one_smooth(g):
+                    shape = [self._surface(surfaces, f[0]), self._surface(surfaces, g[0]), -1, -1]
+                else:
+                    shape = [-1, -1, self._shell(f), self._shell(g)]
+                given = [
+                    field
+                    for k, contact in enumerate(self.contacts)
+                    if {id(contact.body_a), id(contact.body_b)} == {id(body) for body in pair} and shape[0] >= 0
+                    for field in (k, int(contact.body_a is pair[1]))
+                ]
+                places = [self._places[id(body)] for body in pair]
+                records += [*places, trees[f], trees[g], *shape, minimum, first, first + count, len(listed), len(given) // 2]
+                listed += given
+            first += count
+        given_at, _ = self._add(listed)
+        table = np.array(records, dtype=np.int64).reshape(-1, watch.PAIR_RECORD)
+        table[:, watch.GIVEN] += given_at
+        pair_table, _ = self._add(table.ravel())
+        lengths = np.zeros(watch.LENGTH_COUNT)
+        lengths[watch.NEGLECT] = min(clearance.neglect for clearance in self.clearances)
+        lengths[watch.FIRST_REACH], lengths[watch.LAST_REACH] = FIRST_REACH, LAST_REACH
+        _, lengths_at = self._add(pool=lengths)
+        _, radii_at = self._add(pool=radii)
+        return self._add(
+            [len(table), self.guards, len(bodies), pair_table, radii_at, len(self.contacts), 0, lengths_at]
+        )[0]
 
     def _trim(self, trim: TrimContact, rows: list[list[int]]) -> list[list[int]]:
         """The records of a trim's rows."""
@@ -467,6 +556,31 @@ class Packed:
             pool[at + 2] = (target[2] - z) / scale
         for frame_distance, at in self._turns:
             pool[at : at + 4] = frame_distance.body_quaternion
+
+
+def guarded_pairs(clearances: Sequence[Clearance], bodies: Sequence[Body]) -> list[list[tuple[Body, Body]]]:
+    """The pairs that each clearance keeps apart; no pair may be that of two."""
+    owner: dict[frozenset[int], str] = {}
+    result = []
+    for clearance in clearances:
+        pairs = clearance.pairs(bodies)
+        for a, b in pairs:
+            other = owner.setdefault(frozenset((id(a), id(b))), clearance.name)
+            if other != clearance.name:
+                raise InputError(
+                    f"clearance {clearance.name!r} is of bodies {a.name!r} and {b.name!r}, of which clearance {other!r} "
+                    "is, too; expected each pair once, say exclude=..."
+                )
+        result.append(pairs)
+    return result
+
+
+def _places(clearance: Clearance, pairs: Sequence[tuple[Body, Body]]) -> int:
+    """How many contacts may be near at a time."""
+    if not pairs:
+        return 0
+    bodies = len({id(body) for pair in pairs for body in pair})
+    return clearance.places or min(6 * len(pairs), 12 + 6 * bodies)
 
 
 def structure_of(constraints: Sequence[Constraint]) -> tuple[tuple[object, ...], ...]:

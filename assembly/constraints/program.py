@@ -16,12 +16,15 @@ from assembly.constraints.layout import (
     COORDINATE,
     DEEPEST_AT,
     EXTRA_COLUMN,
+    FIRST_GUARD,
     FREE_COLUMN,
+    GUARDS,
     JOINT_RECORD,
     JOINT_ROW,
     JOINT_TABLE,
     JOINTS,
     KIND,
+    MINIMUM,
     MOVING,
     NEAREST_AT,
     ONE_SIDED,
@@ -60,7 +63,7 @@ from assembly.geometry.vec import dot, sub
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.extremal import CLOSE, CONVERGED, LEFT_PATCH, SINGULAR, solve_pair
 from assembly.proximity.free_pair import VARIABLES, free_hessian, free_rows
-from assembly.proximity.solid_contact import CONTACT_RECORD, FEATURE_F, FOLD, PROPER, TRACK
+from assembly.proximity.solid_contact import CONTACT_RECORD, FEATURE_F, FOLD, PAIR_GAP, PROPER, TRACK
 from assembly.proximity.start import global_start
 from assembly.proximity.velocity import GAP, add_gap_terms, gradient_row, store_record
 
@@ -126,22 +129,62 @@ def track_row(table, pool, row, q, start, patience, records, tracked, r):
     return status == CONVERGED or status == SINGULAR
 
 
+@kernel(inline=True)
+def is_guard(table, r):
+    """Whether row r is a clearance's."""
+    return table[FIRST_GUARD] <= r < table[FIRST_GUARD] + table[GUARDS]
+
+
 @kernel(inner=True)
-def solids_row(table, pool, r, start, patience, point):
+def idle_row(r, gap, point):
+    """A row that is open by `gap`, whatever moves."""
+    _q, _tracked, records, residual, jacobian = point
+    for i in range(CONTACT_RECORD):
+        records[r, i] = 0.0
+    records[r, GAP] = gap
+    records[r, PROPER] = 1.0
+    records[r, FOLD] = 1.0
+    residual[r] = gap
+    for i in range(FREE_COLUMN):
+        jacobian[r, i] = 0.0
+
+
+@kernel(inner=True)
+def lost_guard(table, pool, r, start, loose, point):
+    """Row r of a clearance whose pair was lost: idle, if it was farther open than the bodies moved since.
+
+    What the neighborhood holds now is for the next look to find.
+    """
+    row = table[ROW_TABLE] + ROW * r
+    moves = loose[5]
+    gap = start[r, PAIR_GAP] - pool[table[row + MINIMUM]] - moves[table[row + BODY_F]] - moves[table[row + BODY_G]]
+    if not gap > 0.0:
+        return False
+    idle_row(r, gap, point)
+    point[1][r, 0] = math.nan
+    return True
+
+
+@kernel(inner=True)
+def solids_row(table, pool, r, start, patience, loose, point):
     """Row r, of a contact of solids. Returns whether its pair was found.
 
     Where the pair that is tracked is lost, the closest one there is takes over, if the row is one-sided or a step may
-    end anywhere: the loop shortens steps as long as it can.
+    end anywhere: the loop shortens steps as long as it can. A clearance has a watch for that.
     """
     q, tracked, records, residual, jacobian = point
     row = table[ROW_TABLE] + ROW * r
     found = track_row(table, pool, row, q, start, patience, records, tracked, r)
-    if not found and (table[row + ONE_SIDED] == 1 or patience == math.inf):
-        found = search_row(table, pool, row, q, tracked, r)
-        if found:
-            found = track_row(table, pool, row, q, tracked, math.inf, records, tracked, r)
+    if not found:
+        if is_guard(table, r):
+            return lost_guard(table, pool, r, start, loose, point)
+        if table[row + ONE_SIDED] == 1 or patience == math.inf:
+            found = search_row(table, pool, row, q, tracked, r)
+            if found:
+                found = track_row(table, pool, row, q, tracked, math.inf, records, tracked, r)
     if found:
-        residual[r] = records[r, GAP]
+        residual[r] = records[r, GAP] - pool[table[row + MINIMUM]]
+        tracked[r, PAIR_GAP] = records[r, GAP]
         gradient_row(records, r, jacobian, r)
     return found
 
@@ -159,8 +202,11 @@ def contact_row(table, pool, r, start, patience, loose, point):
     free = loose[0]
     lengths = loose[1]
     row = table[ROW_TABLE] + ROW * r
+    if table[row + BODY_F] < 0:
+        idle_row(r, 1.0, point)
+        return True
     if table[row + SHELL_F] >= 0:
-        return solids_row(table, pool, r, start, patience, point)
+        return solids_row(table, pool, r, start, patience, loose, point)
     for i in range(FEATURE_F, TRACK):
         tracked[r, i] = start[r, i]
     x = (start[r, 0], start[r, 1], start[r, 2], start[r, 3])
@@ -169,6 +215,8 @@ def contact_row(table, pool, r, start, patience, loose, point):
         if status != CONVERGED and status != SINGULAR:
             if table[row + ONE_SIDED] == 0:
                 return False
+            if is_guard(table, r):
+                return lost_guard(table, pool, r, start, loose, point)
             # A one-sided contact is of the nearest pair, whichever that is now.
             held = status == LEFT_PATCH and distance > 0.0
             status, x = restart_contact(table, pool, row, q, records, r)
@@ -182,7 +230,7 @@ def contact_row(table, pool, r, start, patience, loose, point):
                 records[r, FOLD] = 1.0
             elif not records[r, GAP] > 0.0:
                 return False
-        residual[r] = records[r, GAP]
+        residual[r] = records[r, GAP] - pool[table[row + MINIMUM]]
         gradient_row(records, r, jacobian, r)
     else:
         e = table[ROWS] + 4 * free[r]
@@ -202,7 +250,9 @@ def contact_row(table, pool, r, start, patience, loose, point):
             r,
             e,
         )
+        residual[r] -= pool[table[row + MINIMUM]]
     tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3] = x
+    tracked[r, PAIR_GAP] = residual[r] + pool[table[row + MINIMUM]]
     return True
 
 
@@ -342,7 +392,7 @@ def add_gram(bases, jacobian, r, weight, hessian):
 def add_free_terms(table, pool, r, loose, point, y, weights, hessian):
     """As `add_row_terms`, for the row of a free pair and its rows of tangency."""
     q, tracked, _records, _residual, jacobian = point
-    free, lengths, vectors, block, _guess = loose
+    free, lengths, vectors, block = loose[0], loose[1], loose[2], loose[3]
     row = table[ROW_TABLE] + ROW * r
     f = 6 * table[table[SLOTS] + table[row + BODY_F]]
     g = 6 * table[table[SLOTS] + table[row + BODY_G]]

@@ -1,7 +1,7 @@
 """A contact of two solids as a solve tracks it: the pair of features that is closest, its coordinates, its normal.
 
-Of every contact a solve keeps `TRACK` numbers: the coordinates of the pair (4), the two features, and the normal in the
-axes of body f, which tells on which side of each other two edges are where they touch.
+Of every contact a solve keeps `TRACK` numbers: the coordinates of the pair (4), the two features, the normal in the
+axes of body f, which tells on which side of each other two edges are where they touch, and the gap.
 
 The kernels here are large, and few scenes need them: loops call them by address (`_kernel.call_address`).
 """
@@ -20,7 +20,7 @@ from assembly.proximity.nearest_query import NORMAL, PAIR
 from assembly.proximity.switching import track_features
 from assembly.proximity.velocity import RECORD
 
-FEATURE_F, FEATURE_G, PAIR_NORMAL, TRACK = 4, 5, 6, 9
+FEATURE_F, FEATURE_G, PAIR_NORMAL, PAIR_GAP, TRACK = 4, 5, 6, 9, 10
 # Behind a record: whether surfaces do not cross at the pair, and how far it is from a fold.
 PROPER, FOLD, CONTACT_RECORD = RECORD, RECORD + 1, RECORD + 2
 

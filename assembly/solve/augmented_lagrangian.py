@@ -23,9 +23,10 @@ import math
 
 import numpy as np
 
-from assembly._kernel import kernel
+from assembly._kernel import call_address, kernel
 from assembly.constraints.layout import (
     BODIES,
+    CLOCK_AT,
     CONTACTS,
     EXTRA,
     EXTRA_COLUMN,
@@ -33,13 +34,16 @@ from assembly.constraints.layout import (
     JOINTS,
     MOVING,
     REFERENCE,
+    RESULTS,
     ROWS,
     SCALE,
     SLOTS,
     TAPE_ROOM,
     TRACKED,
     VECTOR_TRIMS,
+    WATCH,
 )
+from assembly.constraints.guards import allowed_share, clear_guards, forget_guards, forget_looks, look_around, place_guards
 from assembly.constraints.program import add_row_terms, evaluate
 from assembly.constraints.terms import objective, recenter
 from assembly.proximity.free_pair import VARIABLES, VECTORS
@@ -48,7 +52,7 @@ from assembly.solve.contacts import free_folds, is_of_surfaces, start_contacts
 from assembly.solve.gather import gather, scattered
 from assembly.solve.linear import factorize_shifted
 from assembly.solve.multipliers import choose_multipliers, curve_rows, least_multipliers, strongest, weigh_rows
-from assembly.solve.report import judge, write_pose, write_rows
+from assembly.solve.report import bring_back, judge, keep, write_pose, write_rows
 from assembly.solve.rows import (
     add_transposed,
     carry,
@@ -62,21 +66,17 @@ from assembly.solve.rows import (
 from assembly.solve.search import SHORTEST, damped_step, goal, search
 
 # Outcomes; `solution.Status` gives each a sentence. RUNNING is none of them.
-SOLVED, INFEASIBLE, STALLED, ITERATION_LIMIT, CONTACT_LOST, RUNNING = 0, 1, 2, 3, 4, 5
+SOLVED, INFEASIBLE, STALLED, ITERATION_LIMIT, CONTACT_LOST, OUT_OF_TIME, RUNNING = 0, 1, 2, 3, 4, 5, 6
 # Settings, in scaled lengths.
-FEASIBILITY, STATIONARITY, ITERATIONS, PENALTY, PENALTY_FLOOR, RADIUS, GATHER, FREE_TRIMS, SETTINGS = (
-    0,
-    1,
-    2,
-    3,
-    4,
-    5,
-    6,
-    7,
-    8,
-)
+FEASIBILITY, STATIONARITY, ITERATIONS, PENALTY, PENALTY_FLOOR, RADIUS, GATHER, FREE_TRIMS = 0, 1, 2, 3, 4, 5, 6, 7
+# Whether all that moved is looked at once more before a pose counts as solved. Of a tick: whether it is one, which ends
+# at a pose that holds after so many iterations, and at the last one that held where it ends otherwise; how long it may
+# take (0: as long as it takes); whether its end is tested for a minimum.
+LAST_LOOK, TICK, BUDGET, SECOND_ORDER, SETTINGS = 8, 9, 10, 11, 12
 # Results at the end of the state.
-STATUS, COUNT, OBJECTIVE, VIOLATION, DUAL, CULPRIT, IMPROPER, SCATTER, RESULTS = 0, 1, 2, 3, 4, 5, 6, 7, 8
+STATUS, COUNT, OBJECTIVE, VIOLATION, DUAL, CULPRIT, IMPROPER, SCATTER = 0, 1, 2, 3, 4, 5, 6, 7
+# Of a tick: whether it ended at a pose that held before; whether its end is a minimum (0: not tested, 1, or -1: no).
+HELD, CURVED = 8, 9
 HISTORY = 7  # figures an iteration: objective, feasibility, stationarity, mu, regularization, step length, radius
 # A pair this near to a fold (det H over |H|^2) gets its coordinates as unknowns.
 FREE_BELOW = 0.02
@@ -85,6 +85,8 @@ PATIENCE = 25
 RESTORATIONS = 3
 # A violation above this, at the stationary point of all violations, tells that the rows cannot hold.
 TOUCHING = 1e-9
+# A tick that does not hold after its iterations has so many times more of them.
+EXTRA_TIME = 4
 # Multipliers this much stronger than the objective's slope are looked at once more.
 EXCESS = 10.0
 # Where violations are stationary, this much curvature downward makes a saddle of it; a small move leads off it, in a
@@ -114,6 +116,9 @@ def solve_program(table, pool, settings, state, history, tips):
     o_tracked = 7 * bodies
     o_y = o_tracked + TRACK * tracks
     results = state[o_y + 2 * m :]
+    # What the watch of clearances knows, and whether there is one.
+    memory = results[RESULTS:]
+    watched = table[WATCH] >= 0
     # Rows and variables grow by four for every free pair.
     rows = m
     most = m + 4 * pairs
@@ -165,9 +170,9 @@ def solve_program(table, pool, settings, state, history, tips):
         np.empty((VECTORS if pairs > 0 else 0, 3, VARIABLES)),
         np.empty((VARIABLES if pairs > 0 else 0, VARIABLES)),
         tracked[2],
+        np.zeros(bodies),
+        memory,
     )
-    place_rows(table, free, bases, one_sided)
-    envelope(table, bases, rows, n, last, last_row)
     o_room = table[TAPE_ROOM]
     room = (np.empty(table[o_room]), np.empty(table[o_room + 1]), np.empty(table[o_room + 2]))
     gram = np.empty((most, most))
@@ -198,7 +203,21 @@ def solve_program(table, pool, settings, state, history, tips):
     results[CULPRIT] = -1.0
 
     free_trims = settings[FREE_TRIMS] == 1.0
+    tick = settings[TICK] == 1.0
+    begin = call_address(table[CLOCK_AT], ()) if settings[BUDGET] > 0.0 else 0
+    # The last pose that held, its tracked values and multipliers; none yet.
+    held = (np.empty((bodies, 7)), np.empty((tracks, TRACK)), np.empty(most))
+    holds = False
+    results[HELD] = 0.0
+    results[CURVED] = 0.0
     lost = start_contacts(table, pool, here[0], here[1], free, loose[1])
+    if watched:
+        place_guards(table, memory, y, better_y, free)
+        if lost < 0:
+            look_around(table, pool, memory, here, 0)
+            place_guards(table, memory, y, better_y, free)
+    place_rows(table, free, bases, one_sided)
+    envelope(table, bases, rows, n, last, last_row)
     count = free_folds(table, pool, here[2], here[1], active, free, loose[1], -1.0, -1, free_trims)
     if lost < 0 and count == 0:
         lost = evaluate(table, pool, here[1], math.inf, loose, room, here)
@@ -211,7 +230,15 @@ def solve_program(table, pool, settings, state, history, tips):
         gather(table, pool, bases, table[SLOTS], here)
         for k in range(pairs):
             here[1][k, 0] = math.nan
+        if watched:
+            forget_guards(table, memory)
+            place_guards(table, memory, y, better_y, free)
         start_contacts(table, pool, here[0], here[1], free, loose[1])
+        if watched:
+            look_around(table, pool, memory, here, 0)
+            place_guards(table, memory, y, better_y, free)
+            place_rows(table, free, bases, one_sided)
+            envelope(table, bases, rows, n, last, last_row)
         if table[IMPLICIT] == 1:
             recenter(table, pool, here[0])
         for r in range(m):
@@ -223,11 +250,18 @@ def solve_program(table, pool, settings, state, history, tips):
             results[CULPRIT] = float(lost)
     lost = np.int64(-1)
     below = FREE_BELOW
+    # Whether other contacts are near now than rows were placed for.
+    changed = False
     while status == RUNNING:
+        if watched and not changed:
+            changed = look_around(table, pool, memory, here, 0)
+        if changed:
+            place_guards(table, memory, y, better_y, free)
         weigh_rows(rows, one_sided, here[3], y, mu, forces, active)
         if pairs > 0:
             count = free_folds(table, pool, here[2], here[1], active, free, loose[1], below, lost, free_trims)
-        if m + 4 * count != rows:
+        if m + 4 * count != rows or changed:
+            changed = False
             for r in range(rows, most):
                 # New rows of tangency say nothing yet: least squares leave them out.
                 y[r] = 0.0
@@ -271,13 +305,23 @@ def solve_program(table, pool, settings, state, history, tips):
             status = STALLED
             break
         if violation <= feasible and dual <= settings[STATIONARITY]:
+            if watched and settings[LAST_LOOK] == 1.0:
+                changed = look_around(table, pool, memory, here, 1)
+                if changed:
+                    continue
             status = SOLVED
             if strongest(y, rows) > EXCESS * strongest(gradient, n):
                 # Rows that depend on each other: of all multipliers that balance the objective, the least.
                 dual = least_multipliers(shape, rows, here, active, gradient, descent, gram, dual, y, better_y)
             break
-        if iteration >= limit:
+        if tick and violation <= feasible:
+            holds = True
+            keep(here, y, rows, held)
+        if iteration >= limit and (not tick or violation <= feasible or iteration >= EXTRA_TIME * limit):
             status = ITERATION_LIMIT
+            break
+        if settings[BUDGET] > 0.0 and iteration > 0 and call_address(table[CLOCK_AT], ()) - begin > settings[BUDGET]:
+            status = OUT_OF_TIME
             break
         if restoring and violation <= max(0.1 * entered, feasible):
             restoring = False
@@ -323,6 +367,8 @@ def solve_program(table, pool, settings, state, history, tips):
         last_dual = dual
         cut = min(1.0, radius / longest) if longest > 0.0 else 1.0
         cut = min(cut, 1.0 / turn) if turn > 0.0 else cut
+        if watched:
+            cut = allowed_share(table, pool, memory, step, cut, loose[5])
         slope = 0.0
         steepest = 0.0
         for i in range(n):
@@ -410,12 +456,27 @@ def solve_program(table, pool, settings, state, history, tips):
             radius = max(2.0 * alpha * longest, SHORTEST)
         iteration += 1
 
+    if tick and holds and not violation <= feasible:
+        # Back to the last pose that held; what is near there is looked for again.
+        bring_back(held, rows, here, y)
+        results[HELD] = 1.0
+        if watched:
+            forget_looks(table, memory)
     write_pose(table, pool, here[0], state)
+    for b in range(bodies):
+        loose[5][b] = 0.0
     if status != CONTACT_LOST:
         holds, violation = judge(table, pool, state, loose, room, shape, rows, here, trial, 1.25 * feasible)
         if status == SOLVED and not holds:
             status = STALLED
     results[IMPROPER] = write_rows(table, here, y, free, size, state)
+    if settings[SECOND_ORDER] == 1.0 and results[HELD] == 0.0 and status != CONTACT_LOST:
+        goal(table, pool, shape, rows, loose, room, tips, here, 1, gradient, lagrangian)
+        weigh_rows(rows, one_sided, here[3], y, settings[PENALTY_FLOOR], forces, active)
+        add_row_terms(table, pool, loose, room, bases, here, y, active, lagrangian)
+        results[CURVED] = 1.0 if factorize_shifted(lagrangian, n, last, 0.0, matrix) == 0.0 else -1.0
+    if watched:
+        clear_guards(table)
     results[STATUS] = float(status)
     results[COUNT] = float(iteration)
     results[OBJECTIVE] = value

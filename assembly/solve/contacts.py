@@ -58,7 +58,7 @@ def start_contacts(table, pool, q, contacts, free, lengths):
     """
     for k in range(table[CONTACTS]):
         row = table[ROW_TABLE] + ROW * k
-        if not math.isnan(contacts[k, 0]):
+        if not math.isnan(contacts[k, 0]) or table[row + BODY_F] < 0:
             continue
         i = table[row + BODY_F]
         j = table[row + BODY_G]

@@ -74,7 +74,7 @@ def rows_of(packed: Packed, state: Array) -> Rows:
     InputError
         An expression has no finite value or slope there.
     """
-    m, pairs, n = packed.rows, len(packed.contacts), packed.count
+    m, pairs, n = packed.rows, packed.pair_rows, packed.count
     state = state.copy()
     free = np.empty(pairs, dtype=np.int64)
     residual, jacobian = np.empty(m + 4 * pairs), np.empty((m + 4 * pairs, 6 * n + 4 * pairs))

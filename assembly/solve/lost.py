@@ -44,6 +44,6 @@ def goal(solution: Solution) -> tuple[float, float]:
     """The objective in the user's units, and the largest component of its gradient, scaled."""
     packed = solution._packed
     gradient = np.empty(6 * packed.count)
-    free = np.empty(len(packed.contacts), dtype=np.int64)
+    free = np.empty(packed.pair_rows, dtype=np.int64)
     value = gradient_at(packed.table, solution._wished_pool(), solution._state, free, gradient, packed.tips)
     return float(value) * packed.unit, float(np.abs(gradient).max())

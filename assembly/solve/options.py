@@ -12,6 +12,7 @@ from assembly.errors import InputError, integer, number
 from assembly.solve.augmented_lagrangian import (
     FEASIBILITY,
     ITERATIONS,
+    LAST_LOOK,
     PENALTY,
     PENALTY_FLOOR,
     RADIUS,
@@ -82,4 +83,5 @@ class Options:
         out[PENALTY] = self.penalty_floor if warm else self.penalty
         out[PENALTY_FLOOR] = self.penalty_floor
         out[RADIUS] = self.radius
+        out[LAST_LOOK] = 1.0
         return out

@@ -30,7 +30,7 @@ from assembly.errors import InputError
 from assembly.geometry.surface import NurbsSurface
 from assembly.kinematics.body import Body, BodyFace
 from assembly.proximity.solid_contact import FEATURE_F, TRACK
-from assembly.solve.augmented_lagrangian import COUNT, CULPRIT, DUAL, IMPROPER, OBJECTIVE, RESULTS, VIOLATION
+from assembly.solve.augmented_lagrangian import COUNT, CULPRIT, DUAL, IMPROPER, OBJECTIVE, VIOLATION
 from assembly.solve.check import audit, is_extremal, twist_gradients
 from assembly.solve.measure import Near
 from assembly.solve.reference_rows import Poses, Rows
@@ -295,7 +295,7 @@ class ReferenceSolver:
                 status = Status.SOLVED
             elif status is Status.SOLVED or (found.held and status is Status.INFEASIBLE):
                 status = Status.STALLED
-        state = np.zeros(packed.results_at + RESULTS)
+        state = packed.new_state()
         state[: packed.contacts_at] = q.ravel()
         tracked = state[packed.contacts_at : packed.angles_at].reshape(-1, TRACK)
         tracked[:, :4], tracked[:, FEATURE_F:] = found.parameters, 0.0

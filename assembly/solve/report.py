@@ -39,6 +39,32 @@ def write_pose(table, pool, q, state):
 
 
 @kernel(inner=True)
+def keep(here, y, rows, held):
+    """Copy poses, tracked values and multipliers of a point."""
+    for b in range(held[0].shape[0]):
+        for k in range(7):
+            held[0][b, k] = here[0][b, k]
+    for r in range(held[1].shape[0]):
+        for k in range(TRACK):
+            held[1][r, k] = here[1][r, k]
+    for r in range(rows):
+        held[2][r] = y[r]
+
+
+@kernel(inner=True)
+def bring_back(held, rows, here, y):
+    """The point that `keep` copied."""
+    for b in range(held[0].shape[0]):
+        for k in range(7):
+            here[0][b, k] = held[0][b, k]
+    for r in range(held[1].shape[0]):
+        for k in range(TRACK):
+            here[1][r, k] = held[1][r, k]
+    for r in range(rows):
+        y[r] = held[2][r]
+
+
+@kernel(inner=True)
 def judge(table, pool, state, loose, room, shape, rows, here, trial, bound):
     """The pose as it is returned, rounded to the user's coordinates, evaluated afresh into `trial`.
 

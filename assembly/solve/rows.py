@@ -43,11 +43,13 @@ from assembly.constraints.layout import (
     TRACKED,
     TRIM_PAIR,
     TRIMS,
+    WATCH,
 )
+from assembly.constraints.guards import bound_moves
 from assembly.constraints.terms import TAPE_TERM, TERM, TERM_KIND, TERM_TABLE, TERM_TAPE
 from assembly.kinematics.motion import retract
 from assembly.proximity.extremal import into_domain
-from assembly.proximity.solid_contact import FEATURE_F, TRACK
+from assembly.proximity.solid_contact import FEATURE_F, PAIR_GAP, PAIR_NORMAL
 from assembly.proximity.velocity import RATES, ZED
 
 
@@ -245,11 +247,16 @@ def carry(table, pool, bases, loose, tracked, records, d, alpha):
     out = loose[4]
     for k in range(table[CONTACTS], table[TRACKED]):
         out[k, 0] = tracked[k, 0]
+    if table[WATCH] >= 0:
+        bound_moves(table, pool, d, alpha, loose[5])
     for k in range(table[CONTACTS]):
         row = table[ROW_TABLE] + ROW * k
+        if table[row + BODY_F] < 0:
+            continue
         f = bases[k, 0]
         g = bases[k, 1]
         u = bases[k, 2]
+        out[k, PAIR_GAP] = tracked[k, PAIR_GAP]
         for i in range(4):
             out[k, i] = tracked[k, i]
             if u >= 0:
@@ -272,7 +279,7 @@ def carry(table, pool, bases, loose, tracked, records, d, alpha):
 def keep_inside(table, pool, row, tracked, k, out):
     """A prediction may run over the end of a patch; Newton starts inside."""
     if table[row + SHELL_F] >= 0:
-        for i in range(FEATURE_F, TRACK):
+        for i in range(FEATURE_F, PAIR_NORMAL + 3):
             out[k, i] = tracked[k, i]
         # What becomes of edges is up to switching.
         return

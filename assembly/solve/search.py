@@ -7,10 +7,11 @@ shortened.
 from __future__ import annotations
 
 from assembly._kernel import kernel
-from assembly.constraints.layout import CONTACTS, MOVING
+from assembly.constraints.layout import CONTACTS, MOVING, WATCH
 from assembly.constraints.program import evaluate
 from assembly.constraints.terms import objective
 from assembly.proximity.extremal import BEND
+from assembly.proximity.watch import share_of_step
 from assembly.solve.dexterity import add_dexterities
 from assembly.solve.linear import factorize_shifted, forward, substitute
 from assembly.solve.rows import add_transposed, carry, merit, move
@@ -117,6 +118,11 @@ def search(
     while alpha * longest > 1e-9 * SHORTEST or alpha == 1.0:
         move(table, here[0], step, alpha, trial[0])
         carry(table, pool, bases, loose, here[1], here[2], step, alpha)
+        if table[WATCH] >= 0 and share_of_step(table, table[WATCH], loose[6], loose[5], 1.0) < 1.0:
+            # Bent, it would go farther than is known to be free.
+            bends = 2
+            alpha *= 0.5
+            continue
         lost = evaluate(table, pool, loose[4], BEND, loose, room, trial)
         if lost < 0:
             there = merit(trial[3], one_sided, rows, y, mu)

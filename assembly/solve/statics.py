@@ -158,7 +158,7 @@ def _balancing(
         across[:, own] = np.linalg.svd(shares[own][None])[2][1:]
         directions = np.vstack([directions, across])
     gradient = np.empty(jacobian.shape[1])
-    free = np.empty(len(packed.contacts), dtype=np.int64)
+    free = np.empty(packed.pair_rows, dtype=np.int64)
     gradient_at(packed.table, solution._wished_pool(), solution._state, free, gradient, packed.tips)
     moving = np.repeat([not body.fixed for body in solution._scene.bodies], 6)
     lacking = -(gradient + z @ jacobian)[moving]

@@ -18,7 +18,7 @@ from assembly.constraints.expression import Expression
 from assembly.constraints.packing import Packed, pack
 from assembly.constraints.trim_contact import TrimContact
 from assembly.proximity.solid_contact import TRACK
-from assembly.solve.augmented_lagrangian import HISTORY, RESULTS, solve_program
+from assembly.solve.augmented_lagrangian import HISTORY, solve_program
 from assembly.solve.jacobian import Rows
 from assembly.solve.options import Options
 from assembly.solve.rank import HELD
@@ -77,17 +77,18 @@ class Problem:
     def start(self, q: Array, after: Solution | None = None) -> Array:
         """The state of a solve from poses (n, 7); tracked values go on from a solution's."""
         packed = self.packed
-        state = np.zeros(packed.results_at + RESULTS)
+        state = packed.new_state()
         state[: packed.contacts_at] = q.ravel()
         packed.refresh()
         tracked = state[packed.contacts_at : packed.multipliers_at].reshape(-1, TRACK)
         if after is not None:
             tracked[:] = after._state[packed.contacts_at : packed.multipliers_at].reshape(-1, TRACK)
         else:
+            tracked[:] = np.nan
             for k, contact in enumerate(packed.contacts):
                 tracked[k] = self._near[contact.name]
             for k, angle in enumerate(packed._angles):
-                tracked[len(packed.contacts) + k] = self._near[id(angle)]
+                tracked[packed.pair_rows + k] = self._near[id(angle)]
         return state
 
     def solve(self, q: Array, after: Solution | None = None) -> Solution:
@@ -132,7 +133,7 @@ class Snapshot:
         self.q = state[: packed.contacts_at].reshape(-1, 7)
         tracked = state[packed.contacts_at : packed.multipliers_at].reshape(-1, TRACK)
         self._near: dict[str | int, Array] = {contact.name: tracked[k] for k, contact in enumerate(packed.contacts)}
-        self._near |= {id(angle): tracked[len(packed.contacts) + k] for k, angle in enumerate(packed._angles)}
+        self._near |= {id(angle): tracked[packed.pair_rows + k] for k, angle in enumerate(packed._angles)}
         self._equations: dict[int, list[Equation]] = {}
         stored = state[packed.residuals_at : packed.results_at]
         now = {} if rows is None or not solved else dict(zip(rows.program_rows.tolist(), rows.residual, strict=True))

@@ -161,7 +161,7 @@ def _evaluated(scene: Assembly, objective: Dexterity, q: ArrayLike | Solution | 
     state = _state(scene, packed, q)
     table, pool, term = _with_term(packed, objective)
     jacobian = np.empty((task.rows, len(task.inputs)))
-    free = np.empty(len(packed.contacts), dtype=np.int64)
+    free = np.empty(packed.pair_rows, dtype=np.int64)
     lost, outcome, value = tip_at(table, pool, term, state, free, jacobian)
     if lost >= 0:
         name = packed.contacts[lost].name

@@ -1,0 +1,130 @@
+"""Rows of clearances: places of a watch (`proximity/watch.py`) as one-sided contacts of a packed scene."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from assembly._kernel import call_address, kernel
+from assembly.constraints.layout import (
+    BODIES,
+    BODY_F,
+    BODY_G,
+    FIRST_GUARD,
+    GUARD_NUMBER,
+    GUARDS,
+    LOOK_AT,
+    MINIMUM,
+    ROW,
+    ROW_TABLE,
+    SHELL_F,
+    SLOTS,
+    SURFACE_F,
+    WATCH,
+)
+from assembly.proximity.watch import (
+    BODY_MEMORY,
+    LOOKED,
+    MEMORY_HEADER,
+    PAIR_F,
+    PAIR_G,
+    PAIR_MEMORY,
+    PAIR_MINIMUM,
+    PAIR_RECORD,
+    PAIR_SHELL_F,
+    PAIR_SURFACE_F,
+    PAIR_TABLE,
+    PAIRS,
+    PLACE_MEMORY,
+    PLACE_NUMBER,
+    RADII,
+    memory_places,
+    share_of_step,
+)
+
+
+@kernel(inner=True)
+def clear_guards(table):
+    """No row has a contact: so a packed scene is left, whose solutions have contacts of their own."""
+    for k in range(table[FIRST_GUARD], table[FIRST_GUARD] + table[GUARDS]):
+        row = table[ROW_TABLE] + ROW * k
+        table[row + BODY_F] = -1
+        table[row + BODY_G] = -1
+        table[row + GUARD_NUMBER] = 0
+
+
+@kernel(inner=True)
+def forget_looks(table, memory):
+    """Every pair is to be looked at again."""
+    watch = table[WATCH]
+    pairs = memory_places(table, watch)[0]
+    for p in range(table[watch + PAIRS]):
+        memory[pairs + PAIR_MEMORY * p + LOOKED] = -math.inf
+
+
+@kernel(inner=True)
+def forget_guards(table, memory):
+    """Begin again: nothing has been looked at, and no contact has a place."""
+    watch = table[WATCH]
+    places = memory_places(table, watch)[1]
+    for b in range(table[BODIES]):
+        memory[MEMORY_HEADER + BODY_MEMORY * b] = math.nan
+    forget_looks(table, memory)
+    for k in range(table[GUARDS]):
+        memory[places + PLACE_MEMORY * k] = -1.0
+
+
+@kernel(inner=True)
+def place_guards(table, memory, y, better_y, free):
+    """Make every row the contact that its place has; multipliers of one that is new are zero."""
+    watch = table[WATCH]
+    places = memory_places(table, watch)[1]
+    for k in range(table[GUARDS]):
+        r = table[FIRST_GUARD] + k
+        row = table[ROW_TABLE] + ROW * r
+        p = np.int64(memory[places + PLACE_MEMORY * k])
+        number = np.int64(memory[places + PLACE_MEMORY * k + PLACE_NUMBER]) if p >= 0 else 0
+        if number == table[row + GUARD_NUMBER]:
+            continue
+        table[row + GUARD_NUMBER] = number
+        y[r] = 0.0
+        better_y[r] = 0.0
+        free[r] = -1
+        if p < 0:
+            table[row + BODY_F] = -1
+            table[row + BODY_G] = -1
+            continue
+        pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
+        table[row + BODY_F] = table[pair + PAIR_F]
+        table[row + BODY_G] = table[pair + PAIR_G]
+        table[row + MINIMUM] = table[pair + PAIR_MINIMUM]
+        for i in range(2):
+            table[row + SURFACE_F + i] = table[pair + PAIR_SURFACE_F + i]
+            table[row + SHELL_F + i] = table[pair + PAIR_SHELL_F + i]
+
+
+@kernel(inner=True)
+def look_around(table, pool, memory, point, everything):
+    """The watch's look at a point; whether rows changed."""
+    return call_address(table[LOOK_AT], (table, pool, table[WATCH], memory, point[0], point[1], everything)) > 0
+
+
+@kernel(inner=True)
+def bound_moves(table, pool, step, alpha, moves):
+    """How far any point of every body moves at most along alpha times a step."""
+    radii = table[table[WATCH] + RADII]
+    for b in range(table[BODIES]):
+        s = 6 * table[table[SLOTS] + b]
+        moves[b] = 0.0
+        if s >= 0:
+            x = step[s] * step[s] + step[s + 1] * step[s + 1] + step[s + 2] * step[s + 2]
+            w = step[s + 3] * step[s + 3] + step[s + 4] * step[s + 4] + step[s + 5] * step[s + 5]
+            moves[b] = alpha * (x**0.5 + w**0.5 * pool[radii + b])
+
+
+@kernel(inner=True)
+def allowed_share(table, pool, memory, step, share, moves):
+    """How much of a step the watch allows, at most `share`."""
+    bound_moves(table, pool, step, 1.0, moves)
+    return share_of_step(table, table[WATCH], memory, moves, share)

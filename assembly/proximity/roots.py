@@ -1,0 +1,312 @@
+"""Extremal pairs of two bodies, the roots of a look (`watch.py`): from pairs of patches by Newton's method.
+
+A root counts where outward normals oppose each other and the distance has a local minimum, by which solids touch; a
+saddle of the distance is known, but not listed. Two roots are one where their points are near in space and along the
+surfaces as well: the surface point halfway between their parameters is near them, too (paper 001, section 5).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from assembly._kernel import call_address, kernel
+from assembly.geometry.spline import BREAKS_U, BREAKS_V, CLOSED_U, CLOSED_V, SPANS_U, SPANS_V, surface_point
+from assembly.geometry.vec import add, cross, dot, matvec, matvec_t, scale, sub
+from assembly.kinematics.motion import rotation
+from assembly.proximity.bounding_tree import (
+    CENTER,
+    CHILD,
+    ELEMENT,
+    ELEMENT_FEATURE,
+    ELEMENT_POOL,
+    FEATURE,
+    HALF,
+    NODE,
+    NODE_INTS,
+    NODE_POOL,
+    NODE_TABLE,
+    three,
+)
+from assembly.proximity.extremal import CONVERGED, SINGULAR, solve_pair
+from assembly.proximity.shell import FACES
+from assembly.proximity.solid_contact import FEATURE_F, FEATURE_G, PAIR_NORMAL, PROPER
+from assembly.proximity.start import opposed
+from assembly.proximity.switching import feature_at
+from assembly.proximity.velocity import ARM_F, GAP as RECORD_GAP
+from assembly.proximity.velocity import NORMAL
+
+# A root: parameters, features, normal in the axes of f, gap, where it is from, its points in the axes of f.
+CODE_F, CODE_G, ROOT_NORMAL, GAP, ORIGIN, POINT_F, POINT_G, ROOT = 4, 5, 6, 9, 10, 11, 14, 17
+# Where it is from: of no use, a given contact, new, or from LISTED on the place it has.
+USELESS, GIVEN_CONTACT, NEW, LISTED = -3.0, -2.0, -1.0, 0
+# What became of a start: nothing there, a root that is known, a saddle, a minimum.
+NOTHING, ALIKE, SADDLE, MINIMUM_FOUND = 0, 1, 2, 3
+# Segments are cut by facets between these parts of them.
+INNER, OUTER = 1e-3, 0.999
+# Room for the descent of a segment.
+DEPTH = 256
+
+
+@kernel(inline=True)
+def between(table, pool, r, u, v, s, t):
+    """The middle of two pairs of parameters, the shorter way around."""
+    a = 0.5 * (u + s)
+    b = 0.5 * (v + t)
+    if table[r + CLOSED_U] == 1:
+        period = pool[table[r + BREAKS_U] + table[r + SPANS_U]] - pool[table[r + BREAKS_U]]
+        if abs(u - s) > 0.5 * period:
+            a += 0.5 * period if a < pool[table[r + BREAKS_U]] + 0.5 * period else -0.5 * period
+    if table[r + CLOSED_V] == 1:
+        period = pool[table[r + BREAKS_V] + table[r + SPANS_V]] - pool[table[r + BREAKS_V]]
+        if abs(v - t) > 0.5 * period:
+            b += 0.5 * period if b < pool[table[r + BREAKS_V]] + 0.5 * period else -0.5 * period
+    return a, b
+
+
+@kernel(inline=True)
+def square_to(a, b):
+    """The square of the distance of two points."""
+    d = sub(a, b)
+    return dot(d, d)
+
+
+@kernel(inner=True)
+def are_one(table, pool, scene, roots, i, k, neglect):
+    """Whether roots i and k are the same contact."""
+    square = neglect * neglect
+    for side in range(2):
+        o = POINT_F + 3 * side
+        a = (roots[i, o], roots[i, o + 1], roots[i, o + 2])
+        b = (roots[k, o], roots[k, o + 1], roots[k, o + 2])
+        if roots[i, CODE_F + side] != roots[k, CODE_F + side] or square_to(a, b) > square:
+            return False
+        surface = scene[2][side]
+        if surface < 0:
+            shell = scene[2][2 + side]
+            if roots[i, CODE_F + side] >= table[shell + FACES]:
+                continue
+            surface = feature_at(table, shell, np.int64(roots[i, CODE_F + side]))
+        u, v = between(
+            table, pool, surface, roots[i, 2 * side], roots[i, 2 * side + 1], roots[k, 2 * side], roots[k, 2 * side + 1]
+        )
+        p = surface_point(table, pool, surface, u, v)[0]
+        if side == 1:
+            p = add(matvec(scene[0], p), scene[1])
+        if square_to(p, a) > square and square_to(p, b) > square:
+            return False
+    return True
+
+
+@kernel(inner=True)
+def surfaces_root(table, pool, scene, start, roots, k):
+    """Newton on two surfaces from `start`; fills root k. NOTHING, SADDLE or MINIMUM_FOUND."""
+    turn, shift = scene[0], scene[1]
+    f, g = scene[2][0], scene[2][1]
+    status, x, _count, frame, curvature = solve_pair(table, pool, f, g, turn, shift, start, 1.0, math.inf, 0.0)
+    if status != CONVERGED and status != SINGULAR:
+        return NOTHING
+    if not opposed(frame, turn, table, pool, g, x):
+        return NOTHING
+    write(roots, k, x, 0, 0, frame[0], frame[10], frame[3], frame[4])
+    h = curvature[1]
+    det = h[0] * h[3] - h[1] * h[2]
+    norm2 = h[0] * h[0] + h[1] * h[1] + h[2] * h[2] + h[3] * h[3]
+    return MINIMUM_FOUND if det > -1e-9 * norm2 and h[0] + h[3] <= 0.0 else SADDLE
+
+
+@kernel(inner=True)
+def solids_root(table, pool, scene, codes, start, n, roots, k, work):
+    """Switching and Newton on the features of two solids; fills root k."""
+    i, j, q, track_at = scene[4]
+    records, tracked = work
+    tracked[0, 0], tracked[0, 1], tracked[0, 2], tracked[0, 3] = start
+    tracked[0, FEATURE_F] = float(codes[0])
+    tracked[0, FEATURE_G] = float(codes[1])
+    for l in range(3):
+        tracked[0, PAIR_NORMAL + l] = n[l]
+    status = call_address(
+        track_at, (table, pool, scene[2][2], scene[2][3], i, j, q, tracked, math.inf, records, tracked, 0)
+    )
+    if status != CONVERGED and status != SINGULAR:
+        return NOTHING
+    turn = rotation(q, i)
+    m = (tracked[0, PAIR_NORMAL], tracked[0, PAIR_NORMAL + 1], tracked[0, PAIR_NORMAL + 2])
+    pg = matvec_t(turn, (records[0, ARM_F], records[0, ARM_F + 1], records[0, ARM_F + 2]))
+    gap = records[0, RECORD_GAP]
+    x = (tracked[0, 0], tracked[0, 1], tracked[0, 2], tracked[0, 3])
+    write(roots, k, x, tracked[0, FEATURE_F], tracked[0, FEATURE_G], m, gap, sub(pg, scale(gap, m)), pg)
+    return MINIMUM_FOUND if records[0, PROPER] == 1.0 else SADDLE
+
+
+@kernel(inline=True)
+def write(roots, k, x, code_f, code_g, n, gap, pf, pg):
+    roots[k, 0], roots[k, 1], roots[k, 2], roots[k, 3] = x
+    roots[k, CODE_F] = float(code_f)
+    roots[k, CODE_G] = float(code_g)
+    roots[k, ROOT_NORMAL], roots[k, ROOT_NORMAL + 1], roots[k, ROOT_NORMAL + 2] = n
+    roots[k, GAP] = gap
+    roots[k, ORIGIN] = USELESS
+    roots[k, POINT_F], roots[k, POINT_F + 1], roots[k, POINT_F + 2] = pf
+    roots[k, POINT_G], roots[k, POINT_G + 1], roots[k, POINT_G + 2] = pg
+
+
+@kernel(inner=True)
+def add_root(table, pool, scene, codes, start, n, neglect, roots, count, work):
+    """Look for a root from a start and add it, as USELESS, if it is none of the known ones.
+
+    Returns how many roots there are, and NOTHING, ALIKE, SADDLE or MINIMUM_FOUND.
+    """
+    if scene[2][0] >= 0:
+        found = surfaces_root(table, pool, scene, start, roots, count)
+    else:
+        found = solids_root(table, pool, scene, codes, start, n, roots, count, work)
+    if found == NOTHING:
+        return count, found
+    for k in range(count):
+        if are_one(table, pool, scene, roots, count, k, neglect):
+            return count, ALIKE
+    return count + 1, found
+
+
+@kernel(inner=True)
+def add_given(table, pool, scene, tracked, listed, many, roots, work):
+    """Add the roots that given contacts of the two bodies have now. Returns how many."""
+    count = 0
+    for c in range(many):
+        r = table[listed + 2 * c]
+        x = (tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3])
+        if math.isnan(x[0]) or count == roots.shape[0]:
+            continue
+        if table[listed + 2 * c + 1] == 1:
+            x = (x[2], x[3], x[0], x[1])
+        before = count
+        count, _found = add_root(
+            table, pool, scene, (0, 0), x, (0.0, 0.0, 0.0), 0.0, roots, count, work
+        )
+        if count > before:
+            roots[before, ORIGIN] = GIVEN_CONTACT
+    return count
+
+
+@kernel(inline=True)
+def is_within(table, pool, surface, x, y, u, v, half_u, half_v):
+    """Whether parameters (x, y) are in a box around (u, v)."""
+    du = abs(x - u)
+    dv = abs(y - v)
+    if surface >= 0:
+        if table[surface + CLOSED_U] == 1:
+            period = pool[table[surface + BREAKS_U] + table[surface + SPANS_U]] - pool[table[surface + BREAKS_U]]
+            du = min(du, period - du)
+        if table[surface + CLOSED_V] == 1:
+            period = pool[table[surface + BREAKS_V] + table[surface + SPANS_V]] - pool[table[surface + BREAKS_V]]
+            dv = min(dv, period - dv)
+    return du <= half_u and dv <= half_v
+
+
+@kernel(inner=True)
+def is_known(table, pool, scene, e, d, roots, count):
+    """The features of elements e and d, the parameters of their middles, and whether a known root is in both."""
+    o = table[scene[3][0] + ELEMENT_POOL] + ELEMENT * e
+    p = table[scene[3][1] + ELEMENT_POOL] + ELEMENT * d
+    codes = (np.int64(pool[o + ELEMENT_FEATURE]), np.int64(pool[p + ELEMENT_FEATURE]))
+    start = (pool[o], pool[o + 1], pool[p], pool[p + 1])
+    f = scene[2][0]
+    g = scene[2][1]
+    for k in range(count):
+        if roots[k, CODE_F] != codes[0] or roots[k, CODE_G] != codes[1]:
+            continue
+        if is_within(table, pool, f, roots[k, 0], roots[k, 1], pool[o], pool[o + 1], pool[o + 2], pool[o + 3]):
+            if is_within(table, pool, g, roots[k, 2], roots[k, 3], pool[p], pool[p + 1], pool[p + 2], pool[p + 3]):
+                return codes, start, True
+    return codes, start, False
+
+
+@kernel(inline=True)
+def meets_box(pool, o, a, d):
+    """Whether the segment from a to a + d meets the box of the node at o."""
+    lo = 0.0
+    hi = 1.0
+    for i in range(3):
+        low = pool[o + CENTER + i] - pool[o + HALF + i] - a[i]
+        high = pool[o + CENTER + i] + pool[o + HALF + i] - a[i]
+        if abs(d[i]) < 1e-300:
+            if low > 0.0 or high < 0.0:
+                return False
+        else:
+            s = low / d[i]
+            t = high / d[i]
+            lo = max(lo, min(s, t))
+            hi = min(hi, max(s, t))
+    return lo <= hi
+
+
+@kernel(inline=True)
+def cuts(a, d, p, q, r):
+    """Whether the inside of a segment from a along d cuts the triangle p q r (Möller and Trumbore)."""
+    e = sub(q, p)
+    f = sub(r, p)
+    h = cross(d, f)
+    det = dot(e, h)
+    if abs(det) < 1e-300:
+        return False
+    s = sub(a, p)
+    u = dot(s, h) / det
+    w = cross(s, e)
+    v = dot(d, w) / det
+    t = dot(f, w) / det
+    return u >= 0.0 and v >= 0.0 and u + v <= 1.0 and INNER < t < OUTER
+
+
+@kernel(inner=True, allocates=True)
+def is_cut(table, pool, tree, surface, shell, a, d):
+    """Whether facets of a body's faces cut the segment from a to a + d, all in the body's axes."""
+    stack = np.empty(DEPTH, np.int64)
+    stack[0] = 0
+    used = 1
+    while used > 0:
+        used -= 1
+        i = stack[used]
+        o = table[tree + NODE_POOL] + NODE * i
+        if not meets_box(pool, o, a, d):
+            continue
+        at = table[tree + NODE_TABLE] + NODE_INTS * i
+        child = table[at + CHILD]
+        if child >= 0:
+            if used + 2 <= DEPTH:
+                stack[used] = child
+                stack[used + 1] = child + 1
+                used += 2
+            continue
+        code = table[at + FEATURE]
+        r = surface
+        if r < 0:
+            if code >= table[shell + FACES]:
+                continue
+            r = feature_at(table, shell, code)
+        e = table[tree + ELEMENT_POOL] + ELEMENT * (-1 - child)
+        u0 = pool[e] - pool[e + 2]
+        u1 = pool[e] + pool[e + 2]
+        v0 = pool[e + 1] - pool[e + 3]
+        v1 = pool[e + 1] + pool[e + 3]
+        p = surface_point(table, pool, r, u0, v0)[0]
+        q = surface_point(table, pool, r, u1, v0)[0]
+        s = surface_point(table, pool, r, u1, v1)[0]
+        t = surface_point(table, pool, r, u0, v1)[0]
+        if cuts(a, d, p, q, s) or cuts(a, d, p, s, t):
+            return True
+    return False
+
+
+@kernel(inner=True)
+def is_outside(table, pool, scene, roots, k):
+    """Whether root k, of a negative gap, is one of far sides: then a surface is between its points."""
+    turn, shift = scene[0], scene[1]
+    a = (roots[k, POINT_F], roots[k, POINT_F + 1], roots[k, POINT_F + 2])
+    b = (roots[k, POINT_G], roots[k, POINT_G + 1], roots[k, POINT_G + 2])
+    if is_cut(table, pool, scene[3][0], scene[2][0], scene[2][2], a, sub(b, a)):
+        return True
+    a = matvec_t(turn, sub(a, shift))
+    b = matvec_t(turn, sub(b, shift))
+    return is_cut(table, pool, scene[3][1], scene[2][1], scene[2][3], a, sub(b, a))

@@ -1,0 +1,357 @@
+"""The global manager's kernel: which pairs of bodies are looked at, which contacts between them are listed.
+
+Every body carries a tree of patches (`bounding_tree.py`). A look at a pair of bodies descends their trees, finds the
+pairs of patches that may hold an extremum of the distance within the pair's reach, and the extrema by Newton's method
+(`roots.py`). The near ones are listed: each has a place, from which it is tracked exactly. What is left out is farther
+than the pair's allowance: until both bodies together have moved by that much, nothing unlisted can touch. Bodies keep
+the length of their way, so a pair that need not be looked at costs a comparison.
+
+The record of a watch is in the table of integers, what it knows in a memory of doubles:
+
+    header | of every body its last pose and its way | of every pair PAIR_MEMORY | of every place PLACE_MEMORY | events
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from assembly._kernel import kernel
+from assembly.kinematics.motion import relative_pose, rotation
+from assembly.proximity.bounding_tree import pairs_within
+from assembly.proximity.roots import (
+    ALIKE,
+    CODE_F,
+    CODE_G,
+    GAP,
+    LISTED,
+    MINIMUM_FOUND,
+    NEW,
+    ORIGIN,
+    ROOT,
+    ROOT_NORMAL,
+    USELESS,
+    add_given,
+    add_root,
+    is_known,
+    is_outside,
+)
+from assembly.proximity.solid_contact import CONTACT_RECORD, FEATURE_F, FEATURE_G, PAIR_GAP, PAIR_NORMAL, TRACK
+
+# The record of a watch: counts; where pairs begin; where the bodies' radii about their origins are in the pool; the
+# row of `tracked` that is the first place; address of `track_solids`; where its lengths are in the pool.
+PAIRS, PLACES, BODY_COUNT, PAIR_TABLE, RADII, FIRST, TRACK_SOLIDS, LENGTHS, WATCH_RECORD = 0, 1, 2, 3, 4, 5, 6, 7, 8
+# Its lengths: roots nearer to each other than the first, and along the surfaces, are one; the reach of a first look;
+# the largest.
+NEGLECT, FIRST_REACH, LAST_REACH, LENGTH_COUNT = 0, 1, 2, 3
+# A pair: bodies, trees, surfaces or else (-1) shells, where its least gap is in the pool, its places from and to, and
+# rows of given contacts between the two (row, 1 if the bodies are the other way round).
+PAIR_F, PAIR_G, TREE_F, TREE_G, PAIR_SURFACE_F, PAIR_SURFACE_G, PAIR_SHELL_F, PAIR_SHELL_G = 0, 1, 2, 3, 4, 5, 6, 7
+PAIR_MINIMUM, LOW, HIGH, GIVEN, GIVEN_COUNT, PAIR_RECORD = 8, 9, 10, 11, 12, 13
+# Memory. Header: events so far, looks so far, contacts so far, the time of the caller, whether a near root found no
+# place.
+EVENT_COUNT, LOOKS, BORN, TIME, CROWDED, MEMORY_HEADER = 0, 1, 2, 3, 4, 5
+WAY, BODY_MEMORY = 7, 8
+# Of a pair: both ways at its last look, how far they may go from there, its reach, and its state.
+LOOKED, ALLOWANCE, REACH, STATE, PAIR_MEMORY = 0, 1, 2, 3, 4
+FAR, NEAR, TRACKING = 0, 1, 2
+# Of a place: its pair (-1: none), the number of its contact.
+PLACE_PAIR, PLACE_NUMBER, PLACE_MEMORY = 0, 1, 2
+# An event: kind, reason, pair, number of the contact, gap, time. The last so many are kept.
+EVENT, EVENTS = 6, 64
+ADDED, REMOVED, HANDED_OFF, MERGED = 0, 1, 2, 3
+CAME_NEAR, WENT_AWAY, LOST, SAME_ROOT, NO_PLACE = 0, 1, 2, 3, 4
+# A pair is looked at again when this part of its allowance is used.
+USED = 0.5
+# Roots nearer than this part of the reach are listed; those that are, stay so up to the second.
+TAKE, KEEP = 0.4, 0.8
+# Room: pairs of patches of a look, roots.
+CANDIDATES, ROOTS, STACK = 8192, 96, 1024
+# A look that finds more pairs of patches than this takes a shorter reach the next time; one without any a longer one.
+MANY = 600
+
+
+@kernel(inline=True)
+def memory_places(table, watch):
+    """Where pairs, places and events begin in the memory."""
+    pairs = MEMORY_HEADER + BODY_MEMORY * table[watch + BODY_COUNT]
+    places = pairs + PAIR_MEMORY * table[watch + PAIRS]
+    return pairs, places, places + PLACE_MEMORY * table[watch + PLACES]
+
+
+@kernel(inner=True)
+def note(table, watch, memory, kind, reason, p, number, gap):
+    """Write an event into the log."""
+    at = memory_places(table, watch)[2] + EVENT * (np.int64(memory[EVENT_COUNT]) % EVENTS)
+    memory[at] = float(kind)
+    memory[at + 1] = float(reason)
+    memory[at + 2] = float(p)
+    memory[at + 3] = number
+    memory[at + 4] = gap
+    memory[at + 5] = memory[TIME]
+    memory[EVENT_COUNT] += 1.0
+
+
+@kernel(inline=True)
+def farthest_move(q, b, memory, o, radius):
+    """A bound of how far any point of body b is from where it was at the pose in the memory."""
+    x = q[b, 0] - memory[o]
+    y = q[b, 1] - memory[o + 1]
+    z = q[b, 2] - memory[o + 2]
+    # A turn by the angle a moves a point at radius r by 2 r sin(a / 2), and |e - e'| is 2 sin(a / 4).
+    square = 0.0
+    other = 0.0
+    for k in range(3, 7):
+        d = q[b, k] - memory[o + k]
+        s = q[b, k] + memory[o + k]
+        square += d * d
+        other += s * s
+    return math.sqrt(x * x + y * y + z * z) + 2.0 * radius * math.sqrt(min(square, other))
+
+
+@kernel(inner=True)
+def go_on(table, pool, watch, memory, q):
+    """Add the moves since the last call to the ways."""
+    for b in range(table[watch + BODY_COUNT]):
+        o = MEMORY_HEADER + BODY_MEMORY * b
+        if math.isnan(memory[o]):
+            memory[o + WAY] = 0.0
+        else:
+            memory[o + WAY] += farthest_move(q, b, memory, o, pool[table[watch + RADII] + b])
+        for k in range(7):
+            memory[o + k] = q[b, k]
+
+
+@kernel(inline=True)
+def both_ways(table, memory, pair):
+    """The ways of the two bodies of a pair together."""
+    return (
+        memory[MEMORY_HEADER + BODY_MEMORY * table[pair + PAIR_F] + WAY]
+        + memory[MEMORY_HEADER + BODY_MEMORY * table[pair + PAIR_G] + WAY]
+    )
+
+
+@kernel(inner=True)
+def any_lost(table, watch, memory, p, tracked):
+    """Whether a listed contact of pair p has lost its root."""
+    pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
+    places = memory_places(table, watch)[1]
+    for k in range(table[pair + LOW], table[pair + HIGH]):
+        if memory[places + PLACE_MEMORY * k] == p and math.isnan(tracked[table[watch + FIRST] + k, 0]):
+            return True
+    return False
+
+
+@kernel(inner=True)
+def release(table, watch, memory, k, tracked):
+    """Make place k free."""
+    o = memory_places(table, watch)[1] + PLACE_MEMORY * k
+    memory[o + PLACE_PAIR] = -1.0
+    tracked[table[watch + FIRST] + k, 0] = math.nan
+
+
+@kernel(inner=True)
+def free_place(table, watch, memory, pair):
+    """A place without a contact among those of a pair, or -1."""
+    places = memory_places(table, watch)[1]
+    for k in range(table[pair + LOW], table[pair + HIGH]):
+        if memory[places + PLACE_MEMORY * k] < 0.0:
+            return k
+    return -1
+
+
+@kernel(inner=True)
+def write_root(roots, i, tracked, r):
+    """Track root i in row r."""
+    for k in range(4):
+        tracked[r, k] = roots[i, k]
+    tracked[r, FEATURE_F] = roots[i, CODE_F]
+    tracked[r, FEATURE_G] = roots[i, CODE_G]
+    for k in range(3):
+        tracked[r, PAIR_NORMAL + k] = roots[i, ROOT_NORMAL + k]
+    tracked[r, PAIR_GAP] = roots[i, GAP]
+
+
+@kernel(inner=True)
+def known_roots(table, pool, watch, memory, p, scene, tracked, roots, work):
+    """The roots that contacts of pair p have now: given ones, then listed ones. Returns how many roots there are.
+
+    A listed contact that lost its root, or came to that of another one, gives up its place.
+    """
+    pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
+    places = memory_places(table, watch)[1]
+    count = add_given(table, pool, scene, tracked, table[pair + GIVEN], table[pair + GIVEN_COUNT], roots, work)
+    for k in range(table[pair + LOW], table[pair + HIGH]):
+        o = places + PLACE_MEMORY * k
+        if memory[o] != p:
+            continue
+        r = table[watch + FIRST] + k
+        lost = math.isnan(tracked[r, 0])
+        before = count
+        if not lost and count < ROOTS:
+            start = (tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3])
+            codes = (np.int64(tracked[r, FEATURE_F]), np.int64(tracked[r, FEATURE_G]))
+            n = (tracked[r, PAIR_NORMAL], tracked[r, PAIR_NORMAL + 1], tracked[r, PAIR_NORMAL + 2])
+            neglect = pool[table[watch + LENGTHS] + NEGLECT]
+            count, found = add_root(table, pool, scene, codes, start, n, neglect, roots, count, work)
+            lost = found != ALIKE and found != MINIMUM_FOUND
+        if count > before and not lost:
+            roots[before, ORIGIN] = LISTED + k
+            write_root(roots, before, tracked, r)
+        else:
+            kind, reason = (HANDED_OFF, LOST) if lost else (MERGED, SAME_ROOT)
+            note(table, watch, memory, kind, reason, p, memory[o + PLACE_NUMBER], tracked[r, PAIR_GAP])
+            release(table, watch, memory, k, tracked)
+    return count
+
+
+@kernel(inner=True)
+def list_roots(table, pool, watch, memory, p, roots, count, tracked):
+    """Give places to the near roots of pair p and take them from the far ones. Returns the least gap not listed."""
+    pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
+    places, reach = memory_places(table, watch)[1], memory[memory_places(table, watch)[0] + PAIR_MEMORY * p + REACH]
+    least = pool[table[pair + PAIR_MINIMUM]]
+    rest = math.inf
+    for i in range(count):
+        origin = np.int64(roots[i, ORIGIN])
+        if origin >= LISTED and roots[i, GAP] - least > KEEP * reach:
+            k = origin - LISTED
+            number = memory[places + PLACE_MEMORY * k + PLACE_NUMBER]
+            note(table, watch, memory, REMOVED, WENT_AWAY, p, number, roots[i, GAP])
+            release(table, watch, memory, k, tracked)
+            rest = min(rest, roots[i, GAP] - least)
+    # The nearest first, so that it is the far ones for which places may be wanting.
+    while True:
+        best = -1
+        for i in range(count):
+            if roots[i, ORIGIN] == NEW and (best < 0 or roots[i, GAP] < roots[best, GAP]):
+                best = i
+        if best < 0:
+            break
+        gap = roots[best, GAP] - least
+        roots[best, ORIGIN] = USELESS
+        k = free_place(table, watch, memory, pair) if gap <= TAKE * reach else -1
+        if k < 0:
+            rest = min(rest, gap)
+            continue
+        o = places + PLACE_MEMORY * k
+        memory[o + PLACE_PAIR] = float(p)
+        memory[BORN] += 1.0
+        memory[o + PLACE_NUMBER] = memory[BORN]
+        write_root(roots, best, tracked, table[watch + FIRST] + k)
+        note(table, watch, memory, ADDED, CAME_NEAR, p, memory[BORN], roots[best, GAP])
+    return rest
+
+
+@kernel(inner=True)
+def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, roots, work):
+    """Find and list the roots of pair p."""
+    pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
+    at = memory_places(table, watch)[0] + PAIR_MEMORY * p
+    i = table[pair + PAIR_F]
+    j = table[pair + PAIR_G]
+    turn, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
+    scene = (
+        turn,
+        shift,
+        (table[pair + PAIR_SURFACE_F], table[pair + PAIR_SURFACE_G], table[pair + PAIR_SHELL_F], table[pair + PAIR_SHELL_G]),
+        (table[pair + TREE_F], table[pair + TREE_G]),
+        (i, j, q, table[watch + TRACK_SOLIDS]),
+    )
+    memory[LOOKS] += 1.0
+    is_first = math.isinf(memory[at + LOOKED])
+    moved = math.inf if is_first else both_ways(table, memory, pair) - memory[at + LOOKED]
+    least = pool[table[pair + PAIR_MINIMUM]]
+    lengths = table[watch + LENGTHS]
+    reach = memory[at + REACH]
+    found = np.int64(-1)
+    while True:
+        found = pairs_within(
+            table, pool, table[pair + TREE_F], table[pair + TREE_G], turn, shift, reach + least, stack, candidates
+        )
+        if 0 <= found <= candidates.shape[0]:
+            break
+        # Out of room: what is nearer is looked at more often.
+        reach *= 0.5
+    memory[at + REACH] = reach
+    count = known_roots(table, pool, watch, memory, p, scene, tracked, roots, work)
+    for c in range(found):
+        if count == ROOTS:
+            break
+        codes, start, inside = is_known(table, pool, scene, candidates[c, 0], candidates[c, 1], roots, count)
+        if inside:
+            continue
+        before = count
+        count, result = add_root(
+            table, pool, scene, codes, start, (0.0, 0.0, 0.0), pool[lengths + NEGLECT], roots, count, work
+        )
+        if count > before and result == MINIMUM_FOUND:
+            gap = roots[before, GAP]
+            # The far sides of two bodies oppose each other, too; of surfaces that were apart none is deeper in the
+            # other than they moved.
+            alien = gap > reach + least or (gap < 0.0 and (gap < -moved or is_outside(table, pool, scene, roots, before)))
+            roots[before, ORIGIN] = USELESS if alien else NEW
+    rest = list_roots(table, pool, watch, memory, p, roots, count, tracked)
+    listed = 0
+    for k in range(table[pair + LOW], table[pair + HIGH]):
+        if memory[memory_places(table, watch)[1] + PLACE_MEMORY * k] == p:
+            listed += 1
+    memory[at + LOOKED] = both_ways(table, memory, pair)
+    memory[at + ALLOWANCE] = min(reach, rest) if count < ROOTS else 0.0
+    memory[at + STATE] = float(TRACKING if listed > 0 else (NEAR if found > 0 else FAR))
+    if rest <= 0.0 or count == ROOTS:
+        memory[CROWDED] = 1.0
+    if found == 0:
+        memory[at + REACH] = min(2.0 * reach, pool[lengths + LAST_REACH])
+    elif found > MANY:
+        memory[at + REACH] = 0.7 * reach
+    elif reach < pool[lengths + FIRST_REACH]:
+        memory[at + REACH] = min(1.2 * reach, pool[lengths + FIRST_REACH])
+
+
+@kernel
+def look(table, pool, watch, memory, q, tracked, everything):
+    """Look at the pairs of bodies that need it, or that moved at all since their last look; list what is near.
+
+    Returns how many events that made. `tracked` has a row for every place (`solid_contact.py`), at the roots of the
+    poses q or close by.
+    """
+    go_on(table, pool, watch, memory, q)
+    before = memory[EVENT_COUNT]
+    memory[CROWDED] = 0.0
+    ready = False
+    stack = np.empty((1, 2), np.int64)
+    candidates = stack
+    roots = np.empty((1, ROOT))
+    work = (roots, roots)
+    at = memory_places(table, watch)[0]
+    for p in range(table[watch + PAIRS]):
+        pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
+        o = at + PAIR_MEMORY * p
+        moved = both_ways(table, memory, pair) - memory[o + LOOKED]
+        if not any_lost(table, watch, memory, p, tracked):
+            if moved <= (0.0 if everything else USED * memory[o + ALLOWANCE]):
+                continue
+        if not ready:
+            ready = True
+            stack = np.empty((STACK, 2), np.int64)
+            candidates = np.empty((CANDIDATES, 2), np.int64)
+            roots = np.empty((ROOTS, ROOT))
+            work = (np.empty((1, CONTACT_RECORD)), np.empty((1, TRACK)))
+        look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, roots, work)
+    return np.int64(memory[EVENT_COUNT] - before)
+
+
+@kernel(inner=True)
+def share_of_step(table, watch, memory, moves, share):
+    """How much of a step that moves bodies by at most `moves` is allowed: no more than brings in what is not listed."""
+    at = memory_places(table, watch)[0]
+    for p in range(table[watch + PAIRS]):
+        pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
+        o = at + PAIR_MEMORY * p
+        left = memory[o + ALLOWANCE] - (both_ways(table, memory, pair) - memory[o + LOOKED])
+        need = moves[table[pair + PAIR_F]] + moves[table[pair + PAIR_G]]
+        if share * need > left:
+            share = max(left, 0.0) / need
+    return share

@@ -1,0 +1,375 @@
+"""Tracker: poses that follow a hand, one call of the compiled loop a tick."""
+
+from __future__ import annotations
+
+from enum import Enum
+from functools import cached_property
+from math import isfinite
+from time import perf_counter, sleep
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly._kernel import clock_address
+from assembly.assembly import Assembly
+from assembly.constraints.layout import CLOCK_AT
+from assembly.constraints.objectives import FrameDistance, PointDistance
+from assembly.errors import InputError, integer, number, positive
+from assembly.kinematics.body import Body, Frame, Point
+from assembly.kinematics.pose import Pose, axes_quaternion, rotation_matrix
+from assembly.proximity.events import Event, events_of
+from assembly.proximity.watch import EVENT_COUNT
+from assembly.solve.augmented_lagrangian import (
+    BUDGET,
+    COUNT,
+    CURVED,
+    DUAL,
+    FEASIBILITY,
+    HELD,
+    HISTORY,
+    ITERATIONS,
+    LAST_LOOK,
+    OBJECTIVE,
+    SECOND_ORDER,
+    STATIONARITY,
+    TICK,
+    VIOLATION,
+    solve_program,
+)
+from assembly.solve.options import Options
+from assembly.solve.solution import Scene, Solution, Status
+
+if TYPE_CHECKING:
+    from assembly.constraints.packing import Packed
+    from assembly.tracking.log import TrackLog
+    from assembly.tracking.trace import Trace
+
+__all__ = ["Step", "TrackStatus", "Tracker"]
+
+Array = NDArray[np.float64]
+
+
+class TrackStatus(Enum):
+    """How a tick ended; the value says it in a sentence."""
+
+    FOLLOWED = "the constraints hold and the pose is as near to the hand as they allow"
+    APPROACHING = "the constraints hold; the next tick goes on toward the hand"
+    LATE = "the time was spent; the constraints hold at the pose returned"
+    HELD = "no further pose was found that holds; the last one that does is returned"
+    BAD_TARGET = "the target is no finite point or pose; nothing moved"
+    VIOLATED = "the constraints hold at no pose that was found; the violation says by how much"
+
+
+# What the loop says of a tick whose pose holds.
+_STATUSES = {0: TrackStatus.FOLLOWED, 6: TrackStatus.LATE}
+
+
+class Step:
+    """What a tick did. Tables are computed when they are read.
+
+    Attributes
+    ----------
+    q : (n, 7)
+        A row a body: x y z qw qx qy qz.
+    feasibility : float
+        Largest violation of a constraint at `q`, in the user's units.
+    status : TrackStatus
+    force, wrench : (3,), (6,)
+        What the assembly exerts on the hand: force, then torque about the followed point, world axes; stiffness times
+        what the hand is ahead.
+    is_minimum : bool or None
+        Whether the second derivative along what the constraints leave free is positive definite; None if not asked.
+    iterations : int
+    seconds : float
+        From the call of `step` to its end.
+    events : tuple of Event
+        Contacts of clearances that came, went, were handed off or merged in this tick.
+    solution : Solution
+        The same pose with all that a solution tells: contacts, multipliers, wrenches of every constraint.
+    """
+
+    def __init__(
+        self,
+        tracker: Tracker,
+        state: Array,
+        status: TrackStatus,
+        target: Array,
+        events: tuple[Event, ...],
+        seconds: float,
+    ) -> None:
+        self._tracker = tracker
+        self._state = state
+        self._target = target
+        self.status = status
+        self.events = events
+        self.seconds = seconds
+
+    @cached_property
+    def q(self) -> Array:
+        """Configuration, (n, 7)."""
+        return self._state[: self._tracker._packed.contacts_at].reshape(-1, 7).copy()
+
+    def _result(self, place: int) -> float:
+        return float(self._state[self._tracker._packed.results_at + place])
+
+    @property
+    def feasibility(self) -> float:
+        """Largest violation of a constraint, in the user's units."""
+        return self._result(VIOLATION)
+
+    @property
+    def stationarity(self) -> float:
+        """Largest component of the Lagrangian's gradient, scaled."""
+        return self._result(DUAL)
+
+    @property
+    def objective(self) -> float:
+        """The objective, the energy of the hand's spring among it."""
+        return self._result(OBJECTIVE) * self._tracker._packed.unit
+
+    @property
+    def iterations(self) -> int:
+        """Steps of the loop."""
+        return int(self._result(COUNT))
+
+    @property
+    def is_minimum(self) -> bool | None:
+        """Whether the reduced Hessian is positive definite; None where it was not asked for."""
+        return {0.0: None, 1.0: True}.get(self._result(CURVED), False)
+
+    @cached_property
+    def wrench(self) -> Array:
+        """Force and torque on the hand, (6,)."""
+        return self._tracker._wrench(self.q, self._target)
+
+    @property
+    def force(self) -> Array:
+        """Force on the hand, (3,)."""
+        return self.wrench[:3]
+
+    @cached_property
+    def solution(self) -> Solution:
+        """The pose as a solution."""
+        tracker = self._tracker
+        status = Status.SOLVED if self.status is TrackStatus.FOLLOWED else Status.ITERATION_LIMIT
+        return Solution(tracker._scene, tracker._packed, self._state, status, self.seconds, np.empty((0, HISTORY)))
+
+    def __repr__(self) -> str:
+        return f"Step({self.status.name}, feasibility={self.feasibility:.1e}, {1e6 * self.seconds:.0f} us)"
+
+
+class Tracker:
+    """Follows a hand that holds a point or a frame of a body: made by `Assembly.tracker`.
+
+    Every tick is a few steps of the loop that `solve` runs, from the pose and the multipliers of the tick before. The
+    hand is a spring: it draws the point by `stiffness` times the distance, and the constraints hold all the time. Other
+    objectives of the scene count beside it.
+
+    Parameters
+    ----------
+    scene : Assembly
+        Its bodies, constraints and objectives as they are now; driven values may change between ticks.
+    follow : Point, Frame or Body
+        What the hand holds. A target is a point (3,) for a `Point`, a pose (7,) or a `Pose` for the others.
+    q0 : (n, 7) or Solution, optional
+        Where to begin; the bodies' poses by default. The constraints are solved from there, the hand at rest.
+    stiffness : float
+        Force over distance.
+    budget : float, optional
+        Seconds that the compiled loop of a tick may take; without one it takes what it needs.
+    iterations : int
+        Steps of a tick after which it ends, if the constraints hold; it takes up to four times as many until they do.
+    tolerance : float
+        Largest violation that counts as held, in parts of the scene's size.
+    second_order : bool
+        Whether every tick is tested for a minimum.
+
+    Raises
+    ------
+    InputError, TypeError
+        Arguments out of range, or a start from which the constraints cannot be solved.
+    """
+
+    def __init__(
+        self,
+        scene: Assembly,
+        follow: Point | Frame | Body,
+        *,
+        q0: ArrayLike | Solution | None = None,
+        stiffness: float = 1.0,
+        budget: float | None = None,
+        iterations: int = 2,
+        tolerance: float = 1e-12,
+        second_order: bool = False,
+    ) -> None:
+        weight = 0.5 * positive("stiffness", stiffness)
+        if not isinstance(follow, (Point, Frame, Body)):
+            raise TypeError(f"follow is {follow!r}; expected a Point, a Frame or a Body")
+        limit = number("tolerance", tolerance)
+        if not 1e-14 <= limit <= 1e-3:
+            raise InputError(f"tolerance is {limit:g}; expected a part of the scene's size from 1e-14 to 1e-3")
+        if not isinstance(second_order, (bool, np.bool_)):
+            raise InputError(f"second_order is {second_order!r}; expected True or False")
+        self._scene_given = scene
+        begin = scene.solve(q0) if scene.constraints else None
+        if begin is not None and not begin.success:
+            raise InputError(f"q0 is a start from which the constraints cannot be solved: {begin.message}")
+        if begin is not None:
+            poses = begin.q
+        else:
+            poses = scene.q if q0 is None else scene.solve(q0, max_iterations=0).q
+        self._place = scene.bodies.index(follow if isinstance(follow, Body) else follow.body)
+        self._hand: PointDistance | FrameDistance
+        row = poses[self._place]
+        if isinstance(follow, Point):
+            there = Pose(row[:3], row[3:]).apply(follow.coordinates)
+            self._hand = PointDistance(follow, there, weight)
+        else:
+            self._hand = FrameDistance(follow, Pose(row[:3], row[3:]), weight=weight)
+            frame = self._hand.frame
+            self._hand.target = Pose(row[:3], row[3:]) @ Pose(frame.origin, axes_quaternion(frame.axes))
+        inner = Assembly(scene.bodies)
+        inner.constrain(*scene.constraints)
+        for sign, objective in scene.objectives:
+            (inner.minimize if sign > 0.0 else inner.maximize)(objective)
+        inner.minimize(self._hand)
+        self._inner = inner
+        self._packed: Packed = inner.packed()
+        assert inner._scene is not None
+        self._scene: Scene = inner._scene
+        self._settings = Options().settings(warm=True)
+        self._settings[FEASIBILITY] = limit
+        self._settings[STATIONARITY] = 1e-9
+        self._settings[ITERATIONS] = integer("iterations", iterations, 1, 1000)
+        self._settings[TICK] = 1.0
+        self._settings[LAST_LOOK] = 0.0
+        self._settings[SECOND_ORDER] = float(second_order)
+        if budget is not None:
+            self._settings[BUDGET] = 1e9 * positive("budget", budget)
+            self._packed.table[CLOCK_AT] = clock_address()
+            if self._packed.table[CLOCK_AT] == 0:
+                raise InputError("budget is given, but this interpreter has no clock for compiled code; expected None")
+        self._history = np.empty((1, HISTORY))
+        first = inner.solve(poses)
+        if not first.success:
+            raise InputError(f"q0 is a start from which the constraints cannot be solved: {first.message}")
+        self._state = first._state.copy()
+        self._before = self._state.copy()
+        packed = self._packed
+        self._names = [(a.name, b.name) for pairs in packed.guarded for a, b in pairs]
+        self._seen = 0.0
+        self._at = next(at for target, at in packed._targets if target is self._hand)
+        # Whatever else may change between ticks is written by the scene itself.
+        self._others = bool(packed._sources) or len(packed._targets) + len(packed._turns) > 1
+        self._tolerance = 1.25 * limit * packed.scale
+
+    @property
+    def scene(self) -> Assembly:
+        """The assembly that was given."""
+        return self._scene_given
+
+    @property
+    def q(self) -> Array:
+        """Where the bodies stand now, (n, 7)."""
+        return self._state[: self._packed.contacts_at].reshape(-1, 7).copy()
+
+    def step(self, target: ArrayLike | Pose) -> Step:
+        """Follow the hand for a tick. Never raises: see `Step.status`.
+
+        Parameters
+        ----------
+        target : (3,), (7,) or Pose
+            Where the hand is: a point, or the pose of the frame it holds.
+        """
+        begin = perf_counter()
+        packed, state = self._packed, self._state
+        row = self._aimed(target)
+        if row is None:
+            state = self._front()
+            return Step(self, state, TrackStatus.BAD_TARGET, self._where(), (), perf_counter() - begin)
+        self._before[:] = state
+        code = solve_program(packed.table, packed.pool, self._settings, state, self._history, packed.tips)
+        at = packed.results_at
+        status = _STATUSES.get(code, TrackStatus.APPROACHING)
+        if state[at + HELD] == 1.0:
+            status = TrackStatus.HELD
+        elif not state[at + VIOLATION] <= self._tolerance:
+            status = TrackStatus.HELD if self._before[at + VIOLATION] <= self._tolerance else TrackStatus.VIOLATED
+            if status is TrackStatus.HELD:
+                state[:] = self._before
+        events: tuple[Event, ...] = ()
+        if packed.guards and state[packed.memory_at + EVENT_COUNT] != self._seen:
+            events = events_of(state[packed.memory_at :], self._names, packed.scale, int(self._seen))
+            self._seen = state[packed.memory_at + EVENT_COUNT]
+        return Step(self, self._front(), status, row, events, perf_counter() - begin)
+
+    def _front(self) -> Array:
+        """The state but for what the watch knows."""
+        return self._state[: self._packed.memory_at].copy()
+
+    def _where(self) -> Array:
+        """The target that the loop has."""
+        hand = self._hand
+        return hand._target if isinstance(hand, PointDistance) else hand.target.q
+
+    def _aimed(self, target: ArrayLike | Pose) -> Array | None:
+        """The target as an array, after the loop was told; None for what is none."""
+        hand, packed = self._hand, self._packed
+        try:
+            row = np.array(target.q if isinstance(target, Pose) else target, dtype=np.float64)
+            if isinstance(hand, PointDistance):
+                if row.shape != (3,) or not isfinite(row[0] + row[1] + row[2]):
+                    return None
+                hand._target = row
+            else:
+                if row.shape != (7,):
+                    return None
+                hand.target = Pose(row[:3], row[3:])
+        except (TypeError, ValueError, OverflowError):
+            return None
+        if self._others or not isinstance(hand, PointDistance):
+            packed.refresh()
+        else:
+            packed.pool[self._at : self._at + 3] = (row - packed.reference) / packed.scale
+        return row
+
+    def _wrench(self, q: Array, target: Array) -> Array:
+        """Force and torque of the spring on the hand."""
+        hand = self._hand
+        pose = Pose(q[self._place, :3], q[self._place, 3:])
+        stiffness = 2.0 * hand.weight
+        if isinstance(hand, PointDistance):
+            return np.append(stiffness * (pose.apply(hand.point.coordinates) - target), np.zeros(3))
+        frame = hand.frame
+        force = stiffness * (pose.apply(frame.origin) - target[:3])
+        turn = rotation_matrix(pose.quaternion) @ frame.axes @ rotation_matrix(target[3:]).T
+        # Twice the skew part of a rotation is its sine along its axis.
+        sine = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
+        return np.append(force, stiffness * hand.length**2 * sine)
+
+    def run(self, trace: Trace, *, paced: bool = False) -> TrackLog:
+        """Follow a recorded hand, a tick a sample.
+
+        Parameters
+        ----------
+        trace : Trace
+        paced : bool
+            Wait for each sample's time by the clock; else as fast as possible.
+
+        Returns
+        -------
+        TrackLog
+        """
+        from assembly.tracking.log import Recorder
+
+        recorder = Recorder(trace, len(self._scene.bodies))
+        start = perf_counter()
+        for k, (time, target) in enumerate(trace):
+            if paced:
+                wait = start + time - perf_counter()
+                if wait > 0.0:
+                    sleep(wait)
+            step = self.step(target)
+            recorder.record(k, step)
+        return recorder.log()
