@@ -8,6 +8,7 @@ NURBS Book, P1.10 and P4.9), and so the edge.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,20 @@ from assembly.geometry.curve import NurbsCurve
 from assembly.geometry.face import Face
 from assembly.geometry.surface import NurbsSurface
 
-__all__ = ["curve_boxes", "edge_cells", "first_cells", "outside_cells"]
+__all__ = [
+    "CLEAR",
+    "ENTERED",
+    "OUTSIDE",
+    "BoxParts",
+    "box_hulls",
+    "box_parts",
+    "box_sides",
+    "curve_boxes",
+    "edge_cells",
+    "first_cells",
+    "interval_parts",
+    "outside_cells",
+]
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -24,6 +38,10 @@ Indices = NDArray[np.int64]
 _LEAST, _MOST, _PART = 16, 256, 0.0625
 # Rounding of parameters and of points, relative: boxes and balls must contain, not nearly contain.
 _ROUNDING = 1e-14
+# Of a box: whether all of it is inside the trim, all of it outside, or a boundary curve may enter it.
+CLEAR, OUTSIDE, ENTERED = 0, 1, 2
+# Boxes looked at together.
+_ROWS = 2048
 
 
 def _restricted(points: Array, axis: int, low: Array, high: Array) -> Array:
@@ -66,7 +84,7 @@ def curve_boxes(curve: NurbsCurve, cells: Array) -> Array:
     return np.column_stack([low[:, 0], high[:, 0], low[:, 1], high[:, 1]])
 
 
-def _parts(low: Array, high: Array, at: Array, closed: bool) -> tuple[Indices, Indices, Array, Array]:
+def interval_parts(low: Array, high: Array, at: Array, closed: bool) -> tuple[Indices, Indices, Array, Array]:
     """Intervals of one parameter as parts of spans: interval, span, and from where to where in [0, 1] of the span.
 
     Sorted by interval. In a closed direction they are wrapped; in an open one, reaching out, they include the end.
@@ -101,22 +119,41 @@ def _parts(low: Array, high: Array, at: Array, closed: bool) -> tuple[Indices, I
     return owner[entry][order], span[order], x0[order], x1[order]
 
 
-def _balls(surface: NurbsSurface, boxes: Array) -> tuple[Array, Array]:
-    """Centers (n, 3) and radii (n,) of balls around a surface over boxes (n, 4)."""
+class BoxParts(NamedTuple):
+    """Boxes cut at the knots: of every part its box, its spans, and from where to where in their unit squares."""
+
+    owner: Indices
+    span_u: Indices
+    span_v: Indices
+    box: Array
+
+
+def box_parts(surface: NurbsSurface, boxes: Array) -> BoxParts:
+    """The parts of boxes (n, 4) in (u, v), in the order of the boxes; every box has one at least."""
     at_u, at_v = surface.breaks()
     closed_u, closed_v = surface.closed
-    owner_u, span_u, u0, u1 = _parts(boxes[:, 0], boxes[:, 1], at_u, closed_u)
-    owner_v, span_v, v0, v1 = _parts(boxes[:, 2], boxes[:, 3], at_v, closed_v)
+    owner_u, span_u, u0, u1 = interval_parts(boxes[:, 0], boxes[:, 1], at_u, closed_u)
+    owner_v, span_v, v0, v1 = interval_parts(boxes[:, 2], boxes[:, 3], at_v, closed_v)
     # Every part in u with every part in v of the same box.
     count = np.bincount(owner_v, minlength=len(boxes))
     start = np.cumsum(count) - count
     i = np.repeat(np.arange(owner_u.size), count[owner_u])
     first = np.cumsum(count[owner_u]) - count[owner_u]
     j = start[owner_u[i]] + np.arange(i.size) - first[i]
-    points = surface.bezier_pieces()[span_u[i], span_v[j]]
-    points = _restricted(_restricted(points, 1, u0[i], u1[i]), 2, v0[j], v1[j])
-    xyz = (points[..., :3] / points[..., 3:]).reshape(i.size, -1, 3)
-    owner = owner_u[i]
+    return BoxParts(owner_u[i], span_u[i], span_v[j], np.column_stack([u0[i], u1[i], v0[j], v1[j]]))
+
+
+def box_hulls(surface: NurbsSurface, boxes: Array) -> tuple[Array, Indices]:
+    """Bezier points (m, k, 3) of a surface over the parts of boxes (n, 4), and the box of each part."""
+    parts = box_parts(surface, boxes)
+    points = surface.bezier_pieces()[parts.span_u, parts.span_v]
+    points = _restricted(_restricted(points, 1, *parts.box.T[:2]), 2, *parts.box.T[2:])
+    return (points[..., :3] / points[..., 3:]).reshape(len(points), -1, 3), parts.owner
+
+
+def _balls(surface: NurbsSurface, boxes: Array) -> tuple[Array, Array]:
+    """Centers (n, 3) and radii (n,) of balls around a surface over boxes (n, 4)."""
+    xyz, owner = box_hulls(surface, boxes)
     begins = np.flatnonzero(np.diff(owner, prepend=-1))
     low = np.minimum.reduceat(xyz.min(axis=1), begins)
     high = np.maximum.reduceat(xyz.max(axis=1), begins)
@@ -177,23 +214,33 @@ def _touching(low: Array, high: Array, other_low: Array, other_high: Array, peri
     return np.asarray(other_low + lift <= high[:, None])
 
 
-def outside_cells(face: Face, rows: Array) -> NDArray[np.bool_]:
-    """Which cells (n, CELL_SIZE) of a face's surface (`geometry/cells.py`) lie wholly outside its trim.
+def box_sides(face: Face, boxes: Array) -> Indices:
+    """Where boxes (n, 4) of u from and to, v from and to, are: all inside a face's trim, all outside, or neither.
 
-    A cell that no boundary curve enters is on one side: that of its middle.
+    A box that no boundary curve enters is on one side: that of its middle.
     """
     surface = face.surface
     curves = [curve_boxes(curve, first_cells(curve)) for curve in face.boundary]
-    outside = np.zeros(len(rows), dtype=bool)
     if not curves:
-        return outside
+        return np.full(len(boxes), CLEAR)
     edges = np.concatenate(curves)
-    meets = np.ones((len(rows), len(edges)), dtype=bool)
-    for k in range(2):
-        low, high = surface.domain[k]
-        period = high - low if surface.closed[k] else None
-        middle, half = rows[:, k], rows[:, k + 9] + _ROUNDING * max(abs(low), abs(high))
-        meets &= _touching(middle - half, middle + half, edges[:, 2 * k], edges[:, 2 * k + 1], period)
-    clear = np.flatnonzero(~meets.any(axis=1))
-    outside[clear] = face.locate(rows[clear, 0], rows[clear, 1]) < 0
-    return outside
+    sides = np.full(len(boxes), ENTERED)
+    for start in range(0, len(boxes), _ROWS):
+        rows = boxes[start : start + _ROWS]
+        meets = np.ones((len(rows), len(edges)), dtype=bool)
+        for k in range(2):
+            low, high = surface.domain[k]
+            period = high - low if surface.closed[k] else None
+            slack = _ROUNDING * max(abs(low), abs(high))
+            first, last = rows[:, 2 * k] - slack, rows[:, 2 * k + 1] + slack
+            meets &= _touching(first, last, edges[:, 2 * k], edges[:, 2 * k + 1], period)
+        clear = np.flatnonzero(~meets.any(axis=1))
+        middle_u, middle_v = 0.5 * (rows[clear, 0] + rows[clear, 1]), 0.5 * (rows[clear, 2] + rows[clear, 3])
+        sides[start + clear] = np.where(face.locate(middle_u, middle_v) < 0, OUTSIDE, CLEAR)
+    return sides
+
+
+def outside_cells(face: Face, rows: Array) -> NDArray[np.bool_]:
+    """Which cells (n, CELL_SIZE) of a face's surface (`geometry/cells.py`) lie wholly outside its trim."""
+    u, v, half_u, half_v = rows[:, 0], rows[:, 1], rows[:, 9], rows[:, 10]
+    return np.asarray(box_sides(face, np.column_stack([u - half_u, u + half_u, v - half_v, v + half_v])) == OUTSIDE)

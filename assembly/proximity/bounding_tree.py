@@ -1,0 +1,242 @@
+"""Descent of two trees of boxes and normal cones: which of their elements may hold an extremal pair.
+
+An extremal pair has g - f = gap n, where n lies in the normal cone of f and -n in that of g (Johnson and Cohen,
+Spatialized normal cone hierarchies, 2001). Of two nodes with difference d of their centers and a reach for |gap| none
+holds a pair where
+
+    the boxes are farther apart than the reach, by the planes along the axes of either,
+    no n of the cone of f is within the cone of g turned around: angle(a_f, -a_g) > alpha_f + alpha_g,
+    or d is farther than r_f + r_g, the radii of both, from the double cone of the n of f, or of g.
+
+A tree is a header of `TREE` integers, then `NODE_INTS` a node; a node's doubles and those of an element stand in the
+pool. Nodes are numbered from the root, 0; the two children of a node follow each other. Everything is in the axes of
+f; the rotation and the shift are those of g relative to f.
+"""
+
+from __future__ import annotations
+
+import math
+
+from assembly._kernel import kernel
+from assembly.geometry.vec import add, dot, matvec, matvec_t, sub
+
+# Header: how many nodes, where their integers and their doubles begin, how many elements, where theirs begin.
+NODES, NODE_TABLE, NODE_POOL, ELEMENTS, ELEMENT_POOL, TREE = 0, 1, 2, 3, 4, 5
+# A node: its first child, or -1 - element; the feature of the element, -1 of a node with children.
+CHILD, FEATURE, NODE_INTS = 0, 1, 2
+# Box (center and half widths), cone (axis, cosine and sine of its half angle), radius of the box.
+CENTER, HALF, AXIS, COS, SIN, RADIUS, NODE = 0, 3, 6, 9, 10, 11, 12
+# Of an element: the middle of its box in (u, v), or (t, 0), and half the widths.
+ELEMENT = 4
+# Rounding of unit vectors and of coordinates, relative: what is in doubt is kept.
+ROUNDING = 1e-13
+
+
+@kernel(inline=True)
+def three(pool, o):
+    return (pool[o], pool[o + 1], pool[o + 2])
+
+
+@kernel(inline=True)
+def excess(d, h, k):
+    """The square of the distance of two boxes along common axes: centers d apart, half widths h and k."""
+    x = max(abs(d[0]) - h[0] - k[0], 0.0)
+    y = max(abs(d[1]) - h[1] - k[1], 0.0)
+    z = max(abs(d[2]) - h[2] - k[2], 0.0)
+    return x * x + y * y + z * z
+
+
+@kernel(inline=True)
+def magnitudes(m):
+    """The absolute values of a rotation, rounded up."""
+    e = 4e-16
+    return (
+        abs(m[0]) + e,
+        abs(m[1]) + e,
+        abs(m[2]) + e,
+        abs(m[3]) + e,
+        abs(m[4]) + e,
+        abs(m[5]) + e,
+        abs(m[6]) + e,
+        abs(m[7]) + e,
+        abs(m[8]) + e,
+    )
+
+
+@kernel(inline=True)
+def off_axis(d, dd, axis, c, s):
+    """How far the point d is from the double cone along an axis, c and s of its half angle; less where it is inside."""
+    p = abs(dot(d, axis))
+    return c * math.sqrt(max(dd - p * p, 0.0)) - s * p
+
+
+@kernel(inline=True)
+def may_hold(pool, o, p, d, dd, axis_f, axis_g, c, s):
+    """Whether the cones at o and p, axes in common axes, let two nodes hold a pair; c and s of the sum of the angles."""
+    if s > ROUNDING and -dot(axis_f, axis_g) < c - ROUNDING:
+        return False
+    r = pool[o + RADIUS] + pool[p + RADIUS]
+    if dd <= r * r:
+        return True
+    if off_axis(d, dd, axis_f, pool[o + COS], pool[o + SIN]) > r:
+        return False
+    return off_axis(d, dd, axis_g, pool[p + COS], pool[p + SIN]) <= r
+
+
+@kernel(inner=True)
+def admits(pool, o, p, rotation, bulk, shift, square):
+    """Whether nodes at o of f and at p of g may hold a pair; `square` of the reach, `bulk` the magnitudes."""
+    hf = three(pool, o + HALF)
+    hg = three(pool, p + HALF)
+    d = sub(add(matvec(rotation, three(pool, p + CENTER)), shift), three(pool, o + CENTER))
+    if excess(d, hf, matvec(bulk, hg)) > square:
+        return False
+    if excess(matvec_t(rotation, d), matvec_t(bulk, hf), hg) > square:
+        return False
+    cf = pool[o + COS]
+    sf = pool[o + SIN]
+    cg = pool[p + COS]
+    sg = pool[p + SIN]
+    axis_g = matvec(rotation, three(pool, p + AXIS))
+    return may_hold(pool, o, p, d, dot(d, d), three(pool, o + AXIS), axis_g, cf * cg - sf * sg, sf * cg + cf * sg)
+
+
+@kernel(inline=True)
+def widened(pool, root_f, root_g, shift, reach):
+    """A reach with the rounding of coordinates."""
+    size = pool[root_f + RADIUS] + pool[root_g + RADIUS]
+    c = three(pool, root_f + CENTER)
+    e = three(pool, root_g + CENTER)
+    size += math.sqrt(dot(c, c)) + math.sqrt(dot(e, e)) + math.sqrt(dot(shift, shift))
+    return reach + ROUNDING * size
+
+
+@kernel(inner=True)
+def pairs_within(table, pool, tree_f, tree_g, rotation, shift, reach, stack, out):
+    """Elements (k, 2) of two trees that may hold an extremal pair with |gap| <= reach; their number.
+
+    -1 where the stack (n, 2) is too short; more than `out` holds where `out` is: then what it holds are the first.
+    """
+    node_f = table[tree_f + NODE_POOL]
+    node_g = table[tree_g + NODE_POOL]
+    ints_f = table[tree_f + NODE_TABLE]
+    ints_g = table[tree_g + NODE_TABLE]
+    reach = widened(pool, node_f, node_g, shift, reach)
+    square = reach * reach
+    bulk = magnitudes(rotation)
+    room = stack.shape[0]
+    count = 0
+    if room < 1:
+        return -1
+    if not admits(pool, node_f, node_g, rotation, bulk, shift, square):
+        return 0
+    stack[0, 0] = 0
+    stack[0, 1] = 0
+    used = 1
+    while used > 0:
+        used -= 1
+        i = stack[used, 0]
+        j = stack[used, 1]
+        child_f = table[ints_f + NODE_INTS * i + CHILD]
+        child_g = table[ints_g + NODE_INTS * j + CHILD]
+        if child_f < 0 and child_g < 0:
+            if count < out.shape[0]:
+                out[count, 0] = -1 - child_f
+                out[count, 1] = -1 - child_g
+            count += 1
+            continue
+        if used + 2 > room:
+            return -1
+        o = node_f + NODE * i
+        p = node_g + NODE * j
+        if child_g < 0 or (child_f >= 0 and pool[o + RADIUS] >= pool[p + RADIUS]):
+            for k in range(2):
+                if admits(pool, node_f + NODE * (child_f + k), p, rotation, bulk, shift, square):
+                    stack[used, 0] = child_f + k
+                    stack[used, 1] = j
+                    used += 1
+        else:
+            for k in range(2):
+                if admits(pool, o, node_g + NODE * (child_g + k), rotation, bulk, shift, square):
+                    stack[used, 0] = i
+                    stack[used, 1] = child_g + k
+                    used += 1
+    return count
+
+
+@kernel
+def facing_pairs(table, pool, tree_f, tree_g, rotation, shift, reach, stack, out):
+    """`pairs_within` for Python."""
+    return pairs_within(table, pool, tree_f, tree_g, rotation, shift, reach, stack, out)
+
+
+@kernel(inline=True)
+def box_distance(pool, o, p, rotation, bulk, shift):
+    """The square of a lower bound of the distance of two boxes."""
+    hf = three(pool, o + HALF)
+    hg = three(pool, p + HALF)
+    d = sub(add(matvec(rotation, three(pool, p + CENTER)), shift), three(pool, o + CENTER))
+    along_f = excess(d, hf, matvec(bulk, hg))
+    return max(along_f, excess(matvec_t(rotation, d), matvec_t(bulk, hf), hg))
+
+
+@kernel(inner=True)
+def least_distance(table, pool, tree_f, tree_g, rotation, shift, upper, stack):
+    """A lower bound of the distance of the elements of two trees, at most `upper`: that of their boxes.
+
+    A stack (n, 2) that is too short makes the bound lower, not wrong.
+    """
+    node_f = table[tree_f + NODE_POOL]
+    node_g = table[tree_g + NODE_POOL]
+    ints_f = table[tree_f + NODE_TABLE]
+    ints_g = table[tree_g + NODE_TABLE]
+    slack = widened(pool, node_f, node_g, shift, 0.0)
+    bulk = magnitudes(rotation)
+    room = stack.shape[0]
+    best = (upper + slack) * (upper + slack)
+    used = 0
+    first = box_distance(pool, node_f, node_g, rotation, bulk, shift)
+    if first < best:
+        if room < 1:
+            best = first
+        else:
+            stack[0, 0] = 0
+            stack[0, 1] = 0
+            used = 1
+    while used > 0:
+        used -= 1
+        i = stack[used, 0]
+        j = stack[used, 1]
+        o = node_f + NODE * i
+        p = node_g + NODE * j
+        # What was found since the pair was put here may exclude it.
+        bound = box_distance(pool, o, p, rotation, bulk, shift)
+        if bound >= best:
+            continue
+        child_f = table[ints_f + NODE_INTS * i + CHILD]
+        child_g = table[ints_g + NODE_INTS * j + CHILD]
+        if (child_f < 0 and child_g < 0) or used + 2 > room:
+            best = bound
+            continue
+        if child_g < 0 or (child_f >= 0 and pool[o + RADIUS] >= pool[p + RADIUS]):
+            near = box_distance(pool, node_f + NODE * child_f, p, rotation, bulk, shift)
+            far = box_distance(pool, node_f + NODE * (child_f + 1), p, rotation, bulk, shift)
+            swapped = far < near
+            # The nearer one is looked at first.
+            for k in range(2):
+                second = (k == 1) != swapped
+                if (near if not second else far) < best:
+                    stack[used + 0, 0] = child_f + (0 if not second else 1)
+                    stack[used, 1] = j
+                    used += 1
+        else:
+            near = box_distance(pool, o, node_g + NODE * child_g, rotation, bulk, shift)
+            far = box_distance(pool, o, node_g + NODE * (child_g + 1), rotation, bulk, shift)
+            swapped = far < near
+            for k in range(2):
+                second = (k == 1) != swapped
+                if (near if not second else far) < best:
+                    stack[used, 0] = i
+                    stack[used, 1] = child_g + (0 if not second else 1)
+                    used += 1
+    return max(math.sqrt(best) - slack, 0.0)
