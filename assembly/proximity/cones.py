@@ -35,14 +35,16 @@ def _unit(vectors: Array) -> Array:
     return np.where(length > 1e-3, vectors / np.maximum(length, 1e-3), [0.0, 0.0, 1.0])
 
 
-def around_vectors(vectors: Array, slack: Array) -> tuple[Array, Array]:
-    """Cones around vectors (n, k, 3) and so around their positive combinations; zero vectors count for nothing.
+def around_vectors(vectors: Array, slack: Array, vanish: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """Cones around vectors (n, k, 3) and so around their positive combinations.
 
     Parameters
     ----------
     vectors
     slack : (n,)
-        How far each vector may be off the true one, but for those that are zero.
+        How far each vector may be off the true one.
+    vanish : (n,)
+        Whether vectors that are zero are known to be, and count for nothing.
 
     Returns
     -------
@@ -51,18 +53,16 @@ def around_vectors(vectors: Array, slack: Array) -> tuple[Array, Array]:
         `FULL` where a vector may as well be zero, or where the cone is too wide to be convex.
     """
     length = np.linalg.norm(vectors, axis=2)
-    counts = length > 0.0
-    unit = vectors / np.where(counts, length, 1.0)[..., None]
-    low = np.where(counts[..., None], unit, np.inf).min(axis=1)
-    high = np.where(counts[..., None], unit, -np.inf).max(axis=1)
-    known = counts.any(axis=1)
-    axis = _unit(np.where(known[:, None], 0.5 * (low + high), 0.0))
+    counts = (length > 0.0) | ~vanish[:, None]
+    unit = vectors / np.where(length > 0.0, length, 1.0)[..., None]
+    low = np.where(counts[..., None], unit, 1.0).min(axis=1)
+    high = np.where(counts[..., None], unit, -1.0).max(axis=1)
+    axis = _unit(0.5 * (low + high))
     # How far the true direction may be off, and how far the vector's own is.
-    sine = slack[:, None] / np.where(counts, length, np.inf)
-    doubt = np.arcsin(np.minimum(sine, 1.0))
-    angle = between(unit, axis[:, None]) + doubt
-    half = np.where(counts, angle, 0.0).max(axis=1) + 2.0 * _ROUNDING
-    sure = known & (half < _CONVEX) & (np.where(counts, sine, 0.0).max(axis=1) < 0.5)
+    sine = np.minimum(np.where(counts, slack[:, None] / np.maximum(length, 1e-300), 0.0), 1.0)
+    angle = np.where(counts, between(unit, axis[:, None]) + np.arcsin(sine), 0.0)
+    half = angle.max(axis=1) + 2.0 * _ROUNDING
+    sure = counts.any(axis=1) & (half < _CONVEX) & (np.where(counts, length, 1.0) > 0.0).all(axis=1)
     return axis, np.where(sure, half, FULL)
 
 

@@ -91,8 +91,9 @@ def other_parameter(topology: Topology, edge: Edge, t: Array) -> Array:
 def _normals(nets: Nets, face: Face, boxes: Array, owner: Indices) -> tuple[Array, Array]:
     """Cones around the outward normals over boxes (n, 4) in (u, v), by the owners of the boxes, in their order."""
     parts = box_parts(face.surface, boxes)
-    net = restricted(nets.normals[parts.span_u, parts.span_v], parts.box)
-    axis, half = around_vectors(net.reshape(len(net), -1, 3), nets.slack[parts.span_u, parts.span_v])
+    at = parts.span_u, parts.span_v
+    net = restricted(nets.normals[at], parts.box)
+    axis, half = around_vectors(net.reshape(len(net), -1, 3), nets.slack[at], nets.poles[at])
     begins = np.flatnonzero(np.diff(owner[parts.owner], prepend=-1))
     return around_cones(axis, half, begins)
 
@@ -240,7 +241,7 @@ def vertex_elements(topology: Topology, edges: Elements) -> Elements:
         if rays is not None:
             if len(rays) == 0:
                 continue
-            cone = around_vectors(rays[None], np.array([2.0 * _TOLERANCE]))
+            cone = around_vectors(rays[None], np.array([2.0 * _TOLERANCE]), np.array([False]))
             axis, half = cone[0][0], float(cone[1][0])
         elif directions is not None and (pair := _opposite(directions)) is not None:
             # Two edges go on smoothly into each other: the vertex has no other normals than they.

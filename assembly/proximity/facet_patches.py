@@ -128,13 +128,14 @@ class _Divided:
 
     def _measured(self, piece: Indices, box: Array) -> Patches:
         nets = self.nets
-        points = restricted(nets.points[piece[:, 0], piece[:, 1]], box)
+        at = piece[:, 0], piece[:, 1]
+        points = restricted(nets.points[at], box)
         xyz = points[..., :3] / points[..., 3:]
         pad = _ROUNDING * nets.extent
         corners = xyz[:, [0, -1, -1, 0], [0, 0, -1, -1]]
         flat = xyz.reshape(len(xyz), -1, 3)
-        normals = restricted(nets.normals[piece[:, 0], piece[:, 1]], box)
-        axis, half = around_vectors(normals.reshape(len(xyz), -1, 3), nets.slack[piece[:, 0], piece[:, 1]])
+        normals = restricted(nets.normals[at], box)
+        axis, half = around_vectors(normals.reshape(len(xyz), -1, 3), nets.slack[at], nets.poles[at])
         steps = np.linalg.norm(np.diff(xyz, axis=1), axis=3), np.linalg.norm(np.diff(xyz, axis=2), axis=3)
         return Patches(
             piece,

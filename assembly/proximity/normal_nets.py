@@ -36,6 +36,8 @@ class Nets(NamedTuple):
         Of the outward normal, times a positive function; zero at poles.
     slack : (spans_u, spans_v)
         How far each normal's Bezier point may be off.
+    poles : (spans_u, spans_v) of bool
+        Whether a piece has a pole: zeros among its normals are known to be.
     extent : float
         The largest coordinate.
     """
@@ -45,6 +47,7 @@ class Nets(NamedTuple):
     points: Array
     normals: Array
     slack: Array
+    poles: NDArray[np.bool_]
     extent: float
 
 
@@ -104,11 +107,13 @@ def nets_of(face: Face) -> Nets:
     slack += 32.0 * (p + q) * _ROUNDING * size
     # An edge that is one point, to the tolerance that makes it a pole, is one: the normal's points there vanish.
     bits = surface._pole_bits
+    poles = np.zeros(slack.shape, dtype=bool)
     for bit, edge in ((1, np.s_[0, :, 0]), (2, np.s_[-1, :, -1]), (4, np.s_[:, 0, :, 0]), (8, np.s_[:, -1, :, -1])):
         if bits & bit:
             normals[edge] = 0.0
+            poles[edge[:2]] = True
     at_u, at_v = surface.breaks()
-    return Nets(at_u, at_v, points, face.sign * normals, slack, extent)
+    return Nets(at_u, at_v, points, face.sign * normals, slack, poles, extent)
 
 
 def _restriction(degree: int, low: Array, high: Array) -> Array:
