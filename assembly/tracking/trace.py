@@ -287,7 +287,7 @@ def _known_file(path: str | PathLike[str]) -> Path:
 
 def _arrays(file: Path) -> tuple[Array, Array]:
     try:
-        with np.load(file, allow_pickle=False) as data:
+        with file.open("rb") as stream, np.load(stream, allow_pickle=False) as data:
             return data["times"], data["targets"]
     except (BadZipFile, EOFError, KeyError, TypeError, ValueError) as error:
         raise InputError(f"{file} is no file of a trace: {error}; expected arrays times and targets") from None
