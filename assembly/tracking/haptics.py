@@ -102,7 +102,7 @@ def manipulator_jacobian(axes: ArrayLike, arms: ArrayLike) -> Array:
     InputError
         Wrong shapes, numbers that are not finite, more arms than axes, an axis far from unit.
     """
-    z, b = _vectors("axes", axes, 3, 2), _vectors("arms", arms, 3, 2)
+    z, b = _vectors("axes", axes, "n", 3), _vectors("arms", arms, "m", 3)
     leading = _leading(2, axes=z, arms=b)
     if b.shape[-2] > z.shape[-2]:
         raise InputError(f"arms has {b.shape[-2]} rows; expected {z.shape[-2]} at most, as axes")
@@ -125,23 +125,21 @@ def joint_torques(jacobian: ArrayLike, wrench: ArrayLike) -> Array:
     wrench : (..., 6)
         Force, then torque about the wrist, in the axes of the Jacobian.
     """
-    j, pushed = _vectors("jacobian", jacobian, None, 2), _vectors("wrench", wrench, 6)
-    if j.shape[-2] != 6:
-        raise InputError(f"jacobian has shape {j.shape}; expected (..., 6, n)")
+    j, pushed = _vectors("jacobian", jacobian, 6, "n"), _vectors("wrench", wrench, 6)
     _leading(2, jacobian=j, wrench=pushed[..., None])
     torques: Array = np.einsum("...ij,...i->...j", j, pushed)
     return torques
 
 
-def _vectors(name: str, value: ArrayLike, length: int | None, axes: int = 1) -> Array:
-    """Finite numbers (..., length), with so many axes at least; any length for None."""
+def _vectors(name: str, value: ArrayLike, *last: int | str) -> Array:
+    """Finite numbers whose last axes are these; a string stands for any extent."""
     try:
         shape = np.shape(value)
     except ValueError:
         raise InputError(f"{name} has rows of different lengths; expected an array") from None
-    if len(shape) < axes or length not in (None, shape[-1]):
-        wanted = ", ".join(["...", *"nm"[: axes - 1], "n" if length is None else str(length)])
-        raise InputError(f"{name} has shape {shape}; expected ({wanted})")
+    own = shape[-len(last) :]
+    if len(own) < len(last) or any(isinstance(want, int) and has != want for has, want in zip(own, last, strict=True)):
+        raise InputError(f"{name} has shape {shape}; expected (..., {', '.join(map(str, last))})")
     return real_array(name, value, shape)
 
 

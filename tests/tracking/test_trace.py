@@ -257,7 +257,11 @@ def test_files_that_are_no_traces(tmp_path):
         ([0.0, 1.0], [asm.Pose(), (0, 0, 0)], "targets has rows of different lengths"),
         ([0.0, 1.0], [[0, 0, 0], [0, np.nan, 0]], "targets[1, 1] is nan"),
         ([0.0, 1.0], [["a"] * 3] * 2, "targets is [['a', 'a', 'a'], ['a', 'a', 'a']]; expected real numbers"),
-        ([0.0, 1.0], np.zeros((2, 7)), "targets[0, 3:] is [0.0, 0.0, 0.0, 0.0] with norm 0; expected a unit quaternion"),
+        (
+            [0.0, 1.0],
+            np.zeros((2, 7)),
+            "targets[0, 3:] is [0.0, 0.0, 0.0, 0.0] with norm 0; expected a unit quaternion",
+        ),
     ],
 )
 def test_bad_input(times, targets, message):
