@@ -104,7 +104,7 @@ def replay(
     if not isinstance(scene, Assembly):
         raise TypeError(f"scene is {scene!r}; expected an Assembly")
     if not isinstance(log, TrackLog):
-        raise TypeError(f"log is {log!r}; expected a TrackLog")
+        raise TypeError(f"log is of type {type(log).__name__}; expected a TrackLog")
     if hand is not None and not isinstance(hand, Trace):
         raise TypeError(f"hand is {hand!r}; expected a Trace, or None")
     pace = positive("speed", speed)
