@@ -6,6 +6,7 @@ import json
 import re
 from dataclasses import replace
 from enum import Enum
+from html import unescape
 
 import numpy as np
 import pytest
@@ -125,7 +126,7 @@ setTimeout(() => {
 def test_a_browser_shows_the_poses_and_the_events(balls, log, browser, tmp_path):
     page = tmp_path / "replay.html"
     assert asm.view.replay(balls, log, page, frames=101, direction=(0, -1, 0.2)) is None
-    errors, first, second = json.loads(title_after(page, LOOK, "#frame=50"))
+    errors, first, second = json.loads(unescape(title_after(page, LOOK, "#frame=50")))
     assert errors == []
     # Frame 50 is the middle of the log, tick 200; the second event is in tick 350, between two frames.
     for (red, blue, frame, clock, events), tick, label, ahead in (
