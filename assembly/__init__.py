@@ -61,6 +61,8 @@ if TYPE_CHECKING:
     from assembly.solve.tip import tip_jacobian as tip_jacobian
     from assembly.step import read_step as read_step
     from assembly.step import write_step as write_step
+    from assembly.tracking.log import TrackLog as TrackLog
+    from assembly.tracking.trace import Trace as Trace
 else:
     __getattr__, __dir__, __all__ = lazy_names(
         __name__,
@@ -99,6 +101,8 @@ else:
             "Solution": "assembly.solve.solution",
             "Spherical": "assembly.constraints.joints",
             "Status": "assembly.solve.solution",
+            "Trace": "assembly.tracking.trace",
+            "TrackLog": "assembly.tracking.log",
             "TrimContact": "assembly.constraints.trim_contact",
             "Universal": "assembly.constraints.joints",
             "Wrench": "assembly.solve.statics",

@@ -10,11 +10,13 @@ if TYPE_CHECKING:
     from assembly.view.animation import animate as animate
     from assembly.view.browser import show as show
     from assembly.view.page import save_html as save_html
+    from assembly.view.playback import replay as replay
 else:
     __getattr__, __dir__, __all__ = lazy_names(
         __name__,
         {
             "animate": "assembly.view.animation",
+            "replay": "assembly.view.playback",
             "save_html": "assembly.view.page",
             "show": "assembly.view.browser",
         },

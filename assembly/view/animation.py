@@ -13,6 +13,7 @@ from assembly.assembly import Assembly
 from assembly.errors import InputError, positive
 from assembly.kinematics.ellipsoid import Ellipsoid
 from assembly.view.commands import commands, motion
+from assembly.view.item import Picture
 from assembly.view.page import player, write_page
 from assembly.view.picture import DIRECTION, film
 from assembly.view.series import Trajectory
@@ -20,7 +21,7 @@ from assembly.view.series import Trajectory
 if TYPE_CHECKING:
     from meshcat import Visualizer
 
-__all__ = ["animate"]
+__all__ = ["animate", "present", "require_flag"]
 
 
 def animate(
@@ -77,9 +78,27 @@ def animate(
         See the message; nothing is written or started then.
     """
     duration = positive("seconds", seconds)
-    if not isinstance(loop, (bool, np.bool_)):
-        raise InputError(f"loop is {loop!r}; expected True or False")
-    picture = film(scene, trajectory, direction, ellipsoids)
+    require_flag("loop", loop)
+    return present(film(scene, trajectory, direction, ellipsoids), path, duration, loop, title, open, visualizer)
+
+
+def require_flag(name: str, value: object) -> None:
+    """Raise unless a value is True or False."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise InputError(f"{name} is {value!r}; expected True or False")
+
+
+def present(
+    picture: Picture,
+    path: str | PathLike[str] | None,
+    duration: float,
+    loop: bool,
+    title: str | None,
+    open: bool,
+    visualizer: Visualizer | None,
+    beside: str = "",
+) -> Visualizer | None:
+    """Play a moving picture as `animate` does; markup may stand beside it in a file."""
     if path is None:
         if title is not None:
             raise InputError(f"title is {title!r} without a path; expected a path to write a page to, or no title")
@@ -90,5 +109,6 @@ def animate(
     if open or visualizer is not None:
         raise InputError("open or visualizer is given with a path; expected either a file or a window")
     frames = round(float(picture.times[-1])) + 1
-    write_page(path, title, [*commands(picture), motion(picture, duration, loop)], player(frames, loop))
+    controls = player(frames, loop) + beside
+    write_page(path, title, [*commands(picture), motion(picture, duration, loop)], controls)
     return None

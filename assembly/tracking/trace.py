@@ -1,0 +1,315 @@
+"""Recorded motions of a hand: where it was at which time, and its motion between the samples.
+
+Between samples a trace is a cubic spline through all of them, with continuous velocity and acceleration, so that a
+hand recorded at 60 Hz can be followed at 1000. Orientations are the normalized spline of quaternions that are first
+brought to the same side: the same motion whatever frame it is seen from, and off a smooth one by the fourth power of
+the interval, up to its ends. (Scipy's `RotationSpline`, which has no angular acceleration at the ends, is off by the
+square of the interval there, and thirty times slower.)
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple, Self
+from zipfile import BadZipFile
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.errors import InputError, number, positive, real_array
+from assembly.kinematics.pose import UNIT_ROUNDING, UNIT_TOLERANCE, Pose
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
+
+__all__ = ["Speed", "Trace"]
+
+Array = NDArray[np.float64]
+_COLUMNS = ("time", "x", "y", "z", "qw", "qx", "qy", "qz")
+# Two traces meet where one ends and the other begins within this, relative to the positions' size; radians.
+_MEETING = 1e-9
+# Part of an interval by which rounding may make a duration shorter.
+_ROUNDING = 1e-9
+
+
+class Speed(NamedTuple):
+    """The largest speed from a sample to the next, and the one that is exceeded half of the time."""
+
+    peak: float
+    median: float
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """A hand's motion: points or poses at times.
+
+    Parameters
+    ----------
+    times : (k,)
+        Increasing, in seconds; two at least.
+    targets : (k, 3) or (k, 7), or sequence of k Pose
+        Points, or rows x y z qw qx qy qz. Quaternions are normalized, and each is taken on the side of the one before:
+        q and -q are the same turn. From one to the next the shorter turn is meant.
+
+    Raises
+    ------
+    InputError
+        Wrong shapes, numbers that are not finite, times that do not increase, quaternions far from unit.
+    """
+
+    times: Array
+    targets: Array
+
+    def __post_init__(self) -> None:
+        times = real_array("times", self.times, ("k",))
+        if len(times) < 2:
+            raise InputError("times has 1 entry; expected two at least")
+        steps = np.diff(times)
+        if not (steps > 0.0).all():
+            k = int(np.argmin(steps > 0.0))
+            raise InputError(f"times[{k + 1}] is {times[k + 1]} after {times[k]}; expected increasing times")
+        targets = _target_rows("targets", self.targets, len(times))
+        times.flags.writeable = targets.flags.writeable = False
+        object.__setattr__(self, "times", times)
+        object.__setattr__(self, "targets", targets)
+
+    @classmethod
+    def through(cls, points: ArrayLike | Sequence[Pose], times: ArrayLike, rate: float = 1000.0) -> Self:
+        """A made motion: from rest through points or poses at given times to rest, sampled at a rate [Hz].
+
+        Smooth as a hand: velocity and acceleration are continuous. Between poses turns must be less than half a turn;
+        a twist by more goes through several. It ends at the last sample before or at the last time.
+        """
+        when = real_array("times", times, ("k",))
+        return cls(when, _target_rows("points", points, len(when)))._sampled(rate, "clamped")
+
+    @classmethod
+    def concatenate(cls, traces: Sequence[Trace], pause: float = 0.0) -> Self:
+        """One trace after the other; the times go on from those of the first.
+
+        Parameters
+        ----------
+        traces : sequence of Trace
+            All of points, or all of poses; one at least.
+        pause : float
+            Seconds from the end of one to the begin of the next. With none, the next must begin where the one ends.
+
+        Raises
+        ------
+        InputError
+            No traces, points beside poses, a negative pause, or none where two do not meet.
+        """
+        if not traces:
+            raise InputError("traces is empty; expected one trace at least")
+        wait = number("pause", pause)
+        if wait < 0.0:
+            raise InputError(f"pause is {wait:g}; expected seconds, not below zero")
+        times, targets = [traces[0].times], [traces[0].targets]
+        for k, trace in enumerate(traces[1:], 1):
+            if trace.targets.shape[1] != targets[0].shape[1]:
+                kinds = {3: "points", 7: "poses"}
+                expected = kinds[targets[0].shape[1]]
+                raise InputError(f"traces[{k}] has {kinds[trace.targets.shape[1]]}; expected {expected} as traces[0]")
+            skip = 0
+            if wait == 0.0:
+                _require_meeting(f"traces[{k}]", targets[-1][-1], trace.targets[0])
+                skip = 1
+            times.append(trace.times[skip:] - trace.times[0] + (times[-1][-1] + wait))
+            targets.append(trace.targets[skip:])
+        return cls(np.concatenate(times), np.concatenate(targets))
+
+    def then(self, other: Trace, pause: float = 0.0) -> Self:
+        """The motion of another trace after the one of this, as `concatenate`."""
+        return self.concatenate([self, other], pause)
+
+    @property
+    def duration(self) -> float:
+        """Seconds from the first sample to the last."""
+        return float(self.times[-1] - self.times[0])
+
+    @property
+    def positions(self) -> Array:
+        """Points, or the origins of poses, (k, 3)."""
+        return self.targets[:, :3]
+
+    @property
+    def speed(self) -> Speed:
+        """Peak and median speed of the points, or of the origins of poses: lengths over seconds."""
+        return self._speed(np.linalg.norm(np.diff(self.positions, axis=0), axis=1))
+
+    @property
+    def turning(self) -> Speed:
+        """Peak and median angular speed of poses, radians over seconds; zero for points."""
+        e = self.targets[:, 3:]
+        # |e - f| and |e + f| are twice the sine and twice the cosine of a quarter of the angle between them.
+        sine, cosine = (np.linalg.norm(e[1:] - sign * e[:-1], axis=1) for sign in (1.0, -1.0))
+        return self._speed(4.0 * np.arctan2(sine, cosine))
+
+    def _speed(self, ways: Array) -> Speed:
+        steps = np.diff(self.times)
+        speeds = ways / steps
+        order = np.argsort(speeds)
+        passed = np.cumsum(steps[order])
+        return Speed(float(speeds.max()), float(speeds[order[np.searchsorted(passed, 0.5 * passed[-1])]]))
+
+    @cached_property
+    def _spline(self) -> CubicSpline:
+        return self._fit("not-a-knot")
+
+    def _fit(self, ends: str) -> CubicSpline:
+        from scipy.interpolate import CubicSpline  # a second of import
+
+        return CubicSpline(self.times, self.targets, bc_type=ends)
+
+    def at(self, t: ArrayLike) -> Array:
+        """Targets at times (...), (..., 3) or (..., 7); before the first sample the first, after the last the last."""
+        times = np.asarray(t)
+        asked = real_array("t", t, times.shape)
+        return self._evaluated(self._spline, asked)
+
+    def _evaluated(self, spline: CubicSpline, times: Array) -> Array:
+        rows: Array = spline(np.clip(times, self.times[0], self.times[-1]))
+        if rows.shape[-1] == 7:
+            rows[..., 3:] /= np.linalg.norm(rows[..., 3:], axis=-1, keepdims=True)
+        return rows
+
+    def resampled(self, rate: float) -> Self:
+        """The same motion at a uniform rate [Hz], from the first time to the last, or less than an interval before it.
+
+        Raises
+        ------
+        InputError
+            A rate that is not positive, or leaves a single sample.
+        """
+        return self._sampled(rate, "not-a-knot")
+
+    def _sampled(self, rate: float, ends: str) -> Self:
+        frequency = positive("rate", rate)
+        count = int(np.floor(self.duration * frequency + _ROUNDING)) + 1
+        if count < 2:
+            raise InputError(f"rate is {frequency:g} for {self.duration:g} s; expected two samples at least")
+        times = self.times[0] + np.arange(count) / frequency
+        return type(self)(times, self._evaluated(self._fit(ends), times))
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write a `.csv` file or a `.npz`, with every bit.
+
+        The heading of a `.csv` is time,x,y,z or time,x,y,z,qw,qx,qy,qz.
+
+        Raises
+        ------
+        InputError
+            A path with another ending.
+        """
+        file = _known_file(path)
+        if file.suffix == ".npz":
+            np.savez(file, times=self.times, targets=self.targets)
+            return
+        rows = np.column_stack([self.times, self.targets])
+        lines = [",".join(_COLUMNS[: rows.shape[1]]), *(",".join(map(repr, row)) for row in rows.tolist())]
+        file.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+    @classmethod
+    def load(cls, path: str | PathLike[str]) -> Self:
+        """Read what `save` writes; of a `.csv` file any program may be the author.
+
+        Raises
+        ------
+        InputError
+            A path with another ending; a file that is no such table, the message names the line.
+        OSError
+            No such file.
+        """
+        file = _known_file(path)
+        times, targets = _arrays(file) if file.suffix == ".npz" else _table(file)
+        try:
+            return cls(times, targets)
+        except InputError as error:
+            raise InputError(f"{file}: {error}") from None
+
+    def __iter__(self) -> Iterator[tuple[float, Array]]:
+        """A time and a target, (3,) or (7,), after the other."""
+        return zip(self.times.tolist(), self.targets, strict=True)
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def __repr__(self) -> str:
+        kind = "poses" if self.targets.shape[1] == 7 else "points"
+        return f"Trace({len(self)} {kind} in {self.duration:g} s, speed up to {self.speed.peak:.3g}/s)"
+
+
+def _target_rows(name: str, value: ArrayLike | Sequence[Pose], count: int) -> Array:
+    """Points (count, 3), or pose rows (count, 7) with unit quaternions, each on the side of the one before."""
+    given: ArrayLike = value  # type: ignore[assignment]  # poses become rows
+    if isinstance(value, (list, tuple)) and any(isinstance(entry, Pose) for entry in value):
+        given = [entry.q if isinstance(entry, Pose) else entry for entry in value]
+    try:
+        shape = np.shape(given)
+    except ValueError:
+        raise InputError(f"{name} has rows of different lengths; expected points or poses") from None
+    if shape not in ((count, 3), (count, 7)):
+        raise InputError(f"{name} has shape {shape}; expected ({count}, 3) for points or ({count}, 7) for poses")
+    rows = real_array(name, given, shape)
+    if rows.shape[1] == 7:
+        norms = np.linalg.norm(rows[:, 3:], axis=1)
+        far = ~(np.abs(norms - 1.0) <= UNIT_TOLERANCE)
+        if far.any():
+            k = int(np.argmax(far))
+            came = f"{name}[{k}, 3:] is {rows[k, 3:].tolist()} with norm {norms[k]:.6g}"
+            raise InputError(f"{came}; expected a unit quaternion (w, x, y, z)")
+        rows[:, 3:] /= np.where(np.abs(norms - 1.0) <= UNIT_ROUNDING, 1.0, norms)[:, None]
+        turned_over = (rows[1:, 3:] * rows[:-1, 3:]).sum(axis=1) < 0.0
+        rows[1:, 3:] *= np.cumprod(np.where(turned_over, -1.0, 1.0))[:, None]
+    return rows
+
+
+def _require_meeting(name: str, end: Array, begin: Array) -> None:
+    apart = float(np.linalg.norm(begin[:3] - end[:3]))
+    size = float(max(np.abs(end[:3]).max(), np.abs(begin[:3]).max()))
+    turn = 2.0 * float(min(np.linalg.norm(begin[3:] - end[3:]), np.linalg.norm(begin[3:] + end[3:])))
+    if apart > _MEETING * size or turn > _MEETING:
+        off = f"{apart:.3g} away" + (f", turned by {turn:.3g} rad," if turn > _MEETING else "")
+        raise InputError(f"{name} begins {off} from where the one before ends; expected the same place, or a pause")
+
+
+def _known_file(path: str | PathLike[str]) -> Path:
+    file = Path(path)
+    if file.suffix not in (".csv", ".npz"):
+        raise InputError(f"path is {str(path)!r}; expected a name that ends with .csv or .npz")
+    return file
+
+
+def _arrays(file: Path) -> tuple[Array, Array]:
+    try:
+        with file.open("rb") as stream, np.load(stream, allow_pickle=False) as data:
+            return data["times"], data["targets"]
+    except (BadZipFile, EOFError, KeyError, TypeError, ValueError) as error:
+        raise InputError(f"{file} is no file of a trace: {error}; expected arrays times and targets") from None
+
+
+def _table(file: Path) -> tuple[Array, Array]:
+    with file.open(newline="", encoding="utf-8-sig") as lines:
+        rows = csv.reader(lines)
+        heading = tuple(name.strip() for name in next(rows, []))
+        if heading not in (_COLUMNS[:4], _COLUMNS):
+            expected = f"{','.join(_COLUMNS[:4])} or {','.join(_COLUMNS)}"
+            raise InputError(f"{file} line 1 is {','.join(heading)!r}; expected {expected}")
+        values = []
+        for row in rows:
+            if not row:
+                continue
+            try:
+                values.append([float(cell) for cell in row])
+            except ValueError as error:
+                raise InputError(f"{file} line {rows.line_num}: {error}; expected numbers") from None
+            if len(row) != len(heading):
+                came = f"{len(row)} value{'s' if len(row) > 1 else ''}"
+                raise InputError(f"{file} line {rows.line_num} has {came}; expected {','.join(heading)}")
+    table = np.array(values, dtype=np.float64).reshape(-1, len(heading))
+    return table[:, 0], table[:, 1:]
