@@ -1,10 +1,10 @@
 """Every nearest point of round wires, by closed forms: what contacts and clearances are judged by.
 
 A wire is what is within r of a center line of straight lines and arcs; its free ends are half balls. Where D is the
-distance of two center lines, the surfaces are D - r_f - r_g apart, and every pair of surface points whose outward
-normals oppose each other belongs to a critical point of D(s, t)^2. These are found, all of them, from polynomials:
-the nearest and the farthest point of a circle are known, so that along another circle t the critical ones are among
-the roots of
+distance of two center lines, the surfaces are D - r_f - r_g apart, and every pair of surface points that face each
+other, outward normals opposed, belongs to a critical point of D(s, t)^2 (as do the far sides of both, -D - r_f - r_g
+apart, which are no contact). These are found, all of them, from polynomials: the nearest and the farthest point of a
+circle are known, so that along another circle t the critical ones are among the roots of
 
     F(t) = (r.r')^2 rho^2 - R^2 (x x' + y y')^2,     r = (x, y, z) in the circle's frame, rho^2 = x^2 + y^2,
 
@@ -37,6 +37,8 @@ Mask = NDArray[np.bool_]
 SAME = 1e-8
 # How far from the unit circle, or from real, roots may be to be polished: what is no root is thrown out afterwards.
 NEAR_ROOT = 1e-2
+# A point that near to the axis of a circle, in radii, is polished as if it was on it too.
+NEAR_AXIS = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,7 +213,7 @@ class _Posed:
         """Arc length of the nearest point of whole lines and circles."""
         local = np.einsum("nki,ni->nk", self.axes[piece], point - self.start[piece])
         bend = self.bend[piece]
-        return np.where(bend > 0.0, bend * np.arctan2(local[:, 1], local[:, 0]), local[:, 0])
+        return np.asarray(np.where(bend > 0.0, bend * np.arctan2(local[:, 1], local[:, 0]), local[:, 0]))
 
     def between_pieces(self) -> Part:
         """Critical points inside of two pieces."""
@@ -234,9 +236,11 @@ class _Posed:
     def _polished(self, pair: Table, s: Array, t: Array) -> Part:
         for _ in range(12):
             gradient, hessian, _ = self._derivatives(pair, s, t)
-            # Newton's step by normal equations, which a singular Hessian does not break.
-            square = hessian @ hessian + 1e-24 * np.linalg.norm(hessian, axis=(1, 2))[:, None, None] ** 2 * np.eye(2)
-            step = -np.linalg.solve(square, (hessian @ gradient[..., None]))[..., 0]
+            # Newton's step, none along which a continuum runs.
+            values, vectors = np.linalg.eigh(hessian)
+            steep = np.abs(values) > 1e-13 * np.abs(values).max(axis=1, keepdims=True)
+            along = np.einsum("nik,ni->nk", vectors, gradient) * steep / np.where(steep, values, 1.0)
+            step = -np.einsum("nik,nk->ni", vectors, along)
             s, t = s + step[:, 0], t + step[:, 1]
         s, on_f = self.within(pair[:, 0], s, SAME * self.size)
         t, on_g = self.within(pair[:, 1], t, SAME * self.size)
@@ -346,8 +350,8 @@ def _circle_roots(posed: _Posed, pairs: Table) -> tuple[Table, Array, Array]:
     z = _companion_roots(np.concatenate([spectrum[:, -4:], spectrum[:, :5]], axis=1))
     row, column = np.nonzero(np.abs(np.log(np.maximum(np.abs(z), 1e-300))) < NEAR_ROOT)
     t = np.angle(z[row, column])
-    r, _ = _on_circle(center[row], e[row], f[row], other[row], t[:, None])
-    return _both_sides(pairs[row], posed.bend[first][row], r[:, 0], posed.bend[second][row] * t)
+    r, dr = _on_circle(center[row], e[row], f[row], other[row], t[:, None])
+    return _starts(pairs[row], posed.bend[first][row], r[:, 0], dr[:, 0], posed.bend[second][row] * t)
 
 
 def _on_circle(center: Array, e: Array, f: Array, radius: Array, t: Array) -> tuple[Array, Array]:
@@ -379,14 +383,23 @@ def _line_roots(posed: _Posed, pairs: Table) -> tuple[Table, Array, Array]:
     t = z[row, column].real
     s = radius[row] * t - foot[row]
     local = radius[row, None] * (p[row] + t[:, None] * d[row])
-    return _both_sides(pairs[row], radius[row], local, s)
+    return _starts(pairs[row], radius[row], local, d[row], s)
 
 
-def _both_sides(pairs: Table, radius: Array, local: Array, t: Array) -> tuple[Table, Array, Array]:
-    """The nearest and the farthest point of circles from points in their frames."""
+def _starts(pairs: Table, radius: Array, local: Array, rate: Array, t: Array) -> tuple[Table, Array, Array]:
+    """The nearest and the farthest point of circles from points in their frames, which move at a rate.
+
+    On the axis all points of a circle are as far; critical are those p with (x - p).x' = 0.
+    """
     angle = np.arctan2(local[:, 1], local[:, 0])
-    s = np.concatenate([radius * angle, radius * (angle + np.pi)])
-    return np.concatenate([pairs, pairs]), s, np.concatenate([t, t])
+    axial = np.hypot(local[:, 0], local[:, 1]) < NEAR_AXIS * radius
+    across, along = np.hypot(rate[:, 0], rate[:, 1]), (local * rate).sum(axis=1)
+    bound = radius * across
+    swing = np.arccos(np.clip(along / np.where(bound > 0.0, bound, 1.0), -1.0, 1.0))[axial]
+    middle = np.arctan2(rate[:, 1], rate[:, 0])[axial]
+    angles = np.concatenate([angle, angle + np.pi, middle + swing, middle - swing])
+    rows = np.concatenate([np.arange(t.size), np.arange(t.size), *2 * [np.flatnonzero(axial)]])
+    return pairs[rows], radius[rows] * angles, t[rows]
 
 
 def _distinct(bodies: Table, centers: Array, tolerance: float) -> Mask:
