@@ -144,6 +144,8 @@ class Bowl:
 
 
 BOWL = Bowl()
+# How the ball is turned: its poles are no special places of the motion.
+POLES = (0.6, 0.7, 0.0)
 
 
 def bowl_distance(place: Array, bowl: Bowl = BOWL) -> float:
@@ -161,7 +163,9 @@ def bowl_distance(place: Array, bowl: Bowl = BOWL) -> float:
 def ball_in_bowl(touching: bool = True) -> Drag:
     """A ball in the bowl, kept touching it or not, the hand at the ball's center."""
     bowl = asm.Body("bowl", BOWL.face(), fixed=True)
-    ball = asm.Body("ball", asm.shapes.sphere(BOWL.ball), position=(2.0, 1.0, 6.0))
+    ball = asm.Body(
+        "ball", asm.shapes.sphere(BOWL.ball), (2.0, 1.0, 6.0), Rotation.from_rotvec(POLES).as_quat(scalar_first=True)
+    )
     scene = asm.Assembly([bowl, ball])
     if touching:
         scene.constrain(asm.Contact(bowl, ball, "touch"))
