@@ -34,18 +34,18 @@ from assembly.proximity.pairs import OFFSETS
 from assembly.proximity.shell import EDGE_CURVE, EDGE_END, EDGE_RECORD, EDGE_START, EDGE_SURFACE
 from assembly.proximity import watch
 from assembly.proximity.events import fresh_memory
-from assembly.proximity.facet_packing import pack_tree
 from assembly.proximity.facet_tree import FacetTree
 from assembly.proximity.shell_packing import pack_shell
 from assembly.proximity.solid import is_one_smooth, solid_of
 from assembly.proximity.solid_contact import TRACK
+from assembly.proximity.tree_packing import pack_tree
 
 __all__ = ["Packed", "pack", "structure_of"]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
-# Of a watch, in parts of the scene's size: how far its first look at a pair of bodies reaches, and any at most.
-FIRST_REACH, LAST_REACH = 0.03, 100.0
+# Of a watch, in parts of the scene's size: how far its looks reach at least, and at most.
+FIRST_REACH, LAST_REACH = 0.005, 0.05
 
 
 class Packed:

@@ -31,18 +31,24 @@ from assembly.proximity.bounding_tree import (
 )
 from assembly.proximity.extremal import CONVERGED, SINGULAR, solve_pair
 from assembly.proximity.shell import FACES
-from assembly.proximity.solid_contact import FEATURE_F, FEATURE_G, PAIR_NORMAL, PROPER
+from assembly.proximity.solid_contact import FEATURE_F, FEATURE_G, FOLD, PAIR_NORMAL, PROPER
 from assembly.proximity.start import opposed
 from assembly.proximity.switching import feature_at
 from assembly.proximity.velocity import ARM_F, GAP as RECORD_GAP
 from assembly.proximity.velocity import NORMAL
 
-# A root: parameters, features, normal in the axes of f, gap, where it is from, its points in the axes of f.
-CODE_F, CODE_G, ROOT_NORMAL, GAP, ORIGIN, POINT_F, POINT_G, ROOT = 4, 5, 6, 9, 10, 11, 14, 17
+# A root: parameters, features, normal in the axes of f, gap, where it is from, its points in the axes of f, and how far
+# it is from a fold (det H / |H|^2).
+CODE_F, CODE_G, ROOT_NORMAL, GAP, ORIGIN, POINT_F, POINT_G, ROOT_FOLD, ROOT = 4, 5, 6, 9, 10, 11, 14, 17, 18
 # Where it is from: of no use, a given contact, new, or from LISTED on the place it has.
 USELESS, GIVEN_CONTACT, NEW, LISTED = -3.0, -2.0, -1.0, 0
 # What became of a start: nothing there, a root that is known, a saddle, a minimum.
 NOTHING, ALIKE, SADDLE, MINIMUM_FOUND = 0, 1, 2, 3
+# A step from the middle of a patch that turns a normal by more than this leads to no root of the patch.
+FARTHEST_TURN = 1.2
+# A root this far from a fold is the only one in its patches and those beside them, which turn by less than half a radian
+# each.
+ALONE, BESIDE = 0.05, 3.0
 # Segments are cut by facets between these parts of them.
 INNER, OUTER = 1e-3, 0.999
 # Room for the descent of a segment.
@@ -104,15 +110,16 @@ def surfaces_root(table, pool, scene, start, roots, k):
     """Newton on two surfaces from `start`; fills root k. NOTHING, SADDLE or MINIMUM_FOUND."""
     turn, shift = scene[0], scene[1]
     f, g = scene[2][0], scene[2][1]
-    status, x, _count, frame, curvature = solve_pair(table, pool, f, g, turn, shift, start, 1.0, math.inf, 0.0)
+    status, x, _count, frame, curvature = solve_pair(table, pool, f, g, turn, shift, start, 1.0, FARTHEST_TURN, 0.0)
     if status != CONVERGED and status != SINGULAR:
         return NOTHING
     if not opposed(frame, turn, table, pool, g, x):
         return NOTHING
-    write(roots, k, x, 0, 0, frame[0], frame[10], frame[3], frame[4])
     h = curvature[1]
     det = h[0] * h[3] - h[1] * h[2]
     norm2 = h[0] * h[0] + h[1] * h[1] + h[2] * h[2] + h[3] * h[3]
+    fold = det / norm2 if norm2 > 1e-18 else 0.0
+    write(roots, k, x, 0, 0, frame[0], frame[10], frame[3], frame[4], fold)
     return MINIMUM_FOUND if det > -1e-9 * norm2 and h[0] + h[3] <= 0.0 else SADDLE
 
 
@@ -136,12 +143,12 @@ def solids_root(table, pool, scene, codes, start, n, roots, k, work):
     pg = matvec_t(turn, (records[0, ARM_F], records[0, ARM_F + 1], records[0, ARM_F + 2]))
     gap = records[0, RECORD_GAP]
     x = (tracked[0, 0], tracked[0, 1], tracked[0, 2], tracked[0, 3])
-    write(roots, k, x, tracked[0, FEATURE_F], tracked[0, FEATURE_G], m, gap, sub(pg, scale(gap, m)), pg)
+    write(roots, k, x, tracked[0, FEATURE_F], tracked[0, FEATURE_G], m, gap, sub(pg, scale(gap, m)), pg, records[0, FOLD])
     return MINIMUM_FOUND if records[0, PROPER] == 1.0 else SADDLE
 
 
 @kernel(inline=True)
-def write(roots, k, x, code_f, code_g, n, gap, pf, pg):
+def write(roots, k, x, code_f, code_g, n, gap, pf, pg, fold):
     roots[k, 0], roots[k, 1], roots[k, 2], roots[k, 3] = x
     roots[k, CODE_F] = float(code_f)
     roots[k, CODE_G] = float(code_g)
@@ -150,6 +157,7 @@ def write(roots, k, x, code_f, code_g, n, gap, pf, pg):
     roots[k, ORIGIN] = USELESS
     roots[k, POINT_F], roots[k, POINT_F + 1], roots[k, POINT_F + 2] = pf
     roots[k, POINT_G], roots[k, POINT_G + 1], roots[k, POINT_G + 2] = pg
+    roots[k, ROOT_FOLD] = fold
 
 
 @kernel(inner=True)
@@ -217,9 +225,13 @@ def is_known(table, pool, scene, e, d, roots, count):
     for k in range(count):
         if roots[k, CODE_F] != codes[0] or roots[k, CODE_G] != codes[1]:
             continue
-        if is_within(table, pool, f, roots[k, 0], roots[k, 1], pool[o], pool[o + 1], pool[o + 2], pool[o + 3]):
-            if is_within(table, pool, g, roots[k, 2], roots[k, 3], pool[p], pool[p + 1], pool[p + 2], pool[p + 3]):
-                return codes, start, True
+        wide = BESIDE if roots[k, ROOT_FOLD] > ALONE else 1.0
+        if is_within(
+            table, pool, f, roots[k, 0], roots[k, 1], pool[o], pool[o + 1], wide * pool[o + 2], wide * pool[o + 3]
+        ) and is_within(
+            table, pool, g, roots[k, 2], roots[k, 3], pool[p], pool[p + 1], wide * pool[p + 2], wide * pool[p + 3]
+        ):
+            return codes, start, True
     return codes, start, False
 
 

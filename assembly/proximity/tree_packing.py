@@ -62,5 +62,6 @@ def pack_tree(tree: FacetTree, scale: float, table_at: int = 0, pool_at: int = 0
     box = tree.parameters
     rows = pool[layout.NODE * count :].reshape(elements, layout.ELEMENT)
     rows[:, :2] = 0.5 * (box[:, ::2] + box[:, 1::2])
-    rows[:, 2:] = 0.5 * (box[:, 1::2] - box[:, ::2])
+    rows[:, 2:4] = 0.5 * (box[:, 1::2] - box[:, ::2])
+    rows[:, layout.ELEMENT_FEATURE] = tree.feature
     return table, pool, table_at

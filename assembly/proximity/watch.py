@@ -19,7 +19,7 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly.kinematics.motion import relative_pose, rotation
-from assembly.proximity.bounding_tree import pairs_within
+from assembly.proximity.bounding_tree import least_distance, pairs_within
 from assembly.proximity.roots import (
     ALIKE,
     CODE_F,
@@ -50,11 +50,11 @@ NEGLECT, FIRST_REACH, LAST_REACH, LENGTH_COUNT = 0, 1, 2, 3
 PAIR_F, PAIR_G, TREE_F, TREE_G, PAIR_SURFACE_F, PAIR_SURFACE_G, PAIR_SHELL_F, PAIR_SHELL_G = 0, 1, 2, 3, 4, 5, 6, 7
 PAIR_MINIMUM, LOW, HIGH, GIVEN, GIVEN_COUNT, PAIR_RECORD = 8, 9, 10, 11, 12, 13
 # Memory. Header: events so far, looks so far, contacts so far, the time of the caller, whether a near root found no
-# place.
-EVENT_COUNT, LOOKS, BORN, TIME, CROWDED, MEMORY_HEADER = 0, 1, 2, 3, 4, 5
+# place, calls so far.
+EVENT_COUNT, LOOKS, BORN, TIME, CROWDED, CALLS, MEMORY_HEADER = 0, 1, 2, 3, 4, 5, 6
 WAY, BODY_MEMORY = 7, 8
-# Of a pair: both ways at its last look, how far they may go from there, its reach, and its state.
-LOOKED, ALLOWANCE, REACH, STATE, PAIR_MEMORY = 0, 1, 2, 3, 4
+# Of a pair: both ways at its last look, how far they may go from there, its reach, its state, calls at its last look.
+LOOKED, ALLOWANCE, REACH, STATE, CALLED, PAIR_MEMORY = 0, 1, 2, 3, 4, 5
 FAR, NEAR, TRACKING = 0, 1, 2
 # Of a place: its pair (-1: none), the number of its contact.
 PLACE_PAIR, PLACE_NUMBER, PLACE_MEMORY = 0, 1, 2
@@ -68,8 +68,8 @@ USED = 0.5
 TAKE, KEEP = 0.4, 0.8
 # Room: pairs of patches of a look, roots.
 CANDIDATES, ROOTS, STACK = 8192, 96, 1024
-# A look that finds more pairs of patches than this takes a shorter reach the next time; one without any a longer one.
-MANY = 600
+# A reach is for so many moves as the last ones.
+MOVES = 12.0
 
 
 @kernel(inline=True)
@@ -265,6 +265,10 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, r
     least = pool[table[pair + PAIR_MINIMUM]]
     lengths = table[watch + LENGTHS]
     reach = memory[at + REACH]
+    if not is_first:
+        pace = moved / max(memory[CALLS] - memory[at + CALLED], 1.0)
+        reach = min(max(MOVES * pace, pool[lengths + FIRST_REACH]), pool[lengths + LAST_REACH])
+    memory[at + CALLED] = memory[CALLS]
     found = np.int64(-1)
     while True:
         found = pairs_within(
@@ -298,16 +302,14 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, r
         if memory[memory_places(table, watch)[1] + PLACE_MEMORY * k] == p:
             listed += 1
     memory[at + LOOKED] = both_ways(table, memory, pair)
+    if found == 0:
+        # Nothing faces the other body within reach: the boxes tell how far that is so.
+        trees = scene[3]
+        reach = max(reach, least_distance(table, pool, trees[0], trees[1], turn, shift, math.inf, stack) - least)
     memory[at + ALLOWANCE] = min(reach, rest) if count < ROOTS else 0.0
     memory[at + STATE] = float(TRACKING if listed > 0 else (NEAR if found > 0 else FAR))
     if rest <= 0.0 or count == ROOTS:
         memory[CROWDED] = 1.0
-    if found == 0:
-        memory[at + REACH] = min(2.0 * reach, pool[lengths + LAST_REACH])
-    elif found > MANY:
-        memory[at + REACH] = 0.7 * reach
-    elif reach < pool[lengths + FIRST_REACH]:
-        memory[at + REACH] = min(1.2 * reach, pool[lengths + FIRST_REACH])
 
 
 @kernel
@@ -319,6 +321,7 @@ def look(table, pool, watch, memory, q, tracked, everything):
     """
     go_on(table, pool, watch, memory, q)
     before = memory[EVENT_COUNT]
+    memory[CALLS] += 1.0
     memory[CROWDED] = 0.0
     ready = False
     stack = np.empty((1, 2), np.int64)

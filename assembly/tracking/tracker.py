@@ -31,7 +31,9 @@ from assembly.solve.augmented_lagrangian import (
     ITERATIONS,
     LAST_LOOK,
     OBJECTIVE,
+    OUT_OF_TIME,
     SECOND_ORDER,
+    SOLVED,
     STATIONARITY,
     TICK,
     VIOLATION,
@@ -39,10 +41,10 @@ from assembly.solve.augmented_lagrangian import (
 )
 from assembly.solve.options import Options
 from assembly.solve.solution import Scene, Solution, Status
+from assembly.tracking.log import TrackLog
 
 if TYPE_CHECKING:
     from assembly.constraints.packing import Packed
-    from assembly.tracking.log import TrackLog
     from assembly.tracking.trace import Trace
 
 __all__ = ["Step", "TrackStatus", "Tracker"]
@@ -62,7 +64,8 @@ class TrackStatus(Enum):
 
 
 # What the loop says of a tick whose pose holds.
-_STATUSES = {0: TrackStatus.FOLLOWED, 6: TrackStatus.LATE}
+_STATUSES = {SOLVED: TrackStatus.FOLLOWED, OUT_OF_TIME: TrackStatus.LATE}
+_CODES = {status: k for k, status in enumerate(TrackStatus)}
 
 
 class Step:
@@ -245,6 +248,7 @@ class Tracker:
         self._settings[TICK] = 1.0
         self._settings[LAST_LOOK] = 0.0
         self._settings[SECOND_ORDER] = float(second_order)
+        self._budget = budget
         if budget is not None:
             self._settings[BUDGET] = 1e9 * positive("budget", budget)
             self._packed.table[CLOCK_AT] = clock_address()
@@ -348,7 +352,7 @@ class Tracker:
         sine = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
         return np.append(force, stiffness * hand.length**2 * sine)
 
-    def run(self, trace: Trace, *, paced: bool = False) -> TrackLog:
+    def run(self, trace: Trace, *, paced: bool = False, stride: int = 1) -> TrackLog:
         """Follow a recorded hand, a tick a sample.
 
         Parameters
@@ -356,14 +360,14 @@ class Tracker:
         trace : Trace
         paced : bool
             Wait for each sample's time by the clock; else as fast as possible.
+        stride : int
+            Poses are kept of every so many ticks.
 
         Returns
         -------
         TrackLog
         """
-        from assembly.tracking.log import Recorder
-
-        recorder = Recorder(trace, len(self._scene.bodies))
+        recorder = TrackLog.recorder(trace.times, len(self._scene.bodies), TrackStatus, stride=stride, budget=self._budget)
         start = perf_counter()
         for k, (time, target) in enumerate(trace):
             if paced:
@@ -371,5 +375,7 @@ class Tracker:
                 if wait > 0.0:
                     sleep(wait)
             step = self.step(target)
-            recorder.record(k, step)
+            recorder.record(k, step.q, step.seconds, step.feasibility, _CODES[step.status], step.iterations)
+            if step.events:
+                recorder.note(k, step.events)
         return recorder.log()
