@@ -99,10 +99,8 @@ class TrackLog:
     budget: float | None = None
 
     def __post_init__(self) -> None:
-        times = _numbers("times", self.times, ("k",), np.float64)
+        times = _tick_times(self.times)
         count = len(times)
-        if count == 0 or not (np.diff(times) > 0.0).all():
-            raise InputError("times is empty or does not increase; expected the times of one tick at least")
         stride = integer("stride", self.stride, 1, 2**62)
         fields: dict[str, Any] = {
             "times": times,
@@ -285,9 +283,10 @@ class Recorder:
     def __init__(
         self, times: ArrayLike, bodies: int, statuses: type[Enum], *, stride: int = 1, budget: float | None = None
     ) -> None:
-        self.times = _numbers("times", times, ("k",), np.float64)
+        # All that a log would raise is raised before the first tick.
+        self.times = _tick_times(times)
         self.stride = integer("stride", stride, 1, 2**62)
-        self.budget = budget
+        self.budget = None if budget is None else positive("budget", budget)
         self.statuses = tuple(member.name for member in statuses)
         count = len(self.times)
         # Filled, not only reserved, so that no tick waits for its page of memory.
@@ -332,6 +331,13 @@ class Recorder:
             stride=self.stride,
             budget=self.budget,
         )
+
+
+def _tick_times(value: ArrayLike) -> Array:
+    times: Array = _numbers("times", value, ("k",), np.float64)
+    if len(times) == 0 or not (np.diff(times) > 0.0).all():
+        raise InputError("times is empty or does not increase; expected the times of one tick at least")
+    return times
 
 
 def _numbers(name: str, value: ArrayLike, shape: tuple[int | str, ...], dtype: type) -> NDArray[Any]:

@@ -4,12 +4,11 @@ Between samples a trace is a cubic spline through all of them, with continuous v
 hand recorded at 60 Hz can be followed at 1000. Orientations are the normalized spline of quaternions that are first
 brought to the same side: the same motion whatever frame it is seen from, and off a smooth one by the fourth power of
 the interval, up to its ends. (Scipy's `RotationSpline`, which has no angular acceleration at the ends, is off by the
-square of the interval there, and thirty times slower.)
+square of the interval there, and some twenty times slower.)
 """
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -31,7 +30,7 @@ __all__ = ["Speed", "Trace"]
 
 Array = NDArray[np.float64]
 _COLUMNS = ("time", "x", "y", "z", "qw", "qx", "qy", "qz")
-# Two traces meet where one ends and the other begins within this, relative to the positions' size; radians.
+# Two traces meet where one ends and the other begins within this, relative to their largest coordinate; radians.
 _MEETING = 1e-9
 # Part of an interval by which rounding may make a duration shorter.
 _ROUNDING = 1e-9
@@ -80,13 +79,28 @@ class Trace:
 
     @classmethod
     def through(cls, points: ArrayLike | Sequence[Pose], times: ArrayLike, rate: float = 1000.0) -> Self:
-        """A made motion: from rest through points or poses at given times to rest, sampled at a rate [Hz].
+        """A made motion: from rest through points or poses at given times to rest, evenly sampled.
 
         Smooth as a hand: velocity and acceleration are continuous. Between poses turns must be less than half a turn;
-        a twist by more goes through several. It ends at the last sample before or at the last time.
+        a twist by more goes through several.
+
+        Parameters
+        ----------
+        points : (k, 3) or (k, 7), or sequence of k Pose
+        times : (k,)
+        rate : float
+            Samples a second, or as few more as it takes to have one at both ends.
+
+        Raises
+        ------
+        InputError
+            As for a trace of the points; a rate that is not positive.
         """
         when = real_array("times", times, ("k",))
-        return cls(when, _target_rows("points", points, len(when)))._sampled(rate, "clamped")
+        path = cls(when, _target_rows("points", points, len(when)))
+        count = max(int(np.ceil(path.duration * positive("rate", rate) - _ROUNDING)), 1) + 1
+        even = np.linspace(when[0], when[-1], count)
+        return cls(even, path._evaluated(path._fit("clamped"), even))
 
     @classmethod
     def concatenate(cls, traces: Sequence[Trace], pause: float = 0.0) -> Self:
@@ -117,7 +131,7 @@ class Trace:
                 raise InputError(f"traces[{k}] has {kinds[trace.targets.shape[1]]}; expected {expected} as traces[0]")
             skip = 0
             if wait == 0.0:
-                _require_meeting(f"traces[{k}]", targets[-1][-1], trace.targets[0])
+                _require_meeting(f"traces[{k}]", traces[k - 1], trace)
                 skip = 1
             times.append(trace.times[skip:] - trace.times[0] + (times[-1][-1] + wait))
             targets.append(trace.targets[skip:])
@@ -186,15 +200,12 @@ class Trace:
         InputError
             A rate that is not positive, or leaves a single sample.
         """
-        return self._sampled(rate, "not-a-knot")
-
-    def _sampled(self, rate: float, ends: str) -> Self:
         frequency = positive("rate", rate)
         count = int(np.floor(self.duration * frequency + _ROUNDING)) + 1
         if count < 2:
             raise InputError(f"rate is {frequency:g} for {self.duration:g} s; expected two samples at least")
         times = self.times[0] + np.arange(count) / frequency
-        return type(self)(times, self._evaluated(self._fit(ends), times))
+        return type(self)(times, self.at(times))
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write a `.csv` file or a `.npz`, with every bit.
@@ -269,9 +280,10 @@ def _target_rows(name: str, value: ArrayLike | Sequence[Pose], count: int) -> Ar
     return rows
 
 
-def _require_meeting(name: str, end: Array, begin: Array) -> None:
+def _require_meeting(name: str, first: Trace, second: Trace) -> None:
+    end, begin = first.targets[-1], second.targets[0]
     apart = float(np.linalg.norm(begin[:3] - end[:3]))
-    size = float(max(np.abs(end[:3]).max(), np.abs(begin[:3]).max()))
+    size = float(max(np.abs(first.positions).max(), np.abs(second.positions).max()))
     turn = 2.0 * float(min(np.linalg.norm(begin[3:] - end[3:]), np.linalg.norm(begin[3:] + end[3:])))
     if apart > _MEETING * size or turn > _MEETING:
         off = f"{apart:.3g} away" + (f", turned by {turn:.3g} rad," if turn > _MEETING else "")
@@ -294,22 +306,24 @@ def _arrays(file: Path) -> tuple[Array, Array]:
 
 
 def _table(file: Path) -> tuple[Array, Array]:
-    with file.open(newline="", encoding="utf-8-sig") as lines:
-        rows = csv.reader(lines)
-        heading = tuple(name.strip() for name in next(rows, []))
-        if heading not in (_COLUMNS[:4], _COLUMNS):
-            expected = f"{','.join(_COLUMNS[:4])} or {','.join(_COLUMNS)}"
-            raise InputError(f"{file} line 1 is {','.join(heading)!r}; expected {expected}")
-        values = []
-        for row in rows:
-            if not row:
-                continue
-            try:
-                values.append([float(cell) for cell in row])
-            except ValueError as error:
-                raise InputError(f"{file} line {rows.line_num}: {error}; expected numbers") from None
-            if len(row) != len(heading):
-                came = f"{len(row)} value{'s' if len(row) > 1 else ''}"
-                raise InputError(f"{file} line {rows.line_num} has {came}; expected {','.join(heading)}")
+    try:
+        lines = file.read_text(encoding="utf-8-sig").splitlines()
+    except UnicodeDecodeError as error:
+        raise InputError(f"{file} is no text: {error}; expected a table of numbers") from None
+    heading, *rows = [[cell.strip(' "') for cell in line.split(",")] for line in lines] or [[""]]
+    if tuple(heading) not in (_COLUMNS[:4], _COLUMNS):
+        expected = f"{','.join(_COLUMNS[:4])} or {','.join(_COLUMNS)}"
+        raise InputError(f"{file} line 1 is {','.join(heading)!r}; expected {expected}")
+    values = []
+    for k, row in enumerate(rows, 2):
+        if row == [""]:
+            continue
+        try:
+            values.append([float(cell) for cell in row])
+        except ValueError as error:
+            raise InputError(f"{file} line {k}: {error}; expected numbers") from None
+        if len(row) != len(heading):
+            came = f"{len(row)} value{'s' if len(row) > 1 else ''}"
+            raise InputError(f"{file} line {k} has {came}; expected {','.join(heading)}")
     table = np.array(values, dtype=np.float64).reshape(-1, len(heading))
     return table[:, 0], table[:, 1:]

@@ -207,3 +207,18 @@ def test_bad_input(change, message):
 def test_an_empty_recorder_has_no_log():
     with pytest.raises(InputError, match="expected the times of one tick at least"):
         asm.TrackLog.recorder([0.0, 1.0], 1, Ended).log()
+
+
+def test_a_recorder_raises_before_the_first_tick():
+    for arguments, message in (
+        (([], 1, Ended), "times is empty or does not increase"),
+        (([0.0, 0.0], 1, Ended), "times is empty or does not increase"),
+        (([0.0, np.nan], 1, Ended), "times is empty or does not increase"),
+        (([0.0], 0, Ended), "bodies is 0; expected an integer from 1"),
+    ):
+        with pytest.raises(InputError, match=message):
+            asm.TrackLog.recorder(*arguments)
+    with pytest.raises(InputError, match="budget is 0; expected a positive number"):
+        asm.TrackLog.recorder([0.0], 1, Ended, budget=0.0)
+    with pytest.raises(InputError, match="stride is 1.5; expected an integer from 1"):
+        asm.TrackLog.recorder([0.0], 1, Ended, stride=1.5)

@@ -130,13 +130,19 @@ def test_a_motion_made_through_points_begins_and_ends_at_rest(width):
     times = np.array([0.0, 0.7, 1.0, 2.0])
     rows = turns(0.7 * times)[:, :width]
     made = asm.Trace.through(rows, times, rate=1000.0)
-    assert len(made) == 2001 and made.times[700] == 0.7
+    assert len(made) == 2001 and made.times[-1] == 2.0
     np.testing.assert_allclose(made.targets[[0, 700, 1000, 2000]], rows, rtol=0, atol=1e-14)
     ways = np.linalg.norm(np.diff(made.targets, axis=0), axis=1)
     # From rest s = a t^2 / 2: a first step of a / 2 h^2, against steps of h in the middle.
     assert ways[0] < 1e-4 and ways[-1] < 1e-4 and ways.max() > 1e-3
     # Velocity changes by acceleration times h, nowhere more.
     assert np.abs(np.diff(made.targets, n=2, axis=0)).max() < 1e-4
+    # An interval that does not fit is a little shorter.
+    odd = asm.Trace.through(rows, times, rate=1.9)
+    np.testing.assert_allclose(np.diff(odd.times), 0.5, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(odd.targets[-1], rows[-1], rtol=0, atol=1e-14)
+    with pytest.raises(InputError, match="rate is 0; expected a positive number"):
+        asm.Trace.through(rows, times, rate=0.0)
     with pytest.raises(InputError, match=r"points has shape \(4, 2\); expected \(4, 3\) for points or \(4, 7\)"):
         asm.Trace.through(rows[:, :2], times)
 
@@ -151,6 +157,9 @@ def test_one_after_the_other():
     many = asm.Trace.concatenate([both] * 4)
     assert len(many) == 4 * 30 + 1 and many.duration == pytest.approx(12.0, abs=1e-12)
     assert len(asm.Trace.concatenate([out])) == 11
+    # Rounding at the origin is no gap.
+    near = asm.Trace([0.0, 1.0], [(1e-17, 0, 0), (1, 2, 3)])
+    assert len(both.then(near)) == 32
     # With a pause the hand goes on elsewhere.
     jump = out.then(out, pause=0.5)
     assert len(jump) == 22 and jump.times[11] == 6.5
@@ -198,7 +207,7 @@ def test_files_keep_every_bit(tmp_path, ending, width):
 
 def test_a_table_of_another_program(tmp_path):
     path = tmp_path / "hand.csv"
-    path.write_bytes(b"\xef\xbb\xbftime, x, y, z\r\n0,1,2,3\r\n\r\n0.5, 1e1 ,2,3\r\n")
+    path.write_bytes(b'\xef\xbb\xbf"time", x, y, z\r\n0,1,2,3\r\n\r\n0.5, 1e1 ,2,3\r\n')
     trace = asm.Trace.load(path)
     assert trace.times.tolist() == [0.0, 0.5] and trace.targets.tolist() == [[1, 2, 3], [10, 2, 3]]
 
@@ -230,6 +239,9 @@ def test_files_that_are_no_traces(tmp_path):
         asm.Trace([0, 1], np.zeros((2, 3))).save("hand")
     with pytest.raises(FileNotFoundError):
         asm.Trace.load(tmp_path / "hand.csv")
+    (tmp_path / "text.csv").write_bytes(b"time,x,y,z\n0,0,\xff,0\n")
+    with pytest.raises(InputError, match="text.csv is no text: .* expected a table of numbers"):
+        asm.Trace.load(tmp_path / "text.csv")
     for content in (b"", b"time", b"PK\x03\x04 and more"):
         (tmp_path / "hand.npz").write_bytes(content)
         with pytest.raises(InputError, match="hand.npz is no file of a trace"):
