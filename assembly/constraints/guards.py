@@ -55,22 +55,14 @@ def clear_guards(table):
 
 
 @kernel(inner=True)
-def forget_looks(table, memory):
-    """Every pair is to be looked at again."""
-    watch = table[WATCH]
-    pairs = memory_places(table, watch)[0]
-    for p in range(table[watch + PAIRS]):
-        memory[pairs + PAIR_MEMORY * p + LOOKED] = -math.inf
-
-
-@kernel(inner=True)
 def forget_guards(table, memory):
     """Begin again: nothing has been looked at, and no contact has a place."""
     watch = table[WATCH]
-    places = memory_places(table, watch)[1]
+    pairs, places, _events = memory_places(table, watch)
     for b in range(table[BODIES]):
         memory[MEMORY_HEADER + BODY_MEMORY * b] = math.nan
-    forget_looks(table, memory)
+    for p in range(table[watch + PAIRS]):
+        memory[pairs + PAIR_MEMORY * p + LOOKED] = -math.inf
     for k in range(table[GUARDS]):
         memory[places + PLACE_MEMORY * k] = -1.0
 

@@ -43,7 +43,7 @@ from assembly.constraints.layout import (
     VECTOR_TRIMS,
     WATCH,
 )
-from assembly.constraints.guards import allowed_share, clear_guards, forget_guards, forget_looks, look_around, place_guards
+from assembly.constraints.guards import allowed_share, clear_guards, forget_guards, look_around, place_guards
 from assembly.constraints.program import add_row_terms, evaluate
 from assembly.constraints.terms import objective, recenter
 from assembly.proximity.free_pair import VARIABLES, VECTORS
@@ -51,7 +51,14 @@ from assembly.proximity.solid_contact import CONTACT_RECORD, FOLD, TRACK
 from assembly.solve.contacts import free_folds, is_of_surfaces, start_contacts
 from assembly.solve.gather import gather, scattered
 from assembly.solve.linear import factorize_shifted
-from assembly.solve.multipliers import choose_multipliers, curve_rows, least_multipliers, strongest, weigh_rows
+from assembly.solve.multipliers import (
+    choose_multipliers,
+    curve_rows,
+    foresee,
+    least_multipliers,
+    strongest,
+    weigh_rows,
+)
 from assembly.solve.report import bring_back, judge, keep, write_pose, write_rows
 from assembly.solve.rows import (
     add_transposed,
@@ -85,6 +92,8 @@ PATIENCE = 25
 RESTORATIONS = 3
 # A violation above this, at the stationary point of all violations, tells that the rows cannot hold.
 TOUCHING = 1e-9
+# A step is computed so many times more for one-sided rows that it would break.
+FORESEEN = 4
 # A tick that does not hold after its iterations has so many times more of them.
 EXTRA_TIME = 4
 # Multipliers this much stronger than the objective's slope are looked at once more.
@@ -128,7 +137,7 @@ def solve_program(table, pool, settings, state, history, tips):
     poses = np.empty((2, bodies, 7))
     tracked = np.empty((3, tracks, TRACK))
     records = np.empty((2, pairs + table[JOINTS] + table[VECTOR_TRIMS], CONTACT_RECORD))
-    by_row = np.zeros((6, most))
+    by_row = np.zeros((7, most))
     jacobians = np.empty((2, most, EXTRA_COLUMN + 6 * table[EXTRA]))
     here = (poses[0], tracked[0], records[0], by_row[0], jacobians[0])
     trial = (poses[1], tracked[1], records[1], by_row[1], jacobians[1])
@@ -136,6 +145,7 @@ def solve_program(table, pool, settings, state, history, tips):
     better_y = by_row[3]
     active = by_row[4]
     forces = by_row[5]
+    foreseen = by_row[6]
     reach = 0.0
     for b in range(bodies):
         for k in range(7):
@@ -351,7 +361,10 @@ def solve_program(table, pool, settings, state, history, tips):
         add_transposed(bases, jacobian, rows, forces, descent)
         # Where the last step gained so much that a second one by its factor will do, that is cheaper.
         gain = 2.0 * max(violation / max(last_violation, feasible), dual / max(last_dual, settings[STATIONARITY]))
-        if not (kept and gain * violation <= feasible and gain * dual <= settings[STATIONARITY]):
+        is_fresh = not (kept and gain * violation <= feasible and gain * dual <= settings[STATIONARITY])
+        for r in range(rows):
+            foreseen[r] = 0.0
+        if is_fresh:
             curve_rows(rows, residual, y, active, restoring, forces)
             add_row_terms(table, pool, loose, room, bases, here, forces, active, lagrangian)
             # What the inertia needs falls with the distance to the solution.
@@ -360,6 +373,21 @@ def solve_program(table, pool, settings, state, history, tips):
                 status = STALLED
                 break
         used, longest, turn = damped_step(table, lagrangian, n, last, shift, radius, matrix, descent, step, straight)
+        for _ in range(FORESEEN):
+            if used < 0.0 or restoring:
+                break
+            if foresee(shape, rows, residual, jacobian, y, mu, step, is_fresh, active, foreseen, descent, lagrangian) == 0:
+                break
+            if not is_fresh:
+                is_fresh = True
+                curve_rows(rows, residual, y, active, restoring, forces)
+                add_row_terms(table, pool, loose, room, bases, here, forces, active, lagrangian)
+            shift = factorize_shifted(lagrangian, n, last, max(shift, 1e-8), matrix)
+            used = shift
+            if shift >= 0.0:
+                used, longest, turn = damped_step(
+                    table, lagrangian, n, last, shift, radius, matrix, descent, step, straight
+                )
         if used < 0.0:
             status = STALLED
             break
@@ -376,6 +404,10 @@ def solve_program(table, pool, settings, state, history, tips):
             straight[i] = step[i]
             slope -= descent[i] * step[i]
             steepest = max(steepest, abs(descent[i]))
+        for r in range(rows):
+            if foreseen[r] == 1.0:
+                # What the row adds to the descent is not in the merit before it binds.
+                slope -= (y[r] + residual[r] / mu) * times(bases, jacobian, r, step)
         if restoring:
             if steepest <= 1e-9 * violation or longest < 1e-12:
                 if kicks < KICKS and factorize_shifted(lagrangian, n, last, 1e-8, matrix) > SADDLE:
@@ -461,7 +493,8 @@ def solve_program(table, pool, settings, state, history, tips):
         bring_back(held, rows, here, y)
         results[HELD] = 1.0
         if watched:
-            forget_looks(table, memory)
+            forget_guards(table, memory)
+            place_guards(table, memory, y, better_y, free)
     write_pose(table, pool, here[0], state)
     for b in range(bodies):
         loose[5][b] = 0.0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
+from assembly.constraints.program import add_gram
 from assembly.solve.linear import factorize, substitute
 from assembly.solve.rows import add_row, add_transposed, clear_row, times
 
@@ -20,6 +21,31 @@ def weigh_rows(rows, one_sided, residual, y, mu, forces, active):
         idle = one_sided[r] == 1 and t >= 0.0
         forces[r] = 0.0 if idle else -t
         active[r] = 0.0 if idle else 1.0 / mu
+
+
+@kernel(inner=True)
+def foresee(shape, rows, residual, jacobian, y, mu, step, in_matrix, active, foreseen, descent, lagrangian):
+    """Let one-sided rows count that are idle here and would push at the end of the step; those that would not, no more.
+
+    Their sign is that of y + (c + J step) / mu. Descent changes with them, and so does the Lagrangian, if it holds the
+    rows' terms (`in_matrix`). Returns how many rows changed.
+    """
+    bases, one_sided = shape[0], shape[1]
+    changed = 0
+    for r in range(rows):
+        if one_sided[r] == 0 or (active[r] > 0.0 and foreseen[r] == 0.0):
+            continue
+        pushes = y[r] + (residual[r] + times(bases, jacobian, r, step)) / mu < 0.0
+        if pushes == (foreseen[r] == 1.0):
+            continue
+        changed += 1
+        sign = 1.0 if pushes else -1.0
+        foreseen[r] = 1.0 if pushes else 0.0
+        active[r] = 1.0 / mu if pushes else 0.0
+        add_row(bases, jacobian, r, -sign * (y[r] + residual[r] / mu), descent)
+        if in_matrix:
+            add_gram(bases, jacobian, r, sign / mu, lagrangian)
+    return changed
 
 
 @kernel(inner=True)
