@@ -230,7 +230,9 @@ def test_every_extremum_that_newton_finds_is_in_a_pair(pair):
         s, t = (rng.uniform(*ends, 1500) for ends in g.surface.domain)
         d = np.linalg.norm(f.surface.evaluate(u, v)[:, None] - (g.surface.evaluate(s, t) @ turn.T + shift), axis=2)
         d += np.where(f.normal(u, v) @ (g.normal(s, t) @ turn.T).T < -0.5, 0.0, 100.0)
-        i, j = np.unravel_index(np.argsort(d, axis=None)[:: max(1, int((d < 2.0 * radius).sum()) // 150)][:150], d.shape)
+        i, j = np.unravel_index(
+            np.argsort(d, axis=None)[:: max(1, int((d < 2.0 * radius).sum()) // 150)][:150], d.shape
+        )
         for start in np.column_stack([u[i], v[i], s[j], t[j]]):
             root = extremal_pair(f, home, g, q, start=start)
             x = root.parameters
@@ -249,7 +251,9 @@ def test_the_closest_features_are_in_a_pair(pair):
     rng = np.random.default_rng(13)
     bodies = [BODIES[name] for name in pair]
     descent = Descent(*bodies)
-    first = [(0, len(tree.topology.faces), len(tree.topology.faces) + len(tree.topology.edges)) for tree in descent.trees]
+    first = [
+        (0, len(tree.topology.faces), len(tree.topology.faces) + len(tree.topology.edges)) for tree in descent.trees
+    ]
     kinds = ("face", "edge", "vertex")
     middles = [0.5 * (tree.low.min(axis=0) + tree.high.max(axis=0)) for tree in descent.trees]
     checked = 0
