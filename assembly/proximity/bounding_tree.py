@@ -6,7 +6,7 @@ holds a pair where
 
     the boxes are farther apart than the reach, by the planes along the axes of either,
     no n of the cone of f is within the cone of g turned around: angle(a_f, -a_g) > alpha_f + alpha_g,
-    or d is farther than r_f + r_g, the radii of both, from the double cone of the n of f, or of g.
+    or d is farther than r_f + r_g, the radii of balls, from the double cone of the n of f, or of g.
 
 A tree is a header of `TREE` integers, then `NODE_INTS` a node; a node's doubles and those of an element stand in the
 pool. Nodes are numbered from the root, 0; the two children of a node follow each other. Everything is in the axes of
@@ -24,7 +24,7 @@ from assembly.geometry.vec import add, dot, matvec, matvec_t, neg, sub
 NODES, NODE_TABLE, NODE_POOL, ELEMENTS, ELEMENT_POOL, TREE = 0, 1, 2, 3, 4, 5
 # A node: its first child, or -1 - element; the feature of the element, -1 of a node with children.
 CHILD, FEATURE, NODE_INTS = 0, 1, 2
-# Box (center and half widths), cone (axis, cosine and sine of its half angle), radius of the box.
+# Box (center and half widths), cone (axis, cosine and sine of its half angle), radius of a ball.
 CENTER, HALF, AXIS, COS, SIN, RADIUS, NODE = 0, 3, 6, 9, 10, 11, 12
 # Of an element: the middle of its box in (u, v), or (t, 0), and half the widths.
 ELEMENT = 4
@@ -83,11 +83,10 @@ def seen_from(pool, p, rotation, bulk, shift):
 
 
 @kernel(inline=True)
-def admits(pool, o, p, seen, rotation, bulk, square):
+def admits(pool, o, p, seen, rotation, bulk, reach):
     """Whether the nodes at o of one tree and at p of the other, seen from the one, may hold a pair.
 
-    `square` is that of the reach, `rotation` that of the other tree, `bulk` its magnitudes. It costs what it does not
-    find out early: cones that do not face each other are most frequent.
+    `rotation` is that of the other tree, `bulk` its magnitudes. What excludes most pairs for little comes first.
     """
     center, around, axis_p = seen
     axis_o = three(pool, o + AXIS)
@@ -97,12 +96,15 @@ def admits(pool, o, p, seen, rotation, bulk, square):
     sp = pool[p + SIN]
     if so * cp + co * sp > ROUNDING and -dot(axis_o, axis_p) < co * cp - so * sp - ROUNDING:
         return False
-    ho = three(pool, o + HALF)
     d = sub(center, three(pool, o + CENTER))
+    dd = dot(d, d)
+    r = pool[o + RADIUS] + pool[p + RADIUS]
+    if dd > (r + reach) * (r + reach):
+        return False
+    square = reach * reach
+    ho = three(pool, o + HALF)
     if excess(d, ho, around) > square:
         return False
-    r = pool[o + RADIUS] + pool[p + RADIUS]
-    dd = dot(d, d)
     if dd > r * r:
         if off_axis(d, dd, axis_o, co, so) > r or off_axis(d, dd, axis_p, cp, sp) > r:
             return False
@@ -130,7 +132,6 @@ def pairs_within(table, pool, tree_f, tree_g, rotation, shift, reach, stack, out
     ints_f = table[tree_f + NODE_TABLE]
     ints_g = table[tree_g + NODE_TABLE]
     reach = widened(pool, node_f, node_g, shift, reach)
-    square = reach * reach
     bulk = magnitudes(rotation)
     back = transposed(rotation)
     back_bulk = transposed(bulk)
@@ -139,7 +140,7 @@ def pairs_within(table, pool, tree_f, tree_g, rotation, shift, reach, stack, out
     count = 0
     if room < 1:
         return -1
-    if not admits(pool, node_f, node_g, seen_from(pool, node_g, rotation, bulk, shift), rotation, bulk, square):
+    if not admits(pool, node_f, node_g, seen_from(pool, node_g, rotation, bulk, shift), rotation, bulk, reach):
         return 0
     stack[0, 0] = 0
     stack[0, 1] = 0
@@ -163,14 +164,14 @@ def pairs_within(table, pool, tree_f, tree_g, rotation, shift, reach, stack, out
         if child_g < 0 or (child_f >= 0 and pool[o + RADIUS] >= pool[p + RADIUS]):
             seen = seen_from(pool, p, rotation, bulk, shift)
             for k in range(2):
-                if admits(pool, node_f + NODE * (child_f + k), p, seen, rotation, bulk, square):
+                if admits(pool, node_f + NODE * (child_f + k), p, seen, rotation, bulk, reach):
                     stack[used, 0] = child_f + k
                     stack[used, 1] = j
                     used += 1
         else:
             seen = seen_from(pool, o, back, back_bulk, back_shift)
             for k in range(2):
-                if admits(pool, node_g + NODE * (child_g + k), o, seen, back, back_bulk, square):
+                if admits(pool, node_g + NODE * (child_g + k), o, seen, back, back_bulk, reach):
                     stack[used, 0] = i
                     stack[used, 1] = child_g + k
                     used += 1
