@@ -12,6 +12,7 @@ from assembly._kernel import kernel, lane, load_lanes
 from assembly.geometry.spline import surface_lanes, surface_point
 from assembly.geometry.vec import add
 from assembly.kinematics.motion import relative_pose, rotation
+from assembly.proximity.bounding_tree import pairs_within
 from assembly.proximity.extremal import pair_frame, pair_matrix, solve_pair
 from assembly.proximity.velocity import RATES, ZED, into_quaternions, pair_derivatives, store_record
 
@@ -106,4 +107,19 @@ def all_derivatives(table, pool, records, q, parameters, size, times, out, hessi
         for _ in range(times):
             error, _regular = pair_derivatives(table, pool, records[i, 0], records[i, 1], q[i], x, size, out, hessian)
             total += error + hessian[11, 0]
+    return total
+
+
+@kernel
+def facing_bodies(table, pool, trees, q, reach, stack, out):
+    """Pairs of elements of all pairs of bodies at poses q (n, 7) that may hold an extremal pair; -1 without room."""
+    total = 0
+    for j in range(trees.size):
+        turn_j = rotation(q, j)
+        for i in range(j):
+            turn, shift = relative_pose(q, i, rotation(q, i), j, turn_j)
+            count = pairs_within(table, pool, trees[i], trees[j], turn, shift, reach, stack, out[total:])
+            if count < 0 or count > out.shape[0] - total:
+                return -1
+            total += count
     return total

@@ -6,7 +6,7 @@ holds a pair where
 
     the boxes are farther apart than the reach, by the planes along the axes of either,
     no n of the cone of f is within the cone of g turned around: angle(a_f, -a_g) > alpha_f + alpha_g,
-    or d is farther than r_f + r_g, the radii of both, from the double cone of the n of f, or of g.
+    or d is farther than r_f + r_g, the radii of balls, from the double cone of the n of f, or of g.
 
 A tree is a header of `TREE` integers, then `NODE_INTS` a node; a node's doubles and those of an element stand in the
 pool. Nodes are numbered from the root, 0; the two children of a node follow each other. Everything is in the axes of
@@ -18,13 +18,13 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly.geometry.vec import add, dot, matvec, matvec_t, sub
+from assembly.geometry.vec import add, dot, matvec, matvec_t, neg, sub
 
 # Header: how many nodes, where their integers and their doubles begin, how many elements, where theirs begin.
 NODES, NODE_TABLE, NODE_POOL, ELEMENTS, ELEMENT_POOL, TREE = 0, 1, 2, 3, 4, 5
 # A node: its first child, or -1 - element; the feature of the element, -1 of a node with children.
 CHILD, FEATURE, NODE_INTS = 0, 1, 2
-# Box (center and half widths), cone (axis, cosine and sine of its half angle), radius of the box.
+# Box (center and half widths), cone (axis, cosine and sine of its half angle), radius of a ball.
 CENTER, HALF, AXIS, COS, SIN, RADIUS, NODE = 0, 3, 6, 9, 10, 11, 12
 # Of an element: the middle of its box in (u, v), or (t, 0), half the widths, and its feature.
 ELEMENT_FEATURE, ELEMENT = 4, 5
@@ -64,6 +64,11 @@ def magnitudes(m):
 
 
 @kernel(inline=True)
+def transposed(m):
+    return (m[0], m[3], m[6], m[1], m[4], m[7], m[2], m[5], m[8])
+
+
+@kernel(inline=True)
 def off_axis(d, dd, axis, c, s):
     """How far the point d is from the double cone along an axis, c and s of its half angle; less where it is inside."""
     p = abs(dot(d, axis))
@@ -71,34 +76,39 @@ def off_axis(d, dd, axis, c, s):
 
 
 @kernel(inline=True)
-def may_hold(pool, o, p, d, dd, axis_f, axis_g, c, s):
-    """Whether the cones at o and p, axes in common axes, let two nodes hold a pair; c and s of the sum of the angles."""
-    if s > ROUNDING and -dot(axis_f, axis_g) < c - ROUNDING:
+def seen_from(pool, p, rotation, bulk, shift):
+    """The node at p as another tree sees it: center, half widths of a box around its own, axis."""
+    center = add(matvec(rotation, three(pool, p + CENTER)), shift)
+    return center, matvec(bulk, three(pool, p + HALF)), matvec(rotation, three(pool, p + AXIS))
+
+
+@kernel(inline=True)
+def admits(pool, o, p, seen, rotation, bulk, reach):
+    """Whether the nodes at o of one tree and at p of the other, seen from the one, may hold a pair.
+
+    `rotation` is that of the other tree, `bulk` its magnitudes. What excludes most pairs for little comes first.
+    """
+    center, around, axis_p = seen
+    axis_o = three(pool, o + AXIS)
+    co = pool[o + COS]
+    so = pool[o + SIN]
+    cp = pool[p + COS]
+    sp = pool[p + SIN]
+    if so * cp + co * sp > ROUNDING and -dot(axis_o, axis_p) < co * cp - so * sp - ROUNDING:
         return False
+    d = sub(center, three(pool, o + CENTER))
+    dd = dot(d, d)
     r = pool[o + RADIUS] + pool[p + RADIUS]
-    if dd <= r * r:
-        return True
-    if off_axis(d, dd, axis_f, pool[o + COS], pool[o + SIN]) > r:
+    if dd > (r + reach) * (r + reach):
         return False
-    return off_axis(d, dd, axis_g, pool[p + COS], pool[p + SIN]) <= r
-
-
-@kernel(inner=True)
-def admits(pool, o, p, rotation, bulk, shift, square):
-    """Whether nodes at o of f and at p of g may hold a pair; `square` of the reach, `bulk` the magnitudes."""
-    hf = three(pool, o + HALF)
-    hg = three(pool, p + HALF)
-    d = sub(add(matvec(rotation, three(pool, p + CENTER)), shift), three(pool, o + CENTER))
-    if excess(d, hf, matvec(bulk, hg)) > square:
+    square = reach * reach
+    ho = three(pool, o + HALF)
+    if excess(d, ho, around) > square:
         return False
-    if excess(matvec_t(rotation, d), matvec_t(bulk, hf), hg) > square:
-        return False
-    cf = pool[o + COS]
-    sf = pool[o + SIN]
-    cg = pool[p + COS]
-    sg = pool[p + SIN]
-    axis_g = matvec(rotation, three(pool, p + AXIS))
-    return may_hold(pool, o, p, d, dot(d, d), three(pool, o + AXIS), axis_g, cf * cg - sf * sg, sf * cg + cf * sg)
+    if dd > r * r:
+        if off_axis(d, dd, axis_o, co, so) > r or off_axis(d, dd, axis_p, cp, sp) > r:
+            return False
+    return excess(matvec_t(rotation, d), matvec_t(bulk, ho), three(pool, p + HALF)) <= square
 
 
 @kernel(inline=True)
@@ -122,13 +132,15 @@ def pairs_within(table, pool, tree_f, tree_g, rotation, shift, reach, stack, out
     ints_f = table[tree_f + NODE_TABLE]
     ints_g = table[tree_g + NODE_TABLE]
     reach = widened(pool, node_f, node_g, shift, reach)
-    square = reach * reach
     bulk = magnitudes(rotation)
+    back = transposed(rotation)
+    back_bulk = transposed(bulk)
+    back_shift = neg(matvec(back, shift))
     room = stack.shape[0]
     count = 0
     if room < 1:
         return -1
-    if not admits(pool, node_f, node_g, rotation, bulk, shift, square):
+    if not admits(pool, node_f, node_g, seen_from(pool, node_g, rotation, bulk, shift), rotation, bulk, reach):
         return 0
     stack[0, 0] = 0
     stack[0, 1] = 0
@@ -137,6 +149,8 @@ def pairs_within(table, pool, tree_f, tree_g, rotation, shift, reach, stack, out
         used -= 1
         i = stack[used, 0]
         j = stack[used, 1]
+        o = node_f + NODE * i
+        p = node_g + NODE * j
         child_f = table[ints_f + NODE_INTS * i + CHILD]
         child_g = table[ints_g + NODE_INTS * j + CHILD]
         if child_f < 0 and child_g < 0:
@@ -147,17 +161,17 @@ def pairs_within(table, pool, tree_f, tree_g, rotation, shift, reach, stack, out
             continue
         if used + 2 > room:
             return -1
-        o = node_f + NODE * i
-        p = node_g + NODE * j
         if child_g < 0 or (child_f >= 0 and pool[o + RADIUS] >= pool[p + RADIUS]):
+            seen = seen_from(pool, p, rotation, bulk, shift)
             for k in range(2):
-                if admits(pool, node_f + NODE * (child_f + k), p, rotation, bulk, shift, square):
+                if admits(pool, node_f + NODE * (child_f + k), p, seen, rotation, bulk, reach):
                     stack[used, 0] = child_f + k
                     stack[used, 1] = j
                     used += 1
         else:
+            seen = seen_from(pool, o, back, back_bulk, back_shift)
             for k in range(2):
-                if admits(pool, o, node_g + NODE * (child_g + k), rotation, bulk, shift, square):
+                if admits(pool, node_g + NODE * (child_g + k), o, seen, back, back_bulk, reach):
                     stack[used, 0] = i
                     stack[used, 1] = child_g + k
                     used += 1
@@ -171,20 +185,19 @@ def facing_pairs(table, pool, tree_f, tree_g, rotation, shift, reach, stack, out
 
 
 @kernel(inline=True)
-def box_distance(pool, o, p, rotation, bulk, shift):
-    """The square of a lower bound of the distance of two boxes."""
-    hf = three(pool, o + HALF)
-    hg = three(pool, p + HALF)
-    d = sub(add(matvec(rotation, three(pool, p + CENTER)), shift), three(pool, o + CENTER))
-    along_f = excess(d, hf, matvec(bulk, hg))
-    return max(along_f, excess(matvec_t(rotation, d), matvec_t(bulk, hf), hg))
+def box_distance(pool, o, p, seen, rotation, bulk):
+    """The square of a lower bound of the distance of the boxes at o and at p; see `admits`."""
+    ho = three(pool, o + HALF)
+    d = sub(seen[0], three(pool, o + CENTER))
+    along = excess(d, ho, seen[1])
+    return max(along, excess(matvec_t(rotation, d), matvec_t(bulk, ho), three(pool, p + HALF)))
 
 
 @kernel(inner=True)
-def least_distance(table, pool, tree_f, tree_g, rotation, shift, upper, stack):
-    """A lower bound of the distance of the elements of two trees, at most `upper`: that of their boxes.
+def least_distance(table, pool, tree_f, tree_g, rotation, shift, upper, stack, bounds):
+    """A lower bound of the distance of two trees' elements, at most `upper`: that of their boxes.
 
-    A stack (n, 2) that is too short makes the bound lower, not wrong.
+    A stack (n, 2) with its bounds (n,) that is too short makes what is found lower, not wrong.
     """
     node_f = table[tree_f + NODE_POOL]
     node_g = table[tree_g + NODE_POOL]
@@ -192,51 +205,59 @@ def least_distance(table, pool, tree_f, tree_g, rotation, shift, upper, stack):
     ints_g = table[tree_g + NODE_TABLE]
     slack = widened(pool, node_f, node_g, shift, 0.0)
     bulk = magnitudes(rotation)
-    room = stack.shape[0]
+    back = transposed(rotation)
+    back_bulk = transposed(bulk)
+    back_shift = neg(matvec(back, shift))
+    room = min(stack.shape[0], bounds.size)
     best = (upper + slack) * (upper + slack)
+    first = box_distance(pool, node_f, node_g, seen_from(pool, node_g, rotation, bulk, shift), rotation, bulk)
     used = 0
-    first = box_distance(pool, node_f, node_g, rotation, bulk, shift)
     if first < best:
         if room < 1:
             best = first
         else:
             stack[0, 0] = 0
             stack[0, 1] = 0
+            bounds[0] = first
             used = 1
     while used > 0:
         used -= 1
+        bound = bounds[used]
+        # What was found since the pair was put there may exclude it.
+        if bound >= best:
+            continue
         i = stack[used, 0]
         j = stack[used, 1]
         o = node_f + NODE * i
         p = node_g + NODE * j
-        # What was found since the pair was put here may exclude it.
-        bound = box_distance(pool, o, p, rotation, bulk, shift)
-        if bound >= best:
-            continue
         child_f = table[ints_f + NODE_INTS * i + CHILD]
         child_g = table[ints_g + NODE_INTS * j + CHILD]
         if (child_f < 0 and child_g < 0) or used + 2 > room:
             best = bound
             continue
-        if child_g < 0 or (child_f >= 0 and pool[o + RADIUS] >= pool[p + RADIUS]):
-            near = box_distance(pool, node_f + NODE * child_f, p, rotation, bulk, shift)
-            far = box_distance(pool, node_f + NODE * (child_f + 1), p, rotation, bulk, shift)
-            swapped = far < near
-            # The nearer one is looked at first.
-            for k in range(2):
-                second = (k == 1) != swapped
-                if (near if not second else far) < best:
-                    stack[used + 0, 0] = child_f + (0 if not second else 1)
-                    stack[used, 1] = j
-                    used += 1
+        descend_f = child_g < 0 or (child_f >= 0 and pool[o + RADIUS] >= pool[p + RADIUS])
+        if descend_f:
+            seen = seen_from(pool, p, rotation, bulk, shift)
+            one = box_distance(pool, node_f + NODE * child_f, p, seen, rotation, bulk)
+            other = box_distance(pool, node_f + NODE * (child_f + 1), p, seen, rotation, bulk)
         else:
-            near = box_distance(pool, o, node_g + NODE * child_g, rotation, bulk, shift)
-            far = box_distance(pool, o, node_g + NODE * (child_g + 1), rotation, bulk, shift)
-            swapped = far < near
-            for k in range(2):
-                second = (k == 1) != swapped
-                if (near if not second else far) < best:
-                    stack[used, 0] = i
-                    stack[used, 1] = child_g + (0 if not second else 1)
-                    used += 1
+            seen = seen_from(pool, o, back, back_bulk, back_shift)
+            one = box_distance(pool, node_g + NODE * child_g, o, seen, back, back_bulk)
+            other = box_distance(pool, node_g + NODE * (child_g + 1), o, seen, back, back_bulk)
+        # The nearer one comes last, and is looked at first.
+        near = 0 if one <= other else 1
+        for k in range(2):
+            side = near if k == 1 else 1 - near
+            value = one if side == 0 else other
+            if value < best:
+                stack[used, 0] = child_f + side if descend_f else i
+                stack[used, 1] = j if descend_f else child_g + side
+                bounds[used] = value
+                used += 1
     return max(math.sqrt(best) - slack, 0.0)
+
+
+@kernel
+def tree_distance(table, pool, tree_f, tree_g, rotation, shift, upper, stack, bounds):
+    """`least_distance` for Python."""
+    return least_distance(table, pool, tree_f, tree_g, rotation, shift, upper, stack, bounds)

@@ -66,7 +66,9 @@ class _Checked:
         self._in_boxes(points, tree.low[element], tree.high[element])
         at = self.leaf[element]
         while len(at):
-            self._in_boxes(points, tree.nodes.low[at], tree.nodes.high[at])
+            low, high = tree.nodes.low[at], tree.nodes.high[at]
+            self._in_boxes(points, low, high)
+            self.take((np.linalg.norm(points - 0.5 * (low + high), axis=1) - tree.nodes.radius[at]) / self.size)
             at, points = self.parents[at], points[self.parents[at] >= 0]
             at = at[at >= 0]
 

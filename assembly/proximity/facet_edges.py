@@ -7,6 +7,7 @@ away from it; where no such n exists there is none.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -46,15 +47,22 @@ class Elements(NamedTuple):
 
     def at(self, chosen: Indices | Mask) -> Elements:
         """Some of them."""
-        return Elements(*(column[chosen] for column in self))
+        return Elements(
+            self.feature[chosen],
+            self.parameters[chosen],
+            self.low[chosen],
+            self.high[chosen],
+            self.axis[chosen],
+            self.half_angle[chosen],
+        )
 
 
-def _none() -> Elements:
-    return Elements(np.empty(0, dtype=np.int64), *(np.empty((0, k)) for k in (4, 3, 3, 3)), np.empty(0))
-
-
-def _joined(parts: list[Elements]) -> Elements:
-    return Elements(*(np.concatenate(columns) for columns in zip(*parts, strict=True))) if parts else _none()
+    @staticmethod
+    def joined(parts: Sequence[Elements]) -> Elements:
+        """Several as one."""
+        three = np.empty((0, 3))
+        none = Elements(np.empty(0, dtype=np.int64), np.empty((0, 4)), three, three, three, np.empty(0))
+        return Elements(*(np.concatenate(columns) for columns in zip(none, *parts, strict=True)))
 
 
 def edge_point(surface: NurbsSurface, curve: NurbsCurve, t: Array) -> tuple[Array, Array]:
@@ -110,8 +118,8 @@ class _Body:
             self.nets[number] = nets_of(self.topology.faces[number])
         return self.nets[number]
 
-    def measured(self, index: int, cells: Array) -> tuple[Elements, Mask, Mask]:
-        """Parts (n, 2) of an edge as elements; which of them turn by too much, and which are concave."""
+    def measured(self, index: int, cells: Array) -> tuple[Elements, Array, Mask]:
+        """Parts (n, 2) of an edge as elements; by how much they turn, and which are concave."""
         edge = self.topology.edges[index]
         face = self.topology.faces[edge.face_a]
         curve = face.boundary[edge.curve_a]
@@ -193,7 +201,7 @@ def edge_elements(topology: Topology, angle: float) -> Elements:
             cells = np.concatenate(
                 [np.column_stack([cells[more, 0], middle]), np.column_stack([middle, cells[more, 1]])]
             )
-    return _joined(result)
+    return Elements.joined(result)
 
 
 def _away(topology: Topology, vertex: Vertex) -> Array | None:
@@ -254,7 +262,7 @@ def vertex_elements(topology: Topology, edges: Elements) -> Elements:
         pad = topology.tolerance
         code = np.array([faces + len(topology.edges) + number])
         result.append(Elements(code, np.zeros((1, 4)), point - pad, point + pad, axis[None], np.array([half])))
-    return _joined(result)
+    return Elements.joined(result)
 
 
 def _last(topology: Topology, edges: Elements, faces: int, index: int, side: int) -> Indices:

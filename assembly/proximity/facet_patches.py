@@ -155,7 +155,9 @@ class _Divided:
         origin = corners[:, 0][:, None, None]
         square = np.stack([corners[:, [0, 3]], corners[:, [1, 2]]], axis=1) - origin
         shifted = np.concatenate([points[..., :3] - origin * points[..., 3:], points[..., 3:]], axis=3)
-        raised = np.einsum("ai,bj,nijc->nabc", *self._raised, shifted)
+        in_u, in_v = self._raised
+        rows = (in_u @ shifted.reshape(*shifted.shape[:2], -1)).reshape(-1, len(in_u), *shifted.shape[2:])
+        raised = in_v @ rows
         off = raised[..., :3] - bezier_product(points[..., 3:], square)
         twist = corners[:, 0] - corners[:, 1] + corners[:, 2] - corners[:, 3]
         most = (np.linalg.norm(off, axis=3) / raised[..., 3]).max(axis=(1, 2))

@@ -41,6 +41,8 @@ class Nodes(NamedTuple):
         The first of the two children, or -1 - element.
     low, high : (m, 3)
         Boxes around the elements below.
+    radius : (m,)
+        Of a ball about the middle of the box, around what the elements below hold of the body.
     axis, half_angle : (m, 3), (m,)
         Cones around their outward normals.
     """
@@ -48,6 +50,7 @@ class Nodes(NamedTuple):
     child: Indices
     low: Array
     high: Array
+    radius: Array
     axis: Array
     half_angle: Array
 
@@ -160,47 +163,60 @@ def _tree_of(faces: tuple[Face, ...], angle: float, count: int | None) -> FacetT
     ]
     edges = edge_elements(topology, angle)
     parts += [edges, vertex_elements(topology, edges)]
-    elements = Elements(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+    elements = Elements.joined(parts)
     corners = np.concatenate([patch.corners for patch, _ in patches])
     chord_error = np.concatenate([patch.chord_error for patch, _ in patches])
-    nodes = _nodes(elements)
+    nodes = _Builder(elements, corners, chord_error).nodes()
     for array in (*elements, corners, chord_error, *nodes):
         array.flags.writeable = False
     return FacetTree(topology, *elements, corners, chord_error, nodes)
 
 
-def _nodes(elements: Elements) -> Nodes:
-    """A level at a time: all nodes of a level with several elements are halved at once."""
-    middle = 0.5 * (elements.low + elements.high)
-    items = np.arange(len(middle))
-    sizes = np.array([len(middle)])
-    made = [_level(elements, items, sizes)]
-    count = 1
-    while sizes.max(initial=0) > 1:
-        # What is a leaf is done.
-        inner = sizes > 1
-        items = items[np.repeat(inner, sizes)]
-        sizes = sizes[inner]
-        made[-1].child[inner] = count + 2 * np.arange(len(sizes))
-        begins = np.cumsum(sizes) - sizes
-        points = middle[items]
-        extent = np.maximum.reduceat(points, begins) - np.minimum.reduceat(points, begins)
-        owner = np.repeat(np.arange(len(sizes)), sizes)
-        along = points[np.arange(len(items)), extent.argmax(axis=1)[owner]]
-        items = items[np.lexsort((along, owner))]
-        sizes = np.stack([sizes // 2, sizes - sizes // 2], axis=1).ravel()
-        made.append(_level(elements, items, sizes))
-        count += len(sizes)
-    return Nodes(*(np.concatenate(columns) for columns in zip(*made, strict=True)))
+class _Builder:
+    """Makes nodes a level at a time: all of a level with several elements are halved at once."""
 
+    def __init__(self, elements: Elements, corners: Array, chord_error: Array) -> None:
+        self.elements = elements
+        self.middle = 0.5 * (elements.low + elements.high)
+        # Every element is within a distance of the hull of four points: its corners, or its middle.
+        self.points = np.repeat(self.middle[:, None], 4, axis=1)
+        self.points[: len(corners)] = corners
+        self.beyond = 0.5 * np.linalg.norm(elements.high - elements.low, axis=1)
+        self.beyond[: len(corners)] = chord_error
 
-def _level(elements: Elements, items: Indices, sizes: Indices) -> Nodes:
-    """Nodes over so many of the items each; all of them leaves at first."""
-    begins = np.cumsum(sizes) - sizes
-    axis, half = around_cones(elements.axis[items], elements.half_angle[items], begins)
-    single = sizes == 1
-    first = items[begins]
-    axis = np.where(single[:, None], elements.axis[first], axis)
-    half = np.where(single, elements.half_angle[first], np.minimum(half, FULL))
-    low = np.minimum.reduceat(elements.low[items], begins)
-    return Nodes(-1 - first, low, np.maximum.reduceat(elements.high[items], begins), axis, half)
+    def nodes(self) -> Nodes:
+        """All nodes."""
+        items = np.arange(len(self.middle))
+        sizes = np.array([len(items)])
+        made = [self.level(items, sizes)]
+        count = 1
+        while sizes.max(initial=0) > 1:
+            # What is a leaf is done.
+            inner = sizes > 1
+            items = items[np.repeat(inner, sizes)]
+            sizes = sizes[inner]
+            made[-1].child[inner] = count + 2 * np.arange(len(sizes))
+            begins = np.cumsum(sizes) - sizes
+            points = self.middle[items]
+            extent = np.maximum.reduceat(points, begins) - np.minimum.reduceat(points, begins)
+            owner = np.repeat(np.arange(len(sizes)), sizes)
+            along = points[np.arange(len(items)), extent.argmax(axis=1)[owner]]
+            items = items[np.lexsort((along, owner))]
+            sizes = np.stack([sizes // 2, sizes - sizes // 2], axis=1).ravel()
+            made.append(self.level(items, sizes))
+            count += len(sizes)
+        return Nodes(*(np.concatenate(columns) for columns in zip(*made, strict=True)))
+
+    def level(self, items: Indices, sizes: Indices) -> Nodes:
+        """Nodes over so many of the items each; all of them leaves at first."""
+        elements, begins = self.elements, np.cumsum(sizes) - sizes
+        first, single = items[begins], sizes == 1
+        low = np.minimum.reduceat(elements.low[items], begins)
+        high = np.maximum.reduceat(elements.high[items], begins)
+        middle = np.repeat(0.5 * (low + high), sizes, axis=0)
+        reach = np.linalg.norm(self.points[items] - middle[:, None], axis=2).max(axis=1) + self.beyond[items]
+        radius = np.minimum(np.maximum.reduceat(reach, begins), 0.5 * np.linalg.norm(high - low, axis=1))
+        axis, half = around_cones(elements.axis[items], elements.half_angle[items], begins)
+        axis = np.where(single[:, None], elements.axis[first], axis)
+        half = np.where(single, elements.half_angle[first], np.minimum(half, FULL))
+        return Nodes(-1 - first, low, high, radius * (1.0 + 1e-14), axis, half)

@@ -58,7 +58,7 @@ def pack_tree(tree: FacetTree, scale: float, table_at: int = 0, pool_at: int = 0
     full = nodes.half_angle >= np.pi
     doubles[:, layout.COS] = np.where(full, -1.0, np.cos(nodes.half_angle))
     doubles[:, layout.SIN] = np.where(full, 0.0, np.sin(nodes.half_angle))
-    doubles[:, layout.RADIUS] = np.linalg.norm(half, axis=1) * (1.0 + 4.0 * _ROUNDING)
+    doubles[:, layout.RADIUS] = factor * nodes.radius + 4.0 * _ROUNDING * np.linalg.norm(np.abs(center) + half, axis=1)
     box = tree.parameters
     rows = pool[layout.NODE * count :].reshape(elements, layout.ELEMENT)
     rows[:, :2] = 0.5 * (box[:, ::2] + box[:, 1::2])
