@@ -580,7 +580,7 @@ def _places(clearance: Clearance, pairs: Sequence[tuple[Body, Body]]) -> int:
     if not pairs:
         return 0
     bodies = len({id(body) for pair in pairs for body in pair})
-    return clearance.places or min(6 * len(pairs), 12 + 6 * bodies)
+    return clearance.places or min(4 + 2 * len(pairs), 8 + 4 * bodies)
 
 
 def structure_of(constraints: Sequence[Constraint]) -> tuple[tuple[object, ...], ...]:

@@ -65,7 +65,7 @@ from assembly.proximity.extremal import CLOSE, CONVERGED, LEFT_PATCH, SINGULAR, 
 from assembly.proximity.free_pair import VARIABLES, free_hessian, free_rows
 from assembly.proximity.solid_contact import CONTACT_RECORD, FEATURE_F, FOLD, PAIR_GAP, PROPER, TRACK
 from assembly.proximity.start import global_start
-from assembly.proximity.velocity import GAP, add_gap_terms, gradient_row, store_record
+from assembly.proximity.velocity import GAP, RATES, add_gap_terms, gradient_row, store_record
 
 
 @kernel(inner=True)
@@ -135,38 +135,38 @@ def is_guard(table, r):
     return table[FIRST_GUARD] <= r < table[FIRST_GUARD] + table[GUARDS]
 
 
-@kernel(inner=True)
+@kernel(inline=True)
 def idle_row(r, gap, point):
-    """A row that is open by `gap`, whatever moves."""
-    _q, _tracked, records, residual, jacobian = point
-    for i in range(CONTACT_RECORD):
-        records[r, i] = 0.0
+    """A row that is open by `gap`."""
+    records = point[2]
     records[r, GAP] = gap
     records[r, PROPER] = 1.0
     records[r, FOLD] = 1.0
-    residual[r] = gap
-    for i in range(FREE_COLUMN):
-        jacobian[r, i] = 0.0
+    point[3][r] = gap
 
 
 @kernel(inner=True)
-def lost_guard(table, pool, r, start, loose, point):
-    """Row r of a clearance whose pair was lost: idle, if it was farther open than the bodies moved since.
+def lost_guard(table, pool, r, start, point):
+    """Row r of a clearance whose pair was lost: idle, if its gap would be open.
 
     What the neighborhood holds now is for the next look to find.
     """
     row = table[ROW_TABLE] + ROW * r
-    moves = loose[5]
-    gap = start[r, PAIR_GAP] - pool[table[row + MINIMUM]] - moves[table[row + BODY_F]] - moves[table[row + BODY_G]]
+    gap = start[r, PAIR_GAP] - pool[table[row + MINIMUM]]
     if not gap > 0.0:
         return False
     idle_row(r, gap, point)
+    # Nothing moves it: its pair is not known.
+    for i in range(RATES, CONTACT_RECORD - 2):
+        point[2][r, i] = 0.0
+    for i in range(FREE_COLUMN):
+        point[4][r, i] = 0.0
     point[1][r, 0] = math.nan
     return True
 
 
 @kernel(inner=True)
-def solids_row(table, pool, r, start, patience, loose, point):
+def solids_row(table, pool, r, start, patience, point):
     """Row r, of a contact of solids. Returns whether its pair was found.
 
     Where the pair that is tracked is lost, the closest one there is takes over, if the row is one-sided or a step may
@@ -177,7 +177,7 @@ def solids_row(table, pool, r, start, patience, loose, point):
     found = track_row(table, pool, row, q, start, patience, records, tracked, r)
     if not found:
         if is_guard(table, r):
-            return lost_guard(table, pool, r, start, loose, point)
+            return lost_guard(table, pool, r, start, point)
         if table[row + ONE_SIDED] == 1 or patience == math.inf:
             found = search_row(table, pool, row, q, tracked, r)
             if found:
@@ -206,7 +206,7 @@ def contact_row(table, pool, r, start, patience, loose, point):
         idle_row(r, 1.0, point)
         return True
     if table[row + SHELL_F] >= 0:
-        return solids_row(table, pool, r, start, patience, loose, point)
+        return solids_row(table, pool, r, start, patience, point)
     for i in range(FEATURE_F, TRACK):
         tracked[r, i] = start[r, i]
     x = (start[r, 0], start[r, 1], start[r, 2], start[r, 3])
@@ -216,7 +216,7 @@ def contact_row(table, pool, r, start, patience, loose, point):
             if table[row + ONE_SIDED] == 0:
                 return False
             if is_guard(table, r):
-                return lost_guard(table, pool, r, start, loose, point)
+                return lost_guard(table, pool, r, start, point)
             # A one-sided contact is of the nearest pair, whichever that is now.
             held = status == LEFT_PATCH and distance > 0.0
             status, x = restart_contact(table, pool, row, q, records, r)

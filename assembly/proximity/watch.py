@@ -62,8 +62,8 @@ PLACE_PAIR, PLACE_NUMBER, PLACE_MEMORY = 0, 1, 2
 EVENT, EVENTS = 6, 64
 ADDED, REMOVED, HANDED_OFF, MERGED = 0, 1, 2, 3
 CAME_NEAR, WENT_AWAY, LOST, SAME_ROOT, NO_PLACE = 0, 1, 2, 3, 4
-# A pair is looked at again when this part of its allowance is used.
-USED = 0.5
+# The pair that used most of its allowance is looked at again when that is this part of it; others can wait until so much.
+USED, SPENT = 0.5, 0.85
 # Roots nearer than this part of the reach are listed; those that are, stay so up to the second.
 TAKE, KEEP = 0.4, 0.8
 # Room: pairs of patches of a look, roots.
@@ -245,7 +245,7 @@ def list_roots(table, pool, watch, memory, p, roots, count, tracked):
 
 
 @kernel(inner=True)
-def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, roots, work):
+def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, bounds, candidates, roots, work):
     """Find and list the roots of pair p."""
     pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
     at = memory_places(table, watch)[0] + PAIR_MEMORY * p
@@ -305,11 +305,32 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, r
     if found == 0:
         # Nothing faces the other body within reach: the boxes tell how far that is so.
         trees = scene[3]
-        reach = max(reach, least_distance(table, pool, trees[0], trees[1], turn, shift, math.inf, stack) - least)
+        reach = max(reach, least_distance(table, pool, trees[0], trees[1], turn, shift, math.inf, stack, bounds) - least)
     memory[at + ALLOWANCE] = min(reach, rest) if count < ROOTS else 0.0
     memory[at + STATE] = float(TRACKING if listed > 0 else (NEAR if found > 0 else FAR))
     if rest <= 0.0 or count == ROOTS:
         memory[CROWDED] = 1.0
+
+
+@kernel(inner=True)
+def part_used(table, watch, memory, p):
+    """Which part of its allowance a pair has used: 0 where neither body moved, infinite before its first look."""
+    o = memory_places(table, watch)[0] + PAIR_MEMORY * p
+    moved = both_ways(table, memory, table[watch + PAIR_TABLE] + PAIR_RECORD * p) - memory[o + LOOKED]
+    return moved / memory[o + ALLOWANCE] if moved > 0.0 else 0.0
+
+
+@kernel(inner=True)
+def most_used(table, watch, memory):
+    """The pair that used the largest part of its allowance."""
+    best = 0
+    largest = -1.0
+    for p in range(table[watch + PAIRS]):
+        part = part_used(table, watch, memory, p)
+        if part > largest:
+            best = p
+            largest = part
+    return best
 
 
 @kernel
@@ -325,24 +346,27 @@ def look(table, pool, watch, memory, q, tracked, everything):
     memory[CROWDED] = 0.0
     ready = False
     stack = np.empty((1, 2), np.int64)
+    bounds = np.empty(1)
     candidates = stack
     roots = np.empty((1, ROOT))
     work = (roots, roots)
-    at = memory_places(table, watch)[0]
+    next_pair = most_used(table, watch, memory)
     for p in range(table[watch + PAIRS]):
-        pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
-        o = at + PAIR_MEMORY * p
-        moved = both_ways(table, memory, pair) - memory[o + LOOKED]
-        if not any_lost(table, watch, memory, p, tracked):
-            if moved <= (0.0 if everything else USED * memory[o + ALLOWANCE]):
-                continue
+        part = part_used(table, watch, memory, p)
+        if everything:
+            due = part > 0.0
+        else:
+            due = part > SPENT or (p == next_pair and part > USED)
+        if not due and not any_lost(table, watch, memory, p, tracked):
+            continue
         if not ready:
             ready = True
             stack = np.empty((STACK, 2), np.int64)
+            bounds = np.empty(STACK)
             candidates = np.empty((CANDIDATES, 2), np.int64)
             roots = np.empty((ROOTS, ROOT))
             work = (np.empty((1, CONTACT_RECORD)), np.empty((1, TRACK)))
-        look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, roots, work)
+        look_at_pair(table, pool, watch, memory, p, q, tracked, stack, bounds, candidates, roots, work)
     return np.int64(memory[EVENT_COUNT] - before)
 
 

@@ -46,6 +46,7 @@ from assembly.constraints.layout import (
 from assembly.constraints.guards import allowed_share, clear_guards, forget_guards, look_around, place_guards
 from assembly.constraints.program import add_row_terms, evaluate
 from assembly.constraints.terms import objective, recenter
+from assembly.proximity.extremal import BEND
 from assembly.proximity.free_pair import VARIABLES, VECTORS
 from assembly.proximity.solid_contact import CONTACT_RECORD, FOLD, TRACK
 from assembly.solve.contacts import free_folds, is_of_surfaces, start_contacts
@@ -57,6 +58,7 @@ from assembly.solve.multipliers import (
     foresee,
     least_multipliers,
     strongest,
+    toward_rows,
     weigh_rows,
 )
 from assembly.solve.report import bring_back, judge, keep, write_pose, write_rows
@@ -160,8 +162,8 @@ def solve_program(table, pool, settings, state, history, tips):
         for i in range(TRACK):
             here[1][k, i] = state[o_tracked + TRACK * k + i]
     for k in range(pairs):
-        for i in range(CONTACT_RECORD):
-            here[2][k, i] = 1.0
+        # Before anything is evaluated no pair is near a fold.
+        here[2][k, FOLD] = 1.0
     for r in range(m):
         here[3][r] = math.inf
         y[r] = state[o_y + r]
@@ -393,10 +395,36 @@ def solve_program(table, pool, settings, state, history, tips):
             break
         last_violation = violation
         last_dual = dual
+        if tick and iteration >= limit:
+            # Its time is over: the shortest way back onto the rows.
+            toward_rows(shape, rows, residual, jacobian, active, foreseen, matrix, n, forces, step)
+            if watched and allowed_share(table, pool, memory, step, 1.0, loose[5]) < 1.0:
+                status = STALLED
+                break
+            move(table, here[0], step, 1.0, trial[0])
+            carry(table, pool, bases, loose, here, step, 1.0)
+            if evaluate(table, pool, loose[4], BEND, loose, room, trial) >= 0:
+                status = STALLED
+                break
+            if not violation_of(trial[3], one_sided, rows) < violation:
+                status = STALLED
+                break
+            here, trial = trial, here
+            for r in range(rows):
+                better_y[r] = y[r]
+            kept = False
+            alpha = 1.0
+            iteration += 1
+            continue
         cut = min(1.0, radius / longest) if longest > 0.0 else 1.0
         cut = min(cut, 1.0 / turn) if turn > 0.0 else cut
         if watched:
             cut = allowed_share(table, pool, memory, step, cut, loose[5])
+        if tick and cut < 1.0:
+            # What brings the rows to hold is not shortened with the rest.
+            toward_rows(shape, rows, residual, jacobian, active, foreseen, matrix, n, forces, straight)
+            for i in range(n):
+                step[i] += (1.0 / cut - 1.0) * straight[i]
         slope = 0.0
         steepest = 0.0
         for i in range(n):
@@ -416,7 +444,7 @@ def solve_program(table, pool, settings, state, history, tips):
                     for i in range(n):
                         step[i] = KICK * math.sin(kicks + i) if i < 6 * table[MOVING] else 0.0
                     move(table, here[0], step, 1.0, trial[0])
-                    carry(table, pool, bases, loose, here[1], here[2], step, 1.0)
+                    carry(table, pool, bases, loose, here, step, 1.0)
                     if evaluate(table, pool, loose[4], math.inf, loose, room, trial) < 0:
                         here, trial = trial, here
                         iteration += 1
@@ -498,7 +526,8 @@ def solve_program(table, pool, settings, state, history, tips):
     write_pose(table, pool, here[0], state)
     for b in range(bodies):
         loose[5][b] = 0.0
-    if status != CONTACT_LOST:
+    if status != CONTACT_LOST and not (tick and results[HELD] == 0.0):
+        # A tick that went well ends at a pose that was just evaluated.
         holds, violation = judge(table, pool, state, loose, room, shape, rows, here, trial, 1.25 * feasible)
         if status == SOLVED and not holds:
             status = STALLED

@@ -49,6 +49,17 @@ def foresee(shape, rows, residual, jacobian, y, mu, step, in_matrix, active, for
 
 
 @kernel(inner=True)
+def toward_rows(shape, rows, residual, jacobian, active, foreseen, matrix, n, forces, out):
+    """The part of a step that brings the rows which bind here to hold, by its factor in `matrix`, into out."""
+    for i in range(n):
+        out[i] = 0.0
+    for r in range(rows):
+        forces[r] = 0.0 if foreseen[r] == 1.0 else -residual[r] * active[r]
+    add_transposed(shape[0], jacobian, rows, forces, out)
+    substitute(matrix, n, shape[2], out)
+
+
+@kernel(inner=True)
 def curve_rows(rows, residual, y, active, restoring, forces):
     """Into forces the multipliers whose rows' curvature goes into the matrix."""
     most = 0.0

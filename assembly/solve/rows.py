@@ -238,11 +238,13 @@ def move(table, q, d, alpha, out):
 
 
 @kernel(inner=True)
-def carry(table, pool, bases, loose, tracked, records, d, alpha):
+def carry(table, pool, bases, loose, here, d, alpha):
     """Contact coordinates along alpha d: by the contact velocity, or, for a free pair, by its own unknowns.
 
-    Angles start from where they are: a step turns no body by more than a radian. The guess goes into `loose`.
+    Gaps follow to first order, angles start from where they are: a step turns no body by more than a radian. The guess
+    goes into `loose`.
     """
+    _q, tracked, records, _residual, jacobian = here
     lengths = loose[1]
     out = loose[4]
     for k in range(table[CONTACTS], table[TRACKED]):
@@ -256,7 +258,7 @@ def carry(table, pool, bases, loose, tracked, records, d, alpha):
         f = bases[k, 0]
         g = bases[k, 1]
         u = bases[k, 2]
-        out[k, PAIR_GAP] = tracked[k, PAIR_GAP]
+        out[k, PAIR_GAP] = tracked[k, PAIR_GAP] + alpha * times(bases, jacobian, k, d)
         for i in range(4):
             out[k, i] = tracked[k, i]
             if u >= 0:

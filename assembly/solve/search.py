@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from assembly._kernel import kernel
 from assembly.constraints.layout import CONTACTS, MOVING, WATCH
-from assembly.constraints.program import evaluate
+from assembly.constraints.program import evaluate, is_guard
 from assembly.constraints.terms import objective
 from assembly.proximity.extremal import BEND
 from assembly.proximity.watch import share_of_step
@@ -117,7 +117,7 @@ def search(
     lost = -1
     while alpha * longest > 1e-9 * SHORTEST or alpha == 1.0:
         move(table, here[0], step, alpha, trial[0])
-        carry(table, pool, bases, loose, here[1], here[2], step, alpha)
+        carry(table, pool, bases, loose, here, step, alpha)
         if table[WATCH] >= 0 and share_of_step(table, table[WATCH], loose[6], loose[5], 1.0) < 1.0:
             # Bent, it would go farther than is known to be free.
             bends = 2
@@ -146,6 +146,7 @@ def search(
                 for i in range(n):
                     step[i] = straight[i]
         alpha *= 0.5
-        if lost >= 0 and alpha * longest < 0.01:
+        # A pair near a fold is freed; a clearance's is given up where its gap does not close.
+        if lost >= 0 and alpha * longest < 0.01 and not is_guard(table, lost):
             break
     return False, alpha, lost

@@ -32,6 +32,7 @@ from assembly.solve.augmented_lagrangian import (
     LAST_LOOK,
     OBJECTIVE,
     OUT_OF_TIME,
+    RADIUS,
     SECOND_ORDER,
     SOLVED,
     STATIONARITY,
@@ -50,6 +51,8 @@ if TYPE_CHECKING:
 __all__ = ["Step", "TrackStatus", "Tracker"]
 
 Array = NDArray[np.float64]
+# Steps of a tick may be bounded to this, in parts of the scene's size, after ticks that led nowhere.
+SHORTEST_RADIUS = 1e-5
 
 
 class TrackStatus(Enum):
@@ -259,10 +262,15 @@ class Tracker:
         if not first.success:
             raise InputError(f"q0 is a start from which the constraints cannot be solved: {first.message}")
         self._state = first._state.copy()
+        # Numbers are read from a view in half the time it takes to read them from the array.
+        self._view = memoryview(self._state)  # type: ignore[arg-type]  # an array is a buffer
         self._before = self._state.copy()
+        self._radius = float(self._settings[RADIUS])
         packed = self._packed
         self._names = [(a.name, b.name) for pairs in packed.guarded for a, b in pairs]
         self._seen = 0.0
+        self._pool = memoryview(packed.pool)  # type: ignore[arg-type]
+        self._reference = packed.reference.tolist()
         self._at = next(at for target, at in packed._targets if target is self._hand)
         # Whatever else may change between ticks is written by the scene itself.
         self._others = bool(packed._sources) or len(packed._targets) + len(packed._turns) > 1
@@ -292,21 +300,29 @@ class Tracker:
         if row is None:
             state = self._front()
             return Step(self, state, TrackStatus.BAD_TARGET, self._where(), (), perf_counter() - begin)
-        self._before[:] = state
+        before, view = self._before, self._view
+        before[:] = state
         code = solve_program(packed.table, packed.pool, self._settings, state, self._history, packed.tips)
         at = packed.results_at
         status = _STATUSES.get(code, TrackStatus.APPROACHING)
-        if state[at + HELD] == 1.0:
+        if view[at + HELD] == 1.0:
             status = TrackStatus.HELD
-        elif not state[at + VIOLATION] <= self._tolerance:
-            status = TrackStatus.HELD if self._before[at + VIOLATION] <= self._tolerance else TrackStatus.VIOLATED
-            if status is TrackStatus.HELD:
-                state[:] = self._before
+        elif not view[at + VIOLATION] <= self._tolerance:
+            status = TrackStatus.VIOLATED
+            if before[at + VIOLATION] <= self._tolerance:
+                status = TrackStatus.HELD
+                state[:] = before
+        # After a step too far the next ones are shorter, until they do better.
+        radius = self._settings[RADIUS]
+        if status is TrackStatus.HELD:
+            self._settings[RADIUS] = max(0.25 * radius, SHORTEST_RADIUS)
+        elif radius < self._radius:
+            self._settings[RADIUS] = min(2.0 * radius, self._radius)
         events: tuple[Event, ...] = ()
-        if packed.guards and state[packed.memory_at + EVENT_COUNT] != self._seen:
+        if packed.guards and view[packed.memory_at + EVENT_COUNT] != self._seen:
             events = events_of(state[packed.memory_at :], self._names, packed.scale, int(self._seen))
-            self._seen = state[packed.memory_at + EVENT_COUNT]
-        return Step(self, self._front(), status, row, events, perf_counter() - begin)
+            self._seen = view[packed.memory_at + EVENT_COUNT]
+        return Step(self, state[: packed.memory_at].copy(), status, row, events, perf_counter() - begin)
 
     def _front(self) -> Array:
         """The state but for what the watch knows."""
@@ -323,7 +339,10 @@ class Tracker:
         try:
             row = np.array(target.q if isinstance(target, Pose) else target, dtype=np.float64)
             if isinstance(hand, PointDistance):
-                if row.shape != (3,) or not isfinite(row[0] + row[1] + row[2]):
+                if row.shape != (3,):
+                    return None
+                x, y, z = row.tolist()
+                if not isfinite(x + y + z):
                     return None
                 hand._target = row
             else:
@@ -335,7 +354,9 @@ class Tracker:
         if self._others or not isinstance(hand, PointDistance):
             packed.refresh()
         else:
-            packed.pool[self._at : self._at + 3] = (row - packed.reference) / packed.scale
+            pool, at, size = self._pool, self._at, packed.scale
+            left, front, low = self._reference
+            pool[at], pool[at + 1], pool[at + 2] = (x - left) / size, (y - front) / size, (z - low) / size
         return row
 
     def _wrench(self, q: Array, target: Array) -> Array:
