@@ -49,6 +49,7 @@ from assembly.constraints.terms import objective, recenter
 from assembly.proximity.extremal import BEND
 from assembly.proximity.free_pair import VARIABLES, VECTORS
 from assembly.proximity.solid_contact import CONTACT_RECORD, FOLD, TRACK
+from assembly.proximity.watch import share_of_step
 from assembly.solve.contacts import free_folds, is_of_surfaces, start_contacts
 from assembly.solve.gather import gather, scattered
 from assembly.solve.linear import factorize_shifted
@@ -335,6 +336,26 @@ def solve_program(table, pool, settings, state, history, tips):
         if settings[BUDGET] > 0.0 and iteration > 0 and call_address(table[CLOCK_AT], ()) - begin > settings[BUDGET]:
             status = OUT_OF_TIME
             break
+        if tick and iteration >= limit:
+            # Its time is over: the shortest way back onto the rows.
+            weigh_rows(rows, one_sided, residual, y, mu, forces, active)
+            toward_rows(shape, rows, residual, jacobian, active, lagrangian, matrix, n, forces, step)
+            move(table, here[0], step, 1.0, trial[0])
+            carry(table, pool, bases, loose, here, step, 1.0)
+            if (
+                (watched and share_of_step(table, table[WATCH], memory, loose[5], 1.0) < 1.0)
+                or evaluate(table, pool, loose[4], BEND, loose, room, trial) >= 0
+                or not violation_of(trial[3], one_sided, rows) < violation
+            ):
+                status = STALLED
+                break
+            here, trial = trial, here
+            for r in range(rows):
+                better_y[r] = y[r]
+            kept = False
+            alpha = 1.0
+            iteration += 1
+            continue
         if restoring and violation <= max(0.1 * entered, feasible):
             restoring = False
             mu = 1e-4
@@ -395,36 +416,10 @@ def solve_program(table, pool, settings, state, history, tips):
             break
         last_violation = violation
         last_dual = dual
-        if tick and iteration >= limit:
-            # Its time is over: the shortest way back onto the rows.
-            toward_rows(shape, rows, residual, jacobian, active, foreseen, matrix, n, forces, step)
-            if watched and allowed_share(table, pool, memory, step, 1.0, loose[5]) < 1.0:
-                status = STALLED
-                break
-            move(table, here[0], step, 1.0, trial[0])
-            carry(table, pool, bases, loose, here, step, 1.0)
-            if evaluate(table, pool, loose[4], BEND, loose, room, trial) >= 0:
-                status = STALLED
-                break
-            if not violation_of(trial[3], one_sided, rows) < violation:
-                status = STALLED
-                break
-            here, trial = trial, here
-            for r in range(rows):
-                better_y[r] = y[r]
-            kept = False
-            alpha = 1.0
-            iteration += 1
-            continue
         cut = min(1.0, radius / longest) if longest > 0.0 else 1.0
         cut = min(cut, 1.0 / turn) if turn > 0.0 else cut
         if watched:
             cut = allowed_share(table, pool, memory, step, cut, loose[5])
-        if tick and cut < 1.0:
-            # What brings the rows to hold is not shortened with the rest.
-            toward_rows(shape, rows, residual, jacobian, active, foreseen, matrix, n, forces, straight)
-            for i in range(n):
-                step[i] += (1.0 / cut - 1.0) * straight[i]
         slope = 0.0
         steepest = 0.0
         for i in range(n):

@@ -6,7 +6,7 @@ import math
 
 from assembly._kernel import kernel
 from assembly.constraints.program import add_gram
-from assembly.solve.linear import factorize, substitute
+from assembly.solve.linear import factorize, factorize_shifted, substitute
 from assembly.solve.rows import add_row, add_transposed, clear_row, times
 
 # Multipliers below this count for nothing against the objective's curvature, which is of order one.
@@ -49,14 +49,20 @@ def foresee(shape, rows, residual, jacobian, y, mu, step, in_matrix, active, for
 
 
 @kernel(inner=True)
-def toward_rows(shape, rows, residual, jacobian, active, foreseen, matrix, n, forces, out):
-    """The part of a step that brings the rows which bind here to hold, by its factor in `matrix`, into out."""
+def toward_rows(shape, rows, residual, jacobian, active, lagrangian, matrix, n, forces, out):
+    """The shortest step after which the rows that bind hold to first order, into out; both matrices are overwritten."""
+    bases, _one_sided, last, _last_row = shape
     for i in range(n):
         out[i] = 0.0
+        for j in range(i, last[i] + 1):
+            lagrangian[i, j] = 0.0
     for r in range(rows):
-        forces[r] = 0.0 if foreseen[r] == 1.0 else -residual[r] * active[r]
-    add_transposed(shape[0], jacobian, rows, forces, out)
-    substitute(matrix, n, shape[2], out)
+        forces[r] = -residual[r] * active[r]
+        if active[r] > 0.0:
+            add_gram(bases, jacobian, r, active[r], lagrangian)
+    add_transposed(bases, jacobian, rows, forces, out)
+    if factorize_shifted(lagrangian, n, last, 1.0, matrix) > 0.0:
+        substitute(matrix, n, last, out)
 
 
 @kernel(inner=True)
