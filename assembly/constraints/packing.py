@@ -46,6 +46,9 @@ Array = NDArray[np.float64]
 Table = NDArray[np.int64]
 # Of a watch, in parts of the scene's size: how far its looks reach at least, and at most.
 FIRST_REACH, LAST_REACH = 0.005, 0.05
+# How far bodies may go between looks where contacts may be born, in parts of the smallest radius of curvature of the
+# two; in parts of the scene's size, it is no less than this.
+FLANK, LEAST_FLANK = 0.3, 1e-4
 
 
 class Packed:
@@ -394,6 +397,7 @@ class Packed:
     def _watch(self, bodies: Sequence[Body]) -> int:
         """Pack what clearances watch; where its record begins."""
         trees = {}
+        thin: dict[tuple[Face, ...], float] = {}
         radii = np.zeros(len(bodies))
         for body in {id(body): body for pairs in self.guarded for pair in pairs for body in pair}.values():
             faces = _side_faces(body)
@@ -403,14 +407,16 @@ class Packed:
             if faces not in trees:
                 table, pool, trees[faces] = pack_tree(tree, self.scale, self._table_size, self._pool_size)
                 self._add(table, pool)
+                thin[faces] = tree.least_radius / self.scale
         surfaces: dict[tuple[int, bool], int] = {}
         records: list[int] = []
         listed: list[int] = []
         first = 0
         for clearance, pairs, count in zip(self.clearances, self.guarded, self.places, strict=True):
-            _, minimum = self._add(pool=[clearance.minimum / self.scale])
             for pair in pairs:
                 f, g = (_side_faces(body) for body in pair)
+                flank = max(FLANK * min(thin[f], thin[g]), LEAST_FLANK)
+                _, minimum = self._add(pool=[clearance.minimum / self.scale, flank])
                 if is_one_smooth(f) and is_one_smooth(g):
                     shape = [self._surface(surfaces, f[0]), self._surface(surfaces, g[0]), -1, -1]
                 else:

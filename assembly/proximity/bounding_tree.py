@@ -26,8 +26,8 @@ NODES, NODE_TABLE, NODE_POOL, ELEMENTS, ELEMENT_POOL, TREE = 0, 1, 2, 3, 4, 5
 CHILD, FEATURE, NODE_INTS = 0, 1, 2
 # Box (center and half widths), cone (axis, cosine and sine of its half angle), radius of a ball.
 CENTER, HALF, AXIS, COS, SIN, RADIUS, NODE = 0, 3, 6, 9, 10, 11, 12
-# Of an element: the middle of its box in (u, v), or (t, 0), half the widths, and its feature.
-ELEMENT_FEATURE, ELEMENT = 4, 5
+# Of an element: the middle of its box in (u, v), or (t, 0), half the widths, its feature, and its node.
+ELEMENT_FEATURE, ELEMENT_NODE, ELEMENT = 4, 5, 6
 # Rounding of unit vectors and of coordinates, relative: what is in doubt is kept.
 ROUNDING = 1e-13
 

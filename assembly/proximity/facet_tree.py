@@ -126,6 +126,16 @@ class FacetTree:
         return float(self.chord_error.max(initial=0.0))
 
     @property
+    def least_radius(self) -> float:
+        """About the smallest radius of curvature: of the patches' widths over the angles by which their normals turn."""
+        turns = self.half_angle[: len(self.corners)]
+        sides = np.linalg.norm(self.corners - np.roll(self.corners, 1, axis=1), axis=2)
+        # Where a side is a point, at a pole, the others tell.
+        sizes = 0.5 * np.where(sides > 1e-9 * sides.max(), sides, np.inf).min(axis=1)
+        curved = (turns > 1e-3) & (turns < 0.5 * np.pi)
+        return float((sizes[curved] / turns[curved]).min(initial=np.inf))
+
+    @property
     def triangles(self) -> Array:
         """The facets (m, 3, 3), two a patch, counterclockwise in (u, v)."""
         return self.corners[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3, 3)

@@ -20,6 +20,7 @@ from assembly.proximity.bounding_tree import (
     CHILD,
     ELEMENT,
     ELEMENT_FEATURE,
+    ELEMENT_NODE,
     ELEMENT_POOL,
     FEATURE,
     HALF,
@@ -27,7 +28,7 @@ from assembly.proximity.bounding_tree import (
     NODE_INTS,
     NODE_POOL,
     NODE_TABLE,
-    three,
+    box_distance,
 )
 from assembly.proximity.extremal import CONVERGED, SINGULAR, solve_pair
 from assembly.proximity.shell import FACES
@@ -196,6 +197,19 @@ def add_given(table, pool, scene, tracked, listed, many, roots, work):
         if count > before:
             roots[before, ORIGIN] = GIVEN_CONTACT
     return count
+
+
+@kernel(inner=True)
+def element_distance(table, pool, trees, turn, shift, bulk, e, d):
+    """A lower bound of the distance of two elements: that of their boxes."""
+    o = table[trees[0] + ELEMENT_POOL] + ELEMENT * e
+    p = table[trees[1] + ELEMENT_POOL] + ELEMENT * d
+    i = np.int64(pool[o + ELEMENT_NODE])
+    j = np.int64(pool[p + ELEMENT_NODE])
+    square = box_distance(
+        pool, table[trees[0] + NODE_POOL] + NODE * i, table[trees[1] + NODE_POOL] + NODE * j, turn, bulk, shift
+    )
+    return math.sqrt(square)
 
 
 @kernel(inline=True)

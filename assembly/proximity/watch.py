@@ -19,7 +19,7 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly.kinematics.motion import relative_pose, rotation
-from assembly.proximity.bounding_tree import least_distance, pairs_within
+from assembly.proximity.bounding_tree import least_distance, magnitudes, pairs_within
 from assembly.proximity.roots import (
     ALIKE,
     CODE_F,
@@ -34,6 +34,7 @@ from assembly.proximity.roots import (
     USELESS,
     add_given,
     add_root,
+    element_distance,
     is_known,
     is_outside,
 )
@@ -45,7 +46,8 @@ PAIRS, PLACES, BODY_COUNT, PAIR_TABLE, RADII, FIRST, TRACK_SOLIDS, LENGTHS, WATC
 # Its lengths: roots nearer to each other than the first, and along the surfaces, are one; the reach of a first look;
 # the largest.
 NEGLECT, FIRST_REACH, LAST_REACH, LENGTH_COUNT = 0, 1, 2, 3
-# A pair: bodies, trees, surfaces or else (-1) shells, where its least gap is in the pool, its places from and to, and
+# A pair: bodies, trees, surfaces or else (-1) shells, where its least gap is in the pool (and behind it how far it may go
+# between looks where contacts may be born), its places from and to, and
 # rows of given contacts between the two (row, 1 if the bodies are the other way round).
 PAIR_F, PAIR_G, TREE_F, TREE_G, PAIR_SURFACE_F, PAIR_SURFACE_G, PAIR_SHELL_F, PAIR_SHELL_G = 0, 1, 2, 3, 4, 5, 6, 7
 PAIR_MINIMUM, LOW, HIGH, GIVEN, GIVEN_COUNT, PAIR_RECORD = 8, 9, 10, 11, 12, 13
@@ -280,9 +282,18 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, bounds, candi
         reach *= 0.5
     memory[at + REACH] = reach
     count = known_roots(table, pool, watch, memory, p, scene, tracked, roots, work)
+    flank = pool[table[pair + PAIR_MINIMUM] + 1]
+    enough = max(TAKE * reach, flank)
+    bulk = magnitudes(turn)
+    free = math.inf
     for c in range(found):
         if count == ROOTS:
             break
+        bound = element_distance(table, pool, scene[3], turn, shift, bulk, candidates[c, 0], candidates[c, 1]) - least
+        if bound > enough:
+            # Whatever root is there is not near enough for a place.
+            free = min(free, bound)
+            continue
         codes, start, inside = is_known(table, pool, scene, candidates[c, 0], candidates[c, 1], roots, count)
         if inside:
             continue
@@ -290,11 +301,13 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, bounds, candi
         count, result = add_root(
             table, pool, scene, codes, start, (0.0, 0.0, 0.0), pool[lengths + NEGLECT], roots, count, work
         )
-        if count > before and result == MINIMUM_FOUND:
+        if count == before or result != MINIMUM_FOUND:
+            # Patches that face each other and hold no root of their own: a motion may bring one forth.
+            free = min(free, max(bound, flank))
+        else:
             gap = roots[before, GAP]
-            # The far sides of two bodies oppose each other, too; of surfaces that were apart none is deeper in the
-            # other than they moved.
-            alien = gap > reach + least or (gap < 0.0 and (gap < -moved or is_outside(table, pool, scene, roots, before)))
+            # The far sides of two bodies oppose each other, too.
+            alien = gap > reach + least or (gap < 0.0 and is_outside(table, pool, scene, roots, before))
             roots[before, ORIGIN] = USELESS if alien else NEW
     rest = list_roots(table, pool, watch, memory, p, roots, count, tracked)
     listed = 0
@@ -306,7 +319,7 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, bounds, candi
         # Nothing faces the other body within reach: the boxes tell how far that is so.
         trees = scene[3]
         reach = max(reach, least_distance(table, pool, trees[0], trees[1], turn, shift, math.inf, stack, bounds) - least)
-    memory[at + ALLOWANCE] = min(reach, rest) if count < ROOTS else 0.0
+    memory[at + ALLOWANCE] = min(min(reach, rest), free) if count < ROOTS else 0.0
     memory[at + STATE] = float(TRACKING if listed > 0 else (NEAR if found > 0 else FAR))
     if rest <= 0.0 or count == ROOTS:
         memory[CROWDED] = 1.0
