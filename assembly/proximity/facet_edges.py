@@ -56,7 +56,6 @@ class Elements(NamedTuple):
             self.half_angle[chosen],
         )
 
-
     @staticmethod
     def joined(parts: Sequence[Elements]) -> Elements:
         """Several as one."""
