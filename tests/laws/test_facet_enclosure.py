@@ -16,7 +16,7 @@ from assembly.geometry.face import Face
 from assembly.geometry.surface import NurbsSurface
 from assembly.proximity import FeatureStatus, PairStatus, closest_features, extremal_pair
 from assembly.proximity.bounding_tree import NODES, facing_pairs, least_distance, pairs_within, tree_distance
-from assembly.proximity.facet_edges import edge_point, other_parameter
+from assembly.proximity.facet_check import edge_point, other_parameter
 from assembly.proximity.facet_tree import FacetTree
 from assembly.proximity.tree_packing import pack_tree
 from tests.geometry.test_surface import random_surface
