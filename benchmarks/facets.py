@@ -212,7 +212,7 @@ def _two_clips(quick: bool, coal: Any | None) -> tuple[list[dict[str, Any]], lis
     rows, figures = [], []
     for name, part in (("a quarter of", 0.25), ("one", 1.0)):
         seconds, found = _seconds(lambda q, part=part: descents.pairs(q, part * CLIP_RADIUS), list(poses))  # type: ignore[misc]
-        what = f"two clips, {4 * count:,} facets, reach {name} radius"
+        what = f"two clips of {2 * count:,} facets each, reach {name} radius"
         rows.append({"what": what, "pairs, median": float(np.median(found)), "pairs, most": float(np.max(found))})
         figures.append(figure(what, "seconds", float(np.median(seconds)), reach=1e-4, peers=peers))
         figures.append(figure(f"{what}, 99 of 100", "seconds", float(np.quantile(seconds, 0.99))))
