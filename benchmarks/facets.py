@@ -81,7 +81,7 @@ class _Descents:
             offsets.append(at)
         self.table, self.pool = np.concatenate(tables), np.concatenate(pools)
         self.offsets = np.array(offsets)
-        self.stack, self.bounds = np.empty((256, 2), dtype=np.int64), np.empty(256)
+        self.stack = np.empty((256, 2), dtype=np.int64)
         self.out = np.empty((20_000, 2), dtype=np.int64)
 
     def pairs(self, q: Array, reach: float) -> int:
@@ -91,7 +91,7 @@ class _Descents:
     def lower(self, pose: tuple[tuple[float, ...], tuple[float, ...]]) -> float:
         """A lower bound of the distance of the first two."""
         one, other = self.offsets[:2].tolist()
-        return float(tree_distance(self.table, self.pool, one, other, *pose, 1e3, self.stack, self.bounds))
+        return float(tree_distance(self.table, self.pool, one, other, *pose, 1e3, self.stack))
 
 
 def _seconds(call: Callable[[Any], Any], cases: Sequence[Any]) -> tuple[Array, list[Any]]:

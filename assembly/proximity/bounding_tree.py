@@ -231,10 +231,10 @@ def box_distance(pool, o, p, seen, rotation, bulk):
 
 
 @kernel(inner=True)
-def least_distance(table, pool, tree_f, tree_g, rotation, shift, upper, stack, bounds):
+def least_distance(table, pool, tree_f, tree_g, rotation, shift, upper, stack):
     """A lower bound of the distance of two trees' elements, at most `upper`: that of their boxes.
 
-    A stack (n, 2) with its bounds (n,) that is too short makes what is found lower, not wrong.
+    A stack (n, 2) that is too short makes what is found lower, not wrong.
     """
     node_f = table[tree_f + NODE_POOL]
     node_g = table[tree_g + NODE_POOL]
@@ -245,28 +245,24 @@ def least_distance(table, pool, tree_f, tree_g, rotation, shift, upper, stack, b
     back = transposed(rotation)
     back_bulk = transposed(bulk)
     back_shift = neg(matvec(back, shift))
-    room = min(stack.shape[0], bounds.size)
+    room = stack.shape[0]
     best = (upper + slack) * (upper + slack)
-    first = box_distance(pool, node_f, node_g, seen_from(pool, node_g, rotation, bulk, shift), rotation, bulk)
-    used = 0
-    if first < best:
-        if room < 1:
-            best = first
-        else:
-            stack[0, 0] = 0
-            stack[0, 1] = 0
-            bounds[0] = first
-            used = 1
+    if room < 1:
+        return 0.0
+    stack[0, 0] = 0
+    stack[0, 1] = 0
+    used = 1
     while used > 0:
         used -= 1
-        bound = bounds[used]
-        # What was found since the pair was put there may exclude it.
-        if bound >= best:
-            continue
         i = stack[used, 0]
         j = stack[used, 1]
         o = node_f + NODE * i
         p = node_g + NODE * j
+        seen = seen_from(pool, p, rotation, bulk, shift)
+        bound = box_distance(pool, o, p, seen, rotation, bulk)
+        # What was found since the pair was put here may exclude it.
+        if bound >= best:
+            continue
         child_f = table[ints_f + NODE_INTS * i + CHILD]
         child_g = table[ints_g + NODE_INTS * j + CHILD]
         if (child_f < 0 and child_g < 0) or used + 2 > room:
@@ -274,7 +270,6 @@ def least_distance(table, pool, tree_f, tree_g, rotation, shift, upper, stack, b
             continue
         descend_f = child_g < 0 or (child_f >= 0 and pool[o + RADIUS] >= pool[p + RADIUS])
         if descend_f:
-            seen = seen_from(pool, p, rotation, bulk, shift)
             one = box_distance(pool, node_f + NODE * child_f, p, seen, rotation, bulk)
             other = box_distance(pool, node_f + NODE * (child_f + 1), p, seen, rotation, bulk)
         else:
@@ -285,16 +280,14 @@ def least_distance(table, pool, tree_f, tree_g, rotation, shift, upper, stack, b
         near = 0 if one <= other else 1
         for k in range(2):
             side = near if k == 1 else 1 - near
-            value = one if side == 0 else other
-            if value < best:
+            if (one if side == 0 else other) < best:
                 stack[used, 0] = child_f + side if descend_f else i
                 stack[used, 1] = j if descend_f else child_g + side
-                bounds[used] = value
                 used += 1
     return max(math.sqrt(best) - slack, 0.0)
 
 
 @kernel
-def tree_distance(table, pool, tree_f, tree_g, rotation, shift, upper, stack, bounds):
+def tree_distance(table, pool, tree_f, tree_g, rotation, shift, upper, stack):
     """`least_distance` for Python."""
-    return least_distance(table, pool, tree_f, tree_g, rotation, shift, upper, stack, bounds)
+    return least_distance(table, pool, tree_f, tree_g, rotation, shift, upper, stack)

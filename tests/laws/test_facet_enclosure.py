@@ -71,7 +71,7 @@ class Descent:
         table, pool, self.f = pack_tree(self.trees[0], 1.0)
         more, doubles, self.g = pack_tree(self.trees[1], 1.0, table.size, pool.size)
         self.table, self.pool = np.concatenate([table, more]), np.concatenate([pool, doubles])
-        self.stack, self.bounds = np.empty((256, 2), dtype=np.int64), np.empty(256)
+        self.stack = np.empty((256, 2), dtype=np.int64)
         self.out = np.empty((200_000, 2), dtype=np.int64)
 
     def pairs(self, turn, shift, reach, stack=None, out=None):
@@ -88,7 +88,7 @@ class Descent:
     def lower(self, turn, shift, upper, stack=None):
         stack = self.stack if stack is None else stack
         pose = tuple(turn.ravel().tolist()), tuple(shift.tolist())
-        return tree_distance(self.table, self.pool, self.f, self.g, *pose, upper, stack, self.bounds)
+        return tree_distance(self.table, self.pool, self.f, self.g, *pose, upper, stack)
 
 
 def elements_at(tree, feature, parameters):
@@ -327,7 +327,7 @@ def test_plain_python_finds_the_same():
         # An inner kernel is plain Python when it is called from Python.
         count = pairs_within(*arrays, *pose, 0.2, descent.stack, room)
         assert {tuple(row) for row in room[:count].tolist()} == descent.found(turn, shift, 0.2)
-        lower = least_distance(*arrays, *pose, 5.0, descent.stack, descent.bounds)
+        lower = least_distance(*arrays, *pose, 5.0, descent.stack)
         assert descent.lower(turn, shift, 5.0) == pytest.approx(lower, rel=1e-12, abs=1e-12)
 
 
