@@ -51,10 +51,14 @@ NEAR = 0.1
 SAME = 0.8
 # Points nearer than this part of the size meet; steps shorter than it end the descent.
 MEET = 1e-10
+# Where the descent ends with points nearer than this part of the size, they would meet: surfaces that touch.
+TOUCH = 1e-5
+# What of a gradient is rounding, as a part of the size.
+ROUNDING = 1e-13
 # A first damping, against curvatures of |d|^2 / 2, which are one for points that move along a plane.
 DAMPING = 1e-2
-# Damping at which a step is too short to count.
-STUCK = 1e9
+# The least damping, so that points that may slide without coming closer stay; one whose steps are too short to count.
+LEAST, STUCK = 1e-8, 1e9
 
 
 @kernel(inline=True)
@@ -73,11 +77,11 @@ def end_of(pool, breaks, spans, closed, pole_low, pole_high, u):
 
 
 @kernel(inline=True)
-def free_directions(table, pool, r, u, v, e, gx, gy):
+def free_directions(table, pool, r, u, v, e, gx, gy, slack):
     """Two directions (tx, ty) in which a point may descend, zero where an end of the patch takes one away; how many.
 
-    e is E^-1 of `own_frame`, (gx, gy) the gradient over tangent lengths. Along an end the direction is that of the
-    end: S_v at an end of u.
+    e is E^-1 of `own_frame`, (gx, gy) the gradient over tangent lengths, `slack` what of it is rounding. Along an end
+    the direction is that of the end: S_v at an end of u.
     """
     if e[0] == 0.0:
         # At a pole.
@@ -90,15 +94,15 @@ def free_directions(table, pool, r, u, v, e, gx, gy):
     vx = -scale_v * e[1]
     vy = scale_v * e[0]
     # An end holds where descent leads out of it: at the low one where the gradient is positive.
-    held_u = end_u * gx < 0.0
-    held_v = end_v * (vx * gx + vy * gy) < 0.0
+    length = math.sqrt(vx * vx + vy * vy)
+    held_u = end_u * gx < -slack
+    held_v = end_v * (vx * gx + vy * gy) < -slack * length
     if held_u and held_v:
         return 0.0, 0.0, 0.0, 0.0, 0
     if held_v:
         return 1.0, 0.0, 0.0, 0.0, 1
     if held_u:
-        i = 1.0 / math.sqrt(vx * vx + vy * vy)
-        return i * vx, i * vy, 0.0, 0.0, 1
+        return vx / length, vy / length, 0.0, 0.0, 1
     return 1.0, 0.0, 0.0, 1.0, 2
 
 
@@ -167,8 +171,8 @@ def both_frames(table, pool, f, g, rotation, shift, x):
 def finish(table, pool, f, g, rotation, shift, x, size, reach):
     """Newton's method from x: the result of `solve_pair`, and whether it is the root that the descent leads to.
 
-    That is one no farther apart than x, off by no more than `reach` on either surface; with reach = 0, at a crossing,
-    one that is deepest in it.
+    That is one no farther apart than x, off by no more than `reach` on either surface; with reach = 0, where the
+    surfaces meet, one where they touch or, solids, are deepest in each other.
     """
     n, tx, ty, pf, pg, e, t, a, c, r, beta, regular = pair_frame(table, pool, f, g, rotation, shift, x)
     status, y, count, frame, matrices = solve_pair(table, pool, f, g, rotation, shift, x, size, BEND, 0.0)
@@ -186,7 +190,7 @@ def finish(table, pool, f, g, rotation, shift, x, size, reach):
             same = same and dot(moved_f, moved_f) <= limit and dot(moved_g, moved_g) <= limit
         else:
             opposed = dot(after, matvec_t(rotation, frame[0])) < 0.0
-            same = same and opposed and frame[10] <= 1e-12 * size
+            same = same and (abs(frame[10]) <= 1e-9 * size or (opposed and frame[10] < 0.0))
     return same, status, y, count, frame, matrices
 
 
@@ -199,10 +203,10 @@ def descend_pair(table, pool, f, g, rotation, shift, x, size, limit):
     CONVERGED, SINGULAR: Newton's method finished, at the root the descent led to.
     LEFT_PATCH: nearest at the end of a patch.
     CROSSED: the points met, and there is no pair of a shallow penetration beside them.
-    NOT_CONVERGED: the steps were spent, or there is no tangent plane to go on.
+    NOT_CONVERGED: the steps were spent, there is no tangent plane to go on, or x is a maximum or a saddle.
     """
     status = NOT_CONVERGED
-    mu = 0.0
+    mu = LEAST
     near = NEAR
     count = 0
     f_now, g_now, d, dg, regular = both_frames(table, pool, f, g, rotation, shift, x)
@@ -215,8 +219,8 @@ def descend_pair(table, pool, f, g, rotation, shift, x, size, limit):
         ng, xg, yg, eg, b = g_now
         gf = (-dot(xf, d), -dot(yf, d))
         gg = (dot(xg, dg), dot(yg, dg))
-        tf = free_directions(table, pool, f, x[0], x[1], ef, gf[0], gf[1])
-        tg = free_directions(table, pool, g, x[2], x[3], eg, gg[0], gg[1])
+        tf = free_directions(table, pool, f, x[0], x[1], ef, gf[0], gf[1], ROUNDING * size)
+        tg = free_directions(table, pool, g, x[2], x[3], eg, gg[0], gg[1], ROUNDING * size)
         held = tf[4] < 2 or tg[4] < 2
         # The second derivative of |d|^2 / 2 over those directions.
         k = dot(nf, d)
@@ -241,7 +245,7 @@ def descend_pair(table, pool, f, g, rotation, shift, x, size, limit):
         while mu < STUCK * (1.0 + first):
             sf, sg, definite = descent_step(p, c, q, rf, rg, mu)
             if not definite:
-                mu = max(4.0 * mu, 1e-6 * first)
+                mu = max(4.0 * mu, 1e-4 * first)
                 continue
             step = max(abs(sf[0]) + abs(sf[1]), abs(sg[0]) + abs(sg[1]))
             bend = max((abs(sf[0]) + abs(sf[1])) * bend_f, (abs(sg[0]) + abs(sg[1])) * bend_g)
@@ -276,7 +280,7 @@ def descend_pair(table, pool, f, g, rotation, shift, x, size, limit):
                 lower = True
                 # Half of the slope is what Newton's method gives near a minimum.
                 mu = 0.1 * mu if now < square + 0.5 * slope else mu
-                mu = mu if mu > 1e-6 * first else 0.0
+                mu = mu if mu > 1e-4 * first else LEAST
                 break
             mu = max(4.0 * mu, first)
         if not lower:
@@ -287,6 +291,8 @@ def descend_pair(table, pool, f, g, rotation, shift, x, size, limit):
         x = y
         f_now, g_now, d, dg, regular = f_next, g_next, d_next, dg_next, regular_next
         square = now
+    if status == NOT_CONVERGED and square <= TOUCH * TOUCH * size * size:
+        status = CROSSED
     if status == CROSSED:
         same, done, y, more, frame, matrices = finish(table, pool, f, g, rotation, shift, x, size, 0.0)
         if same:
