@@ -218,8 +218,7 @@ class Controller:
         if len(rows) != 1:
             raise InputError(f"q has {len(rows)} rows; expected one pose, or call run")
         before = rows[0] if self._q is None else self._q
-        found = self._advance(np.stack([before, rows[0]]), 1, dt, rows=2)
-        return ControlRun(*(part[-1:] for part in found[:5]), found[5])  # type: ignore[arg-type]
+        return self._advance(np.stack([before, rows[0]]), 1, dt, kept=1)
 
     def run(
         self, steps: int, q: ArrayLike | None = None, q_target: ArrayLike | None = None, dt: float = 1.0
@@ -236,7 +235,7 @@ class Controller:
         """
         steps = integer("steps", steps, 1, 100_000_000)
         rows = self._motion(q, q_target)
-        return ControlRun(*self._advance(rows, steps, dt, rows=steps + 1))
+        return self._advance(rows, steps, dt, kept=steps + 1)
 
     def _motion(self, q: ArrayLike | None, q_target: ArrayLike | None) -> Array:
         """Poses (n, 2, 7) of both."""
@@ -246,10 +245,9 @@ class Controller:
         count = max(len(a), len(b))
         return np.stack([np.broadcast_to(a, (count, 7)), np.broadcast_to(b, (count, 7))], axis=1)
 
-    def _advance(
-        self, poses: Array, steps: int, dt: float, rows: int
-    ) -> tuple[Array, Array, Array, NDArray[np.int64], Array, ControlStatus]:
-        out = np.empty((rows, ROW))
+    def _advance(self, poses: Array, steps: int, dt: float, kept: int) -> ControlRun:
+        """Steps along poses; of the states the last one, or all of them in `kept` rows."""
+        out = np.empty((kept, ROW))
         status, done = run_control(
             self._table,
             self._pool,
@@ -271,4 +269,4 @@ class Controller:
         self._q = poses[min(done, len(poses) - 1)]
         count = 4 if self._second >= 0 else 2
         mode = out[:, MODE_F : MODE_G + 1][:, : count // 2].astype(np.int64)
-        return out[:, :count], out[:, DISTANCE], out[:, ERROR], mode, out[:, GAIN], _STATUSES[status]
+        return ControlRun(out[:, :count], out[:, DISTANCE], out[:, ERROR], mode, out[:, GAIN], _STATUSES[status])

@@ -1,15 +1,12 @@
 """From any start down to the nearest pair of two patches: the controller that takes over where Newton's method fails.
 
-The controller of theorem 2 of paper 000 moves the two witness points against the projection errors: with d = g - f,
-
-    a = -P_f^T grad_f,   b = -P_g^T grad_g,   grad_f = -d,   grad_g = d      (P: orthonormal tangents)
-
-lowers |d| for every positive definite gain. Here the gain is (H + mu I)^-1 of the nearest such mu,
+The controller of theorem 2 of paper 000 moves the two witness points against the projection errors. With d = g - f and
+orthonormal tangents P, the slopes of |d|^2 / 2 over lengths on the surfaces are -P_f^T d and P_g^T d, and every positive
+definite gain lowers |d|. Here the gain is (H + mu I)^-1 with a mu that makes it so,
 
     H = [[I + (d.n_f) A_f, -P_f^T P_g], [-P_g^T P_f, I - (d.n_g) A_g]],
 
-the second derivative of |d|^2 / 2 over lengths on the surfaces, A their shape operators: far away it is steepest
-descent, near a minimum Newton's method. What would leave a patch is set to zero component by component before the step
+the second derivative of |d|^2 / 2, A the shape operators: steepest descent far away, Newton's method near a minimum. What would leave a patch is set to zero component by component before the step
 and clamped after it (`docs/controllers.md`), and a step is taken only if the points come closer.
 """
 
@@ -29,6 +26,7 @@ from assembly.geometry.spline import (
     surface_point,
 )
 from assembly.geometry.vec import add, blend, dot, matvec, matvec_t, sub
+from assembly.kinematics.motion import position, relative_pose, rotation
 from assembly.proximity.extremal import (
     BEND,
     CONVERGED,
@@ -159,23 +157,23 @@ def descent_step(p, c, q, gf, gg, mu):
 
 
 @kernel(inline=True)
-def both_frames(table, pool, f, g, rotation, shift, x):
+def both_frames(table, pool, f, g, turn, shift, x):
     """`own_frame` of either surface, each in its own axes, and the vector d from f to g in both."""
     pf, nf, xf, yf, ef, a, regular_f = own_frame(table, pool, f, x[0], x[1])
     pg, ng, xg, yg, eg, b, regular_g = own_frame(table, pool, g, x[2], x[3])
-    d = sub(add(matvec(rotation, pg), shift), pf)
-    return (nf, xf, yf, ef, a), (ng, xg, yg, eg, b), d, matvec_t(rotation, d), regular_f and regular_g
+    d = sub(add(matvec(turn, pg), shift), pf)
+    return (nf, xf, yf, ef, a), (ng, xg, yg, eg, b), d, matvec_t(turn, d), regular_f and regular_g
 
 
 @kernel(inner=True)
-def finish(table, pool, f, g, rotation, shift, x, size, reach):
+def finish(table, pool, f, g, turn, shift, x, size, reach):
     """Newton's method from x: the result of `solve_pair`, and whether it is the root that the descent leads to.
 
     That is one no farther apart than x, off by no more than `reach` on either surface; with reach = 0, where the
     surfaces meet, one where they touch or, solids, are deepest in each other.
     """
-    n, tx, ty, pf, pg, e, t, a, c, r, beta, regular = pair_frame(table, pool, f, g, rotation, shift, x)
-    status, y, count, frame, matrices = solve_pair(table, pool, f, g, rotation, shift, x, size, BEND, 0.0)
+    n, tx, ty, pf, pg, e, t, a, c, r, beta, regular = pair_frame(table, pool, f, g, turn, shift, x)
+    status, y, count, frame, matrices = solve_pair(table, pool, f, g, turn, shift, x, size, BEND, 0.0)
     same = (status == CONVERGED or status == SINGULAR) and dot(n, frame[0]) > SAME
     if same:
         before = own_frame(table, pool, g, x[2], x[3])[1]
@@ -189,13 +187,13 @@ def finish(table, pool, f, g, rotation, shift, x, size, reach):
             same = same and abs(frame[10]) <= math.sqrt(dot(d, d)) + 1e-12 * size
             same = same and dot(moved_f, moved_f) <= limit and dot(moved_g, moved_g) <= limit
         else:
-            opposed = dot(after, matvec_t(rotation, frame[0])) < 0.0
+            opposed = dot(after, matvec_t(turn, frame[0])) < 0.0
             same = same and (abs(frame[10]) <= 1e-9 * size or (opposed and frame[10] < 0.0))
     return same, status, y, count, frame, matrices
 
 
 @kernel(inner=True)
-def descend_pair(table, pool, f, g, rotation, shift, x, size, limit):
+def descend_pair(table, pool, f, g, turn, shift, x, size, limit):
     """From any parameters x down to the nearest pair that the descent leads to, in at most `limit` steps.
 
     Returns what `solve_pair` returns: status, parameters, steps, frame, matrices. The points never move apart.
@@ -209,7 +207,7 @@ def descend_pair(table, pool, f, g, rotation, shift, x, size, limit):
     mu = LEAST
     near = NEAR
     count = 0
-    f_now, g_now, d, dg, regular = both_frames(table, pool, f, g, rotation, shift, x)
+    f_now, g_now, d, dg, regular = both_frames(table, pool, f, g, turn, shift, x)
     square = dot(d, d)
     while regular:
         if square <= MEET * MEET * size * size:
@@ -231,8 +229,8 @@ def descend_pair(table, pool, f, g, rotation, shift, x, size, limit):
             p = (1.0 - end_curvature(table, pool, f, x[0], x[1], tf[1] != 0.0, d), 0.0, 1.0)
         if tg[4] == 1:
             q = (1.0 + end_curvature(table, pool, g, x[2], x[3], tg[1] != 0.0, dg), 0.0, 1.0)
-        f1 = matvec_t(rotation, blend(tf[0], xf, tf[1], yf))
-        f2 = matvec_t(rotation, blend(tf[2], xf, tf[3], yf))
+        f1 = matvec_t(turn, blend(tf[0], xf, tf[1], yf))
+        f2 = matvec_t(turn, blend(tf[2], xf, tf[3], yf))
         g1 = blend(tg[0], xg, tg[1], yg)
         g2 = blend(tg[2], xg, tg[3], yg)
         c = (-dot(f1, g1), -dot(f1, g2), -dot(f2, g1), -dot(f2, g2))
@@ -252,7 +250,7 @@ def descend_pair(table, pool, f, g, rotation, shift, x, size, limit):
             if not held and bend < near and mu <= 1e-3 * first:
                 # `solve_pair` takes the rest; should it go elsewhere, the descent goes on to a nearer start.
                 same, done, y, more, frame, matrices = finish(
-                    table, pool, f, g, rotation, shift, x, size, 8.0 * step + 1e-9 * size
+                    table, pool, f, g, turn, shift, x, size, 8.0 * step + 1e-9 * size
                 )
                 if same:
                     return done, y, count + more, frame, matrices
@@ -271,7 +269,7 @@ def descend_pair(table, pool, f, g, rotation, shift, x, size, limit):
                 table, pool, g, x[2], x[3], eg[0] * bx + eg[1] * by, eg[2] * by, blend(bx, xg, by, yg)
             )
             y = (uf, vf, ug, vg)
-            f_next, g_next, d_next, dg_next, regular_next = both_frames(table, pool, f, g, rotation, shift, y)
+            f_next, g_next, d_next, dg_next, regular_next = both_frames(table, pool, f, g, turn, shift, y)
             now = dot(d_next, d_next)
             count += 1
             # What the slope alone would give over this step.
@@ -294,9 +292,27 @@ def descend_pair(table, pool, f, g, rotation, shift, x, size, limit):
     if status == NOT_CONVERGED and square <= TOUCH * TOUCH * size * size:
         status = CROSSED
     if status == CROSSED:
-        same, done, y, more, frame, matrices = finish(table, pool, f, g, rotation, shift, x, size, 0.0)
+        same, done, y, more, frame, matrices = finish(table, pool, f, g, turn, shift, x, size, 0.0)
         if same:
             return done, y, count + more, frame, matrices
-    n, tx, ty, pf, pg, e, t, a, c, r, beta, regular = pair_frame(table, pool, f, g, rotation, shift, x)
+    n, tx, ty, pf, pg, e, t, a, c, r, beta, regular = pair_frame(table, pool, f, g, turn, shift, x)
     matrices = pair_matrix(a, c, beta, 1e-9 / size)
     return status, x, count, (n, tx, ty, pf, pg, e, t, a, c, r, beta, regular), matrices
+
+
+@kernel
+def find_descent(table, pool, f, g, q, x, size, limit, out):
+    """The descent for Python.
+
+    out: parameters (4), point of f (3), point of g (3), normal (3), gap; all in world axes. Returns the status.
+    """
+    turn_f = rotation(q, 0)
+    turn, shift = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
+    status, x, _count, frame, _matrices = descend_pair(table, pool, f, g, turn, shift, x, size, limit)
+    origin = position(q, 0)
+    out[0], out[1], out[2], out[3] = x
+    out[4], out[5], out[6] = add(matvec(turn_f, frame[3]), origin)
+    out[7], out[8], out[9] = add(matvec(turn_f, frame[4]), origin)
+    out[10], out[11], out[12] = matvec(turn_f, frame[0])
+    out[13] = frame[10]
+    return status
