@@ -1,13 +1,14 @@
 """From any start down to the nearest pair of two patches: the controller that takes over where Newton's method fails.
 
 The controller of theorem 2 of paper 000 moves the two witness points against the projection errors. With d = g - f and
-orthonormal tangents P, the slopes of |d|^2 / 2 over lengths on the surfaces are -P_f^T d and P_g^T d, and every positive
-definite gain lowers |d|. Here the gain is (H + mu I)^-1 with a mu that makes it so,
+orthonormal tangents P, the slopes of |d|^2 / 2 over lengths on the surfaces are -P_f^T d and P_g^T d, and any positive
+definite gain lowers |d|. Here the gain is (H + mu I)^-1 with a mu that makes it positive definite,
 
     H = [[I + (d.n_f) A_f, -P_f^T P_g], [-P_g^T P_f, I - (d.n_g) A_g]],
 
-the second derivative of |d|^2 / 2, A the shape operators: steepest descent far away, Newton's method near a minimum. What would leave a patch is set to zero component by component before the step
-and clamped after it (`docs/controllers.md`), and a step is taken only if the points come closer.
+the second derivative of |d|^2 / 2, A the shape operators: steepest descent far away, Newton's method near a minimum.
+What would leave a patch is set to zero component by component before the step and clamped after it
+(`docs/controllers.md`), and a step is taken only if the points come closer.
 """
 
 from __future__ import annotations
