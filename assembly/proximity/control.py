@@ -121,8 +121,8 @@ class Controller:
     form : "unit", "covariant" or "contravariant"
         What the projections psi are of: f - h on unit tangents, on f_u and f_v, or its components along them.
     gain : float, optional
-        K of u' = -K psi [1/s]. By default, and at most with a `rate`, half of what a step may have: 1 / (dt times the
-        largest eigenvalue), for which see `gain_limit`.
+        K of u' = -K psi [1/s]. By default, and at most with a `rate`, half of what a step may have (`gain_limit`), and
+        where nothing moves a step that would lead farther apart is halved.
     rate : float, optional
         K is chosen so that |f - h| - nearest decays by this rate [1/s]: bounded where `nearest` is the least distance.
     nearest : float
@@ -141,9 +141,8 @@ class Controller:
 
     Notes
     -----
-    Paper 000, eqs. 1, 13 and 14, with the sign, the gains and the saturation of `docs/controllers.md`. Distances
-    shrink in every step with the default gain but for terms of higher order; that it is the closest point that is
-    reached holds where `is_globally_convergent` says so. A pole counts as an edge of the patch.
+    Paper 000, eqs. 1, 13 and 14, with the sign, the gains and the saturation of `docs/controllers.md`. That it is the
+    closest point that is reached holds where `is_globally_convergent` says so. A pole counts as an edge of the patch.
     """
 
     def __init__(

@@ -34,6 +34,8 @@ ROW = 9
 DISTANCE, ERROR, MODE_F, MODE_G, GAIN = 4, 5, 6, 7, 8
 # Fields of a law: gain (0: as large as the step allows), exponential rate (0: none), the least distance, feed-forward.
 LAW_GAIN, LAW_RATE, LAW_NEAREST, LAW_FEED, LAW = 0, 1, 2, 3, 4
+# A step without a given gain is halved at most so often.
+HALVINGS = 30
 # How region-of-attraction runs move.
 NEWTON, NEWTON_SATURATED, SWITCHING = 0, 1, 2
 
@@ -152,7 +154,10 @@ def control_rates(table, pool, f, g, turn, shift, x, drift_f, drift_g, form, law
     h = second_form(s, d)
     power = -(psi[0] * ru + psi[1] * rv)
     error = free_error(psi, s[1], s[2], held_u, held_v)
-    top = largest(h, b, held_u, held_v)
+    zero = (0.0, 0.0, 0.0)
+    # Where D's curvature cancels that of the metric, H says nothing of larger steps: B I bounds the gain then.
+    metric_f = largest(second_form(s, zero), b, held_u, held_v)
+    top = max(largest(h, b, held_u, held_v), metric_f)
     rr = 0.0
     rs = 0.0
     held_r = False
@@ -169,10 +174,8 @@ def control_rates(table, pool, f, g, turn, shift, x, drift_f, drift_g, form, law
         power -= chi[0] * rr + chi[1] * rs
         error += free_error(chi, t[1], t[2], held_r, held_s)
         # A bound for both together: the couplings -f_i.h_j add at most the mean of those of B I.
-        zero = (0.0, 0.0, 0.0)
-        top = max(top, largest(k, c, held_r, held_s)) + math.sqrt(
-            largest(second_form(s, zero), b, held_u, held_v) * largest(second_form(t, zero), c, held_r, held_s)
-        )
+        metric_g = largest(second_form(t, zero), c, held_r, held_s)
+        top = max(top, largest(k, c, held_r, held_s), metric_g) + math.sqrt(metric_f * metric_g)
     limit = 1.0 / (dt * top) if top > 0.0 else 0.0
     gain = law[LAW_GAIN] if law[LAW_GAIN] > 0.0 else limit
     if law[LAW_RATE] > 0.0:
@@ -198,6 +201,35 @@ def control_rates(table, pool, f, g, turn, shift, x, drift_f, drift_g, form, law
         if definite:
             rates = (rates[0] + add_f[0], rates[1] + add_f[1], rates[2] + add_g[0], rates[3] + add_g[1])
     return rates, distance, math.sqrt(error), mode_f, mode_g, gain
+
+
+@kernel(inline=True)
+def moved(table, pool, f, g, x, rates, dt):
+    """Parameters after an Euler step, wrapped and clamped."""
+    uf, vf, _end = into_domain(table, pool, f, x[0] + dt * rates[0], x[1] + dt * rates[1])
+    ug, vg = x[2], x[3]
+    if g >= 0:
+        ug, vg, _end = into_domain(table, pool, g, x[2] + dt * rates[2], x[3] + dt * rates[3])
+    return (uf, vf, ug, vg)
+
+
+@kernel(inner=True)
+def lowering(table, pool, f, g, turn, shift, x, rates, dt, distance):
+    """Parameters after a step that does not lead farther apart: a whole one, or the largest of its halves."""
+    y = x
+    for _ in range(HALVINGS):
+        y = moved(table, pool, f, g, x, rates, dt)
+        target = shift
+        if g >= 0:
+            target = add(matvec(turn, surface_point(table, pool, g, y[2], y[3])[0]), shift)
+        p = surface_point(table, pool, f, y[0], y[1])[0]
+        d = sub(p, target)
+        # At rest distances differ by the rounding of the points.
+        rounding = 1e-14 * (math.sqrt(dot(p, p)) + math.sqrt(dot(target, target)))
+        if dot(d, d) <= distance * (distance + rounding):
+            return y
+        dt *= 0.5
+    return y
 
 
 @kernel(inline=True)
@@ -264,11 +296,10 @@ def run_control(table, pool, f, g, point, poses, x, dt, steps, form, law, tolera
             return CLOSEST, k
         if k == steps:
             break
-        uf, vf, _end = into_domain(table, pool, f, x[0] + dt * rates[0], x[1] + dt * rates[1])
-        ug, vg = x[2], x[3]
-        if g >= 0:
-            ug, vg, _end = into_domain(table, pool, g, x[2] + dt * rates[2], x[3] + dt * rates[3])
-        x = (uf, vf, ug, vg)
+        if still and law[LAW_GAIN] == 0.0:
+            x = lowering(table, pool, f, g, turn, shift, x, rates, dt, distance)
+        else:
+            x = moved(table, pool, f, g, x, rates, dt)
         turn, shift = next_turn, next_shift
     return ON_ITS_WAY, steps
 
@@ -309,10 +340,11 @@ def attraction(table, pool, point, starts, method, form, limit, tolerance, out):
         error = math.inf
         for _ in range(limit):
             if method == SWITCHING:
-                rates, _d, error, _f, _g, _k = control_rates(
+                rates, distance, error, _f, _g, _k = control_rates(
                     table, pool, 0, -1, same, point, x, zero, zero, form, law, 1.0
                 )
-                du, dv = rates[0], rates[1]
+                y = lowering(table, pool, 0, -1, same, point, x, rates, 1.0, distance)
+                clamped = False
             else:
                 s = surface_point(table, pool, 0, x[0], x[1])
                 d = sub(s[0], point)
@@ -326,14 +358,15 @@ def attraction(table, pool, point, starts, method, form, limit, tolerance, out):
                     du = 0.0 if held_u else du
                     dv = 0.0 if held_v else dv
                 error = math.sqrt(free_error((dot(d, s[1]), dot(d, s[2])), s[1], s[2], held_u, held_v))
+                u, v, clamped = into_domain(table, pool, 0, x[0] + du, x[1] + dv)
+                y = (u, v, 0.0, 0.0)
             if error <= tolerance:
                 ended += 1
                 break
-            u, v, clamped = into_domain(table, pool, 0, x[0] + du, x[1] + dv)
             if clamped and method == NEWTON:
                 error = math.inf
                 break
-            x = (u, v, 0.0, 0.0)
+            x = y
         out[i, 0], out[i, 1] = x[0], x[1]
         out[i, 2] = min(error, 1e300)
     return ended
