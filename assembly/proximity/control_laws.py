@@ -293,7 +293,8 @@ def run_control(table, pool, f, g, point, poses, x, dt, steps, form, law, tolera
         if distance <= meet:
             return MEETING, k
         if still and error <= tolerance:
-            return CLOSEST, k
+            # Where patches cross the error is of the distance itself.
+            return CLOSEST if distance > 10.0 * tolerance else MEETING, k
         if k == steps:
             break
         if still and law[LAW_GAIN] == 0.0:

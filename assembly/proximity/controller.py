@@ -46,8 +46,10 @@ from assembly.proximity.extremal import (
 CROSSED = 4
 # Newton's method takes over where a step turns the normals by less than this many radians.
 NEAR = 0.1
-# A root is that of the descent if neither normal turned by more than the angle with this cosine on the way.
-SAME = 0.8
+# Newton's method is given up where a step would turn a normal by more: from points that are apart, or that meet.
+TURN_APART, TURN_MET = 0.5, 1.0
+# A root is that of the descent if no normal turned by more than the angle with this cosine on the way.
+SAME_APART, SAME_MET = 0.8, 0.5
 # Points nearer than this part of the size meet; steps shorter than it end the descent.
 MEET = 1e-10
 # Where the descent ends with points nearer than this part of the size, they would meet: surfaces that touch.
@@ -174,12 +176,14 @@ def finish(table, pool, f, g, turn, shift, x, size, reach):
     surfaces meet, one where they touch or, solids, are deepest in each other.
     """
     n, tx, ty, pf, pg, e, t, a, c, r, beta, regular = pair_frame(table, pool, f, g, turn, shift, x)
-    status, y, count, frame, matrices = solve_pair(table, pool, f, g, turn, shift, x, size, BEND, 0.0)
-    same = (status == CONVERGED or status == SINGULAR) and dot(n, frame[0]) > SAME
+    most = TURN_APART if reach > 0.0 else TURN_MET
+    cosine = SAME_APART if reach > 0.0 else SAME_MET
+    status, y, count, frame, matrices = solve_pair(table, pool, f, g, turn, shift, x, size, most, 0.0)
+    same = (status == CONVERGED or status == SINGULAR) and dot(n, frame[0]) > cosine
     if same:
         before = own_frame(table, pool, g, x[2], x[3])[1]
         after = own_frame(table, pool, g, y[2], y[3])[1]
-        same = dot(before, after) > SAME
+        same = dot(before, after) > cosine
         if reach > 0.0:
             d = sub(pg, pf)
             moved_f = sub(frame[3], pf)
