@@ -5,42 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from assembly.geometry.surface import NurbsSurface
-
-# Table I of paper 000, rows of equal y; degree 2 with thirds is the only reading with five points and "order 3".
-TABLE = np.array(
-    [
-        [(0, 0, 0), (3, 0, 2), (5, 0, 3), (8, 0, 3), (10, 0, 0)],
-        [(1, 3, 3), (3, 3, 5), (5, 3, 6), (8, 3, 5), (9, 3, 3)],
-        [(2, 5, 5), (3, 5, 7), (5, 5, 8), (8, 5, 7), (8, 5, 5)],
-        [(1, 8, 3), (3, 8, 5), (5, 8, 6), (8, 8, 5), (9, 8, 3)],
-        [(0, 10, 0), (3, 10, 2), (5, 10, 3), (8, 10, 2), (10, 10, 0)],
-    ],
-    dtype=float,
-)
-
-
-def table_one():
-    knots = [0, 0, 0, 1 / 3, 2 / 3, 1, 1, 1]
-    return NurbsSurface(TABLE.transpose(1, 0, 2), (knots, knots), (2, 2))
-
-
-def biquadratic(function):
-    """The surface of a map of (u, v) in [0, 1]^2 that is quadratic in u and in v: exact."""
-    values = np.array([[function(u, v) for v in (0.0, 0.5, 1.0)] for u in (0.0, 0.5, 1.0)])
-    to_bezier = np.array([[1.0, 0.0, 0.0], [-0.5, 2.0, -0.5], [0.0, 0.0, 1.0]])
-    knots = [0, 0, 0, 1, 1, 1]
-    return NurbsSurface(np.einsum("ik,jl,klm->ijm", to_bezier, to_bezier, values), (knots, knots), (2, 2))
-
-
-def paraboloid(a, b, skew, half=5.0):
-    """z = 8 - a x^2 - b y^2 over a parallelogram: convex, with a convex shadow; 0.06, 0.05 and 0.3 span 84 degrees."""
-
-    def point(u, v):
-        y = half * (2.0 * v - 1.0)
-        x = half * (2.0 * u - 1.0) + skew * y
-        return x, y, 8.0 - a * x * x - b * y * y
-
-    return biquadratic(point)
+from benchmarks.controllers import paraboloid
 
 
 def random_paraboloid(rng):

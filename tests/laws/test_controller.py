@@ -7,7 +7,8 @@ import pytest
 
 from assembly.geometry.face import Face
 from assembly.proximity import Controller, ControlStatus, extremal_pair, gain_bounds, gain_limit
-from tests.laws.control_scenes import above, random_paraboloid, table_one
+from benchmarks.controllers import table_one
+from tests.laws.control_scenes import above, random_paraboloid
 from tests.laws.scenes import placed, random_quaternion
 
 FORMS = ("unit", "covariant", "contravariant")

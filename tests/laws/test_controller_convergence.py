@@ -19,13 +19,12 @@ from assembly.proximity import (
     is_globally_convergent,
 )
 from assembly.proximity.control_bounds import final_parameters
+from benchmarks.controllers import paraboloid, table_one
 from tests.laws.control_scenes import (
     above,
     annular_sector,
     grid,
-    paraboloid,
     random_paraboloid,
-    table_one,
     thin_ellipsoid,
 )
 from tests.laws.scenes import dome, placed, random_quaternion
