@@ -246,7 +246,7 @@ class Controller:
 
     def _advance(self, poses: Array, steps: int, dt: float, kept: int) -> ControlRun:
         """Steps along poses; of the states the last one, or all of them in `kept` rows."""
-        out = np.empty((kept, ROW))
+        out = np.zeros((kept, ROW))
         status, done = run_control(
             self._table,
             self._pool,

@@ -287,9 +287,9 @@ def run_control(table, pool, f, g, point, poses, x, dt, steps, form, law, tolera
         rates, distance, error, mode_f, mode_g, gain = control_rates(
             table, pool, f, g, turn, shift, x, drift_f, drift_g, form, law, dt
         )
-        write_row(out, min(k, last), x, distance, error, mode_f, mode_g, gain)
         if not distance < 1e300:
-            return IRREGULAR, k
+            return IRREGULAR, max(k - 1, 0)
+        write_row(out, min(k, last), x, distance, error, mode_f, mode_g, gain)
         if distance <= meet:
             return MEETING, k
         if still and error <= tolerance:
@@ -320,9 +320,11 @@ def newton_change(s, d, form):
         m21 -= g * dot(s[2], s[4])
         m22 -= g * dot(s[2], s[5])
     det = m11 * m22 - m12 * m21
-    if det == 0.0:
+    du = -(m22 * psi[0] - m12 * psi[1]) / det
+    dv = -(m11 * psi[1] - m21 * psi[0]) / det
+    if not (abs(du) < 1e300 and abs(dv) < 1e300):
         return 0.0, 0.0
-    return -(m22 * psi[0] - m12 * psi[1]) / det, -(m11 * psi[1] - m21 * psi[0]) / det
+    return du, dv
 
 
 @kernel

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from assembly.geometry.face import Face
 from assembly.proximity import Controller, ControlStatus, extremal_pair, gain_bounds, gain_limit
@@ -198,3 +199,20 @@ def test_turning_the_bodies_together_changes_nothing():
     # Roundings of lengths of 20.
     np.testing.assert_allclose(there.parameters, here.parameters, atol=1e-12)
     np.testing.assert_allclose(there.distance, here.distance, atol=1e-12)
+
+
+def test_a_surface_that_moves_is_a_point_that_moves_the_other_way():
+    rng = np.random.default_rng(9)
+    surface = random_paraboloid(rng)
+    t = np.linspace(0.0, 1.0, 201)
+    q = np.stack([np.sin(t), t, 0 * t, 1 + 0 * t, 0.3 * t, 0.2 * np.sin(t), 0.1 * t], axis=1)
+    point = np.array([1.0, -2.0, 12.0])
+    turn = Rotation.from_quat(q[:, 3:], scalar_first=True)
+    seen = np.pad(turn.inv().apply(point - q[:, :3]), ((0, 0), (0, 4)))
+    seen[:, 3] = 1.0
+    for feedforward in (False, True):
+        one, other = (Controller(surface, place, gain=5.0, feedforward=feedforward) for place in (point, (0, 0, 0)))
+        a, b = one.run(200, q=q, dt=5e-3), other.run(200, q_target=seen, dt=5e-3)
+        # Roundings of lengths of ten.
+        np.testing.assert_allclose(a.parameters, b.parameters, atol=1e-12)
+        np.testing.assert_allclose(a.error, b.error, atol=1e-11)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from assembly.geometry import shapes
 from assembly.geometry.face import Face
@@ -78,6 +79,31 @@ def test_two_patches_fall_together(form):
         # Slopes of 1e-10 of the size over second derivatives that may be a thousandth.
         np.testing.assert_allclose(run.parameters[-1], x, atol=1e-5)
         assert abs(run.distance[-1] - gap) < 1e-9
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_two_patches_that_are_held_at_their_ends(form):
+    # What the printed law leaves: several parameters held at once, on both patches.
+    rng = np.random.default_rng(9)
+    several = 0
+    for _ in range(40):
+        f, g = dome(rng), dome(rng)
+        q = np.r_[rng.normal(size=3) + (0.0, 0.0, 3.0), random_quaternion(rng)]
+        start = [rng.uniform(low, high) for side in (f, g) for low, high in side.domain]
+        run = Controller(f, g, form=form, start=start).run(400_000, q_target=q)
+        assert run.status in (ControlStatus.CLOSEST, ControlStatus.MEETING)
+        assert np.diff(run.distance).max(initial=0.0) < 1e-12
+        low, high = np.array([*f.domain, *g.domain]).T
+        assert np.all((run.parameters >= low) & (run.parameters <= high))
+        several += run.mode[-1].sum() > 1
+        if run.status is ControlStatus.MEETING:
+            continue
+        x = run.parameters[-1]
+        turn = Rotation.from_quat(q[3:], scalar_first=True)
+        at_g = turn.apply(g.evaluate(*x[2:])) + q[:3]
+        at_f = turn.inv().apply(f.evaluate(*x[:2]) - q[:3])
+        assert max(slopes(f, x[:2], at_g), slopes(g, x[2:], at_f)) < 1e-8
+    assert several > 10
 
 
 @pytest.mark.parametrize("form", FORMS)
@@ -223,6 +249,21 @@ def test_the_lag_is_one_over_the_gain():
 def test_feedforward_leaves_ten_thousandths_of_the_lag():
     assert follow(50.0, feedforward=True).error[5_000:].max() < 1e-6
     assert follow(1000.0, feedforward=True).error[5_000:].max() < 1e-7
+
+
+def test_feedforward_along_an_edge():
+    # Beside the patch: its closest points run along an end, held.
+    surface = paraboloid(0.06, 0.05, 0.3)
+    t = np.linspace(0.0, 1.0, 2_001)
+    path = np.pad(np.stack([9.0 + np.sin(t), 3.0 * np.cos(2 * t), 6.0 + t], 1), ((0, 0), (0, 4)))
+    path[:, 3] = 1.0
+    errors = {}
+    for feedforward in (False, True):
+        control = Controller(surface, (0, 0, 0), gain=20.0, feedforward=feedforward)
+        run = control.run(2_000, q_target=path, dt=5e-4)
+        assert run.modes == ("edge",)
+        errors[feedforward] = run.error[1_000:].max()
+    assert errors[True] < 1e-3 * errors[False]
 
 
 def test_the_largest_gain_is_that_of_the_eigenvalues():

@@ -240,6 +240,19 @@ def test_too_large_a_gain_is_said():
     assert Controller(shapes.plane(2.0, 2.0), (0.3, 0.2, 1.0), gain=5.0).run(100).status is ControlStatus.ON_ITS_WAY
 
 
+def test_no_gain_makes_numbers_that_are_none():
+    for surface in (shapes.sphere(1.0), shapes.plane(2.0, 2.0)):
+        for form in ("unit", "covariant", "contravariant"):
+            control = Controller(surface, (3.0, 0.5, 1.0), form=form, gain=1e308, start=[0.6, 0.7])
+            run = control.run(20, dt=1e5)
+            assert run.status in (ControlStatus.IRREGULAR, ControlStatus.ON_ITS_WAY, ControlStatus.CLOSEST)
+            assert np.isfinite(run.parameters).all() and np.isfinite(run.distance).all()
+            assert np.isfinite(control.parameters).all()
+    # Newton's method where its matrix is singular, and far from everything.
+    ends, _rested = final_parameters(shapes.plane(2.0, 2.0), (1e200, 0.0, 0.0), [[0.1, 0.2]], "newton")
+    assert np.isfinite(ends).all()
+
+
 def test_bad_input():
     flat = shapes.plane(2.0, 2.0)
     cases = [
