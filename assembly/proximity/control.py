@@ -102,10 +102,10 @@ def _poses(name: str, side: object, q: ArrayLike | None) -> Array:
     if q is None:
         body = side.body if isinstance(side, (BodyFace, Point)) else None
         return np.array([_IDENTITY if body is None else body.q], dtype=np.float64)
-    array = np.asarray(q)
-    rows = vector(name, q, 7)[None] if array.ndim < 2 else real_array(name, q, ("n", 7))
-    for k in np.flatnonzero(~(np.abs(rows[:, 3:]).max(axis=1) > 1e-100)):
-        nonzero_quaternion(f"{name}[{k}, 3:]", rows[k, 3:])
+    rows = real_array(name, q, ("n", 7)) if np.ndim(q) > 1 else vector(name, q, 7)[None]
+    for k, (_x, _y, _z, *e) in enumerate(rows.tolist()):
+        if not max(map(abs, e)) > 1e-100:
+            nonzero_quaternion(f"{name}[{k}, 3:]", e)
     return rows
 
 
@@ -213,11 +213,10 @@ class Controller:
         dt : float
             Without a `gain` or a `rate` it does not matter.
         """
-        rows = self._motion(q, q_target)
-        if len(rows) != 1:
-            raise InputError(f"q has {len(rows)} rows; expected one pose, or call run")
-        before = rows[0] if self._q is None else self._q
-        return self._advance(np.stack([before, rows[0]]), 1, dt, kept=1)
+        after = self._motion(q, q_target)
+        if len(after) != 1:
+            raise InputError(f"q has {len(after)} rows; expected one pose, or call run")
+        return self._advance(np.concatenate([after if self._q is None else self._q, after]), 1, dt, kept=1)
 
     def run(
         self, steps: int, q: ArrayLike | None = None, q_target: ArrayLike | None = None, dt: float = 1.0
@@ -241,8 +240,10 @@ class Controller:
         a, b = _poses("q", self._sides[0], q), _poses("q_target", self._sides[1], q_target)
         if len(a) != len(b) and 1 not in (len(a), len(b)):
             raise InputError(f"q has {len(a)} rows and q_target {len(b)}; expected as many, or one")
-        count = max(len(a), len(b))
-        return np.stack([np.broadcast_to(a, (count, 7)), np.broadcast_to(b, (count, 7))], axis=1)
+        poses = np.empty((max(len(a), len(b)), 2, 7))
+        poses[:, 0] = a
+        poses[:, 1] = b
+        return poses
 
     def _advance(self, poses: Array, steps: int, dt: float, kept: int) -> ControlRun:
         """Steps along poses; of the states the last one, or all of them in `kept` rows."""
@@ -265,7 +266,8 @@ class Controller:
         )
         out = out[: done + 1]
         self._x = tuple(out[-1, :4].tolist())
-        self._q = poses[min(done, len(poses) - 1)]
+        last = min(done, len(poses) - 1)
+        self._q = poses[last : last + 1]
         count = 4 if self._second >= 0 else 2
         mode = out[:, MODE_F : MODE_G + 1][:, : count // 2].astype(np.int64)
         return ControlRun(out[:, :count], out[:, DISTANCE], out[:, ERROR], mode, out[:, GAIN], _STATUSES[status])
