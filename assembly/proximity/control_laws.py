@@ -25,11 +25,9 @@ from assembly.proximity.extremal import into_domain
 
 # Forms of the projections.
 UNIT, COVARIANT, CONTRAVARIANT = 0, 1, 2
-# Modes of a witness point: how many of its parameters are held.
-INTERIOR, EDGE, CORNER = 0, 1, 2
 # Statuses of a run.
 CLOSEST, ON_ITS_WAY, MEETING, IRREGULAR = 0, 1, 2, 3
-# What is written of a step: parameters (4), distance, error, modes (2), gain.
+# What is written of a step: parameters (4), distance, error, modes (2: how many parameters are held), gain.
 ROW = 9
 DISTANCE, ERROR, MODE_F, MODE_G, GAIN = 4, 5, 6, 7, 8
 # Fields of a law: gain (0: as large as the step allows), exponential rate (0: none), the least distance, feed-forward.
