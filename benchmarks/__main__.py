@@ -21,7 +21,19 @@ from benchmarks.timing import calibration
 
 # Modules with `run(quick: bool) -> dict`. The dict goes to the JSON as it is; its "rows", a list of
 # flat dicts, are printed as a table, and so are its "figures" (`figures.figure`), which go to the page as well.
-BENCHMARKS = ("evaluation", "trims", "pairs", "features", "facets", "wires", "mechanisms", "laws", "step", "start")
+BENCHMARKS = (
+    "evaluation",
+    "trims",
+    "pairs",
+    "controllers",
+    "features",
+    "facets",
+    "wires",
+    "mechanisms",
+    "laws",
+    "step",
+    "start",
+)
 LIBRARIES = ("assembly", "casadi", "meshcat", "numba", "numpy", "scipy", "cadquery-ocp", "coal", "python-fcl")
 RESULTS = Path(__file__).resolve().parent / "results"
 

@@ -7,6 +7,15 @@ from typing import TYPE_CHECKING
 from assembly._lazy import lazy_names
 
 if TYPE_CHECKING:
+    from assembly.proximity.control import Controller as Controller
+    from assembly.proximity.control import ControlRun as ControlRun
+    from assembly.proximity.control import ControlStatus as ControlStatus
+    from assembly.proximity.control_bounds import GainBounds as GainBounds
+    from assembly.proximity.control_bounds import Hypotheses as Hypotheses
+    from assembly.proximity.control_bounds import convergence_hypotheses as convergence_hypotheses
+    from assembly.proximity.control_bounds import gain_bounds as gain_bounds
+    from assembly.proximity.control_bounds import gain_limit as gain_limit
+    from assembly.proximity.control_bounds import is_globally_convergent as is_globally_convergent
     from assembly.proximity.curve_pairs import CurvePair as CurvePair
     from assembly.proximity.curve_pairs import curve_contact_jacobian as curve_contact_jacobian
     from assembly.proximity.curve_pairs import curve_gap_gradient as curve_gap_gradient
@@ -20,6 +29,7 @@ if TYPE_CHECKING:
     from assembly.proximity.pairs import ContactPair as ContactPair
     from assembly.proximity.pairs import PairStatus as PairStatus
     from assembly.proximity.pairs import contact_jacobian as contact_jacobian
+    from assembly.proximity.pairs import descend as descend
     from assembly.proximity.pairs import extremal_pair as extremal_pair
     from assembly.proximity.pairs import gap_gradient as gap_gradient
     from assembly.proximity.pairs import gap_hessian as gap_hessian
@@ -27,6 +37,15 @@ else:
     __getattr__, __dir__, __all__ = lazy_names(
         __name__,
         {
+            "ControlRun": "assembly.proximity.control",
+            "ControlStatus": "assembly.proximity.control",
+            "Controller": "assembly.proximity.control",
+            "GainBounds": "assembly.proximity.control_bounds",
+            "Hypotheses": "assembly.proximity.control_bounds",
+            "convergence_hypotheses": "assembly.proximity.control_bounds",
+            "gain_bounds": "assembly.proximity.control_bounds",
+            "gain_limit": "assembly.proximity.control_bounds",
+            "is_globally_convergent": "assembly.proximity.control_bounds",
             "CurvePair": "assembly.proximity.curve_pairs",
             "curve_contact_jacobian": "assembly.proximity.curve_pairs",
             "curve_gap_gradient": "assembly.proximity.curve_pairs",
@@ -40,6 +59,7 @@ else:
             "ContactPair": "assembly.proximity.pairs",
             "PairStatus": "assembly.proximity.pairs",
             "contact_jacobian": "assembly.proximity.pairs",
+            "descend": "assembly.proximity.pairs",
             "extremal_pair": "assembly.proximity.pairs",
             "gap_gradient": "assembly.proximity.pairs",
             "gap_hessian": "assembly.proximity.pairs",

@@ -13,16 +13,17 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.errors import InputError, real_array, vector
+from assembly.errors import InputError, integer, real_array, vector
 from assembly.geometry.face import Face
 from assembly.geometry.spline import BREAKS_U, BREAKS_V, CELLS, COEFFICIENTS, SURFACE_RECORD
 from assembly.geometry.surface import NurbsSurface
 from assembly.kinematics.body import BodyFace
 from assembly.kinematics.pose import nonzero_quaternion
+from assembly.proximity.controller import CROSSED, find_descent
 from assembly.proximity.start import find_pair
 from assembly.proximity.velocity import pair_derivatives
 
-__all__ = ["ContactPair", "PairStatus", "contact_jacobian", "extremal_pair", "gap_gradient", "gap_hessian"]
+__all__ = ["ContactPair", "PairStatus", "contact_jacobian", "descend", "extremal_pair", "gap_gradient", "gap_hessian"]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
@@ -161,6 +162,47 @@ def extremal_pair(
     out = np.empty(14)
     status = find_pair(table, pool, 0, SURFACE_RECORD, q, x, size, out)
     return ContactPair(out[:4], out[4:10].reshape(2, 3), out[10:13], float(out[13]), _STATUSES[status])
+
+
+def descend(
+    surface_f: Side, q_f: ArrayLike, surface_g: Side, q_g: ArrayLike, start: ArrayLike, steps: int = 200
+) -> ContactPair:
+    """The nearest pair of two patches that a descent from any start leads to: points that never move apart.
+
+    Where Newton's method alone may go to any extremum, or nowhere, this one follows the distance down and lets Newton's
+    method finish at the minimum it has come to.
+
+    Parameters
+    ----------
+    surface_f, surface_g : NurbsSurface, Face or BodyFace
+        The whole patches; trims are not seen.
+    q_f, q_g : (7,)
+        Their bodies' poses.
+    start : (4,)
+        Parameters u_f, v_f, u_g, v_g.
+    steps : int
+        The most steps.
+
+    Returns
+    -------
+    ContactPair
+        LEFT_PATCH: nearest at an end of a patch. NOT_CONVERGED also where the patches cross, and the points met, and no
+        pair of a shallow penetration is beside them. Where they touch or overlap a little, that pair.
+
+    Raises
+    ------
+    InputError, TypeError
+        Naming the argument.
+    """
+    f, g = as_face("surface_f", surface_f), as_face("surface_g", surface_g)
+    steps = integer("steps", steps, 1, 1_000_000)
+    q = _configuration(q_f, q_g)
+    table, pool, size = _packed(_key(f), _key(g))
+    x = inside("start", vector("start", start, 4), (f.surface, g.surface))
+    out = np.empty(14)
+    status = find_descent(table, pool, 0, SURFACE_RECORD, q, x, size, steps, out)
+    named = PairStatus.NOT_CONVERGED if status == CROSSED else _STATUSES[status]
+    return ContactPair(out[:4], out[4:10].reshape(2, 3), out[10:13], float(out[13]), named)
 
 
 def _derivatives(

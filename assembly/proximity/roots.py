@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from assembly._kernel import call_address, kernel
-from assembly.geometry.spline import BREAKS_U, BREAKS_V, CLOSED_U, CLOSED_V, SPANS_U, SPANS_V, surface_point
+from assembly.geometry.spline import BREAKS_U, BREAKS_V, CLOSED_U, CLOSED_V, SIGN, SPANS_U, SPANS_V, surface_point
 from assembly.geometry.vec import add, cross, dot, matvec, matvec_t, scale, sub
 from assembly.kinematics.motion import rotation
 from assembly.proximity.bounding_tree import (
@@ -35,7 +35,7 @@ from assembly.proximity.bounding_tree import (
     seen_from,
     three,
 )
-from assembly.proximity.extremal import CONVERGED, SINGULAR, solve_pair
+from assembly.proximity.extremal import CONVERGED, SINGULAR, into_domain, solve_pair
 from assembly.proximity.shell import FACES
 from assembly.proximity.solid_contact import FEATURE_F, FEATURE_G, FOLD, PAIR_NORMAL, PROPER
 from assembly.proximity.start import opposed
@@ -55,8 +55,8 @@ FARTHEST_TURN = 1.2
 # A root this far from a fold is the only one in its patches and those beside them, which turn by less than half a radian
 # each.
 ALONE, BESIDE = 0.05, 3.0
-# Segments are cut by facets between these parts of them.
-INNER, OUTER = 1e-3, 0.999
+# Steps down the slope of a gap.
+SLIDES = 24
 # Room for the descent of a segment.
 DEPTH = 256
 
@@ -127,6 +127,88 @@ def surfaces_root(table, pool, scene, start, roots, k):
     fold = det / norm2 if norm2 > 1e-18 else 0.0
     write(roots, k, x, 0, 0, frame[0], frame[10], frame[3], frame[4], fold)
     return MINIMUM_FOUND if det > -1e-9 * norm2 and h[0] + h[3] <= 0.0 else SADDLE
+
+
+@kernel(inner=True)
+def foot_of(table, pool, g, y, s, t):
+    """Parameters of the point of surface g nearest to y, by Newton's method from (s, t); its signed distance, the normal.
+
+    Positive outside. A step is never longer than what brings the tangent plane's foot.
+    """
+    distance = 0.0
+    n = (0.0, 0.0, 0.0)
+    for _ in range(4):
+        p, su, sv, suu, suv, svv = surface_point(table, pool, g, s, t)
+        d = sub(y, p)
+        n = cross(su, sv)
+        length = math.sqrt(dot(n, n))
+        if not length > 0.0:
+            break
+        n = scale(float(table[g + SIGN]) / length, n)
+        distance = dot(n, d)
+        a = dot(su, su)
+        b = dot(su, sv)
+        c = dot(sv, sv)
+        first = dot(d, su)
+        second = dot(d, sv)
+        h11 = a - distance * dot(n, suu)
+        h12 = b - distance * dot(n, suv)
+        h22 = c - distance * dot(n, svv)
+        det = h11 * h22 - h12 * h12
+        if not (det > 0.1 * (a * c - b * b) and h11 > 0.0):
+            h11, h12, h22 = a, b, c
+            det = a * c - b * b
+        s, t, _held = into_domain(
+            table, pool, g, s + (h22 * first - h12 * second) / det, t + (h11 * second - h12 * first) / det
+        )
+        if first * first / a + second * second / c < 1e-16:
+            break
+    return s, t, distance, n
+
+
+@kernel(inner=True)
+def slide_down(table, pool, f, g, turn, shift, start, stride):
+    """Parameters at which the gap is smaller than at the start: down its slope on f, the foot on g following.
+
+    Newton's method goes to saddles of the gap as well; this does not. The first step is `stride` times the sine of the
+    angle between the normals; then steps are those of Barzilai and Borwein, halved where the gap grows.
+    """
+    u, v, s, t = start
+    p, su, sv, _uu, _uv, _vv = surface_point(table, pool, f, u, v)
+    s, t, gap, n = foot_of(table, pool, g, matvec_t(turn, sub(p, shift)), s, t)
+    slope = matvec(turn, n)
+    normal = cross(su, sv)
+    across = scale(1.0 / max(math.sqrt(dot(normal, normal)), 1e-300), normal)
+    slope = sub(slope, scale(dot(slope, across), across))
+    length = stride
+    for _ in range(SLIDES):
+        if dot(slope, slope) < 1e-12:
+            break
+        a = dot(su, su)
+        b = dot(su, sv)
+        c = dot(sv, sv)
+        det = a * c - b * b
+        if not det > 0.0:
+            break
+        first = -length * dot(slope, su)
+        second = -length * dot(slope, sv)
+        u_new, v_new, _held = into_domain(
+            table, pool, f, u + (c * first - b * second) / det, v + (a * second - b * first) / det
+        )
+        q, ru, rv, _uu, _uv, _vv = surface_point(table, pool, f, u_new, v_new)
+        s_new, t_new, gap_new, n = foot_of(table, pool, g, matvec_t(turn, sub(q, shift)), s, t)
+        if gap_new > gap:
+            length *= 0.25
+            continue
+        normal = cross(ru, rv)
+        across = scale(1.0 / max(math.sqrt(dot(normal, normal)), 1e-300), normal)
+        there = matvec(turn, n)
+        there = sub(there, scale(dot(there, across), across))
+        moved = sub(q, p)
+        bent = dot(moved, sub(there, slope))
+        length = min(dot(moved, moved) / bent, 4.0 * length) if bent > 0.0 else 2.0 * length
+        u, v, s, t, gap, p, su, sv, slope = u_new, v_new, s_new, t_new, gap_new, q, ru, rv, there
+    return (u, v, s, t)
 
 
 @kernel(inner=True)
@@ -261,7 +343,10 @@ def is_known(table, pool, scene, e, d, roots, count):
     for k in range(count):
         if roots[k, CODE_F] != codes[0] or roots[k, CODE_G] != codes[1]:
             continue
-        wide = BESIDE if roots[k, ROOT_FOLD] > ALONE else 1.0
+        if not roots[k, ROOT_FOLD] > ALONE:
+            # Near a fold there is a second root beside it.
+            continue
+        wide = BESIDE
         if is_within(
             table, pool, f, roots[k, 0], roots[k, 1], pool[o], pool[o + 1], wide * pool[o + 2], wide * pool[o + 3]
         ) and is_within(
@@ -291,8 +376,8 @@ def meets_box(pool, o, a, d):
 
 
 @kernel(inline=True)
-def cuts(a, d, p, q, r):
-    """Whether the inside of a segment from a along d cuts the triangle p q r (Möller and Trumbore)."""
+def cuts(a, d, p, q, r, end):
+    """Whether a segment from a along d cuts the triangle p q r (Möller and Trumbore), but for that part at its ends."""
     e = sub(q, p)
     f = sub(r, p)
     h = cross(d, f)
@@ -304,12 +389,12 @@ def cuts(a, d, p, q, r):
     w = cross(s, e)
     v = dot(d, w) / det
     t = dot(f, w) / det
-    return u >= 0.0 and v >= 0.0 and u + v <= 1.0 and INNER < t < OUTER
+    return u >= 0.0 and v >= 0.0 and u + v <= 1.0 and end < t < 1.0 - end
 
 
 @kernel(inner=True, allocates=True)
-def is_cut(table, pool, tree, surface, shell, a, d):
-    """Whether facets of a body's faces cut the segment from a to a + d, all in the body's axes."""
+def is_cut(table, pool, tree, surface, shell, a, d, end):
+    """Whether facets of a body's faces cut the segment from a to a + d, but for that part at its ends; body axes."""
     stack = np.empty(DEPTH, np.int64)
     stack[0] = 0
     used = 1
@@ -342,19 +427,25 @@ def is_cut(table, pool, tree, surface, shell, a, d):
         q = surface_point(table, pool, r, u1, v0)[0]
         s = surface_point(table, pool, r, u1, v1)[0]
         t = surface_point(table, pool, r, u0, v1)[0]
-        if cuts(a, d, p, q, s) or cuts(a, d, p, s, t):
+        if cuts(a, d, p, q, s, end) or cuts(a, d, p, s, t, end):
             return True
     return False
 
 
 @kernel(inner=True)
-def is_outside(table, pool, scene, roots, k):
-    """Whether root k, of a negative gap, is one of far sides: then a surface is between its points."""
+def is_outside(table, pool, scene, roots, k, margin):
+    """Whether root k, of a negative gap, is one of far sides: then a surface is between its points.
+
+    Facets are up to a `margin` beside their surfaces; gaps of no more are taken for true.
+    """
+    if -roots[k, GAP] <= 2.0 * margin:
+        return False
+    end = margin / -roots[k, GAP]
     turn, shift = scene[0], scene[1]
     a = (roots[k, POINT_F], roots[k, POINT_F + 1], roots[k, POINT_F + 2])
     b = (roots[k, POINT_G], roots[k, POINT_G + 1], roots[k, POINT_G + 2])
-    if is_cut(table, pool, scene[3][0], scene[2][0], scene[2][2], a, sub(b, a)):
+    if is_cut(table, pool, scene[3][0], scene[2][0], scene[2][2], a, sub(b, a), end):
         return True
     a = matvec_t(turn, sub(a, shift))
     b = matvec_t(turn, sub(b, shift))
-    return is_cut(table, pool, scene[3][1], scene[2][1], scene[2][3], a, sub(b, a))
+    return is_cut(table, pool, scene[3][1], scene[2][1], scene[2][3], a, sub(b, a), end)

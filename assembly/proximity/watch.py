@@ -40,6 +40,7 @@ from assembly.proximity.roots import (
     element_distance,
     is_known,
     is_outside,
+    slide_down,
 )
 from assembly.proximity.solid_contact import CONTACT_RECORD, FEATURE_F, FEATURE_G, PAIR_GAP, PAIR_NORMAL, TRACK
 
@@ -49,8 +50,8 @@ PAIRS, PLACES, PAIR_TABLE, FIRST, TRACK_SOLIDS, LENGTHS, WATCH_RECORD = 0, 1, 2,
 # Its lengths: roots nearer to each other than the first, and along the surfaces, are one; the reach of a first look;
 # the largest.
 NEGLECT, FIRST_REACH, LAST_REACH, LENGTH_COUNT = 0, 1, 2, 3
-# A pair: bodies, trees, surfaces or else (-1) shells, where its least gap is in the pool (and behind it how far it may go
-# between looks where contacts may be born), its places from and to, and
+# A pair: bodies, trees, surfaces or else (-1) shells, where its least gap is in the pool (behind it how far it may
+# go between looks where contacts may be born, and how far facets are from their surfaces), its places from and to, and
 # rows of given contacts between the two (row, 1 if the bodies are the other way round).
 PAIR_F, PAIR_G, TREE_F, TREE_G, PAIR_SURFACE_F, PAIR_SURFACE_G, PAIR_SHELL_F, PAIR_SHELL_G = 0, 1, 2, 3, 4, 5, 6, 7
 PAIR_MINIMUM, LOW, HIGH, GIVEN, GIVEN_COUNT, PAIR_RECORD = 8, 9, 10, 11, 12, 13
@@ -84,6 +85,8 @@ USED, SPENT = 0.5, 0.85
 TAKE, KEEP = 0.4, 0.8
 # Room: pairs of patches of a look, roots.
 CANDIDATES, ROOTS, STACK = 8192, 96, 1024
+# Starts that a look leads down the slope of the gap, because Newton's method found no minimum from there.
+SLIDES_A_LOOK = 24
 # A reach is for so many moves as the last ones.
 MOVES = 12.0
 
@@ -327,10 +330,12 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, r
     memory[at + REACH] = reach
     count = known_roots(table, pool, watch, memory, p, scene, tracked, roots, work)
     flank = pool[table[pair + PAIR_MINIMUM] + 1]
+    margin = pool[table[pair + PAIR_MINIMUM] + 2]
     enough = max(TAKE * reach, flank)
     bulk = magnitudes(turn)
     free = math.inf
     fertile = math.inf
+    slides = 0
     lo = (math.inf, math.inf, math.inf)
     hi = (-math.inf, -math.inf, -math.inf)
     for c in range(found):
@@ -348,6 +353,17 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, r
         count, result = add_root(
             table, pool, scene, codes, start, (0.0, 0.0, 0.0), pool[lengths + NEGLECT], roots, count, work
         )
+        if scene[2][0] >= 0 and slides < SLIDES_A_LOOK and (count == before or result != MINIMUM_FOUND):
+            # Newton's method may have gone to a saddle, or past a minimum beside it.
+            if count > before:
+                before += 1
+            slides += 1
+            stride = element_ball(table, pool, table[pair + TREE_F], candidates[c, 0])[1]
+            start = slide_down(table, pool, scene[2][0], scene[2][1], turn, shift, start, stride)
+            if count < ROOTS:
+                count, result = add_root(
+                    table, pool, scene, codes, start, (0.0, 0.0, 0.0), pool[lengths + NEGLECT], roots, count, work
+                )
         if count == before or result != MINIMUM_FOUND:
             # Patches that face each other and hold no root of their own: a motion may bring one forth.
             fertile = min(fertile, max(bound, flank))
@@ -357,7 +373,7 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, r
         else:
             gap = roots[before, GAP]
             # The far sides of two bodies oppose each other, too.
-            alien = gap > reach + least or (gap < 0.0 and is_outside(table, pool, scene, roots, before))
+            alien = gap > reach + least or (gap < 0.0 and is_outside(table, pool, scene, roots, before, margin))
             roots[before, ORIGIN] = USELESS if alien else NEW
     rest = list_roots(table, pool, watch, memory, p, roots, count, tracked)
     listed = 0
