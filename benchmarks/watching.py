@@ -12,8 +12,7 @@ from scipy.spatial.transform import Rotation
 import assembly as asm
 from assembly.constraints import layout
 from assembly.proximity import watch
-from assembly.proximity.events import fresh_memory
-from assembly.proximity.solid_contact import PAIR_GAP, PAIR_NORMAL, TRACK
+from assembly.proximity.solid_contact import PAIR_GAP, TRACK
 
 __all__ = ["Listed", "Watch"]
 
