@@ -81,7 +81,7 @@ class _Descents:
             offsets.append(at)
         self.table, self.pool = np.concatenate(tables), np.concatenate(pools)
         self.offsets = np.array(offsets)
-        self.stack, self.bounds = np.empty((256, 2), dtype=np.int64), np.empty(256)
+        self.stack = np.empty((256, 2), dtype=np.int64)
         self.out = np.empty((20_000, 2), dtype=np.int64)
 
     def pairs(self, q: Array, reach: float) -> int:
@@ -91,7 +91,7 @@ class _Descents:
     def lower(self, pose: tuple[tuple[float, ...], tuple[float, ...]]) -> float:
         """A lower bound of the distance of the first two."""
         one, other = self.offsets[:2].tolist()
-        return float(tree_distance(self.table, self.pool, one, other, *pose, 1e3, self.stack, self.bounds))
+        return float(tree_distance(self.table, self.pool, one, other, *pose, 1e3, self.stack))
 
 
 def _seconds(call: Callable[[Any], Any], cases: Sequence[Any]) -> tuple[Array, list[Any]]:
@@ -212,7 +212,7 @@ def _two_clips(quick: bool, coal: Any | None) -> tuple[list[dict[str, Any]], lis
     rows, figures = [], []
     for name, part in (("a quarter of", 0.25), ("one", 1.0)):
         seconds, found = _seconds(lambda q, part=part: descents.pairs(q, part * CLIP_RADIUS), list(poses))  # type: ignore[misc]
-        what = f"two clips, {4 * count:,} facets, reach {name} radius"
+        what = f"two clips of {2 * count:,} facets each, reach {name} radius"
         rows.append({"what": what, "pairs, median": float(np.median(found)), "pairs, most": float(np.max(found))})
         figures.append(figure(what, "seconds", float(np.median(seconds)), reach=1e-4, peers=peers))
         figures.append(figure(f"{what}, 99 of 100", "seconds", float(np.quantile(seconds, 0.99))))

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.constraints import addresses, layout, tape, terms
-from assembly.constraints.constraint import Constraint, Coordinate, Equation, FramePair, structure_changes
 from assembly.constraints.clearance import Clearance
+from assembly.constraints.constraint import Constraint, Coordinate, Equation, FramePair, structure_changes
 from assembly.constraints.contact import Contact
 from assembly.constraints.couplings import Coupling
 from assembly.constraints.dexterity import MEASURES, TASKS, Dexterity
@@ -30,11 +30,11 @@ from assembly.geometry.pieces import TRIM_FIRST
 from assembly.geometry.spline import CURVE_RECORD, SURFACE_RECORD
 from assembly.geometry.surface import NurbsSurface
 from assembly.kinematics.body import Body, BodyFace
-from assembly.proximity.pairs import OFFSETS
-from assembly.proximity.shell import EDGE_CURVE, EDGE_END, EDGE_RECORD, EDGE_START, EDGE_SURFACE
 from assembly.proximity import watch
 from assembly.proximity.events import fresh_memory
 from assembly.proximity.facet_tree import FacetTree
+from assembly.proximity.pairs import OFFSETS
+from assembly.proximity.shell import EDGE_CURVE, EDGE_END, EDGE_RECORD, EDGE_START, EDGE_SURFACE
 from assembly.proximity.shell_packing import pack_shell
 from assembly.proximity.solid import is_one_smooth, solid_of
 from assembly.proximity.solid_contact import TRACK
@@ -46,6 +46,9 @@ Array = NDArray[np.float64]
 Table = NDArray[np.int64]
 # Of a watch, in parts of the scene's size: how far its looks reach at least, and at most.
 FIRST_REACH, LAST_REACH = 0.005, 0.05
+# How far bodies may go between looks where contacts may be born, in parts of the smallest radius of curvature of the
+# two; in parts of the scene's size, it is no less than this.
+FLANK, LEAST_FLANK = 0.5, 1e-4
 
 
 class Packed:
@@ -104,7 +107,9 @@ class Packed:
         ]
         self.clearances = [constraint for constraint in constraints if isinstance(constraint, Clearance)]
         self.guarded = guarded_pairs(self.clearances, bodies)
-        self.places = [_places(clearance, pairs) for clearance, pairs in zip(self.clearances, self.guarded, strict=True)]
+        self.places = [
+            _places(clearance, pairs) for clearance, pairs in zip(self.clearances, self.guarded, strict=True)
+        ]
         self.guards = sum(self.places)
         self._targets: list[tuple[PointDistance | FrameDistance, int]] = []
         self._turns: list[tuple[FrameDistance, int]] = []
@@ -138,7 +143,7 @@ class Packed:
         self.memory_at = self.results_at + layout.RESULTS
         self._memory = np.empty(0)
         if self.guards:
-            self._memory = fresh_memory(len(bodies), sum(map(len, self.guarded)), self.guards, FIRST_REACH)
+            self._memory = fresh_memory(sum(map(len, self.guarded)), self.guards, FIRST_REACH)
 
     @property
     def pair_rows(self) -> int:
@@ -194,7 +199,7 @@ class Packed:
             rows += [[layout.CONTACT_ROW, -1, -1, 1, 0, 1, -1, -1, -1, -1, layout.ZERO, 0] for _ in range(count)]
             owners += [numbers[id(clearance)]] * count
         header[layout.FIRST_GUARD], header[layout.GUARDS] = len(self.contacts), self.guards
-        header[layout.WATCH] = self._watch(bodies) if self.guards else -1
+        header[layout.WATCH] = self._watch() if self.guards else -1
         for trim in constraints:
             if isinstance(trim, TrimContact):
                 new = self._trim(trim, rows)
@@ -391,26 +396,26 @@ class Packed:
             self.shells[faces] = shell
         return self.shells[faces]
 
-    def _watch(self, bodies: Sequence[Body]) -> int:
+    def _watch(self) -> int:
         """Pack what clearances watch; where its record begins."""
         trees = {}
-        radii = np.zeros(len(bodies))
+        thin: dict[tuple[Face, ...], float] = {}
         for body in {id(body): body for pairs in self.guarded for pair in pairs for body in pair}.values():
             faces = _side_faces(body)
             tree = FacetTree.of(faces)
-            far = np.maximum(np.abs(tree.low), np.abs(tree.high)).max(axis=0)
-            radii[self._places[id(body)]] = np.linalg.norm(far) / self.scale
             if faces not in trees:
                 table, pool, trees[faces] = pack_tree(tree, self.scale, self._table_size, self._pool_size)
                 self._add(table, pool)
+                thin[faces] = tree.least_radius / self.scale
         surfaces: dict[tuple[int, bool], int] = {}
         records: list[int] = []
         listed: list[int] = []
         first = 0
         for clearance, pairs, count in zip(self.clearances, self.guarded, self.places, strict=True):
-            _, minimum = self._add(pool=[clearance.minimum / self.scale])
             for pair in pairs:
                 f, g = (_side_faces(body) for body in pair)
+                flank = max(FLANK * min(thin[f], thin[g]), LEAST_FLANK)
+                _, minimum = self._add(pool=[clearance.minimum / self.scale, flank])
                 if is_one_smooth(f) and is_one_smooth(g):
                     shape = [self._surface(surfaces, f[0]), self._surface(surfaces, g[0]), -1, -1]
                 else:
@@ -422,7 +427,17 @@ class Packed:
                     for field in (k, int(contact.body_a is pair[1]))
                 ]
                 places = [self._places[id(body)] for body in pair]
-                records += [*places, trees[f], trees[g], *shape, minimum, first, first + count, len(listed), len(given) // 2]
+                records += [
+                    *places,
+                    trees[f],
+                    trees[g],
+                    *shape,
+                    minimum,
+                    first,
+                    first + count,
+                    len(listed),
+                    len(given) // 2,
+                ]
                 listed += given
             first += count
         given_at, _ = self._add(listed)
@@ -433,10 +448,7 @@ class Packed:
         lengths[watch.NEGLECT] = min(clearance.neglect for clearance in self.clearances)
         lengths[watch.FIRST_REACH], lengths[watch.LAST_REACH] = FIRST_REACH, LAST_REACH
         _, lengths_at = self._add(pool=lengths)
-        _, radii_at = self._add(pool=radii)
-        return self._add(
-            [len(table), self.guards, len(bodies), pair_table, radii_at, len(self.contacts), 0, lengths_at]
-        )[0]
+        return self._add([len(table), self.guards, pair_table, len(self.contacts), 0, lengths_at])[0]
 
     def _trim(self, trim: TrimContact, rows: list[list[int]]) -> list[list[int]]:
         """The records of a trim's rows."""

@@ -18,7 +18,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly.geometry.vec import add, dot, matvec, matvec_t, neg, sub
+from assembly.geometry.vec import add, dot, matvec, matvec_t, neg, scale, sub
 
 # Header: how many nodes, where their integers and their doubles begin, how many elements, where theirs begin.
 NODES, NODE_TABLE, NODE_POOL, ELEMENTS, ELEMENT_POOL, TREE = 0, 1, 2, 3, 4, 5
@@ -26,8 +26,8 @@ NODES, NODE_TABLE, NODE_POOL, ELEMENTS, ELEMENT_POOL, TREE = 0, 1, 2, 3, 4, 5
 CHILD, FEATURE, NODE_INTS = 0, 1, 2
 # Box (center and half widths), cone (axis, cosine and sine of its half angle), radius of a ball.
 CENTER, HALF, AXIS, COS, SIN, RADIUS, NODE = 0, 3, 6, 9, 10, 11, 12
-# Of an element: the middle of its box in (u, v), or (t, 0), half the widths, and its feature.
-ELEMENT_FEATURE, ELEMENT = 4, 5
+# Of an element: the middle of its box in (u, v), or (t, 0), half the widths, its feature, and its node.
+ELEMENT_FEATURE, ELEMENT_NODE, ELEMENT = 4, 5, 6
 # Rounding of unit vectors and of coordinates, relative: what is in doubt is kept.
 ROUNDING = 1e-13
 
@@ -69,10 +69,33 @@ def transposed(m):
 
 
 @kernel(inline=True)
-def off_axis(d, dd, axis, c, s):
-    """How far the point d is from the double cone along an axis, c and s of its half angle; less where it is inside."""
-    p = abs(dot(d, axis))
-    return c * math.sqrt(max(dd - p * p, 0.0)) - s * p
+def off_axis(d, dd, axis, c, s, r):
+    """Whether the point d is farther than r from the double cone along an axis, c and s of its half angle."""
+    p = dot(d, axis)
+    beside = r + s * abs(p)
+    return c > 0.0 and c * c * (dd - p * p) > beside * beside + 1e-15 * dd
+
+
+@kernel(inner=True)
+def beside_cone(d, axis, c, s, ho, hp, rotation, slack):
+    """Whether two boxes, centers d apart, are so on one side of a double cone that no difference of theirs is in it.
+
+    Of the planes that touch it, those towards d are tried. The boxes have half widths ho, and hp in turned axes.
+    """
+    p = dot(d, axis)
+    w = sub(d, scale(p, axis))
+    ww = dot(w, w)
+    if not (c > 0.0 and ww > 1e-20 * dot(d, d)):
+        return False
+    w = scale(c / math.sqrt(ww), w)
+    for sign in (-s, s):
+        m = add(w, scale(sign, axis))
+        n = matvec_t(rotation, m)
+        size = abs(m[0]) * ho[0] + abs(m[1]) * ho[1] + abs(m[2]) * ho[2]
+        size += abs(n[0]) * hp[0] + abs(n[1]) * hp[1] + abs(n[2]) * hp[2]
+        if dot(m, d) <= size + slack:
+            return False
+    return True
 
 
 @kernel(inline=True)
@@ -83,10 +106,11 @@ def seen_from(pool, p, rotation, bulk, shift):
 
 
 @kernel(inline=True)
-def admits(pool, o, p, seen, rotation, bulk, reach):
+def admits(pool, o, p, seen, rotation, bulk, reach, slack):
     """Whether the nodes at o of one tree and at p of the other, seen from the one, may hold a pair.
 
-    `rotation` is that of the other tree, `bulk` its magnitudes. What excludes most pairs for little comes first.
+    `rotation` is that of the other tree, `bulk` its magnitudes; `slack` the rounding of coordinates. What excludes
+    most pairs for little comes first.
     """
     center, around, axis_p = seen
     axis_o = three(pool, o + AXIS)
@@ -98,27 +122,38 @@ def admits(pool, o, p, seen, rotation, bulk, reach):
         return False
     d = sub(center, three(pool, o + CENTER))
     dd = dot(d, d)
-    r = pool[o + RADIUS] + pool[p + RADIUS]
+    r = pool[o + RADIUS] + pool[p + RADIUS] + slack
     if dd > (r + reach) * (r + reach):
         return False
     square = reach * reach
     ho = three(pool, o + HALF)
     if excess(d, ho, around) > square:
         return False
-    if dd > r * r:
-        if off_axis(d, dd, axis_o, co, so) > r or off_axis(d, dd, axis_p, cp, sp) > r:
-            return False
+    if off_axis(d, dd, axis_o, co, so, r) or off_axis(d, dd, axis_p, cp, sp, r):
+        return False
     return excess(matvec_t(rotation, d), matvec_t(bulk, ho), three(pool, p + HALF)) <= square
 
 
+@kernel(inner=True)
+def facing(pool, o, p, rotation, shift, slack):
+    """Whether leaves at o of f and at p of g, admitted, still may hold a pair when their boxes are looked at closer."""
+    d = sub(add(matvec(rotation, three(pool, p + CENTER)), shift), three(pool, o + CENTER))
+    ho = three(pool, o + HALF)
+    hp = three(pool, p + HALF)
+    if beside_cone(d, three(pool, o + AXIS), pool[o + COS], pool[o + SIN], ho, hp, rotation, slack):
+        return False
+    axis = matvec(rotation, three(pool, p + AXIS))
+    return not beside_cone(d, axis, pool[p + COS], pool[p + SIN], ho, hp, rotation, slack)
+
+
 @kernel(inline=True)
-def widened(pool, root_f, root_g, shift, reach):
-    """A reach with the rounding of coordinates."""
+def rounding(pool, root_f, root_g, shift):
+    """By how much coordinates may be off."""
     size = pool[root_f + RADIUS] + pool[root_g + RADIUS]
     c = three(pool, root_f + CENTER)
     e = three(pool, root_g + CENTER)
     size += math.sqrt(dot(c, c)) + math.sqrt(dot(e, e)) + math.sqrt(dot(shift, shift))
-    return reach + ROUNDING * size
+    return ROUNDING * size
 
 
 @kernel(inner=True)
@@ -131,7 +166,8 @@ def pairs_within(table, pool, tree_f, tree_g, rotation, shift, reach, stack, out
     node_g = table[tree_g + NODE_POOL]
     ints_f = table[tree_f + NODE_TABLE]
     ints_g = table[tree_g + NODE_TABLE]
-    reach = widened(pool, node_f, node_g, shift, reach)
+    slack = rounding(pool, node_f, node_g, shift)
+    reach += slack
     bulk = magnitudes(rotation)
     back = transposed(rotation)
     back_bulk = transposed(bulk)
@@ -140,7 +176,7 @@ def pairs_within(table, pool, tree_f, tree_g, rotation, shift, reach, stack, out
     count = 0
     if room < 1:
         return -1
-    if not admits(pool, node_f, node_g, seen_from(pool, node_g, rotation, bulk, shift), rotation, bulk, reach):
+    if not admits(pool, node_f, node_g, seen_from(pool, node_g, rotation, bulk, shift), rotation, bulk, reach, slack):
         return 0
     stack[0, 0] = 0
     stack[0, 1] = 0
@@ -154,24 +190,25 @@ def pairs_within(table, pool, tree_f, tree_g, rotation, shift, reach, stack, out
         child_f = table[ints_f + NODE_INTS * i + CHILD]
         child_g = table[ints_g + NODE_INTS * j + CHILD]
         if child_f < 0 and child_g < 0:
-            if count < out.shape[0]:
-                out[count, 0] = -1 - child_f
-                out[count, 1] = -1 - child_g
-            count += 1
+            if facing(pool, o, p, rotation, shift, slack):
+                if count < out.shape[0]:
+                    out[count, 0] = -1 - child_f
+                    out[count, 1] = -1 - child_g
+                count += 1
             continue
         if used + 2 > room:
             return -1
         if child_g < 0 or (child_f >= 0 and pool[o + RADIUS] >= pool[p + RADIUS]):
             seen = seen_from(pool, p, rotation, bulk, shift)
             for k in range(2):
-                if admits(pool, node_f + NODE * (child_f + k), p, seen, rotation, bulk, reach):
+                if admits(pool, node_f + NODE * (child_f + k), p, seen, rotation, bulk, reach, slack):
                     stack[used, 0] = child_f + k
                     stack[used, 1] = j
                     used += 1
         else:
             seen = seen_from(pool, o, back, back_bulk, back_shift)
             for k in range(2):
-                if admits(pool, node_g + NODE * (child_g + k), o, seen, back, back_bulk, reach):
+                if admits(pool, node_g + NODE * (child_g + k), o, seen, back, back_bulk, reach, slack):
                     stack[used, 0] = i
                     stack[used, 1] = child_g + k
                     used += 1
@@ -194,42 +231,38 @@ def box_distance(pool, o, p, seen, rotation, bulk):
 
 
 @kernel(inner=True)
-def least_distance(table, pool, tree_f, tree_g, rotation, shift, upper, stack, bounds):
+def least_distance(table, pool, tree_f, tree_g, rotation, shift, upper, stack):
     """A lower bound of the distance of two trees' elements, at most `upper`: that of their boxes.
 
-    A stack (n, 2) with its bounds (n,) that is too short makes what is found lower, not wrong.
+    A stack (n, 2) that is too short makes what is found lower, not wrong.
     """
     node_f = table[tree_f + NODE_POOL]
     node_g = table[tree_g + NODE_POOL]
     ints_f = table[tree_f + NODE_TABLE]
     ints_g = table[tree_g + NODE_TABLE]
-    slack = widened(pool, node_f, node_g, shift, 0.0)
+    slack = rounding(pool, node_f, node_g, shift)
     bulk = magnitudes(rotation)
     back = transposed(rotation)
     back_bulk = transposed(bulk)
     back_shift = neg(matvec(back, shift))
-    room = min(stack.shape[0], bounds.size)
+    room = stack.shape[0]
     best = (upper + slack) * (upper + slack)
-    first = box_distance(pool, node_f, node_g, seen_from(pool, node_g, rotation, bulk, shift), rotation, bulk)
-    used = 0
-    if first < best:
-        if room < 1:
-            best = first
-        else:
-            stack[0, 0] = 0
-            stack[0, 1] = 0
-            bounds[0] = first
-            used = 1
+    if room < 1:
+        return 0.0
+    stack[0, 0] = 0
+    stack[0, 1] = 0
+    used = 1
     while used > 0:
         used -= 1
-        bound = bounds[used]
-        # What was found since the pair was put there may exclude it.
-        if bound >= best:
-            continue
         i = stack[used, 0]
         j = stack[used, 1]
         o = node_f + NODE * i
         p = node_g + NODE * j
+        seen = seen_from(pool, p, rotation, bulk, shift)
+        bound = box_distance(pool, o, p, seen, rotation, bulk)
+        # What was found since the pair was put here may exclude it.
+        if bound >= best:
+            continue
         child_f = table[ints_f + NODE_INTS * i + CHILD]
         child_g = table[ints_g + NODE_INTS * j + CHILD]
         if (child_f < 0 and child_g < 0) or used + 2 > room:
@@ -237,7 +270,6 @@ def least_distance(table, pool, tree_f, tree_g, rotation, shift, upper, stack, b
             continue
         descend_f = child_g < 0 or (child_f >= 0 and pool[o + RADIUS] >= pool[p + RADIUS])
         if descend_f:
-            seen = seen_from(pool, p, rotation, bulk, shift)
             one = box_distance(pool, node_f + NODE * child_f, p, seen, rotation, bulk)
             other = box_distance(pool, node_f + NODE * (child_f + 1), p, seen, rotation, bulk)
         else:
@@ -248,16 +280,14 @@ def least_distance(table, pool, tree_f, tree_g, rotation, shift, upper, stack, b
         near = 0 if one <= other else 1
         for k in range(2):
             side = near if k == 1 else 1 - near
-            value = one if side == 0 else other
-            if value < best:
+            if (one if side == 0 else other) < best:
                 stack[used, 0] = child_f + side if descend_f else i
                 stack[used, 1] = j if descend_f else child_g + side
-                bounds[used] = value
                 used += 1
     return max(math.sqrt(best) - slack, 0.0)
 
 
 @kernel
-def tree_distance(table, pool, tree_f, tree_g, rotation, shift, upper, stack, bounds):
+def tree_distance(table, pool, tree_f, tree_g, rotation, shift, upper, stack):
     """`least_distance` for Python."""
-    return least_distance(table, pool, tree_f, tree_g, rotation, shift, upper, stack, bounds)
+    return least_distance(table, pool, tree_f, tree_g, rotation, shift, upper, stack)

@@ -72,14 +72,13 @@ class Event:
 _KINDS, _REASONS = tuple(EventKind), tuple(EventReason)
 
 
-def fresh_memory(bodies: int, pairs: int, places: int, reach: float) -> Array:
+def fresh_memory(pairs: int, places: int, reach: float) -> Array:
     """What a watch knows that has seen nothing yet; `reach` is that of its first looks."""
-    pairs_at = watch.MEMORY_HEADER + watch.BODY_MEMORY * bodies
+    pairs_at = watch.MEMORY_HEADER
     places_at = pairs_at + watch.PAIR_MEMORY * pairs
     events_at = places_at + watch.PLACE_MEMORY * places
     memory = np.zeros(events_at + watch.EVENT * watch.EVENTS)
-    memory[watch.MEMORY_HEADER : pairs_at : watch.BODY_MEMORY] = np.nan
-    memory[pairs_at + watch.LOOKED : places_at : watch.PAIR_MEMORY] = -np.inf
+    memory[pairs_at + watch.TURN : places_at : watch.PAIR_MEMORY] = np.nan
     memory[pairs_at + watch.REACH : places_at : watch.PAIR_MEMORY] = reach
     memory[places_at : events_at : watch.PLACE_MEMORY] = -1.0
     return memory

@@ -7,14 +7,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.geometry.curve import NurbsCurve
 from assembly.geometry.face import Face
+from assembly.geometry.surface import NurbsSurface
 from assembly.proximity.cones import FULL, between
-from assembly.proximity.facet_edges import edge_point, other_parameter
+from assembly.proximity.topology import Edge, Topology
 
 if TYPE_CHECKING:
     from assembly.proximity.facet_tree import FacetTree
 
-__all__ = ["largest_excess", "triangle_distance"]
+__all__ = ["edge_point", "largest_excess", "other_parameter", "triangle_distance"]
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -22,6 +24,8 @@ Indices = NDArray[np.int64]
 _SINGULAR = 1e-9
 # Pairs of points and elements looked at together.
 _PAIRS = 4_000_000
+# Steps of Newton's method to the same point of an edge on its other face.
+_STEPS = 8
 
 
 def triangle_distance(points: Array, triangles: Array) -> Array:
@@ -40,6 +44,37 @@ def triangle_distance(points: Array, triangles: Array) -> Array:
         inside &= (np.cross(end - start, points - start) * normal).sum(axis=1) >= 0.0
     height = np.abs(((points - a) * normal).sum(axis=1)) / np.sqrt(np.where(square > 0.0, square, 1.0))
     return np.where(inside, np.minimum(best, height), best)
+
+
+def edge_point(surface: NurbsSurface, curve: NurbsCurve, t: Array) -> tuple[Array, Array]:
+    """Points S(c(t)) of an edge and their derivatives, (n, 3) each."""
+    low, high = curve.domain
+    c, ct = curve.evaluate(np.clip(t, low, high), 1)
+    at = []
+    for k in range(2):
+        start, stop = surface.domain[k]
+        at.append(c[:, k] if surface.closed[k] else np.clip(c[:, k], start, stop))
+    s, su, sv = surface.evaluate(at[0], at[1], 1)
+    return s, ct[:, :1] * su + ct[:, 1:2] * sv
+
+
+def other_parameter(topology: Topology, edge: Edge, t: Array) -> Array:
+    """Where an edge with two faces is at the same points on its second one; beyond the domain of a closed curve."""
+    assert edge.face_b is not None and edge.curve_b is not None
+    a, b = topology.faces[edge.face_a], topology.faces[edge.face_b]
+    points, _ = edge_point(a.surface, a.boundary[edge.curve_a], t)
+    curve = b.boundary[edge.curve_b]
+    low, high = curve.domain
+    closed = edge.start is None
+    at = edge.map_b[0] + edge.map_b[1] * t
+    step = 0.05 * (high - low)
+    for _ in range(_STEPS):
+        inside = low + np.mod(at - low, high - low) if closed else np.clip(at, low, high)
+        p, rate = edge_point(b.surface, curve, inside)
+        square = (rate**2).sum(axis=1)
+        move = ((points - p) * rate).sum(axis=1) / np.where(square > 0.0, square, 1.0)
+        at = (at if closed else inside) + np.clip(move, -step, step)
+    return np.asarray(at if closed else np.clip(at, low, high))
 
 
 class _Checked:

@@ -115,14 +115,14 @@ class _Divided:
         """Where patches are: wholly inside the trim, outside, or neither."""
         if not self.is_trimmed:
             return np.full(len(patches.box), CLEAR)
-        at = self.parameters(patches)
-        return box_sides(self.face, at)
+        return box_sides(self.face, self.parameters(patches))
 
     def inside(self, patches: Patches) -> Patches:
         """Without those outside the trim."""
         return patches.at(self.sides(patches) != OUTSIDE) if self.is_trimmed else patches
 
     def measured(self, piece: Indices, box: Array) -> Patches:
+        """Patches of pieces (n, 2) over boxes (n, 4)."""
         parts = [self._measured(piece[k : k + _BATCH], box[k : k + _BATCH]) for k in range(0, len(piece), _BATCH)]
         return Patches.joined(parts) if parts else self._measured(piece, box)
 
@@ -260,10 +260,10 @@ def patches_by_count(faces: Sequence[Face], count: int) -> list[tuple[Patches, A
     while sum(len(part.box) for part in state) < count:
         # Flat patches are halved by their length.
         worth = np.concatenate([part.chord_error + 1e-9 * part.lengths.max(axis=1) for part in state])
-        order = np.argsort(-worth, kind="stable")
-        large = order[worth[order] >= _ROUND * worth[order[0]]][: count - len(worth)]
         if not len(worth):
             break
+        order = np.argsort(-worth, kind="stable")
+        large = order[worth[order] >= _ROUND * worth[order[0]]][: count - len(worth)]
         chosen = np.zeros(len(worth), dtype=bool)
         chosen[large] = True
         at = 0

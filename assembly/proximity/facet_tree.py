@@ -1,8 +1,9 @@
 """A body as facets in a tree of boxes and normal cones: where two bodies can be near each other, before any Newton.
 
 Faces become patches with two facets each and a proven chord error (`proximity/facet_patches.py`), edges and vertices
-elements with the normals between their faces (`proximity/facet_edges.py`). The tree halves the elements at the median
-along the longest extent of their middles; every node has a box around its elements and a cone around their normals.
+elements with the normals between their faces (`proximity/facet_edges.py`, `proximity/facet_vertices.py`). The tree
+halves the elements at the median along the longest extent of their middles; every node has a box and a ball around its
+elements and a cone around their normals.
 """
 
 from __future__ import annotations
@@ -18,8 +19,10 @@ from assembly.errors import InputError, integer, positive
 from assembly.geometry.face import Face
 from assembly.proximity.cones import FULL, around_cones
 from assembly.proximity.facet_check import largest_excess
-from assembly.proximity.facet_edges import Elements, edge_elements, vertex_elements
+from assembly.proximity.facet_edges import edge_elements
+from assembly.proximity.facet_elements import Elements
 from assembly.proximity.facet_patches import patches_by_angle, patches_by_count
+from assembly.proximity.facet_vertices import vertex_elements
 from assembly.proximity.solid import solid_of
 from assembly.proximity.topology import Topology
 
@@ -124,6 +127,16 @@ class FacetTree:
     def offset(self) -> float:
         """The largest chord error: facets thickened by it contain the body's faces."""
         return float(self.chord_error.max(initial=0.0))
+
+    @property
+    def least_radius(self) -> float:
+        """About the smallest radius of curvature: of the patches' widths over the angles by which their normals turn."""
+        turns = self.half_angle[: len(self.corners)]
+        sides = np.linalg.norm(self.corners - np.roll(self.corners, 1, axis=1), axis=2)
+        # Where a side is a point, at a pole, the others tell.
+        sizes = 0.5 * np.where(sides > 1e-9 * sides.max(), sides, np.inf).min(axis=1)
+        curved = (turns > 1e-3) & (turns < 0.5 * np.pi)
+        return float((sizes[curved] / turns[curved]).min(initial=np.inf))
 
     @property
     def triangles(self) -> Array:

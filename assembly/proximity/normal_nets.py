@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from assembly.geometry.bezier import bernstein
 from assembly.geometry.face import Face
 
-__all__ = ["Nets", "bezier_product", "nets_of", "restricted"]
+__all__ = ["Nets", "bezier_product", "nets_of", "restricted", "restriction"]
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -116,7 +116,7 @@ def nets_of(face: Face) -> Nets:
     return Nets(at_u, at_v, points, face.sign * normals, slack, poles, extent)
 
 
-def _restriction(degree: int, low: Array, high: Array) -> Array:
+def restriction(degree: int, low: Array, high: Array) -> Array:
     """Matrices (n, degree + 1, degree + 1) from the Bezier points of a piece to those over [low, high] of it."""
     ends, place = np.unique(low + 1j * high, return_inverse=True)
     result = np.zeros((ends.size, degree + 1, degree + 1))
@@ -130,6 +130,6 @@ def _restriction(degree: int, low: Array, high: Array) -> Array:
 def restricted(net: Array, boxes: Array) -> Array:
     """Bezier points of pieces (n, m + 1, l + 1, components) over boxes (n, 4) of their unit squares: u, then v."""
     n, rows, columns, components = net.shape
-    in_u = _restriction(rows - 1, boxes[:, 0], boxes[:, 1]) @ net.reshape(n, rows, -1)
-    in_v = _restriction(columns - 1, boxes[:, 2], boxes[:, 3])[:, None] @ in_u.reshape(n, rows, columns, components)
+    in_u = restriction(rows - 1, boxes[:, 0], boxes[:, 1]) @ net.reshape(n, rows, -1)
+    in_v = restriction(columns - 1, boxes[:, 2], boxes[:, 3])[:, None] @ in_u.reshape(n, rows, columns, components)
     return np.asarray(in_v)

@@ -16,10 +16,12 @@ from assembly.geometry.spline import BREAKS_U, BREAKS_V, CLOSED_U, CLOSED_V, SPA
 from assembly.geometry.vec import add, cross, dot, matvec, matvec_t, scale, sub
 from assembly.kinematics.motion import rotation
 from assembly.proximity.bounding_tree import (
+    AXIS,
     CENTER,
     CHILD,
     ELEMENT,
     ELEMENT_FEATURE,
+    ELEMENT_NODE,
     ELEMENT_POOL,
     FEATURE,
     HALF,
@@ -27,6 +29,10 @@ from assembly.proximity.bounding_tree import (
     NODE_INTS,
     NODE_POOL,
     NODE_TABLE,
+    RADIUS,
+    SIN,
+    box_distance,
+    seen_from,
     three,
 )
 from assembly.proximity.extremal import CONVERGED, SINGULAR, solve_pair
@@ -34,8 +40,8 @@ from assembly.proximity.shell import FACES
 from assembly.proximity.solid_contact import FEATURE_F, FEATURE_G, FOLD, PAIR_NORMAL, PROPER
 from assembly.proximity.start import opposed
 from assembly.proximity.switching import feature_at
-from assembly.proximity.velocity import ARM_F, GAP as RECORD_GAP
-from assembly.proximity.velocity import NORMAL
+from assembly.proximity.velocity import ARM_F
+from assembly.proximity.velocity import GAP as RECORD_GAP
 
 # A root: parameters, features, normal in the axes of f, gap, where it is from, its points in the axes of f, and how far
 # it is from a fold (det H / |H|^2).
@@ -143,7 +149,9 @@ def solids_root(table, pool, scene, codes, start, n, roots, k, work):
     pg = matvec_t(turn, (records[0, ARM_F], records[0, ARM_F + 1], records[0, ARM_F + 2]))
     gap = records[0, RECORD_GAP]
     x = (tracked[0, 0], tracked[0, 1], tracked[0, 2], tracked[0, 3])
-    write(roots, k, x, tracked[0, FEATURE_F], tracked[0, FEATURE_G], m, gap, sub(pg, scale(gap, m)), pg, records[0, FOLD])
+    write(
+        roots, k, x, tracked[0, FEATURE_F], tracked[0, FEATURE_G], m, gap, sub(pg, scale(gap, m)), pg, records[0, FOLD]
+    )
     return MINIMUM_FOUND if records[0, PROPER] == 1.0 else SADDLE
 
 
@@ -190,12 +198,40 @@ def add_given(table, pool, scene, tracked, listed, many, roots, work):
         if table[listed + 2 * c + 1] == 1:
             x = (x[2], x[3], x[0], x[1])
         before = count
-        count, _found = add_root(
-            table, pool, scene, (0, 0), x, (0.0, 0.0, 0.0), 0.0, roots, count, work
-        )
+        count, _found = add_root(table, pool, scene, (0, 0), x, (0.0, 0.0, 0.0), 0.0, roots, count, work)
         if count > before:
             roots[before, ORIGIN] = GIVEN_CONTACT
     return count
+
+
+@kernel(inline=True)
+def element_ball(table, pool, tree, e):
+    """Center and radius of a ball around an element, in the axes of its body."""
+    o = table[tree + NODE_POOL] + NODE * np.int64(pool[table[tree + ELEMENT_POOL] + ELEMENT * e + ELEMENT_NODE])
+    return three(pool, o + CENTER), pool[o + RADIUS]
+
+
+@kernel(inner=True)
+def element_distance(table, pool, trees, turn, shift, bulk, e, d):
+    """About the least distance of two elements: that of their boxes, or across the planes of their middle normals.
+
+    A patch leaves its plane by no more than its radius times the sine of the angle by which its normals turn.
+    """
+    o = table[trees[0] + NODE_POOL] + NODE * np.int64(pool[table[trees[0] + ELEMENT_POOL] + ELEMENT * e + ELEMENT_NODE])
+    p = table[trees[1] + NODE_POOL] + NODE * np.int64(pool[table[trees[1] + ELEMENT_POOL] + ELEMENT * d + ELEMENT_NODE])
+    seen = seen_from(pool, p, turn, bulk, shift)
+    square = box_distance(pool, o, p, seen, turn, bulk)
+    apart = sub(seen[0], three(pool, o + CENTER))
+    n = sub(three(pool, o + AXIS), seen[2])
+    length = math.sqrt(dot(n, n))
+    if length < 1.0:
+        return math.sqrt(square)
+    n = scale(1.0 / length, n)
+    off_f = sub(n, three(pool, o + AXIS))
+    off_g = add(n, seen[2])
+    thick = pool[o + RADIUS] * (pool[o + SIN] + math.sqrt(dot(off_f, off_f)))
+    thick += pool[p + RADIUS] * (pool[p + SIN] + math.sqrt(dot(off_g, off_g)))
+    return max(math.sqrt(square), abs(dot(n, apart)) - thick)
 
 
 @kernel(inline=True)

@@ -64,4 +64,5 @@ def pack_tree(tree: FacetTree, scale: float, table_at: int = 0, pool_at: int = 0
     rows[:, :2] = 0.5 * (box[:, ::2] + box[:, 1::2])
     rows[:, 2:4] = 0.5 * (box[:, 1::2] - box[:, ::2])
     rows[:, layout.ELEMENT_FEATURE] = tree.feature
+    rows[-1 - nodes.child[leaf], layout.ELEMENT_NODE] = np.flatnonzero(leaf)
     return table, pool, table_at

@@ -3,12 +3,13 @@
 Every body carries a tree of patches (`bounding_tree.py`). A look at a pair of bodies descends their trees, finds the
 pairs of patches that may hold an extremum of the distance within the pair's reach, and the extrema by Newton's method
 (`roots.py`). The near ones are listed: each has a place, from which it is tracked exactly. What is left out is farther
-than the pair's allowance: until both bodies together have moved by that much, nothing unlisted can touch. Bodies keep
-the length of their way, so a pair that need not be looked at costs a comparison.
+than the pair's allowance: until a point of one body has moved by that much, seen from the other, nothing unlisted can
+touch. Where patches face each other and hold no root, a motion may bring one forth; there, a ball around these patches
+may move by less.
 
 The record of a watch is in the table of integers, what it knows in a memory of doubles:
 
-    header | of every body its last pose and its way | of every pair PAIR_MEMORY | of every place PLACE_MEMORY | events
+    header | of every pair PAIR_MEMORY | of every place PLACE_MEMORY | events
 """
 
 from __future__ import annotations
@@ -18,8 +19,9 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly.geometry.vec import add, dot, matvec, matvec_t, quaternion_matrix, quaternion_product, sub
 from assembly.kinematics.motion import relative_pose, rotation
-from assembly.proximity.bounding_tree import least_distance, pairs_within
+from assembly.proximity.bounding_tree import CENTER, NODE_POOL, RADIUS, least_distance, magnitudes, pairs_within
 from assembly.proximity.roots import (
     ALIKE,
     CODE_F,
@@ -34,27 +36,41 @@ from assembly.proximity.roots import (
     USELESS,
     add_given,
     add_root,
+    element_ball,
+    element_distance,
     is_known,
     is_outside,
 )
 from assembly.proximity.solid_contact import CONTACT_RECORD, FEATURE_F, FEATURE_G, PAIR_GAP, PAIR_NORMAL, TRACK
 
-# The record of a watch: counts; where pairs begin; where the bodies' radii about their origins are in the pool; the
-# row of `tracked` that is the first place; address of `track_solids`; where its lengths are in the pool.
-PAIRS, PLACES, BODY_COUNT, PAIR_TABLE, RADII, FIRST, TRACK_SOLIDS, LENGTHS, WATCH_RECORD = 0, 1, 2, 3, 4, 5, 6, 7, 8
+# The record of a watch: counts; where pairs begin; the row of `tracked` that is the first place; address of
+# `track_solids`; where its lengths are in the pool.
+PAIRS, PLACES, PAIR_TABLE, FIRST, TRACK_SOLIDS, LENGTHS, WATCH_RECORD = 0, 1, 2, 3, 4, 5, 6
 # Its lengths: roots nearer to each other than the first, and along the surfaces, are one; the reach of a first look;
 # the largest.
 NEGLECT, FIRST_REACH, LAST_REACH, LENGTH_COUNT = 0, 1, 2, 3
-# A pair: bodies, trees, surfaces or else (-1) shells, where its least gap is in the pool, its places from and to, and
+# A pair: bodies, trees, surfaces or else (-1) shells, where its least gap is in the pool (and behind it how far it may go
+# between looks where contacts may be born), its places from and to, and
 # rows of given contacts between the two (row, 1 if the bodies are the other way round).
 PAIR_F, PAIR_G, TREE_F, TREE_G, PAIR_SURFACE_F, PAIR_SURFACE_G, PAIR_SHELL_F, PAIR_SHELL_G = 0, 1, 2, 3, 4, 5, 6, 7
 PAIR_MINIMUM, LOW, HIGH, GIVEN, GIVEN_COUNT, PAIR_RECORD = 8, 9, 10, 11, 12, 13
 # Memory. Header: events so far, looks so far, contacts so far, the time of the caller, whether a near root found no
 # place, calls so far.
 EVENT_COUNT, LOOKS, BORN, TIME, CROWDED, CALLS, MEMORY_HEADER = 0, 1, 2, 3, 4, 5, 6
-WAY, BODY_MEMORY = 7, 8
-# Of a pair: both ways at its last look, how far they may go from there, its reach, its state, calls at its last look.
-LOOKED, ALLOWANCE, REACH, STATE, CALLED, PAIR_MEMORY = 0, 1, 2, 3, 4, 5
+# Of a pair: the pose of g seen from f at its last look (a quaternion, NaN before there was one, and a place), how far g
+# may go from there, its reach, its state, calls at its last look; a ball in the axes of g and how far what is in it may go.
+TURN, SHIFT, ALLOWANCE, REACH, STATE, CALLED, BALL, BALL_RADIUS, BALL_ALLOWANCE, PAIR_MEMORY = (
+    0,
+    4,
+    7,
+    8,
+    9,
+    10,
+    11,
+    14,
+    15,
+    16,
+)
 FAR, NEAR, TRACKING = 0, 1, 2
 # Of a place: its pair (-1: none), the number of its contact.
 PLACE_PAIR, PLACE_NUMBER, PLACE_MEMORY = 0, 1, 2
@@ -75,9 +91,8 @@ MOVES = 12.0
 @kernel(inline=True)
 def memory_places(table, watch):
     """Where pairs, places and events begin in the memory."""
-    pairs = MEMORY_HEADER + BODY_MEMORY * table[watch + BODY_COUNT]
-    places = pairs + PAIR_MEMORY * table[watch + PAIRS]
-    return pairs, places, places + PLACE_MEMORY * table[watch + PLACES]
+    places = MEMORY_HEADER + PAIR_MEMORY * table[watch + PAIRS]
+    return MEMORY_HEADER, places, places + PLACE_MEMORY * table[watch + PLACES]
 
 
 @kernel(inner=True)
@@ -94,42 +109,63 @@ def note(table, watch, memory, kind, reason, p, number, gap):
 
 
 @kernel(inline=True)
-def farthest_move(q, b, memory, o, radius):
-    """A bound of how far any point of body b is from where it was at the pose in the memory."""
-    x = q[b, 0] - memory[o]
-    y = q[b, 1] - memory[o + 1]
-    z = q[b, 2] - memory[o + 2]
-    # A turn by the angle a moves a point at radius r by 2 r sin(a / 2), and |e - e'| is 2 sin(a / 4).
-    square = 0.0
-    other = 0.0
-    for k in range(3, 7):
-        d = q[b, k] - memory[o + k]
-        s = q[b, k] + memory[o + k]
-        square += d * d
-        other += s * s
-    return math.sqrt(x * x + y * y + z * z) + 2.0 * radius * math.sqrt(min(square, other))
+def quaternion_from(q, i, j):
+    """The turn of body j seen from body i."""
+    return quaternion_product((q[i, 3], -q[i, 4], -q[i, 5], -q[i, 6]), (q[j, 3], q[j, 4], q[j, 5], q[j, 6]))
 
 
 @kernel(inner=True)
-def go_on(table, pool, watch, memory, q):
-    """Add the moves since the last call to the ways."""
-    for b in range(table[watch + BODY_COUNT]):
-        o = MEMORY_HEADER + BODY_MEMORY * b
-        if math.isnan(memory[o]):
-            memory[o + WAY] = 0.0
-        else:
-            memory[o + WAY] += farthest_move(q, b, memory, o, pool[table[watch + RADII] + b])
-        for k in range(7):
-            memory[o + k] = q[b, k]
+def way(memory, o, e, shift, center, radius):
+    """A bound of how far any point of a ball on g went, seen from f, since the look in the memory at o.
+
+    A turn by an angle a moves a point at a distance r from its axis by 2 r sin(a / 2), and |e - e'| is 2 sin(a / 4).
+    """
+    before = (memory[o + TURN], memory[o + TURN + 1], memory[o + TURN + 2], memory[o + TURN + 3])
+    square = 0.0
+    other = 0.0
+    for k in range(4):
+        square += (e[k] - before[k]) * (e[k] - before[k])
+        other += (e[k] + before[k]) * (e[k] + before[k])
+    there = add(matvec(quaternion_matrix(e[0], e[1], e[2], e[3]), center), shift)
+    was = matvec(quaternion_matrix(before[0], before[1], before[2], before[3]), center)
+    d = sub(sub(there, was), (memory[o + SHIFT], memory[o + SHIFT + 1], memory[o + SHIFT + 2]))
+    return math.sqrt(dot(d, d)) + 2.0 * radius * math.sqrt(min(square, other))
 
 
-@kernel(inline=True)
-def both_ways(table, memory, pair):
-    """The ways of the two bodies of a pair together."""
-    return (
-        memory[MEMORY_HEADER + BODY_MEMORY * table[pair + PAIR_F] + WAY]
-        + memory[MEMORY_HEADER + BODY_MEMORY * table[pair + PAIR_G] + WAY]
-    )
+@kernel(inner=True)
+def part_used(table, pool, watch, memory, p, q):
+    """Which part of its allowances pair p has used at poses q; infinite before its first look."""
+    o = memory_places(table, watch)[0] + PAIR_MEMORY * p
+    if math.isnan(memory[o + TURN]):
+        return math.inf
+    pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
+    i = table[pair + PAIR_F]
+    j = table[pair + PAIR_G]
+    e = quaternion_from(q, i, j)
+    shift = matvec_t(rotation(q, i), (q[j, 0] - q[i, 0], q[j, 1] - q[i, 1], q[j, 2] - q[i, 2]))
+    root = table[table[pair + TREE_G] + NODE_POOL]
+    center = (pool[root + CENTER], pool[root + CENTER + 1], pool[root + CENTER + 2])
+    moved = way(memory, o, e, shift, center, pool[root + RADIUS])
+    if not moved > 0.0:
+        return 0.0
+    part = moved / memory[o + ALLOWANCE]
+    if memory[o + BALL_ALLOWANCE] < memory[o + ALLOWANCE]:
+        center = (memory[o + BALL], memory[o + BALL + 1], memory[o + BALL + 2])
+        part = max(part, way(memory, o, e, shift, center, memory[o + BALL_RADIUS]) / memory[o + BALL_ALLOWANCE])
+    return part
+
+
+@kernel(inner=True)
+def largest_part(table, pool, watch, memory, q):
+    """The pair that used the largest part of its allowances at poses q, and that part."""
+    best = -1
+    largest = -1.0
+    for p in range(table[watch + PAIRS]):
+        part = part_used(table, pool, watch, memory, p, q)
+        if part > largest:
+            best = p
+            largest = part
+    return best, largest
 
 
 @kernel(inner=True)
@@ -245,7 +281,7 @@ def list_roots(table, pool, watch, memory, p, roots, count, tracked):
 
 
 @kernel(inner=True)
-def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, bounds, candidates, roots, work):
+def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, roots, work):
     """Find and list the roots of pair p."""
     pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
     at = memory_places(table, watch)[0] + PAIR_MEMORY * p
@@ -255,20 +291,30 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, bounds, candi
     scene = (
         turn,
         shift,
-        (table[pair + PAIR_SURFACE_F], table[pair + PAIR_SURFACE_G], table[pair + PAIR_SHELL_F], table[pair + PAIR_SHELL_G]),
+        (
+            table[pair + PAIR_SURFACE_F],
+            table[pair + PAIR_SURFACE_G],
+            table[pair + PAIR_SHELL_F],
+            table[pair + PAIR_SHELL_G],
+        ),
         (table[pair + TREE_F], table[pair + TREE_G]),
         (i, j, q, table[watch + TRACK_SOLIDS]),
     )
     memory[LOOKS] += 1.0
-    is_first = math.isinf(memory[at + LOOKED])
-    moved = math.inf if is_first else both_ways(table, memory, pair) - memory[at + LOOKED]
     least = pool[table[pair + PAIR_MINIMUM]]
     lengths = table[watch + LENGTHS]
     reach = memory[at + REACH]
-    if not is_first:
-        pace = moved / max(memory[CALLS] - memory[at + CALLED], 1.0)
+    e = quaternion_from(q, i, j)
+    if not math.isnan(memory[at + TURN]):
+        root = table[table[pair + TREE_G] + NODE_POOL]
+        center = (pool[root + CENTER], pool[root + CENTER + 1], pool[root + CENTER + 2])
+        pace = way(memory, at, e, shift, center, pool[root + RADIUS]) / max(memory[CALLS] - memory[at + CALLED], 1.0)
         reach = min(max(MOVES * pace, pool[lengths + FIRST_REACH]), pool[lengths + LAST_REACH])
     memory[at + CALLED] = memory[CALLS]
+    for k in range(4):
+        memory[at + TURN + k] = e[k]
+    for k in range(3):
+        memory[at + SHIFT + k] = shift[k]
     found = np.int64(-1)
     while True:
         found = pairs_within(
@@ -280,9 +326,21 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, bounds, candi
         reach *= 0.5
     memory[at + REACH] = reach
     count = known_roots(table, pool, watch, memory, p, scene, tracked, roots, work)
+    flank = pool[table[pair + PAIR_MINIMUM] + 1]
+    enough = max(TAKE * reach, flank)
+    bulk = magnitudes(turn)
+    free = math.inf
+    fertile = math.inf
+    lo = (math.inf, math.inf, math.inf)
+    hi = (-math.inf, -math.inf, -math.inf)
     for c in range(found):
         if count == ROOTS:
             break
+        bound = element_distance(table, pool, scene[3], turn, shift, bulk, candidates[c, 0], candidates[c, 1]) - least
+        if bound > enough:
+            # Whatever root is there is not near enough for a place.
+            free = min(free, bound)
+            continue
         codes, start, inside = is_known(table, pool, scene, candidates[c, 0], candidates[c, 1], roots, count)
         if inside:
             continue
@@ -290,47 +348,36 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, bounds, candi
         count, result = add_root(
             table, pool, scene, codes, start, (0.0, 0.0, 0.0), pool[lengths + NEGLECT], roots, count, work
         )
-        if count > before and result == MINIMUM_FOUND:
+        if count == before or result != MINIMUM_FOUND:
+            # Patches that face each other and hold no root of their own: a motion may bring one forth.
+            fertile = min(fertile, max(bound, flank))
+            center, radius = element_ball(table, pool, table[pair + TREE_G], candidates[c, 1])
+            lo = (min(lo[0], center[0] - radius), min(lo[1], center[1] - radius), min(lo[2], center[2] - radius))
+            hi = (max(hi[0], center[0] + radius), max(hi[1], center[1] + radius), max(hi[2], center[2] + radius))
+        else:
             gap = roots[before, GAP]
-            # The far sides of two bodies oppose each other, too; of surfaces that were apart none is deeper in the
-            # other than they moved.
-            alien = gap > reach + least or (gap < 0.0 and (gap < -moved or is_outside(table, pool, scene, roots, before)))
+            # The far sides of two bodies oppose each other, too.
+            alien = gap > reach + least or (gap < 0.0 and is_outside(table, pool, scene, roots, before))
             roots[before, ORIGIN] = USELESS if alien else NEW
     rest = list_roots(table, pool, watch, memory, p, roots, count, tracked)
     listed = 0
     for k in range(table[pair + LOW], table[pair + HIGH]):
         if memory[memory_places(table, watch)[1] + PLACE_MEMORY * k] == p:
             listed += 1
-    memory[at + LOOKED] = both_ways(table, memory, pair)
+    memory[at + BALL_ALLOWANCE] = fertile
+    if fertile < math.inf:
+        d = sub(hi, lo)
+        memory[at + BALL_RADIUS] = 0.5 * math.sqrt(dot(d, d))
+        for k in range(3):
+            memory[at + BALL + k] = 0.5 * (lo[k] + hi[k])
     if found == 0:
         # Nothing faces the other body within reach: the boxes tell how far that is so.
         trees = scene[3]
-        reach = max(reach, least_distance(table, pool, trees[0], trees[1], turn, shift, math.inf, stack, bounds) - least)
-    memory[at + ALLOWANCE] = min(reach, rest) if count < ROOTS else 0.0
+        reach = max(reach, least_distance(table, pool, trees[0], trees[1], turn, shift, math.inf, stack) - least)
+    memory[at + ALLOWANCE] = min(min(reach, rest), free) if count < ROOTS else 0.0
     memory[at + STATE] = float(TRACKING if listed > 0 else (NEAR if found > 0 else FAR))
     if rest <= 0.0 or count == ROOTS:
         memory[CROWDED] = 1.0
-
-
-@kernel(inner=True)
-def part_used(table, watch, memory, p):
-    """Which part of its allowance a pair has used: 0 where neither body moved, infinite before its first look."""
-    o = memory_places(table, watch)[0] + PAIR_MEMORY * p
-    moved = both_ways(table, memory, table[watch + PAIR_TABLE] + PAIR_RECORD * p) - memory[o + LOOKED]
-    return moved / memory[o + ALLOWANCE] if moved > 0.0 else 0.0
-
-
-@kernel(inner=True)
-def most_used(table, watch, memory):
-    """The pair that used the largest part of its allowance."""
-    best = 0
-    largest = -1.0
-    for p in range(table[watch + PAIRS]):
-        part = part_used(table, watch, memory, p)
-        if part > largest:
-            best = p
-            largest = part
-    return best
 
 
 @kernel
@@ -340,19 +387,17 @@ def look(table, pool, watch, memory, q, tracked, everything):
     Returns how many events that made. `tracked` has a row for every place (`solid_contact.py`), at the roots of the
     poses q or close by.
     """
-    go_on(table, pool, watch, memory, q)
     before = memory[EVENT_COUNT]
     memory[CALLS] += 1.0
     memory[CROWDED] = 0.0
     ready = False
     stack = np.empty((1, 2), np.int64)
-    bounds = np.empty(1)
     candidates = stack
     roots = np.empty((1, ROOT))
     work = (roots, roots)
-    next_pair = most_used(table, watch, memory)
+    next_pair, _part = largest_part(table, pool, watch, memory, q)
     for p in range(table[watch + PAIRS]):
-        part = part_used(table, watch, memory, p)
+        part = part_used(table, pool, watch, memory, p, q)
         if everything:
             due = part > 0.0
         else:
@@ -362,23 +407,8 @@ def look(table, pool, watch, memory, q, tracked, everything):
         if not ready:
             ready = True
             stack = np.empty((STACK, 2), np.int64)
-            bounds = np.empty(STACK)
             candidates = np.empty((CANDIDATES, 2), np.int64)
             roots = np.empty((ROOTS, ROOT))
             work = (np.empty((1, CONTACT_RECORD)), np.empty((1, TRACK)))
-        look_at_pair(table, pool, watch, memory, p, q, tracked, stack, bounds, candidates, roots, work)
+        look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, roots, work)
     return np.int64(memory[EVENT_COUNT] - before)
-
-
-@kernel(inner=True)
-def share_of_step(table, watch, memory, moves, share):
-    """How much of a step that moves bodies by at most `moves` is allowed: no more than brings in what is not listed."""
-    at = memory_places(table, watch)[0]
-    for p in range(table[watch + PAIRS]):
-        pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
-        o = at + PAIR_MEMORY * p
-        left = memory[o + ALLOWANCE] - (both_ways(table, memory, pair) - memory[o + LOOKED])
-        need = moves[table[pair + PAIR_F]] + moves[table[pair + PAIR_G]]
-        if share * need > left:
-            share = max(left, 0.0) / need
-    return share

@@ -43,15 +43,21 @@ from assembly.constraints.layout import (
     VECTOR_TRIMS,
     WATCH,
 )
-from assembly.constraints.guards import allowed_share, clear_guards, forget_guards, look_around, place_guards
 from assembly.constraints.program import add_row_terms, evaluate
 from assembly.constraints.terms import objective, recenter
 from assembly.proximity.extremal import BEND
 from assembly.proximity.free_pair import VARIABLES, VECTORS
 from assembly.proximity.solid_contact import CONTACT_RECORD, FOLD, TRACK
-from assembly.proximity.watch import share_of_step
 from assembly.solve.contacts import free_folds, is_of_surfaces, start_contacts
 from assembly.solve.gather import gather, scattered
+from assembly.solve.guards import (
+    allowed_share,
+    clear_guards,
+    forget_guards,
+    is_too_far,
+    look_around,
+    place_guards,
+)
 from assembly.solve.linear import factorize_shifted
 from assembly.solve.multipliers import (
     choose_multipliers,
@@ -183,7 +189,6 @@ def solve_program(table, pool, settings, state, history, tips):
         np.empty((VECTORS if pairs > 0 else 0, 3, VARIABLES)),
         np.empty((VARIABLES if pairs > 0 else 0, VARIABLES)),
         tracked[2],
-        np.zeros(bodies),
         memory,
     )
     o_room = table[TAPE_ROOM]
@@ -343,7 +348,7 @@ def solve_program(table, pool, settings, state, history, tips):
             move(table, here[0], step, 1.0, trial[0])
             carry(table, pool, bases, loose, here, step, 1.0)
             if (
-                (watched and share_of_step(table, table[WATCH], memory, loose[5], 1.0) < 1.0)
+                (watched and is_too_far(table, pool, memory, trial))
                 or evaluate(table, pool, loose[4], BEND, loose, room, trial) >= 0
                 or not violation_of(trial[3], one_sided, rows) < violation
             ):
@@ -399,7 +404,10 @@ def solve_program(table, pool, settings, state, history, tips):
         for _ in range(FORESEEN):
             if used < 0.0 or restoring:
                 break
-            if foresee(shape, rows, residual, jacobian, y, mu, step, is_fresh, active, foreseen, descent, lagrangian) == 0:
+            if (
+                foresee(shape, rows, residual, jacobian, y, mu, step, is_fresh, active, foreseen, descent, lagrangian)
+                == 0
+            ):
                 break
             if not is_fresh:
                 is_fresh = True
@@ -419,7 +427,7 @@ def solve_program(table, pool, settings, state, history, tips):
         cut = min(1.0, radius / longest) if longest > 0.0 else 1.0
         cut = min(cut, 1.0 / turn) if turn > 0.0 else cut
         if watched:
-            cut = allowed_share(table, pool, memory, step, cut, loose[5])
+            cut = allowed_share(table, pool, memory, here, trial, step, cut)
         slope = 0.0
         steepest = 0.0
         for i in range(n):
@@ -519,8 +527,6 @@ def solve_program(table, pool, settings, state, history, tips):
             forget_guards(table, memory)
             place_guards(table, memory, y, better_y, free)
     write_pose(table, pool, here[0], state)
-    for b in range(bodies):
-        loose[5][b] = 0.0
     if status != CONTACT_LOST and not (tick and results[HELD] == 0.0):
         # A tick that went well ends at a pose that was just evaluated.
         holds, violation = judge(table, pool, state, loose, room, shape, rows, here, trial, 1.25 * feasible)

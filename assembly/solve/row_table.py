@@ -137,7 +137,6 @@ def point_at(table, pool, state, free):
         np.empty((VECTORS if pairs > 0 else 0, 3, VARIABLES)),
         np.empty((VARIABLES if pairs > 0 else 0, VARIABLES)),
         np.empty((tracks, TRACK)),
-        np.zeros(table[BODIES]),
         np.empty(0),
     )
     scaled_poses(table, pool, state, q)

@@ -43,9 +43,7 @@ from assembly.constraints.layout import (
     TRACKED,
     TRIM_PAIR,
     TRIMS,
-    WATCH,
 )
-from assembly.constraints.guards import bound_moves
 from assembly.constraints.terms import TAPE_TERM, TERM, TERM_KIND, TERM_TABLE, TERM_TAPE
 from assembly.kinematics.motion import retract
 from assembly.proximity.extremal import into_domain
@@ -249,8 +247,6 @@ def carry(table, pool, bases, loose, here, d, alpha):
     out = loose[4]
     for k in range(table[CONTACTS], table[TRACKED]):
         out[k, 0] = tracked[k, 0]
-    if table[WATCH] >= 0:
-        bound_moves(table, pool, d, alpha, loose[5])
     for k in range(table[CONTACTS]):
         row = table[ROW_TABLE] + ROW * k
         if table[row + BODY_F] < 0:

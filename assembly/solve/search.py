@@ -11,8 +11,8 @@ from assembly.constraints.layout import CONTACTS, MOVING, WATCH
 from assembly.constraints.program import evaluate, is_guard
 from assembly.constraints.terms import objective
 from assembly.proximity.extremal import BEND
-from assembly.proximity.watch import share_of_step
 from assembly.solve.dexterity import add_dexterities
+from assembly.solve.guards import is_too_far
 from assembly.solve.linear import factorize_shifted, forward, substitute
 from assembly.solve.rows import add_transposed, carry, merit, move
 
@@ -118,7 +118,7 @@ def search(
     while alpha * longest > 1e-9 * SHORTEST or alpha == 1.0:
         move(table, here[0], step, alpha, trial[0])
         carry(table, pool, bases, loose, here, step, alpha)
-        if table[WATCH] >= 0 and share_of_step(table, table[WATCH], loose[6], loose[5], 1.0) < 1.0:
+        if table[WATCH] >= 0 and is_too_far(table, pool, loose[5], trial):
             # Bent, it would go farther than is known to be free.
             bends = 2
             alpha *= 0.5

@@ -388,7 +388,9 @@ class Tracker:
         -------
         TrackLog
         """
-        recorder = TrackLog.recorder(trace.times, len(self._scene.bodies), TrackStatus, stride=stride, budget=self._budget)
+        recorder = TrackLog.recorder(
+            trace.times, len(self._scene.bodies), TrackStatus, stride=stride, budget=self._budget
+        )
         start = perf_counter()
         for k, (time, target) in enumerate(trace):
             if paced:

@@ -11,6 +11,7 @@ from assembly.errors import InputError
 from assembly.geometry import shapes, solids
 from assembly.geometry.curve import NurbsCurve
 from assembly.geometry.face import Face
+from assembly.geometry.surface import NurbsSurface
 from assembly.proximity import bounding_tree as layout
 from assembly.proximity.cones import FULL, around_cones, around_vectors, between
 from assembly.proximity.facet_check import triangle_distance
@@ -109,6 +110,23 @@ def test_a_free_edge_has_all_directions():
 def test_a_reversed_face_turns_its_cones():
     one, other = (FacetTree.of((Face(shapes.sphere(1.0), reversed=turned),)) for turned in (False, True))
     np.testing.assert_allclose(one.axis, -other.axis, atol=1e-12)
+
+
+def test_creases_have_all_directions():
+    """A square tube: four knot lines of u, the seam among them, are creases, and no edges of the topology."""
+    corners = np.array([(1, -1), (1, 1), (-1, 1), (-1, -1), (1, -1)], dtype=float)
+    points = np.stack([np.column_stack([corners, np.full(5, z)]) for z in (0.0, 2.0)], axis=1)
+    tube = Face(NurbsSurface(points, ([0, 0, 1, 2, 3, 4, 4], [0, 0, 1, 1]), (1, 1)))
+    assert tube.surface.closed == (True, False)
+    tree = FacetTree.of((tube,), count=400)
+    patches = slice(0, len(tree.corners))
+    u = tree.parameters[patches, :2]
+    creased = (u == np.round(u)).any(axis=1)
+    assert 0 < creased.sum() < 0.9 * len(u)
+    assert (tree.half_angle[patches][creased] == FULL).all()
+    assert (tree.half_angle[patches][~creased] < 1e-12).all()
+    # A wire has knots, too, but no creases.
+    assert FacetTree.of(TORUS).half_angle.max() < FULL
 
 
 def test_nodes_hold_their_children():

@@ -8,7 +8,6 @@ import numpy as np
 
 from assembly._kernel import call_address, kernel
 from assembly.constraints.layout import (
-    BODIES,
     BODY_F,
     BODY_G,
     FIRST_GUARD,
@@ -19,14 +18,10 @@ from assembly.constraints.layout import (
     ROW,
     ROW_TABLE,
     SHELL_F,
-    SLOTS,
     SURFACE_F,
     WATCH,
 )
 from assembly.proximity.watch import (
-    BODY_MEMORY,
-    LOOKED,
-    MEMORY_HEADER,
     PAIR_F,
     PAIR_G,
     PAIR_MEMORY,
@@ -38,10 +33,11 @@ from assembly.proximity.watch import (
     PAIRS,
     PLACE_MEMORY,
     PLACE_NUMBER,
-    RADII,
+    TURN,
+    largest_part,
     memory_places,
-    share_of_step,
 )
+from assembly.solve.rows import move
 
 
 @kernel(inner=True)
@@ -59,10 +55,8 @@ def forget_guards(table, memory):
     """Begin again: nothing has been looked at, and no contact has a place."""
     watch = table[WATCH]
     pairs, places, _events = memory_places(table, watch)
-    for b in range(table[BODIES]):
-        memory[MEMORY_HEADER + BODY_MEMORY * b] = math.nan
     for p in range(table[watch + PAIRS]):
-        memory[pairs + PAIR_MEMORY * p + LOOKED] = -math.inf
+        memory[pairs + PAIR_MEMORY * p + TURN] = math.nan
     for k in range(table[GUARDS]):
         memory[places + PLACE_MEMORY * k] = -1.0
 
@@ -103,20 +97,17 @@ def look_around(table, pool, memory, point, everything):
 
 
 @kernel(inner=True)
-def bound_moves(table, pool, step, alpha, moves):
-    """How far any point of every body moves at most along alpha times a step."""
-    radii = table[table[WATCH] + RADII]
-    for b in range(table[BODIES]):
-        s = 6 * table[table[SLOTS] + b]
-        moves[b] = 0.0
-        if s >= 0:
-            x = step[s] * step[s] + step[s + 1] * step[s + 1] + step[s + 2] * step[s + 2]
-            w = step[s + 3] * step[s + 3] + step[s + 4] * step[s + 4] + step[s + 5] * step[s + 5]
-            moves[b] = alpha * (x**0.5 + w**0.5 * pool[radii + b])
+def allowed_share(table, pool, memory, here, trial, step, share):
+    """How much of a step the watch allows, at most `share`; its poses go into the trial point."""
+    move(table, here[0], step, share, trial[0])
+    _pair, end = largest_part(table, pool, table[WATCH], memory, trial[0])
+    if end <= 1.0:
+        return share
+    _pair, begin = largest_part(table, pool, table[WATCH], memory, here[0])
+    return share * max(0.95 - begin, 0.05) / (end - begin)
 
 
 @kernel(inner=True)
-def allowed_share(table, pool, memory, step, share, moves):
-    """How much of a step the watch allows, at most `share`."""
-    bound_moves(table, pool, step, 1.0, moves)
-    return share_of_step(table, table[WATCH], memory, moves, share)
+def is_too_far(table, pool, memory, point):
+    """Whether the poses of a point are farther than the watch allows."""
+    return largest_part(table, pool, table[WATCH], memory, point[0])[1] > 1.0
