@@ -59,7 +59,7 @@ class Watch:
         self._packed = packed = scene.packed()
         self._at = int(packed.table[layout.WATCH])
         self.pairs = [(self.bodies.index(a), self.bodies.index(b)) for a, b in packed.guarded[0]]
-        self._pairs_at = watch.MEMORY_HEADER + watch.BODY_MEMORY * len(self.bodies)
+        self._pairs_at = watch.MEMORY_HEADER
         self._places_at = self._pairs_at + watch.PAIR_MEMORY * len(self.pairs)
         self.forget()
 

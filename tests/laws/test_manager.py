@@ -94,7 +94,7 @@ def test_a_wire_about_an_ellipsoid(name):
 
 def around(rng, wire, steps):
     """Poses of a wire and an ellipsoid: it moves about the wire, near it, and does not enter it."""
-    q, poses, way = np.array([HERE, HERE]), [], rng.normal(size=6)
+    q, poses, way = np.array([HERE, [9.0, *HERE[1:]]]), [], rng.normal(size=6)
 
     def gap(q):
         try:
