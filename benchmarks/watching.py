@@ -1,0 +1,102 @@
+"""Looks of the global manager at given poses, from outside of any solve: what a clearance would know there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+import assembly as asm
+from assembly.constraints import layout
+from assembly.proximity import watch
+from assembly.proximity.solid_contact import PAIR_GAP, TRACK
+
+__all__ = ["Listed", "Watch"]
+
+Array = NDArray[np.float64]
+Table = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Listed:
+    """Contacts that are listed at a pose.
+
+    Attributes
+    ----------
+    bodies : (n, 2)
+    points : (n, 2, 3)
+        On the surfaces.
+    gap : (n,)
+    take : (pairs,)
+        All contacts of a pair with gaps below this are to be listed.
+    looked : (pairs,)
+        Whether the look was at this pair.
+    """
+
+    bodies: Table
+    points: Array
+    gap: Array
+    take: Array
+    looked: NDArray[np.bool_]
+
+
+class Watch:
+    """Bodies of one whole surface each, all pairs watched.
+
+    Parameters
+    ----------
+    surfaces : sequence of NurbsSurface
+    """
+
+    def __init__(self, surfaces: Sequence[asm.NurbsSurface]) -> None:
+        self.surfaces = list(surfaces)
+        self.bodies = [asm.Body(f"body {k + 1}", surface) for k, surface in enumerate(surfaces)]
+        scene = asm.Assembly(self.bodies)
+        scene.constrain(asm.Clearance())
+        self._packed = packed = scene.packed()
+        self._at = int(packed.table[layout.WATCH])
+        self.pairs = [(self.bodies.index(a), self.bodies.index(b)) for a, b in packed.guarded[0]]
+        self._pairs_at = watch.MEMORY_HEADER
+        self._places_at = self._pairs_at + watch.PAIR_MEMORY * len(self.pairs)
+        self.forget()
+
+    def forget(self) -> None:
+        """Know nothing: the next look is a first one."""
+        self.memory = self._packed._memory.copy()
+        self.tracked = np.full((self._packed.tracked, TRACK), np.nan)
+
+    def _pairs(self) -> Array:
+        return self.memory[self._pairs_at : self._places_at].reshape(-1, watch.PAIR_MEMORY)
+
+    def look(self, q: Array, everything: bool = True) -> Listed:
+        """Look at poses (n, 7); a pair that is not looked at lists nothing.
+
+        Raises
+        ------
+        RuntimeError
+            There were not enough places.
+        """
+        packed, memory = self._packed, self.memory
+        scaled = q.copy()
+        scaled[:, :3] = (q[:, :3] - packed.reference) / packed.scale
+        calls = memory[watch.CALLS] + 1.0
+        watch.look(packed.table, packed.pool, self._at, memory, scaled, self.tracked, int(everything))
+        if memory[watch.CROWDED]:
+            raise RuntimeError("contacts are near for which there is no place")
+        pairs = self._pairs()
+        looked = pairs[:, watch.CALLED] == calls
+        places = memory[self._places_at :][: watch.PLACE_MEMORY * packed.guards].reshape(-1, watch.PLACE_MEMORY)
+        owner = places[:, watch.PLACE_PAIR].astype(int)
+        rows = np.flatnonzero((owner >= 0) & looked[owner])
+        tracked = self.tracked[int(packed.table[self._at + watch.FIRST]) + rows]
+        bodies = np.array(self.pairs)[owner[rows]]
+        points = np.empty((rows.size, 2, 3))
+        for k, (pair, row) in enumerate(zip(bodies, tracked, strict=True)):
+            for side, body in enumerate(pair):
+                local = self.surfaces[body].evaluate(*row[2 * side : 2 * side + 2])
+                points[k, side] = Rotation.from_quat(q[body, 3:], scalar_first=True).apply(local) + q[body, :3]
+        reach = watch.TAKE * pairs[:, watch.REACH] * packed.scale
+        return Listed(bodies, points, tracked[:, PAIR_GAP] * packed.scale, reach, looked)

@@ -1,0 +1,120 @@
+"""The laws of the global manager: of two bodies that move every contact that is near is listed, and once.
+
+Motions are random and do not cross; the judges find all extrema of the distance by other means: of wires from
+polynomials (`benchmarks.wire_oracle`), of a wire and an ellipsoid from dense samples (`ellipsoid_witness`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import assembly as asm
+from benchmarks.center_lines import paper_clip_wire
+from benchmarks.motions import FLAT, PAIRS, SAME, SHAPES, Errors, compared, wander
+from benchmarks.watching import Watch
+from benchmarks.wire_oracle import WireOracle
+from tests.laws.ellipsoid_witness import minima
+
+HERE = [0.0, 0, 0, 1, 0, 0, 0]
+SEMI_AXES = np.array([0.7, 0.4, 0.3])
+MOTIONS = 7
+# Clips seen from another one through which they are threaded. All but parallel, and near in three places:
+PARALLEL = (
+    [7.17912179, 1.00195669, -0.88217643, 0.38502161, -0.03238754, -0.15115273, 0.90986936],
+    [7.0806144, 1.05388361, -0.98058369, 0.38418968, -0.02835516, -0.15081509, 0.91041149],
+)
+# Touching, nearly along a line; 0.1 mm farther a second contact is born beside that one, where the wires cross already.
+FOLD = (
+    [-12.658153294, 3.487747855, -24.243562523, 0.409546902, 0.431255292, 0.075415521, 0.800376604],
+    [-12.642721396, 3.481855649, -24.264572723, 0.409023471, 0.430638004, 0.0750036, 0.801015087],
+    [-12.595296238, 3.463942266, -24.328661362, 0.407620658, 0.428730289, 0.073853356, 0.802858282],
+)
+
+
+@pytest.fixture(scope="module")
+def clips():
+    """Two clips under watch, and who judges them."""
+    return Watch([SHAPES["clip"][1]] * 2), WireOracle([paper_clip_wire()] * 2)
+
+
+@pytest.mark.parametrize(("f", "g"), PAIRS)
+def test_no_contact_is_missed_doubled_or_made_up(f, g):
+    rng = np.random.default_rng([17, PAIRS.index((f, g))])
+    errors = Errors.none()
+    for _ in range(MOTIONS):
+        wander(rng, f, g, int(rng.integers(20, 50)), errors)
+    assert (len(errors.missed), len(errors.doubled), len(errors.strange)) == (0, 0, 0)
+    # Motions that came near, and were compared.
+    assert errors.poses > 20 * MOTIONS - 5 and errors.contacts > MOTIONS
+
+
+@pytest.mark.parametrize("place", PARALLEL)
+def test_wires_that_are_all_but_parallel(clips, place):
+    watch, oracle = clips
+    watch.forget()
+    q = np.array([HERE, place])
+    listed, extrema = watch.look(q), oracle.extrema(q)
+    assert (extrema.gap[extrema.index == 0] < 0.02).sum() == 3
+    due, *errors = compared(listed, extrema, SAME * 80.0, FLAT / 80.0)
+    assert due >= 3 and errors == [0, 0, 0]
+
+
+def test_a_contact_that_is_born_beside_another_one(clips):
+    # No distance tells of it: bodies that touch nearly along a line are looked at as long as they do.
+    watch, oracle = clips
+    watch.forget()
+    for k, place in enumerate(FOLD):
+        q = np.array([HERE, place])
+        listed = watch.look(q, everything=k == 0)
+    found = oracle.minima(q, -1e-6)
+    assert found.gap.size == 1
+    assert listed.looked.all() and listed.gap.min() == pytest.approx(found.gap[0], abs=1e-12)
+
+
+@pytest.mark.parametrize("name", ["torus", "hook", "rod"])
+def test_a_wire_about_an_ellipsoid(name):
+    rng = np.random.default_rng(23)
+    wire, surface, _ = SHAPES[name]
+    watch, due = Watch([surface, asm.shapes.ellipsoid(*SEMI_AXES)]), 0
+    for _ in range(MOTIONS):
+        watch.forget()
+        for q in around(rng, wire, 30):
+            listed = watch.look(q)
+            gaps, points = minima(wire, q[0], SEMI_AXES, q[1])
+            # Feet are found to 1e-10; near a fold of both shapes less is known of where they are.
+            near = np.linalg.norm(listed.points[:, None] - points[None], axis=3).max(axis=2) < 1e-5
+            inside = gaps < listed.take[0] - 1e-9
+            due += int(inside.sum())
+            assert near[:, inside].sum(axis=0).tolist() == [1] * int(inside.sum())
+            assert near.any(axis=1).all()
+    assert due > 20
+
+
+def around(rng, wire, steps):
+    """Poses of a wire and an ellipsoid: it moves about the wire, near it, and does not enter it."""
+    q, poses, way = np.array([HERE, [9.0, *HERE[1:]]]), [], rng.normal(size=6)
+
+    def gap(q):
+        try:
+            return minima(wire, q[0], SEMI_AXES, q[1], samples=100)[0].min(initial=np.inf)
+        except ValueError:
+            return -1.0
+
+    while not 0.0 < gap(q) < 0.1:
+        e = rng.normal(size=(2, 4))
+        q[:, 3:] = e / np.linalg.norm(e, axis=1, keepdims=True)
+        q[1, :3] = rng.uniform(-2.5, 2.5, 3)
+    while len(poses) < steps:
+        way = 0.8 * way + 0.6 * rng.normal(size=6)
+        trial = q.copy()
+        trial[1, :3] += 0.01 * way[:3]
+        turn = Rotation.from_rotvec(0.015 * way[3:]) * Rotation.from_quat(q[1, 3:], scalar_first=True)
+        trial[1, 3:] = turn.as_quat(scalar_first=True)
+        if 0.0 < gap(trial) < 0.3:
+            q = trial
+            poses.append(q)
+        else:
+            way = -way
+    return poses
