@@ -24,6 +24,7 @@ from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.bounding_tree import CENTER, NODE_POOL, RADIUS, least_distance, magnitudes, pairs_within
 from assembly.proximity.roots import (
     ALIKE,
+    ALONE,
     CODE_F,
     CODE_G,
     GAP,
@@ -32,6 +33,7 @@ from assembly.proximity.roots import (
     NEW,
     ORIGIN,
     ROOT,
+    ROOT_FOLD,
     ROOT_NORMAL,
     USELESS,
     add_given,
@@ -336,6 +338,9 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, r
     free = math.inf
     fertile = math.inf
     slides = 0
+    folding = False
+    for k in range(count):
+        folding = folding or not roots[k, ROOT_FOLD] > ALONE
     lo = (math.inf, math.inf, math.inf)
     hi = (-math.inf, -math.inf, -math.inf)
     for c in range(found):
@@ -353,8 +358,10 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, r
         count, result = add_root(
             table, pool, scene, codes, start, (0.0, 0.0, 0.0), pool[lengths + NEGLECT], roots, count, work
         )
-        if scene[2][0] >= 0 and slides < SLIDES_A_LOOK and (count == before or result != MINIMUM_FOUND):
-            # Newton's method may have gone to a saddle, or past a minimum beside it.
+        if count > before:
+            folding = folding or not roots[before, ROOT_FOLD] > ALONE
+        if folding and scene[2][0] >= 0 and slides < SLIDES_A_LOOK and (count == before or result != MINIMUM_FOUND):
+            # Near a fold Newton's method may go to the saddle, past the minimum beside it.
             if count > before:
                 before += 1
             slides += 1
