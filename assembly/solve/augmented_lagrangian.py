@@ -103,6 +103,8 @@ RESTORATIONS = 3
 TOUCHING = 1e-9
 # A step is computed so many times more for one-sided rows that it would break.
 FORESEEN = 4
+# Where a solve with clearances ends at a pose that does not hold, so many more steps lead back onto the rows.
+SETTLING = 30
 # A tick that does not hold after its iterations has so many times more of them.
 EXTRA_TIME = 4
 # Multipliers this much stronger than the objective's slope are looked at once more.
@@ -268,6 +270,9 @@ def solve_program(table, pool, settings, state, history, tips):
             results[CULPRIT] = float(lost)
     lost = np.int64(-1)
     below = FREE_BELOW
+    # How a solve with clearances ended whose bodies are only pushed apart any more, and until when.
+    ended = RUNNING
+    settled_by = 0
     # Whether other contacts are near now than rows were placed for.
     changed = False
     while status == RUNNING:
@@ -336,12 +341,19 @@ def solve_program(table, pool, settings, state, history, tips):
             holds = True
             keep(here, y, rows, held)
         if iteration >= limit and (not tick or violation <= feasible or iteration >= EXTRA_TIME * limit):
-            status = ITERATION_LIMIT
+            if watched and not tick and ended == RUNNING:
+                ended = ITERATION_LIMIT
+                settled_by = iteration + SETTLING
+            if ended == RUNNING:
+                status = ITERATION_LIMIT
+                break
+        if ended != RUNNING and (violation <= feasible or iteration >= settled_by):
+            status = ended
             break
         if settings[BUDGET] > 0.0 and iteration > 0 and call_address(table[CLOCK_AT], ()) - begin > settings[BUDGET]:
             status = OUT_OF_TIME
             break
-        if tick and iteration >= limit:
+        if ended != RUNNING or (tick and iteration >= limit):
             # Its time is over: the shortest way back onto the rows.
             weigh_rows(rows, one_sided, residual, y, mu, forces, active)
             toward_rows(shape, rows, residual, jacobian, active, lagrangian, matrix, n, forces, step)
@@ -352,7 +364,7 @@ def solve_program(table, pool, settings, state, history, tips):
                 or evaluate(table, pool, loose[4], BEND, loose, room, trial) >= 0
                 or not violation_of(trial[3], one_sided, rows) < violation
             ):
-                status = STALLED
+                status = STALLED if ended == RUNNING else ended
                 break
             here, trial = trial, here
             for r in range(rows):
@@ -500,6 +512,10 @@ def solve_program(table, pool, settings, state, history, tips):
                 restorations += 1
                 entered = violation
                 continue
+            if watched and not tick and ended == RUNNING and violation > feasible:
+                ended = STALLED
+                settled_by = iteration + SETTLING
+                continue
             status = STALLED
             break
         for r in range(rows):
@@ -541,7 +557,7 @@ def solve_program(table, pool, settings, state, history, tips):
     if watched:
         clear_guards(table)
     results[STATUS] = float(status)
-    results[COUNT] = float(iteration)
+    results[COUNT] = float(min(iteration, limit) if ended != RUNNING else iteration)
     results[OBJECTIVE] = value
     results[VIOLATION] = violation * size
     results[DUAL] = dual
