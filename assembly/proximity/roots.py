@@ -50,8 +50,6 @@ CODE_F, CODE_G, ROOT_NORMAL, GAP, ORIGIN, POINT_F, POINT_G, ROOT_FOLD, ROOT = 4,
 USELESS, GIVEN_CONTACT, NEW, LISTED = -3.0, -2.0, -1.0, 0
 # What became of a start: nothing there, a root that is known, a saddle, a minimum.
 NOTHING, ALIKE, SADDLE, MINIMUM_FOUND = 0, 1, 2, 3
-# A step from the middle of a patch that turns a normal by more than this leads to no root of the patch.
-FARTHEST_TURN = 1.2
 # A root this far from a fold is the only one in its patches and those beside them, which turn by less than half a radian
 # each.
 ALONE, BESIDE = 0.05, 3.0
@@ -116,7 +114,7 @@ def surfaces_root(table, pool, scene, start, roots, k):
     """Newton on two surfaces from `start`; fills root k. NOTHING, SADDLE or MINIMUM_FOUND."""
     turn, shift = scene[0], scene[1]
     f, g = scene[2][0], scene[2][1]
-    status, x, _count, frame, curvature = solve_pair(table, pool, f, g, turn, shift, start, 1.0, FARTHEST_TURN, 0.0)
+    status, x, _count, frame, curvature = solve_pair(table, pool, f, g, turn, shift, start, 1.0, math.inf, 0.0)
     if status != CONVERGED and status != SINGULAR:
         return NOTHING
     if not opposed(frame, turn, table, pool, g, x):

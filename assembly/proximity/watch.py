@@ -62,9 +62,10 @@ PAIR_MINIMUM, LOW, HIGH, GIVEN, GIVEN_COUNT, PAIR_RECORD = 8, 9, 10, 11, 12, 13
 EVENT_COUNT, LOOKS, BORN, TIME, CROWDED, CALLS, MEMORY_HEADER = 0, 1, 2, 3, 4, 5, 6
 # Of a pair: how g was turned, seen from f, at its last look (a quaternion, NaN before there was one), and where the middle
 # of its tree was; how far g may go from there, its reach, its state, calls at its last look; a ball on g, where its
-# middle was, and how far what is in it may go; which part of its allowances is used.
+# middle was, and how far what is in it may go; which part of its allowances is used; whether it is looked at after every
+# move, because a contact may be born at a fold beside one that touches.
 TURN, PLACE, ALLOWANCE, REACH, STATE, CALLED = 0, 4, 7, 8, 9, 10
-BALL, BALL_RADIUS, BALL_PLACE, BALL_ALLOWANCE, PART, PAIR_MEMORY = 11, 14, 15, 18, 19, 20
+BALL, BALL_RADIUS, BALL_PLACE, BALL_ALLOWANCE, PART, URGENT, PAIR_MEMORY = 11, 14, 15, 18, 19, 20, 21
 FAR, NEAR, TRACKING = 0, 1, 2
 # Of a place: its pair (-1: none), the number of its contact.
 PLACE_PAIR, PLACE_NUMBER, PLACE_MEMORY = 0, 1, 2
@@ -383,6 +384,9 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, r
                 count, result = add_root(
                     table, pool, scene, codes, start, (0.0, 0.0, 0.0), pool[lengths + NEGLECT], roots, count, work
                 )
+        if result == ALIKE and not folding:
+            # On the slopes around a root that is known.
+            continue
         if count == before or result != MINIMUM_FOUND:
             # Patches that face each other and hold no root of their own: a motion may bring one forth.
             fertile = min(fertile, max(bound, flank))
@@ -392,7 +396,7 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, r
         else:
             gap = roots[before, GAP]
             # The far sides of two bodies oppose each other, too.
-            alien = gap > reach + least or (gap < 0.0 and is_outside(table, pool, scene, roots, before, margin))
+            alien = abs(gap) > reach + least or (gap < 0.0 and is_outside(table, pool, scene, roots, before, margin))
             roots[before, ORIGIN] = USELESS if alien else NEW
     rest, wanting = list_roots(table, pool, watch, memory, p, roots, count, tracked)
     listed = 0
@@ -400,6 +404,7 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, r
         if memory[memory_places(table, watch)[1] + PLACE_MEMORY * k] == p:
             listed += 1
     memory[at + BALL_ALLOWANCE] = fertile
+    memory[at + URGENT] = 1.0 if folding and fertile < math.inf else 0.0
     if fertile < math.inf:
         d = sub(hi, lo)
         memory[at + BALL_RADIUS] = 0.5 * math.sqrt(dot(d, d))
@@ -440,6 +445,7 @@ def look(table, pool, watch, memory, q, tracked, everything):
             due = part > 0.0
         else:
             due = part > SPENT or (p == next_pair and part > USED)
+            due = due or (part > 0.0 and memory[at + PAIR_MEMORY * p + URGENT] == 1.0)
         if not due and not any_lost(table, watch, memory, p, tracked):
             continue
         if not ready:

@@ -30,6 +30,7 @@ from assembly.constraints.layout import (
     CONTACTS,
     EXTRA,
     EXTRA_COLUMN,
+    GUARDS,
     IMPLICIT,
     JOINTS,
     MOVING,
@@ -54,8 +55,10 @@ from assembly.solve.guards import (
     allowed_share,
     clear_guards,
     forget_guards,
+    go_back,
     is_too_far,
     look_around,
+    numbers_of,
     place_guards,
 )
 from assembly.solve.linear import factorize_shifted
@@ -228,6 +231,7 @@ def solve_program(table, pool, settings, state, history, tips):
     # The last pose that held, its tracked values and multipliers; none yet.
     held = (np.empty((bodies, 7)), np.empty((tracks, TRACK)), np.empty(most))
     holds = False
+    numbers = np.empty(table[GUARDS], np.int64)
     results[HELD] = 0.0
     results[CURVED] = 0.0
     lost = start_contacts(table, pool, here[0], here[1], free, loose[1])
@@ -340,6 +344,8 @@ def solve_program(table, pool, settings, state, history, tips):
         if tick and violation <= feasible:
             holds = True
             keep(here, y, rows, held)
+            if watched:
+                numbers_of(table, numbers)
         if iteration >= limit and (not tick or violation <= feasible or iteration >= EXTRA_TIME * limit):
             if watched and not tick and ended == RUNNING:
                 ended = ITERATION_LIMIT
@@ -540,7 +546,7 @@ def solve_program(table, pool, settings, state, history, tips):
         bring_back(held, rows, here, y)
         results[HELD] = 1.0
         if watched:
-            forget_guards(table, memory)
+            go_back(table, memory, numbers)
             place_guards(table, memory, here, y, better_y, free)
     write_pose(table, pool, here[0], state)
     if status != CONTACT_LOST and not (tick and results[HELD] == 0.0):

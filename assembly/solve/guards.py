@@ -101,6 +101,29 @@ def look_around(table, pool, memory, point, everything):
 
 
 @kernel(inner=True)
+def numbers_of(table, out):
+    """The numbers of the contacts that rows have now."""
+    for k in range(table[GUARDS]):
+        out[k] = table[table[ROW_TABLE] + ROW * (table[FIRST_GUARD] + k) + GUARD_NUMBER]
+
+
+@kernel(inner=True)
+def go_back(table, memory, numbers):
+    """Keep the contacts that rows had with these numbers; where others came or went, everything is looked at again."""
+    watch = table[WATCH]
+    pairs, places, _events = memory_places(table, watch)
+    same = True
+    for k in range(table[GUARDS]):
+        number = table[table[ROW_TABLE] + ROW * (table[FIRST_GUARD] + k) + GUARD_NUMBER]
+        if number != numbers[k]:
+            same = False
+            memory[places + PLACE_MEMORY * k] = -1.0
+    if not same:
+        for p in range(table[watch + PAIRS]):
+            memory[pairs + PAIR_MEMORY * p + TURN] = math.nan
+
+
+@kernel(inner=True)
 def allowed_share(table, pool, memory, here, trial, step, share):
     """How much of a step the watch allows, at most `share`; its poses go into the trial point."""
     move(table, here[0], step, share, trial[0])
