@@ -67,6 +67,8 @@ EVENT_COUNT, LOOKS, BORN, TIME, CROWDED, CALLS, MEMORY_HEADER = 0, 1, 2, 3, 4, 5
 TURN, PLACE, ALLOWANCE, REACH, STATE, CALLED = 0, 4, 7, 8, 9, 10
 BALL, BALL_RADIUS, BALL_PLACE, BALL_ALLOWANCE, PART, URGENT, PAIR_MEMORY = 11, 14, 15, 18, 19, 20, 21
 FAR, NEAR, TRACKING = 0, 1, 2
+# Looks: at pairs that used up their allowance, at urgent ones too, at all that moved.
+AS_NEEDED, EVERYTHING, CAREFUL = 0, 1, 2
 # Of a place: its pair (-1: none), the number of its contact.
 PLACE_PAIR, PLACE_NUMBER, PLACE_MEMORY = 0, 1, 2
 # An event: kind, reason, pair, number of the contact, gap, time. The last so many are kept.
@@ -80,7 +82,9 @@ TAKE, KEEP = 0.4, 0.8
 # Room: pairs of patches of a look, roots.
 CANDIDATES, ROOTS, STACK = 8192, 96, 1024
 # Starts that a look leads down the slope of the gap, because Newton's method found no minimum from there.
-SLIDES_A_LOOK = 24
+SLIDES_A_LOOK = 6
+# So many pairs of patches are looked into, if there are others that are farther apart.
+FEW = 40
 # Where nothing may move a pair is looked at after every step.
 LEAST_ALLOWANCE = 1e-12
 # A reach is for so many moves as the last ones.
@@ -297,7 +301,25 @@ def list_roots(table, pool, watch, memory, p, roots, count, tracked):
 
 
 @kernel(inner=True)
-def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, roots, work):
+def near_enough(table, pool, scene, bulk, least, enough, candidates, found, distances):
+    """A distance within which so few of the pairs of patches are that each can be looked into; at most `enough`."""
+    for c in range(found):
+        distances[c] = (
+            element_distance(table, pool, scene[3], scene[0], scene[1], bulk, candidates[c, 0], candidates[c, 1]) - least
+        )
+    for _ in range(6):
+        count = 0
+        for c in range(found):
+            if distances[c] <= enough:
+                count += 1
+        if count <= FEW:
+            break
+        enough *= 0.5
+    return enough
+
+
+@kernel(inner=True)
+def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, distances, roots, work):
     """Find and list the roots of pair p."""
     pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
     at = memory_places(table, watch)[0] + PAIR_MEMORY * p
@@ -346,8 +368,8 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, r
     count = known_roots(table, pool, watch, memory, p, scene, tracked, roots, work)
     flank = pool[table[pair + PAIR_MINIMUM] + 1]
     margin = pool[table[pair + PAIR_MINIMUM] + 2]
-    enough = max(TAKE * reach, flank)
     bulk = magnitudes(turn)
+    enough = near_enough(table, pool, scene, bulk, least, max(TAKE * reach, flank), candidates, found, distances)
     free = math.inf
     fertile = math.inf
     slides = 0
@@ -359,10 +381,16 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, r
     for c in range(found):
         if count == ROOTS:
             break
-        bound = element_distance(table, pool, scene[3], turn, shift, bulk, candidates[c, 0], candidates[c, 1]) - least
-        if bound > enough:
+        bound = distances[c]
+        if bound > enough and bound > flank:
             # Whatever root is there is not near enough for a place.
             free = min(free, bound)
+            continue
+        if bound > enough:
+            fertile = flank
+            center, radius = element_ball(table, pool, table[pair + TREE_G], candidates[c, 1])
+            lo = (min(lo[0], center[0] - radius), min(lo[1], center[1] - radius), min(lo[2], center[2] - radius))
+            hi = (max(hi[0], center[0] + radius), max(hi[1], center[1] + radius), max(hi[2], center[2] + radius))
             continue
         codes, start, inside = is_known(table, pool, scene, candidates[c, 0], candidates[c, 1], roots, count)
         if inside:
@@ -424,8 +452,8 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, r
 
 
 @kernel
-def look(table, pool, watch, memory, q, tracked, everything):
-    """Look at the pairs of bodies that need it, or that moved at all since their last look; list what is near.
+def look(table, pool, watch, memory, q, tracked, how):
+    """Look at the pairs of bodies that need it, at urgent ones as well, or at all that moved; list what is near.
 
     Returns how many events that made. `tracked` has a row for every place (`solid_contact.py`), at the roots of the
     poses q or close by.
@@ -435,24 +463,26 @@ def look(table, pool, watch, memory, q, tracked, everything):
     ready = False
     stack = np.empty((1, 2), np.int64)
     candidates = stack
+    distances = np.empty(1)
     roots = np.empty((1, ROOT))
     work = (roots, roots)
     next_pair, _part = largest_part(table, pool, watch, memory, q)
     at = memory_places(table, watch)[0]
     for p in range(table[watch + PAIRS]):
         part = memory[at + PAIR_MEMORY * p + PART]
-        if everything:
+        if how == EVERYTHING:
             due = part > 0.0
         else:
             due = part > SPENT or (p == next_pair and part > USED)
-            due = due or (part > 0.0 and memory[at + PAIR_MEMORY * p + URGENT] == 1.0)
+            due = due or (how == CAREFUL and part > 0.0 and memory[at + PAIR_MEMORY * p + URGENT] == 1.0)
         if not due and not any_lost(table, watch, memory, p, tracked):
             continue
         if not ready:
             ready = True
             stack = np.empty((STACK, 2), np.int64)
             candidates = np.empty((CANDIDATES, 2), np.int64)
+            distances = np.empty(CANDIDATES)
             roots = np.empty((ROOTS, ROOT))
             work = (np.empty((1, CONTACT_RECORD)), np.empty((1, TRACK)))
-        look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, roots, work)
+        look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, distances, roots, work)
     return np.int64(memory[EVENT_COUNT] - before)

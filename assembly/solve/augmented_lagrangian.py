@@ -49,6 +49,7 @@ from assembly.constraints.terms import objective, recenter
 from assembly.proximity.extremal import BEND
 from assembly.proximity.free_pair import VARIABLES, VECTORS
 from assembly.proximity.solid_contact import CONTACT_RECORD, FOLD, TRACK
+from assembly.proximity.watch import AS_NEEDED, CAREFUL, EVERYTHING
 from assembly.solve.contacts import free_folds, is_of_surfaces, start_contacts
 from assembly.solve.gather import gather, scattered
 from assembly.solve.guards import (
@@ -238,7 +239,7 @@ def solve_program(table, pool, settings, state, history, tips):
     if watched:
         place_guards(table, memory, here, y, better_y, free)
         if lost < 0:
-            look_around(table, pool, memory, here, 0)
+            look_around(table, pool, memory, here, AS_NEEDED)
             place_guards(table, memory, here, y, better_y, free)
     place_rows(table, free, bases, one_sided)
     envelope(table, bases, rows, n, last, last_row)
@@ -259,7 +260,7 @@ def solve_program(table, pool, settings, state, history, tips):
             place_guards(table, memory, here, y, better_y, free)
         start_contacts(table, pool, here[0], here[1], free, loose[1])
         if watched:
-            look_around(table, pool, memory, here, 0)
+            look_around(table, pool, memory, here, AS_NEEDED)
             place_guards(table, memory, here, y, better_y, free)
             place_rows(table, free, bases, one_sided)
             envelope(table, bases, rows, n, last, last_row)
@@ -281,7 +282,8 @@ def solve_program(table, pool, settings, state, history, tips):
     changed = False
     while status == RUNNING:
         if watched and not changed:
-            changed = look_around(table, pool, memory, here, 0)
+            holds_now = violation_of(here[3], one_sided, rows) <= TOUCHING
+            changed = look_around(table, pool, memory, here, CAREFUL if holds_now else AS_NEEDED)
         if changed:
             place_guards(table, memory, here, y, better_y, free)
         weigh_rows(rows, one_sided, here[3], y, mu, forces, active)
@@ -333,7 +335,7 @@ def solve_program(table, pool, settings, state, history, tips):
             break
         if violation <= feasible and dual <= settings[STATIONARITY]:
             if watched and settings[LAST_LOOK] == 1.0:
-                changed = look_around(table, pool, memory, here, 1)
+                changed = look_around(table, pool, memory, here, EVERYTHING)
                 if changed:
                     continue
             status = SOLVED

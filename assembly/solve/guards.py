@@ -95,9 +95,9 @@ def place_guards(table, memory, here, y, better_y, free):
 
 
 @kernel(inner=True)
-def look_around(table, pool, memory, point, everything):
+def look_around(table, pool, memory, point, how):
     """The watch's look at a point; whether rows changed."""
-    return call_address(table[LOOK_AT], (table, pool, table[WATCH], memory, point[0], point[1], everything)) > 0
+    return call_address(table[LOOK_AT], (table, pool, table[WATCH], memory, point[0], point[1], how)) > 0
 
 
 @kernel(inner=True)
