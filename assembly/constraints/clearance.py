@@ -62,7 +62,7 @@ class Clearance(Constraint):
                     raise InputError(f"bodies[{k}] is {body.name!r}, a body without a shape; expected one with a face")
             if len(chosen) < 2:
                 raise InputError(f"bodies has {len(chosen)} of them; expected two or more, or None for all")
-        super().__init__(chosen or (), name, "clearance")
+        super().__init__(chosen or (), "clearance" if chosen is None and name is None else name, "clearance")
         self._all = chosen is None
         self._minimum = number("minimum", minimum)
         if not self._minimum >= 0.0:
