@@ -152,7 +152,7 @@ class Manager:
         new_places[len(places) :] = (-1.0, 0.0)
         new_events[:] = events
         # Every pair is looked at once more.
-        new_pairs[:, watch.LOOKED] = -inf
+        new_pairs[:, watch.LOOKED], new_pairs[:, watch.ALLOWANCE] = -inf, 0.0
         self._poses[:] = old[2]
         self._tracked[: len(places)] = old[3]
 
