@@ -206,7 +206,7 @@ class Manager:
         code = -1 if rows is None or not rows.flags.c_contiguous else self._follow(rows)
         if code < 0:
             code = self._follow(pose_rows("q", q, len(self._bodies)))
-        while self._memory[watch.CROWDED] == 1.0 and self._is_full():
+        while code > 0 and self._is_full():
             self._grow()
             code += self._follow(pose_rows("q", q, len(self._bodies)))
         if code == 0:
