@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.constraints import addresses, layout, tape, terms
-from assembly.constraints.constraint import Constraint, Coordinate, Equation, FramePair, structure_changes
 from assembly.constraints.clearance import Clearance
+from assembly.constraints.constraint import Constraint, Coordinate, Equation, FramePair, structure_changes
 from assembly.constraints.contact import Contact
 from assembly.constraints.couplings import Coupling
 from assembly.constraints.dexterity import MEASURES, TASKS, Dexterity
@@ -30,11 +30,11 @@ from assembly.geometry.pieces import TRIM_FIRST
 from assembly.geometry.spline import CURVE_RECORD, SURFACE_RECORD
 from assembly.geometry.surface import NurbsSurface
 from assembly.kinematics.body import Body, BodyFace
-from assembly.proximity.pairs import OFFSETS
-from assembly.proximity.shell import EDGE_CURVE, EDGE_END, EDGE_RECORD, EDGE_START, EDGE_SURFACE
 from assembly.proximity import watch
 from assembly.proximity.events import fresh_memory
 from assembly.proximity.facet_tree import FacetTree
+from assembly.proximity.pairs import OFFSETS
+from assembly.proximity.shell import EDGE_CURVE, EDGE_END, EDGE_RECORD, EDGE_START, EDGE_SURFACE
 from assembly.proximity.shell_packing import pack_shell
 from assembly.proximity.solid import is_one_smooth, solid_of
 from assembly.proximity.solid_contact import TRACK
@@ -104,7 +104,7 @@ class Packed:
         ]
         self.clearances = [constraint for constraint in constraints if isinstance(constraint, Clearance)]
         self.guarded = guarded_pairs(self.clearances, bodies)
-        self.places = [_places(clearance, pairs) for clearance, pairs in zip(self.clearances, self.guarded, strict=True)]
+        self.places = list(map(_places, self.clearances, self.guarded))
         self.guards = sum(self.places)
         self._targets: list[tuple[PointDistance | FrameDistance, int]] = []
         self._turns: list[tuple[FrameDistance, int]] = []
@@ -150,6 +150,37 @@ class Packed:
         state = np.zeros(self.memory_at + self._memory.size)
         state[self.memory_at :] = self._memory
         return state
+
+    def pair_name(self, k: int) -> str:
+        """The name of the contact, or the clearance, that row k is of."""
+        names = [contact.name for contact in self.contacts]
+        for clearance, count in zip(self.clearances, self.places, strict=True):
+            names += [clearance.name] * count
+        return names[k]
+
+    def table_at(self, state: Array) -> Table:
+        """The table with the rows of clearances as a state has them; in the packed one they have no contacts."""
+        table = self.table
+        if self.guards and state.size > self.memory_at:
+            table = table.copy()
+            record = table[layout.WATCH]
+            rows = table[table[layout.ROW_TABLE] + layout.ROW * table[layout.FIRST_GUARD] :][: layout.ROW * self.guards]
+            pairs = table[table[record + watch.PAIR_TABLE] :][: watch.PAIR_RECORD * table[record + watch.PAIRS]]
+            pairs = pairs.reshape(-1, watch.PAIR_RECORD)
+            for row, (place, number) in zip(rows.reshape(-1, layout.ROW), self.listed(state), strict=True):
+                if place >= 0:
+                    pair = pairs[place]
+                    row[[layout.BODY_F, layout.BODY_G]] = pair[[watch.PAIR_F, watch.PAIR_G]]
+                    row[layout.SURFACE_F : layout.SHELL_G + 1] = pair[watch.PAIR_SURFACE_F : watch.PAIR_SHELL_G + 1]
+                    row[layout.MINIMUM], row[layout.GUARD_NUMBER] = pair[watch.PAIR_MINIMUM], number
+        return table
+
+    def listed(self, state: Array) -> list[tuple[int, int]]:
+        """Of every place of a watch in a state: its pair of bodies, or -1, and the number of its contact."""
+        pairs = sum(map(len, self.guarded))
+        at = self.memory_at + watch.MEMORY_HEADER + watch.BODY_MEMORY * self.count + watch.PAIR_MEMORY * pairs
+        places = state[at : at + watch.PLACE_MEMORY * self.guards].reshape(-1, watch.PLACE_MEMORY)
+        return [(int(pair), int(number)) for pair, number in places.tolist()]
 
     def _add(self, table: Sequence[int] | Table = (), pool: Sequence[float] | Array = ()) -> tuple[int, int]:
         """Append; returns where the parts begin."""
@@ -422,7 +453,8 @@ class Packed:
                     for field in (k, int(contact.body_a is pair[1]))
                 ]
                 places = [self._places[id(body)] for body in pair]
-                records += [*places, trees[f], trees[g], *shape, minimum, first, first + count, len(listed), len(given) // 2]
+                room = [first, first + count, len(listed), len(given) // 2]
+                records += [*places, trees[f], trees[g], *shape, minimum, *room]
                 listed += given
             first += count
         given_at, _ = self._add(listed)
@@ -568,8 +600,8 @@ def guarded_pairs(clearances: Sequence[Clearance], bodies: Sequence[Body]) -> li
             other = owner.setdefault(frozenset((id(a), id(b))), clearance.name)
             if other != clearance.name:
                 raise InputError(
-                    f"clearance {clearance.name!r} is of bodies {a.name!r} and {b.name!r}, of which clearance {other!r} "
-                    "is, too; expected each pair once, say exclude=..."
+                    f"clearance {clearance.name!r} is of bodies {a.name!r} and {b.name!r}, of which clearance "
+                    f"{other!r} is, too; expected each pair once, say exclude=..."
                 )
         result.append(pairs)
     return result

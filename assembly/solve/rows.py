@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly.constraints.guards import bound_moves
 from assembly.constraints.layout import (
     ANGLE,
     BODIES,
@@ -45,7 +46,6 @@ from assembly.constraints.layout import (
     TRIMS,
     WATCH,
 )
-from assembly.constraints.guards import bound_moves
 from assembly.constraints.terms import TAPE_TERM, TERM, TERM_KIND, TERM_TABLE, TERM_TAPE
 from assembly.kinematics.motion import retract
 from assembly.proximity.extremal import into_domain

@@ -112,7 +112,8 @@ class Manager:
         self._reach = 0.0 if reach is None else number("reach", reach)
         if not 0.0 <= self._reach <= MOST_REACH * size:
             raise InputError(
-                f"reach is {self._reach:g}; expected a length from 0 to {MOST_REACH * size:g}, a fifth of the largest body"
+                f"reach is {self._reach:g}; expected a length from 0 to {MOST_REACH * size:g}, "
+                "a fifth of the largest body"
             )
         self._neglect = clearance.neglect
         self._pairs = list(combinations(names, 2))
