@@ -138,7 +138,8 @@ class Packed:
         self.memory_at = self.results_at + layout.RESULTS
         self._memory = np.empty(0)
         if self.guards:
-            self._memory = fresh_memory(len(bodies), sum(map(len, self.guarded)), self.guards, FIRST_REACH)
+            # The first look sees what crosses at the start as well, if it is no deeper than this.
+            self._memory = fresh_memory(len(bodies), sum(map(len, self.guarded)), self.guards, LAST_REACH)
 
     @property
     def pair_rows(self) -> int:

@@ -220,7 +220,7 @@ class Tracker:
         self._scene_given = scene
         begin = scene.solve(q0) if scene.constraints else None
         if begin is not None and not begin.success:
-            raise InputError(f"q0 is a start from which the constraints cannot be solved: {begin.message}")
+            raise InputError(f"q0 is a start that leads to no pose to begin at; expected one: {begin.message}")
         if begin is not None:
             poses = begin.q
         else:
@@ -260,7 +260,7 @@ class Tracker:
         self._history = np.empty((1, HISTORY))
         first = inner.solve(poses)
         if not first.success:
-            raise InputError(f"q0 is a start from which the constraints cannot be solved: {first.message}")
+            raise InputError(f"q0 is a start that leads to no pose to begin at; expected one: {first.message}")
         self._state = first._state.copy()
         # Numbers are read from a view in half the time it takes to read them from the array.
         self._view = memoryview(self._state)  # type: ignore[arg-type]  # an array is a buffer
