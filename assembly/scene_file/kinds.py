@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.constraints.constraint import Freedom
 from assembly.constraints.clearance import Clearance
+from assembly.constraints.constraint import Freedom
 from assembly.constraints.contact import Contact
 from assembly.constraints.couplings import Gear, RackPinion
 from assembly.constraints.dexterity import Dexterity

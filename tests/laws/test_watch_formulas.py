@@ -37,7 +37,7 @@ def test_no_point_moves_farther_than_the_bound():
             assert moved.max() <= bound + 1e-15 * 8.0
             least = min(np.linalg.norm(e - f), np.linalg.norm(e + f))
             assert abs(least - 2.0 * np.sin(a / 4.0)) < 1e-15 * 8.0
-            # A point at right angles to the axis of the turn, where nothing is shifted, comes as far as cos(a / 4) of it.
+            # A point at right angles to the axis comes as far as cos(a / 4) of it by the turn alone.
             turn = Rotation.from_quat(f, scalar_first=True) * Rotation.from_quat(e, scalar_first=True).inv()
             across = np.cross(turn.as_rotvec(), rng.normal(size=3))
             across *= radius / np.linalg.norm(across)
