@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from assembly.kinematics.body import Body as Body
     from assembly.kinematics.ellipsoid import Ellipsoid as Ellipsoid
     from assembly.kinematics.pose import Pose as Pose
+    from assembly.proximity.events import Event as Event
     from assembly.proximity.pairs import ContactPair as ContactPair
     from assembly.scene_file import load as load
     from assembly.solve import reference as reference
@@ -62,7 +63,11 @@ if TYPE_CHECKING:
     from assembly.step import read_step as read_step
     from assembly.step import write_step as write_step
     from assembly.tracking.log import TrackLog as TrackLog
+    from assembly.tracking.manager import Manager as Manager
     from assembly.tracking.trace import Trace as Trace
+    from assembly.tracking.tracker import Step as Step
+    from assembly.tracking.tracker import Tracker as Tracker
+    from assembly.tracking.tracker import TrackStatus as TrackStatus
 else:
     __getattr__, __dir__, __all__ = lazy_names(
         __name__,
@@ -77,12 +82,14 @@ else:
             "Dexterity": "assembly.constraints.dexterity",
             "Distance": "assembly.constraints.placements",
             "Ellipsoid": "assembly.kinematics.ellipsoid",
+            "Event": "assembly.proximity.events",
             "Expression": "assembly.constraints.expression",
             "Face": "assembly.geometry.face",
             "Fixed": "assembly.constraints.joints",
             "FrameDistance": "assembly.constraints.objectives",
             "Gear": "assembly.constraints.couplings",
             "Loop": "assembly.geometry.loop",
+            "Manager": "assembly.tracking.manager",
             "Mobility": "assembly.solve.mobility",
             "NurbsCurve": "assembly.geometry.curve",
             "NurbsSurface": "assembly.geometry.surface",
@@ -101,8 +108,11 @@ else:
             "Solution": "assembly.solve.solution",
             "Spherical": "assembly.constraints.joints",
             "Status": "assembly.solve.solution",
+            "Step": "assembly.tracking.tracker",
             "Trace": "assembly.tracking.trace",
             "TrackLog": "assembly.tracking.log",
+            "TrackStatus": "assembly.tracking.tracker",
+            "Tracker": "assembly.tracking.tracker",
             "TrimContact": "assembly.constraints.trim_contact",
             "Universal": "assembly.constraints.joints",
             "Wrench": "assembly.solve.statics",

@@ -118,8 +118,8 @@ class Assembly:
         for constraint in constraints:
             if not isinstance(constraint, Constraint):
                 raise TypeError(
-                    f"constraint is {constraint!r}; expected a Contact or a trim of one, a joint, a coupling or an "
-                    "Expression"
+                    f"constraint is {constraint!r}; expected a Contact or a trim of one, a Clearance, a joint, "
+                    "a coupling or an Expression"
                 )
             self._check_bodies(constraint.name, constraint.bodies)
             if any(other.name == constraint.name for other in self._constraints):

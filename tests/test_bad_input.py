@@ -83,6 +83,28 @@ def contact(a=0, b=1, **arguments):
     return asm.Contact(bodies[a], bodies[b], **arguments)
 
 
+def clearance(**arguments):
+    return asm.Clearance(pair(), **arguments)
+
+
+def keep_twice():
+    scene = touching()
+    scene.constrain(asm.Clearance(scene.bodies), asm.Clearance())
+    return scene.solve()
+
+
+def tracker(**options):
+    scene = touching()
+    return scene.tracker(scene.bodies[1].point(0, 0, 0), **options)
+
+
+def track_what_cannot_hold():
+    a, b = asm.Body("a", BALL, fixed=True), asm.Body("b", BALL, (5.0, 0.0, 0.0))
+    scene = asm.Assembly([a, b])
+    scene.constrain(asm.Contact(a, b), asm.Distance(a.point(0, 0, 0), b.point(0, 0, 0), 7.0))
+    return scene.tracker(b)
+
+
 def q_of(row):
     return [[0, 0, 0, 1, 0, 0, 0], row]
 
@@ -228,6 +250,61 @@ CASES = {
     "option nan": (lambda: solve(stationarity=NAN), "stationarity is nan; expected a finite real number"),
     "option integer": (lambda: solve(max_iterations=2.5), "max_iterations is 2.5; expected an integer"),
     "option negative": (lambda: solve(max_iterations=-1), "max_iterations is -1; expected an integer from 0"),
+    # Clearances, managers and trackers.
+    "clearance of one": (
+        lambda: asm.Clearance(pair()[:1]),
+        "bodies has 1 of them; expected two or more, or None for all",
+    ),
+    "clearance of none": (lambda: asm.Clearance([]), "bodies has 0 of them; expected two or more"),
+    "clearance without shape": (
+        lambda: asm.Clearance([*pair(), asm.Body("c")]),
+        r"bodies\[2\] is 'c', a body without a shape; expected one with a face",
+    ),
+    "clearance of one twice": (
+        lambda: asm.Clearance(2 * pair()[:1]),
+        "body 'a' is named twice; expected distinct bodies",
+    ),
+    "minimum": (lambda: clearance(minimum=-1.0), "minimum is -1; expected a length of zero or more"),
+    "minimum nan": (lambda: clearance(minimum=NAN), "minimum is nan; expected a finite real number"),
+    "minimum text": (lambda: clearance(minimum="1"), "minimum is '1'; expected a finite real number"),
+    "neglect": (lambda: clearance(neglect=0.0), "neglect is 0; expected a part of the scene's size, from above 0 to 1"),
+    "neglect large": (lambda: clearance(neglect=2.0), "neglect is 2; expected a part of the scene's size"),
+    "places": (lambda: clearance(places=0), "places is 0; expected an integer of 1 or more"),
+    "places half": (lambda: clearance(places=1.5), "places is 1.5; expected an integer of 1 or more"),
+    "exclude": (lambda: clearance(exclude=[pair()[0]]), r"exclude\[0\] is .*; expected a pair of bodies"),
+    "exclude strangers": (
+        lambda: clearance(exclude=[pair()]),
+        r"exclude\[0\] names body 'a'; expected bodies of this clearance",
+    ),
+    "clearance name": (lambda: clearance(name=""), "name is ''; expected a nonempty string"),
+    "clearance of strangers": (
+        lambda: touching().constrain(clearance()),
+        "clearance a-b is on body 'a'; expected a body of this assembly",
+    ),
+    "two clearances of a pair": (
+        keep_twice,
+        "'clearance' is of bodies 'a' and 'b', of which clearance 'clearance a-b' is, too; expected each pair once",
+    ),
+    "manager of one": (lambda: asm.Manager(pair()[:1]), "bodies has 1 of them; expected two or more"),
+    "manager of namesakes": (
+        lambda: asm.Manager([pair()[0], pair()[0]]),
+        r"bodies\[1\] has the name 'a' of another body; expected distinct names",
+    ),
+    "reach": (lambda: asm.Manager(pair(), reach=-1.0), "reach is -1; expected a length from 0 to 0.69"),
+    "reach far": (lambda: asm.Manager(pair(), reach=3.0), "reach is 3; expected a length from 0 to 0.69"),
+    "reach nan": (lambda: asm.Manager(pair(), reach=NAN), "reach is nan; expected a finite real number"),
+    "manager neglect": (lambda: asm.Manager(pair(), neglect=0.0), "neglect is 0; expected a part of the scene's size"),
+    "manager places": (lambda: asm.Manager(pair(), places=-1), "places is -1; expected an integer of 1 or more"),
+    "stiffness": (lambda: tracker(stiffness=0.0), "stiffness is 0; expected a positive number"),
+    "budget": (lambda: tracker(budget=-1.0), "budget is -1; expected a positive number"),
+    "tracker iterations": (lambda: tracker(iterations=0), "iterations is 0; expected an integer from 1 to 1000"),
+    "tracker tolerance": (lambda: tracker(tolerance=1.0), "tolerance is 1; expected a part of the scene's size from"),
+    "second order": (lambda: tracker(second_order=1), "second_order is 1; expected True or False"),
+    "tracker q0": (lambda: tracker(q0=np.zeros(7)), r"q0 has shape \(7,\); expected \(2, 7\)"),
+    "no start": (
+        track_what_cannot_hold,
+        "q0 is a start that leads to no pose to begin at; expected one: .*conflicting",
+    ),
     "solution body": (lambda: solve().pose("c"), "body is 'c'; expected one of 'a', 'b'"),
 }
 
@@ -249,6 +326,14 @@ TYPES = {
     "body": (lambda: asm.Assembly(["a"]), "body is 'a'; expected a Body"),
     "constraint": (lambda: touching().constrain("a-b"), "constraint is 'a-b'; expected a Contact"),
     "objective": (lambda: touching().minimize(3.0), "objective is 3.0; expected an objective such as PointDistance"),
+    "clearance body": (lambda: asm.Clearance(["a", "b"]), r"bodies\[0\] is 'a'; expected a Body"),
+    "excluded body": (
+        lambda: clearance(exclude=[("a", "b")]),
+        r"exclude\[0\] is \('a', 'b'\); expected a pair of bodies",
+    ),
+    "manager bodies": (lambda: asm.Manager(3.0), "bodies is 3.0; expected bodies"),
+    "manager body": (lambda: asm.Manager([BALL, BALL]), r"bodies\[0\] is NurbsSurface.*; expected a Body"),
+    "follow": (lambda: touching().tracker((0, 0, 0)), r"follow is \(0, 0, 0\); expected a Point, a Frame or a Body"),
     "pose": (lambda: setattr(pair()[0], "pose", (0, 0, 0)), r"pose is \(0, 0, 0\); expected a Pose"),
 }
 

@@ -82,6 +82,7 @@ def every_constraint():
         touch,
         *joints,
         asm.TrimContact(touch, loop, "inside", "cartesian", side="b", name="kept"),
+        asm.Clearance([ground, crank], THIRD, neglect=0.1, places=3, exclude=[(crank, ground)]),
         asm.Expression(mixed(3, 2), [wheel, ground, crank], unilateral=True, scale=0.1, weight=THIRD),
     )
     scene.minimize(
@@ -330,7 +331,7 @@ CASES = {
     "type": (
         [HINGE, "type"],
         "hinge",
-        r'.type is "hinge"; expected one of contact, fixed, .*, rack_pinion, trim_contact, expression$',
+        r'.type is "hinge"; expected one of contact, fixed, .*, rack_pinion, trim_contact, clearance, expression$',
     ),
     "type of a term": ([HINGE, "type"], "posture", r'.type is "posture"; expected one of contact'),
     "missing": ([HINGE, "limits"], MISSING, " has no field 'limits'; expected the fields type, name, frame_a, frame_b"),

@@ -62,16 +62,14 @@ class Clearance(Constraint):
                     raise InputError(f"bodies[{k}] is {body.name!r}, a body without a shape; expected one with a face")
             if len(chosen) < 2:
                 raise InputError(f"bodies has {len(chosen)} of them; expected two or more, or None for all")
-        super().__init__(chosen or (), name, "clearance")
+        super().__init__(chosen or (), "clearance" if chosen is None and name is None else name, "clearance")
         self._all = chosen is None
         self._minimum = number("minimum", minimum)
         if not self._minimum >= 0.0:
             raise InputError(f"minimum is {self._minimum:g}; expected a length of zero or more")
         self._neglect = number("neglect", neglect)
         if not 0.0 < self._neglect <= 1.0:
-            raise InputError(
-                f"neglect is {self._neglect:g}; expected a part of the scene's size, above 0 and at most 1"
-            )
+            raise InputError(f"neglect is {self._neglect:g}; expected a part of the scene's size, from above 0 to 1")
         if places is not None and (not isinstance(places, int) or isinstance(places, bool) or places < 1):
             raise InputError(f"places is {places!r}; expected an integer of 1 or more")
         self._places = places
@@ -117,7 +115,8 @@ class Clearance(Constraint):
         ]
 
     def __repr__(self) -> str:
-        return f"Clearance({'all bodies' if self._all else list(self.bodies)!r}, minimum={self.minimum:g}, name={self.name!r})"
+        bodies = "all bodies" if self._all else [body.name for body in self.bodies]
+        return f"Clearance({bodies}, minimum={self.minimum:g}, name={self.name!r})"
 
 
 def _pair(k: int, pair: tuple[Body, Body]) -> tuple[Body, Body]:

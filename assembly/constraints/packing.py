@@ -144,7 +144,8 @@ class Packed:
         self.memory_at = self.results_at + layout.RESULTS
         self._memory = np.empty(0)
         if self.guards:
-            self._memory = fresh_memory(sum(map(len, self.guarded)), self.guards, FIRST_REACH)
+            # The first look sees what crosses at the start as well, if it is no deeper than this.
+            self._memory = fresh_memory(sum(map(len, self.guarded)), self.guards, LAST_REACH)
 
     @property
     def pair_rows(self) -> int:
@@ -160,6 +161,37 @@ class Packed:
         state = np.zeros(self.memory_at + self._memory.size)
         state[self.memory_at :] = self._memory
         return state
+
+    def pair_name(self, k: int) -> str:
+        """The name of the contact, or the clearance, that row k is of."""
+        names = [contact.name for contact in self.contacts]
+        for clearance, count in zip(self.clearances, self.places, strict=True):
+            names += [clearance.name] * count
+        return names[k]
+
+    def table_at(self, state: Array) -> Table:
+        """The table with the rows of clearances as a state has them; in the packed one they have no contacts."""
+        table = self.table
+        if self.guards and state.size > self.memory_at:
+            table = table.copy()
+            record = table[layout.WATCH]
+            rows = table[table[layout.ROW_TABLE] + layout.ROW * table[layout.FIRST_GUARD] :][: layout.ROW * self.guards]
+            pairs = table[table[record + watch.PAIR_TABLE] :][: watch.PAIR_RECORD * table[record + watch.PAIRS]]
+            pairs = pairs.reshape(-1, watch.PAIR_RECORD)
+            for row, (place, number) in zip(rows.reshape(-1, layout.ROW), self.listed(state), strict=True):
+                if place >= 0:
+                    pair = pairs[place]
+                    row[[layout.BODY_F, layout.BODY_G]] = pair[[watch.PAIR_F, watch.PAIR_G]]
+                    row[layout.SURFACE_F : layout.SHELL_G + 1] = pair[watch.PAIR_SURFACE_F : watch.PAIR_SHELL_G + 1]
+                    row[layout.MINIMUM], row[layout.GUARD_NUMBER] = pair[watch.PAIR_MINIMUM], number
+        return table
+
+    def listed(self, state: Array) -> list[tuple[int, int]]:
+        """Of every place of a watch in a state: its pair of bodies, or -1, and the number of its contact."""
+        pairs = sum(map(len, self.guarded))
+        at = self.memory_at + watch.MEMORY_HEADER + watch.BODY_MEMORY * self.count + watch.PAIR_MEMORY * pairs
+        places = state[at : at + watch.PLACE_MEMORY * self.guards].reshape(-1, watch.PLACE_MEMORY)
+        return [(int(pair), int(number)) for pair, number in places.tolist()]
 
     def _add(self, table: Sequence[int] | Table = (), pool: Sequence[float] | Array = ()) -> tuple[int, int]:
         """Append; returns where the parts begin."""
@@ -433,17 +465,8 @@ class Packed:
                     for field in (k, int(contact.body_a is pair[1]))
                 ]
                 places = [self._places[id(body)] for body in pair]
-                records += [
-                    *places,
-                    trees[f],
-                    trees[g],
-                    *shape,
-                    minimum,
-                    first,
-                    first + count,
-                    len(listed),
-                    len(given) // 2,
-                ]
+                room = [first, first + count, len(listed), len(given) // 2]
+                records += [*places, trees[f], trees[g], *shape, minimum, *room]
                 listed += given
             first += count
         given_at, _ = self._add(listed)
@@ -586,8 +609,8 @@ def guarded_pairs(clearances: Sequence[Clearance], bodies: Sequence[Body]) -> li
             other = owner.setdefault(frozenset((id(a), id(b))), clearance.name)
             if other != clearance.name:
                 raise InputError(
-                    f"clearance {clearance.name!r} is of bodies {a.name!r} and {b.name!r}, of which clearance {other!r} "
-                    "is, too; expected each pair once, say exclude=..."
+                    f"clearance {clearance.name!r} is of bodies {a.name!r} and {b.name!r}, of which clearance "
+                    f"{other!r} is, too; expected each pair once, say exclude=..."
                 )
         result.append(pairs)
     return result

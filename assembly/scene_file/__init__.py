@@ -30,6 +30,7 @@ Fields of a constraint by its type:
     gear            a {joint, freedom}, b {joint, freedom}, ratio, offset
     rack_pinion     pinion {joint, freedom}, rack {joint, freedom}, radius, offset
     trim_contact    contact, side, loop, keep, form
+    clearance       bodies [names] or null for all, minimum, exclude [[name, name]], neglect, places or null
     expression      bodies [names], function [lines], unilateral, scale, weight
 
 Fields of a term of the objective by its type:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.constraints.clearance import Clearance
 from assembly.constraints.constraint import Freedom
 from assembly.constraints.contact import Contact
 from assembly.constraints.couplings import Gear, RackPinion
@@ -356,6 +357,17 @@ CONSTRAINTS = OneOf(
             Field("keep", Plain(text)),
             Field("form", Plain(text)),
             make=_trim,
+        ),
+        "clearance": Record(
+            Clearance,
+            NAME,
+            Field(
+                "bodies", OrNull(Listed(BODY_NAME)), lambda clearance: None if clearance.is_of_all else clearance.bodies
+            ),
+            Field("minimum", NUMBER),
+            Field("exclude", Listed(Listed(BODY_NAME))),
+            Field("neglect", NUMBER),
+            Field("places", Plain(or_null(whole))),
         ),
         "expression": EXPRESSION,
     }

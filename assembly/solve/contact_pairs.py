@@ -35,17 +35,46 @@ def contact_pairs(solution: Solution) -> dict[str, ContactPair]:
             start = solution._parameters[k, :4]
             q_f, q_g = solution.q[places]
             pairs[contact.name] = extremal_pair(f, q_f, g, q_g, None if np.isnan(start).any() else start)
-    return pairs
+    return pairs | _listed(solution)
 
 
-def _solids(solution: Solution, k: int, places: list[int]) -> ContactPair:
-    """The pair of features of contact k, between bodies in the given places."""
+def _listed(solution: Solution) -> dict[str, ContactPair]:
+    """The pairs that clearances have listed, the oldest first: "clearance: a-b", "clearance: a-b 2", ..."""
+    packed, scene = solution._packed, solution._scene
+    owners = [(item, pair) for item, own in zip(packed.clearances, packed.guarded, strict=True) for pair in own]
+    found: dict[str, ContactPair] = {}
+    if solution._state.size <= packed.memory_at:
+        return found
+    places = [(number, k, pair) for k, (pair, number) in enumerate(packed.listed(solution._state)) if pair >= 0]
+    for _, k, pair in sorted(places):
+        clearance, bodies = owners[pair]
+        r = len(packed.contacts) + k
+        if np.isnan(solution._parameters[r, 0]):
+            continue
+        f, g = bodies
+        if packed.table_at(solution._state)[packed.table[ROW_TABLE] + ROW * r + SHELL_F] >= 0:
+            contact = _solids(solution, r, [scene.index(f), scene.index(g)], bodies)
+        else:
+            q_f, q_g = solution.q[[scene.index(f), scene.index(g)]]
+            contact = extremal_pair(f.faces[0], q_f, g.faces[0], q_g, solution._parameters[r, :4])
+        base = f"{clearance.name}: {f.name}-{g.name}"
+        same = sum(name == base or name.startswith(f"{base} ") for name in found)
+        found[base if same == 0 else f"{base} {same + 1}"] = contact
+    return found
+
+
+def _solids(
+    solution: Solution, k: int, places: list[int], sides: tuple[Body | BodyFace, Body | BodyFace] | None = None
+) -> ContactPair:
+    """The pair of features of contact k, between bodies in the given places; `sides` are those of a clearance's."""
     packed = solution._packed
-    row = packed.table[ROW_TABLE] + ROW * k
+    table = packed.table_at(solution._state)
+    row = table[ROW_TABLE] + ROW * k
+    sides = solution._scene.sides[k] if sides is None else sides
     q = solution.q[places]
     q[:, :3] = (q[:, :3] - packed.reference) / packed.scale
     tracked = solution._parameters[k : k + 1].copy()
-    scene = (packed.table, packed.pool, packed.table[row + SHELL_F], packed.table[row + SHELL_G], 0, 1, q)
+    scene = (table, packed.pool, table[row + SHELL_F], table[row + SHELL_G], 0, 1, q)
     if np.isnan(tracked).any():
         nearest, deepest = packed.table[NEAREST_AT], packed.table[DEEPEST_AT]
         if search_solids(*scene, nearest, deepest, tracked, 0) == 0:
@@ -55,8 +84,7 @@ def _solids(solution: Solution, k: int, places: list[int]) -> ContactPair:
     gap, normal = records[0, GAP], records[0, NORMAL : NORMAL + 3]
     there = q[0, :3] + records[0, ARM_F : ARM_F + 3]
     names = tuple(
-        _feature_name(side, int(tracked[0, column]))
-        for side, column in zip(solution._scene.sides[k], (FEATURE_F, FEATURE_G), strict=True)
+        _feature_name(side, int(tracked[0, column])) for side, column in zip(sides, (FEATURE_F, FEATURE_G), strict=True)
     )
     return ContactPair(
         parameters=tracked[0, :4],

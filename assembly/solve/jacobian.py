@@ -78,11 +78,11 @@ def rows_of(packed: Packed, state: Array) -> Rows:
     state = state.copy()
     free = np.empty(pairs, dtype=np.int64)
     residual, jacobian = np.empty(m + 4 * pairs), np.empty((m + 4 * pairs, 6 * n + 4 * pairs))
-    lost = rows_at(packed.table, packed.pool, state, free, residual, jacobian)
+    lost = rows_at(packed.table_at(state), packed.pool, state, free, residual, jacobian)
     if lost >= 0 and packed.seek_penetration():
-        lost = rows_at(packed.table, packed.pool, state, free, residual, jacobian)
+        lost = rows_at(packed.table_at(state), packed.pool, state, free, residual, jacobian)
     if lost >= 0:
-        raise NoPairError(lost, packed.contacts[lost].name)
+        raise NoPairError(lost, packed.pair_name(lost))
     finite = np.isfinite(residual[:m]) & np.isfinite(jacobian[:m, : 6 * n]).all(axis=1)
     if not finite.all():
         owner = int(packed.owners[np.flatnonzero(~finite)[0]])

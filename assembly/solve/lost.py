@@ -45,5 +45,6 @@ def goal(solution: Solution) -> tuple[float, float]:
     packed = solution._packed
     gradient = np.empty(6 * packed.count)
     free = np.empty(packed.pair_rows, dtype=np.int64)
-    value = gradient_at(packed.table, solution._wished_pool(), solution._state, free, gradient, packed.tips)
+    table, pool = packed.table_at(solution._state), solution._wished_pool()
+    value = gradient_at(table, pool, solution._state, free, gradient, packed.tips)
     return float(value) * packed.unit, float(np.abs(gradient).max())

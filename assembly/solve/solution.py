@@ -117,6 +117,9 @@ class Solution:
     mobility : Mobility
         Degrees of freedom at `q`, free motions, redundant constraints.
     contacts : dict of name -> ContactPair
+        Of a clearance every contact that is near, "clearance: a-b", "clearance: a-b 2" and so on.
+    crossings : tuple of (name, name)
+        Bodies that cross where no constraint of the scene keeps them apart.
     iterations : int
     seconds : float
         Time in the compiled loop.
@@ -285,6 +288,17 @@ class Solution:
 
         return contact_pairs(self)
 
+    @cached_property
+    def crossings(self) -> tuple[tuple[str, str], ...]:
+        """Names of bodies that cross at `q` elsewhere than at their contacts, by a look at all pairs when it is read.
+
+        Of a scene with a `Clearance` nothing is looked at: it keeps its bodies apart, and leaves out what may overlap.
+        Bodies of a joint are not looked at either, which are one in the other as a rule. Once read, it is printed, too.
+        """
+        from assembly.solve.crossings import crossings
+
+        return crossings(self)
+
     def pose(self, body: Body | str) -> Pose:
         """Pose of a body, given itself or its name."""
         row = self.q[self._scene.index(body)]
@@ -296,7 +310,7 @@ class Solution:
         text = self.status.value
         culprit = int(self._result(CULPRIT))
         if self.status is Status.CONTACT_LOST and culprit >= 0:
-            return f"{self._scene.contacts[culprit].name!r}: {text}"
+            return f"{self._packed.pair_name(culprit)!r}: {text}"
         tolerance = 1e-9 * self._scene.scale
         held_off = sorted(
             (name for name, value in self.violations.items() if not value <= tolerance),
@@ -335,6 +349,9 @@ class Solution:
                 pass
             else:
                 lines[1] += f"   {freedoms} degree{'' if freedoms == 1 else 's'} of freedom"
+        # A look takes a second where kernels and trees are not there yet; what is known is said.
+        for a, b in self.__dict__.get("crossings", ()):
+            lines.append(f"  {a} and {b} cross elsewhere; asm.Clearance() keeps them apart")
         worst = sorted(self.violations.items(), key=lambda item: -item[1])[:5]
         lines += [f"  {name:<24} violation {value:.1e}" for name, value in worst]
         for body, row in zip(self._scene.bodies, self.q, strict=True):

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly.constraints.clearance import Clearance
 from assembly.constraints.constraint import Constraint, Freedom
 from assembly.constraints.joint import Joint
 from assembly.constraints.joints import Cylindrical, Prismatic, Revolute, Screw
@@ -136,9 +137,16 @@ def wrenches(solution: Solution) -> dict[str, dict[str, Wrench]]:
         push = -(z[own] @ rows.jacobian[own]).reshape(-1, 6) * scales
         found[constraint.name] = {
             body.name: Wrench(push[index[id(body)], :3], push[index[id(body)], 3:], solution.q[index[id(body)]])
-            for body in constraint.bodies
+            for body in bodies_of(constraint, scene.bodies)
         }
     return found
+
+
+def bodies_of(constraint: Constraint, bodies: Sequence[Body]) -> Sequence[Body]:
+    """The bodies that a constraint is on, among those of its scene."""
+    if isinstance(constraint, Clearance) and constraint.is_of_all:
+        return [body for body in bodies if body.faces]
+    return constraint.bodies
 
 
 def _balancing(
@@ -159,7 +167,7 @@ def _balancing(
         directions = np.vstack([directions, across])
     gradient = np.empty(jacobian.shape[1])
     free = np.empty(packed.pair_rows, dtype=np.int64)
-    gradient_at(packed.table, solution._wished_pool(), solution._state, free, gradient, packed.tips)
+    gradient_at(packed.table_at(solution._state), solution._wished_pool(), solution._state, free, gradient, packed.tips)
     moving = np.repeat([not body.fixed for body in solution._scene.bodies], 6)
     lacking = -(gradient + z @ jacobian)[moving]
     amounts = np.linalg.lstsq((directions @ jacobian[:, moving]).T, lacking, rcond=1e-12)[0]

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.constraints.clearance import Clearance
 from assembly.constraints.constraint import Constraint, Equation
 from assembly.constraints.contact import Contact
 from assembly.constraints.couplings import Coupling
@@ -173,6 +174,8 @@ class Snapshot:
                 return None
             sides, whole = self._sides[constraint.name]
             return Contact(*sides, constraint.name, constraint.unilateral, edges=not whole)
+        if isinstance(constraint, Clearance):
+            return constraint if one_sided else None
         if isinstance(constraint, TrimContact):
             return None if constraint.unilateral and not one_sided else constraint
         if isinstance(constraint, Expression):

@@ -220,7 +220,7 @@ class Tracker:
         self._scene_given = scene
         begin = scene.solve(q0) if scene.constraints else None
         if begin is not None and not begin.success:
-            raise InputError(f"q0 is a start from which the constraints cannot be solved: {begin.message}")
+            raise InputError(f"q0 is a start that leads to no pose to begin at; expected one: {begin.message}")
         if begin is not None:
             poses = begin.q
         else:
@@ -260,7 +260,7 @@ class Tracker:
         self._history = np.empty((1, HISTORY))
         first = inner.solve(poses)
         if not first.success:
-            raise InputError(f"q0 is a start from which the constraints cannot be solved: {first.message}")
+            raise InputError(f"q0 is a start that leads to no pose to begin at; expected one: {first.message}")
         self._state = first._state.copy()
         # Numbers are read from a view in half the time it takes to read them from the array.
         self._view = memoryview(self._state)  # type: ignore[arg-type]  # an array is a buffer
@@ -298,8 +298,7 @@ class Tracker:
         packed, state = self._packed, self._state
         row = self._aimed(target)
         if row is None:
-            state = self._front()
-            return Step(self, state, TrackStatus.BAD_TARGET, self._where(), (), perf_counter() - begin)
+            return Step(self, state.copy(), TrackStatus.BAD_TARGET, self._where(), (), perf_counter() - begin)
         before, view = self._before, self._view
         before[:] = state
         code = solve_program(packed.table, packed.pool, self._settings, state, self._history, packed.tips)
@@ -322,11 +321,7 @@ class Tracker:
         if packed.guards and view[packed.memory_at + EVENT_COUNT] != self._seen:
             events = events_of(state[packed.memory_at :], self._names, packed.scale, int(self._seen))
             self._seen = view[packed.memory_at + EVENT_COUNT]
-        return Step(self, state[: packed.memory_at].copy(), status, row, events, perf_counter() - begin)
-
-    def _front(self) -> Array:
-        """The state but for what the watch knows."""
-        return self._state[: self._packed.memory_at].copy()
+        return Step(self, state.copy(), status, row, events, perf_counter() - begin)
 
     def _where(self) -> Array:
         """The target that the loop has."""
@@ -388,9 +383,8 @@ class Tracker:
         -------
         TrackLog
         """
-        recorder = TrackLog.recorder(
-            trace.times, len(self._scene.bodies), TrackStatus, stride=stride, budget=self._budget
-        )
+        bodies, budget = len(self._scene.bodies), self._budget
+        recorder = TrackLog.recorder(trace.times, bodies, TrackStatus, stride=stride, budget=budget)
         start = perf_counter()
         for k, (time, target) in enumerate(trace):
             if paced:

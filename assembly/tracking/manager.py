@@ -1,0 +1,295 @@
+"""Manager: which bodies are near each other and where, as somebody else moves them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from math import inf
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.constraints.clearance import Clearance
+from assembly.constraints.packing import Packed
+from assembly.errors import InputError, number
+from assembly.kinematics.body import Body
+from assembly.kinematics.pose import pose_rows
+from assembly.proximity import watch
+from assembly.proximity.events import Event, PairState, events_of
+from assembly.proximity.solid_contact import CONTACT_RECORD, TRACK
+from assembly.proximity.velocity import ARM_F, GAP, NORMAL
+from assembly.tracking.follow import follow
+
+__all__ = ["ListedContact", "Manager"]
+
+Array = NDArray[np.float64]
+_STATES = tuple(PairState)
+# Largest reach, in parts of the size of the scene.
+MOST_REACH = 0.2
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class ListedContact:
+    """An extremal pair of points of two bodies that is tracked.
+
+    Attributes
+    ----------
+    bodies : (str, str)
+        Names of f and g.
+    number : int
+        Of the contact; numbers count up and are not used twice.
+    parameters : (4,)
+        u_f, v_f, u_g, v_g; of solids with edges the coordinates on the two features.
+    points : (2, 3)
+        On f, and on g, in the world.
+    normal : (3,)
+        Outward from f.
+    gap : float
+        Positive apart, negative interpenetrating.
+    """
+
+    bodies: tuple[str, str]
+    number: int
+    parameters: Array
+    points: Array
+    normal: Array
+    gap: float
+
+    def __repr__(self) -> str:
+        return f"ListedContact({self.bodies[0]!r}, {self.bodies[1]!r}, number={self.number}, gap={self.gap:.3g})"
+
+
+class _Everything(Clearance):
+    """A clearance of bodies any of which may be moved."""
+
+    def pairs(self, bodies: Sequence[Body]) -> list[tuple[Body, Body]]:
+        """All pairs."""
+        return list(combinations(self.bodies, 2))
+
+
+class Manager:
+    """The global stage without a solve: pairs of bodies from far to near to tracked contacts (paper 001, section 5).
+
+    Every `update` says where bodies stand. A contact that is listed is carried along by the contact velocity
+    formulation and corrected by Newton's method; one that loses its extremum, or is corrected by so much that it may
+    have come to another one, is handed back to a look at its pair of bodies. Other pairs are looked at when the
+    bodies have moved by what the last look left them.
+
+    Parameters
+    ----------
+    bodies : iterable of Body
+        Two or more, with shapes and distinct names; each may move, fixed ones too.
+    reach : float, optional
+        Contacts with a gap up to this are all listed, in the unit of the bodies; at most a fifth of the largest body's
+        size. By default zero: what touches or crosses is listed, and what is near as far as the bodies' pace asks for.
+    neglect : float
+        Two contacts of the same two bodies whose points are nearer than this on both, and near along the surfaces as
+        well, are one: the radius of the spheres of neglect, in parts of the scene's size. Contacts farther apart are
+        all kept, also across a wire thinner than the radius.
+    places : int, optional
+        How many contacts may be near at a time, to begin with; twice as many when they do not do.
+
+    Raises
+    ------
+    InputError, TypeError
+        Fewer than two bodies, bodies without shape, names used twice, numbers out of range.
+    """
+
+    def __init__(
+        self, bodies: Iterable[Body], *, reach: float | None = None, neglect: float = 1e-6, places: int | None = None
+    ) -> None:
+        try:
+            self._bodies = tuple(bodies)
+        except TypeError:
+            raise TypeError(f"bodies is {bodies!r}; expected bodies") from None
+        clearance = Clearance(self._bodies, neglect=neglect, places=places)
+        names = [body.name for body in self._bodies]
+        for k, name in enumerate(names):
+            if name in names[:k]:
+                raise InputError(f"bodies[{k}] has the name {name!r} of another body; expected distinct names")
+        size = max(body.size for body in self._bodies)
+        self._reach = 0.0 if reach is None else number("reach", reach)
+        if not 0.0 <= self._reach <= MOST_REACH * size:
+            raise InputError(
+                f"reach is {self._reach:g}; expected a length from 0 to {MOST_REACH * size:g}, "
+                "a fifth of the largest body"
+            )
+        self._neglect = clearance.neglect
+        self._pairs = list(combinations(names, 2))
+        self._seen = 0.0
+        self._set_up(places)
+
+    def _set_up(self, places: int | None) -> None:
+        """Pack, with room for so many contacts."""
+        # What is to be listed is what comes nearer than this.
+        everything = _Everything(self._bodies, self._reach, neglect=self._neglect, places=places)
+        packed = self._packed = Packed(self._bodies, [everything], ())
+        count, guards = packed.count, packed.guards
+        self._memory = packed.new_state()[packed.memory_at :]
+        self._poses = np.full((count, 7), np.nan)
+        self._poses[:, 3:] = [1.0, 0.0, 0.0, 0.0]
+        self._tracked = np.full((guards, TRACK), np.nan)
+        self._records = np.zeros((guards, CONTACT_RECORD))
+        self._room = (
+            np.empty((count, 7)),
+            np.zeros((count, 6)),
+            np.zeros((guards, TRACK)),
+            np.zeros((guards, TRACK)),
+            np.zeros((2, guards)),
+        )
+        self._free = np.full(guards, -1, dtype=np.int64)
+
+    def _grow(self) -> None:
+        """Twice as many places; what is known stays."""
+        old = (self._packed, self._memory, self._poses, self._tracked)
+        self._set_up(2 * old[0].guards)
+        pairs, places, events = self._parts(*old[:2])
+        new_pairs, new_places, new_events = self._parts(self._packed, self._memory)
+        head = watch.MEMORY_HEADER + watch.BODY_MEMORY * self._packed.count
+        self._memory[:head] = old[1][:head]
+        new_pairs[:] = pairs
+        new_places[: len(places)] = places
+        new_places[len(places) :] = (-1.0, 0.0)
+        new_events[:] = events
+        # Every pair is looked at once more.
+        new_pairs[:, watch.LOOKED], new_pairs[:, watch.ALLOWANCE] = -inf, 0.0
+        self._poses[:] = old[2]
+        self._tracked[: len(places)] = old[3]
+
+    @staticmethod
+    def _parts(packed: Packed, memory: Array) -> tuple[Array, Array, Array]:
+        """Views of what a memory knows of pairs, of places, and of events."""
+        pairs_at = watch.MEMORY_HEADER + watch.BODY_MEMORY * packed.count
+        places_at = pairs_at + watch.PAIR_MEMORY * len(packed.guarded[0])
+        events_at = places_at + watch.PLACE_MEMORY * packed.guards
+        return (
+            memory[pairs_at:places_at].reshape(-1, watch.PAIR_MEMORY),
+            memory[places_at:events_at].reshape(-1, watch.PLACE_MEMORY),
+            memory[events_at:],
+        )
+
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """Bodies in the order of q's rows."""
+        return self._bodies
+
+    @property
+    def reach(self) -> float:
+        """Contacts with a gap up to this are all listed."""
+        return self._reach
+
+    @property
+    def neglect(self) -> float:
+        """Radius of the spheres of neglect, in parts of the scene's size."""
+        return self._neglect
+
+    def update(self, q: ArrayLike) -> tuple[Event, ...]:
+        """Bodies stand here now.
+
+        Parameters
+        ----------
+        q : (n, 7)
+            A row a body: x y z qw qx qy qz.
+
+        Returns
+        -------
+        tuple of Event
+            Contacts that came near, went away, were handed back to the global stage or merged, in that order of
+            happening; the last 64 of them.
+
+        Raises
+        ------
+        InputError
+            Wrong shape, numbers that are not finite, quaternions far from unit; then nothing has changed.
+        """
+        rows = q if isinstance(q, np.ndarray) and q.dtype == np.float64 and q.shape == self._poses.shape else None
+        code = -1 if rows is None or not rows.flags.c_contiguous else self._follow(rows)
+        if code < 0:
+            code = self._follow(pose_rows("q", q, len(self._bodies)))
+        while code > 0 and self._is_full():
+            self._grow()
+            code += self._follow(pose_rows("q", q, len(self._bodies)))
+        if code == 0:
+            return ()
+        since, self._seen = int(self._seen), self._memory[watch.EVENT_COUNT]
+        return events_of(self._memory, self._pairs, self._packed.scale, since)
+
+    def _follow(self, q: Array) -> int:
+        """One call of the kernel."""
+        packed = self._packed
+        return int(
+            follow(
+                packed.table,
+                packed.pool,
+                q,
+                self._poses,
+                self._tracked,
+                self._records,
+                self._room,
+                self._free,
+                self._memory,
+            )
+        )
+
+    def _is_full(self) -> bool:
+        """Whether every place has a contact."""
+        return bool((self._parts(self._packed, self._memory)[1][:, watch.PLACE_PAIR] >= 0.0).all())
+
+    @property
+    def contacts(self) -> tuple[ListedContact, ...]:
+        """The contacts that are listed, in the order of their numbers."""
+        packed = self._packed
+        places = self._parts(packed, self._memory)[1]
+        index = {body: k for k, body in enumerate(body.name for body in self._bodies)}
+        found = []
+        for k in np.flatnonzero(places[:, watch.PLACE_PAIR] >= 0.0).tolist():
+            bodies = self._pairs[int(places[k, watch.PLACE_PAIR])]
+            record = self._records[k]
+            gap, normal = float(record[GAP]), record[NORMAL : NORMAL + 3].copy()
+            there = self._poses[index[bodies[0]], :3] + record[ARM_F : ARM_F + 3]
+            found.append(
+                ListedContact(
+                    bodies=bodies,
+                    number=int(places[k, watch.PLACE_NUMBER]),
+                    parameters=self._tracked[k, :4].copy(),
+                    points=np.array([there - gap * normal, there]) * packed.scale + packed.reference,
+                    normal=normal,
+                    gap=gap * packed.scale,
+                )
+            )
+        return tuple(sorted(found, key=lambda contact: contact.number))
+
+    @property
+    def states(self) -> dict[tuple[str, str], PairState]:
+        """How every pair of bodies is watched; far before the first update."""
+        pairs = self._parts(self._packed, self._memory)[0]
+        return {
+            names: _STATES[int(state)] for names, state in zip(self._pairs, pairs[:, watch.STATE].tolist(), strict=True)
+        }
+
+    @property
+    def gaps(self) -> dict[tuple[str, str], float]:
+        """A lower bound of the gap of every pair of bodies: exact where the nearest contact is listed.
+
+        Of what is not listed, the reach and what the last look left to the bodies, less what they moved since. It
+        holds for bodies that are apart, or cross no deeper than looks see; minus infinity before the first update.
+        """
+        pairs = self._parts(self._packed, self._memory)[0]
+        ways = self._memory[watch.MEMORY_HEADER :][: watch.BODY_MEMORY * len(self._bodies)].reshape(
+            -1, watch.BODY_MEMORY
+        )
+        both = [float(a + b) for a, b in combinations(ways[:, watch.WAY].tolist(), 2)]
+        left = pairs[:, watch.ALLOWANCE] - (np.array(both) - pairs[:, watch.LOOKED])
+        bounds = dict(zip(self._pairs, (self._reach + self._packed.scale * left).tolist(), strict=True))
+        for contact in self.contacts:
+            bounds[contact.bodies] = min(bounds[contact.bodies], contact.gap)
+        return bounds
+
+    @property
+    def log(self) -> tuple[Event, ...]:
+        """The last 64 events, the oldest first."""
+        return events_of(self._memory, self._pairs, self._packed.scale)
+
+    def __repr__(self) -> str:
+        return f"Manager({len(self._bodies)} bodies, {len(self._pairs)} pairs, reach={self._reach:g})"

@@ -1,0 +1,136 @@
+"""What a solution tells of clearances, and of bodies that cross where nobody asked for one."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+
+import assembly as asm
+from assembly.errors import InputError
+from benchmarks.center_lines import torus_wire
+from benchmarks.wire_oracle import WireOracle
+
+BALL = asm.shapes.sphere(1.0)
+RING = asm.shapes.torus(1.0, 0.1)
+
+
+def pile():
+    """Three balls in a row along x, drawn together: the outer ones press on the one between, which is fixed."""
+    balls = [asm.Body(name, BALL, (2.5 * k, 0.1 * k, 0), fixed=k == 1) for k, name in enumerate("abc")]
+    scene = asm.Assembly(balls)
+    scene.constrain(asm.Clearance())
+    for k in (0, 2):
+        scene.minimize(asm.PointDistance(balls[k].point(0, 0, 0), (2.5, 0.1, 0)))
+    return scene
+
+
+def test_contacts_of_a_clearance_have_names_points_and_gaps():
+    scene = pile()
+    solution = scene.solve()
+    assert solution.success, solution.message
+    assert set(solution.contacts) == {"clearance: a-b", "clearance: b-c"}
+    for name, (i, j) in (("clearance: a-b", (0, 1)), ("clearance: b-c", (1, 2))):
+        pair = solution.contacts[name]
+        x, y = solution.q[i, :3], solution.q[j, :3]
+        normal = (y - x) / np.linalg.norm(y - x)
+        # The gap to the loop's tolerance, the rest to rounding.
+        assert abs(pair.gap) < 1e-9 and pair.gap == pytest.approx(np.linalg.norm(y - x) - 2.0, abs=1e-14)
+        assert np.abs(pair.normal - normal).max() < 1e-12
+        assert np.abs(pair.points - [x + normal, y - normal]).max() < 1e-12
+
+
+def test_the_wrenches_of_a_clearance_balance_the_objective():
+    solution = pile().solve()
+    push = solution.wrenches["clearance"]
+    assert set(push) == {"a", "b", "c"}
+    center = solution.q[1, :3]
+    for name, k in (("a", 0), ("c", 2)):
+        # The objective |x - target|^2 pulls with twice the distance.
+        pull = -2.0 * (solution.q[k, :3] - center)
+        assert np.abs(push[name].force + pull).max() < 1e-6
+        assert np.linalg.norm(push[name].force) == pytest.approx(4.0, abs=1e-6)
+        assert np.abs(push[name].torque).max() < 1e-9
+
+
+def test_contacts_of_bodies_with_edges():
+    box = asm.Body("box", asm.shapes.box(2.0, 2.0, 2.0), fixed=True)
+    ball = asm.Body("ball", BALL, (0.1, 0.2, 2.6))
+    scene = asm.Assembly([box, ball])
+    scene.constrain(asm.Clearance([box, ball], minimum=0.25, name="room"))
+    scene.minimize(asm.PointDistance(ball.point(0, 0, 0), (0.1, 0.2, 0.0)))
+    solution = scene.solve()
+    assert solution.success, solution.message
+    assert solution.contacts["room: box-ball"].gap == pytest.approx(0.25, abs=1e-9)
+    assert np.abs(solution.q[1, :3] - [0.1, 0.2, 2.25]).max() < 1e-6
+
+
+@pytest.mark.parametrize("how", [copy.deepcopy, lambda scene: pickle.loads(pickle.dumps(scene))])
+def test_copies_of_a_packed_scene_solve_the_same(how):
+    scene = pile()
+    solution = scene.solve()
+    other = how(scene).solve()
+    assert other.q.tobytes() == solution.q.tobytes()
+
+
+def test_a_scene_file_keeps_clearances(tmp_path):
+    bodies = [asm.Body(name, BALL, (3.0 * k, 0, 0)) for k, name in enumerate("abc")]
+    a, b, c = bodies
+    scene = asm.Assembly(bodies)
+    scene.constrain(
+        asm.Clearance([a, b], minimum=0.125, name="first", neglect=1e-3, places=7),
+        asm.Clearance(exclude=[(a, b), (b, c)]),
+    )
+    scene.save(tmp_path / "scene.json")
+    first, rest = asm.load(tmp_path / "scene.json").constraints
+    assert (first.name, first.minimum, first.neglect, first.places, first.is_of_all) == ("first", 0.125, 1e-3, 7, False)
+    assert [body.name for body in first.bodies] == ["a", "b"] and first.exclude == ()
+    assert (rest.name, rest.minimum, rest.neglect, rest.places, rest.is_of_all) == ("clearance", 0.0, 1e-6, None, True)
+    assert [[body.name for body in pair] for pair in rest.exclude] == [["a", "b"], ["b", "c"]]
+
+
+def test_the_reference_solver_takes_no_clearance():
+    text = r"constraint 'clearance' is Clearance\(all bodies, .*; expected what the reference solver takes"
+    with pytest.raises(InputError, match=text):
+        asm.reference.solve(pile())
+
+
+def test_what_a_clearance_says_of_itself():
+    a, b = (asm.Body(name, BALL) for name in "ab")
+    assert repr(asm.Clearance()) == "Clearance(all bodies, minimum=0, name='clearance')"
+    assert repr(asm.Clearance([a, b], 0.5)) == "Clearance(['a', 'b'], minimum=0.5, name='clearance a-b')"
+
+
+def rings(x):
+    """Rings a and b that touch, and a third one that stays where it is, across a."""
+    upright = (np.sqrt(0.5), np.sqrt(0.5), 0, 0)
+    a = asm.Body("a", RING, fixed=True)
+    b = asm.Body("b", RING, (1.0, 0.0, 0.3), upright)
+    c = asm.Body("c", RING, (x, 0.0, 0.0), upright)
+    scene = asm.Assembly([a, b, c])
+    scene.constrain(asm.Contact(a, b))
+    return scene
+
+
+@pytest.mark.parametrize("x", [-1.3, -1.95, -2.1, -2.19, -2.25])
+def test_bodies_that_cross_are_named(x):
+    solution = rings(x).solve()
+    gaps = WireOracle([torus_wire(1.0, 0.1)] * 3).gaps(solution.q)
+    expected = tuple(pair for pair, gap in zip((("a", "b"), ("a", "c"), ("b", "c")), gaps, strict=True) if gap < -1e-6)
+    assert (x > -2.2) == (("a", "c") in expected) or x == -1.3
+    assert "cross elsewhere" not in str(solution)  # nobody looked yet
+    assert solution.crossings == expected
+    said = [line for line in str(solution).splitlines() if "cross elsewhere" in line]
+    assert said == [f"  {a} and {b} cross elsewhere; asm.Clearance() keeps them apart" for a, b in expected]
+
+
+def test_contacts_that_hold_do_not_cross_and_clearances_are_not_looked_at():
+    scene = rings(-2.5)
+    assert scene.solve().crossings == ()
+    scene = rings(-2.1)
+    scene.constrain(asm.Clearance())
+    solution = scene.solve()
+    assert solution.success and solution.crossings == ()
+    assert WireOracle([torus_wire(1.0, 0.1)] * 3).deepest(solution.q) > -1e-9
