@@ -43,6 +43,8 @@ _STATUSES = tuple(Status)
 _SETTINGS = Options().settings()
 _WARM_SETTINGS = Options().settings(warm=True)
 _LOADING = Options(max_iterations=0).settings()
+# How many times as many places as they ask for a solve gives to clearances.
+MOST_CROWDING = 16
 # Rows of history that are kept.
 MOST_HISTORY = 1000
 
@@ -68,6 +70,7 @@ class Assembly:
         self._constraints: list[Constraint] = []
         self._objectives: list[tuple[float, Objective]] = []
         self._packed: Packed | None = None
+        self._crowding = 1  # how many times as many places as clearances ask for
         self._scene: Scene | None = None
         for body in bodies:
             self.add(body)
@@ -171,7 +174,7 @@ class Assembly:
         if self._packed is None:
             if all(body.fixed for body in self._bodies):
                 raise InputError(f"bodies are {[body.name for body in self._bodies]}, none moving; expected one")
-            packed = pack(self._bodies, self._constraints, self._objectives)
+            packed = pack(self._bodies, self._constraints, self._objectives, self._crowding)
             self._scene = Scene(
                 self.bodies, self.constraints, tuple(packed.contacts), tuple(packed.sides), packed.scale
             )
@@ -243,6 +246,10 @@ class Assembly:
             other, rows = self._start(packed, q0, starts), np.empty_like(history)
             if solve_program(*arguments, settings, other, rows, tips) == 0:
                 code, state, history = 0, other, rows
+        if code != 0 and packed.is_crowded(state) and self._crowding < MOST_CROWDING and not warm:
+            self._crowding *= 2
+            self._packed = None
+            return self.solve(q0, starts=starts, **options)
         solution = Solution(self._scene, packed, state, _STATUSES[code], perf_counter() - begin, history)
         if verbose:
             print(solution.iteration_table())

@@ -90,6 +90,7 @@ class Packed:
         bodies: Sequence[Body],
         constraints: Sequence[Constraint],
         objectives: Sequence[tuple[float, Objective]],
+        places: int = 1,
     ) -> None:
         self.count = len(bodies)
         self.stamp = structure_changes()
@@ -108,7 +109,7 @@ class Packed:
         self.clearances = [constraint for constraint in constraints if isinstance(constraint, Clearance)]
         self.guarded = guarded_pairs(self.clearances, bodies)
         self.places = [
-            _places(clearance, pairs) for clearance, pairs in zip(self.clearances, self.guarded, strict=True)
+            places * _places(clearance, pairs) for clearance, pairs in zip(self.clearances, self.guarded, strict=True)
         ]
         self.guards = sum(self.places)
         self._targets: list[tuple[PointDistance | FrameDistance, int]] = []
@@ -149,6 +150,10 @@ class Packed:
     def pair_rows(self) -> int:
         """Rows of contacts, given ones and those of clearances."""
         return len(self.contacts) + self.guards
+
+    def is_crowded(self, state: Array) -> bool:
+        """Whether contacts of clearances were near that found no place."""
+        return self.guards > 0 and state[self.memory_at + watch.CROWDED] == 1.0
 
     def new_state(self) -> Array:
         """The state of a solve that knows nothing yet."""
@@ -652,7 +657,13 @@ def _face(side: Body | BodyFace) -> BodyFace:
 
 
 def pack(
-    bodies: Sequence[Body], constraints: Sequence[Constraint], objectives: Sequence[tuple[float, Objective]]
+    bodies: Sequence[Body],
+    constraints: Sequence[Constraint],
+    objectives: Sequence[tuple[float, Objective]],
+    places: int = 1,
 ) -> Packed:
-    """Pack a scene. `objectives` are (sign, term): 1 to minimize, -1 to maximize; a posture where there is none."""
-    return Packed(bodies, constraints, objectives)
+    """Pack a scene. `objectives` are (sign, term): 1 to minimize, -1 to maximize; a posture where there is none.
+
+    Clearances have so many times the places they ask for.
+    """
+    return Packed(bodies, constraints, objectives, places)

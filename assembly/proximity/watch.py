@@ -19,7 +19,7 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
-from assembly.geometry.vec import add, dot, matvec, matvec_t, quaternion_matrix, quaternion_product, sub
+from assembly.geometry.vec import add, dot, matvec, matvec_t, quaternion_matrix, quaternion_product, scale, sub
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.bounding_tree import CENTER, NODE_POOL, RADIUS, least_distance, magnitudes, pairs_within
 from assembly.proximity.roots import (
@@ -57,23 +57,14 @@ NEGLECT, FIRST_REACH, LAST_REACH, LENGTH_COUNT = 0, 1, 2, 3
 # rows of given contacts between the two (row, 1 if the bodies are the other way round).
 PAIR_F, PAIR_G, TREE_F, TREE_G, PAIR_SURFACE_F, PAIR_SURFACE_G, PAIR_SHELL_F, PAIR_SHELL_G = 0, 1, 2, 3, 4, 5, 6, 7
 PAIR_MINIMUM, LOW, HIGH, GIVEN, GIVEN_COUNT, PAIR_RECORD = 8, 9, 10, 11, 12, 13
-# Memory. Header: events so far, looks so far, contacts so far, the time of the caller, whether a near root found no
+# Memory. Header: events so far, looks so far, contacts so far, the time of the caller, whether a near root ever found no
 # place, calls so far.
 EVENT_COUNT, LOOKS, BORN, TIME, CROWDED, CALLS, MEMORY_HEADER = 0, 1, 2, 3, 4, 5, 6
-# Of a pair: the pose of g seen from f at its last look (a quaternion, NaN before there was one, and a place), how far g
-# may go from there, its reach, its state, calls at its last look; a ball in the axes of g and how far what is in it may go.
-TURN, SHIFT, ALLOWANCE, REACH, STATE, CALLED, BALL, BALL_RADIUS, BALL_ALLOWANCE, PAIR_MEMORY = (
-    0,
-    4,
-    7,
-    8,
-    9,
-    10,
-    11,
-    14,
-    15,
-    16,
-)
+# Of a pair: how g was turned, seen from f, at its last look (a quaternion, NaN before there was one), and where the middle
+# of its tree was; how far g may go from there, its reach, its state, calls at its last look; a ball on g, where its
+# middle was, and how far what is in it may go; which part of its allowances is used.
+TURN, PLACE, ALLOWANCE, REACH, STATE, CALLED = 0, 4, 7, 8, 9, 10
+BALL, BALL_RADIUS, BALL_PLACE, BALL_ALLOWANCE, PART, PAIR_MEMORY = 11, 14, 15, 18, 19, 20
 FAR, NEAR, TRACKING = 0, 1, 2
 # Of a place: its pair (-1: none), the number of its contact.
 PLACE_PAIR, PLACE_NUMBER, PLACE_MEMORY = 0, 1, 2
@@ -89,6 +80,8 @@ TAKE, KEEP = 0.4, 0.8
 CANDIDATES, ROOTS, STACK = 8192, 96, 1024
 # Starts that a look leads down the slope of the gap, because Newton's method found no minimum from there.
 SLIDES_A_LOOK = 24
+# Where nothing may move a pair is looked at after every step.
+LEAST_ALLOWANCE = 1e-12
 # A reach is for so many moves as the last ones.
 MOVES = 12.0
 
@@ -119,27 +112,37 @@ def quaternion_from(q, i, j):
     return quaternion_product((q[i, 3], -q[i, 4], -q[i, 5], -q[i, 6]), (q[j, 3], q[j, 4], q[j, 5], q[j, 6]))
 
 
-@kernel(inner=True)
-def way(memory, o, e, shift, center, radius):
-    """A bound of how far any point of a ball on g went, seen from f, since the look in the memory at o.
-
-    A turn by an angle a moves a point at a distance r from its axis by 2 r sin(a / 2), and |e - e'| is 2 sin(a / 4).
-    """
-    before = (memory[o + TURN], memory[o + TURN + 1], memory[o + TURN + 2], memory[o + TURN + 3])
+@kernel(inline=True)
+def turned_by(memory, o, e):
+    """|e - e'|, 2 sin(a / 4) of the angle a by which a pair turned since its last look, in the memory at o."""
     square = 0.0
     other = 0.0
     for k in range(4):
-        square += (e[k] - before[k]) * (e[k] - before[k])
-        other += (e[k] + before[k]) * (e[k] + before[k])
-    there = add(matvec(quaternion_matrix(e[0], e[1], e[2], e[3]), center), shift)
-    was = matvec(quaternion_matrix(before[0], before[1], before[2], before[3]), center)
-    d = sub(sub(there, was), (memory[o + SHIFT], memory[o + SHIFT + 1], memory[o + SHIFT + 2]))
-    return math.sqrt(dot(d, d)) + 2.0 * radius * math.sqrt(min(square, other))
+        square += (e[k] - memory[o + TURN + k]) * (e[k] - memory[o + TURN + k])
+        other += (e[k] + memory[o + TURN + k]) * (e[k] + memory[o + TURN + k])
+    return math.sqrt(min(square, other))
+
+
+@kernel(inline=True)
+def moved_from(pool_or_memory, at, memory, was, turn, shift):
+    """How far a point of g, its place on g and where it was in arrays, is from where it was, seen from f."""
+    there = add(matvec(turn, load(pool_or_memory, at)), shift)
+    d = sub(there, load(memory, was))
+    return math.sqrt(dot(d, d))
+
+
+@kernel(inline=True)
+def load(array, at):
+    return (array[at], array[at + 1], array[at + 2])
 
 
 @kernel(inner=True)
 def part_used(table, pool, watch, memory, p, q):
-    """Which part of its allowances pair p has used at poses q; infinite before its first look."""
+    """Which part of its allowances pair p has used at poses q; infinite before its first look.
+
+    A ball's points went no farther than its middle and 2 r |e - e'|: a turn by an angle a about an axis moves a point
+    at a distance r from it by 2 r sin(a / 2), and |e - e'| is 2 sin(a / 4).
+    """
     o = memory_places(table, watch)[0] + PAIR_MEMORY * p
     if math.isnan(memory[o + TURN]):
         return math.inf
@@ -147,16 +150,17 @@ def part_used(table, pool, watch, memory, p, q):
     i = table[pair + PAIR_F]
     j = table[pair + PAIR_G]
     e = quaternion_from(q, i, j)
+    turn = quaternion_matrix(e[0], e[1], e[2], e[3])
     shift = matvec_t(rotation(q, i), (q[j, 0] - q[i, 0], q[j, 1] - q[i, 1], q[j, 2] - q[i, 2]))
     root = table[table[pair + TREE_G] + NODE_POOL]
-    center = (pool[root + CENTER], pool[root + CENTER + 1], pool[root + CENTER + 2])
-    moved = way(memory, o, e, shift, center, pool[root + RADIUS])
+    angle = turned_by(memory, o, e)
+    moved = moved_from(pool, root + CENTER, memory, o + PLACE, turn, shift) + 2.0 * pool[root + RADIUS] * angle
     if not moved > 0.0:
         return 0.0
     part = moved / memory[o + ALLOWANCE]
     if memory[o + BALL_ALLOWANCE] < memory[o + ALLOWANCE]:
-        center = (memory[o + BALL], memory[o + BALL + 1], memory[o + BALL + 2])
-        part = max(part, way(memory, o, e, shift, center, memory[o + BALL_RADIUS]) / memory[o + BALL_ALLOWANCE])
+        moved = moved_from(memory, o + BALL, memory, o + BALL_PLACE, turn, shift) + 2.0 * memory[o + BALL_RADIUS] * angle
+        part = max(part, moved / memory[o + BALL_ALLOWANCE])
     return part
 
 
@@ -167,6 +171,7 @@ def largest_part(table, pool, watch, memory, q):
     largest = -1.0
     for p in range(table[watch + PAIRS]):
         part = part_used(table, pool, watch, memory, p, q)
+        memory[memory_places(table, watch)[0] + PAIR_MEMORY * p + PART] = part
         if part > largest:
             best = p
             largest = part
@@ -249,7 +254,11 @@ def known_roots(table, pool, watch, memory, p, scene, tracked, roots, work):
 
 @kernel(inner=True)
 def list_roots(table, pool, watch, memory, p, roots, count, tracked):
-    """Give places to the near roots of pair p and take them from the far ones. Returns the least gap not listed."""
+    """Give places to the near roots of pair p and take them from the far ones.
+
+    Returns the least gap that is not listed, and whether a place was wanting.
+    """
+    wanting = False
     pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
     places, reach = memory_places(table, watch)[1], memory[memory_places(table, watch)[0] + PAIR_MEMORY * p + REACH]
     least = pool[table[pair + PAIR_MINIMUM]]
@@ -275,6 +284,7 @@ def list_roots(table, pool, watch, memory, p, roots, count, tracked):
         k = free_place(table, watch, memory, pair) if gap <= TAKE * reach else -1
         if k < 0:
             rest = min(rest, gap)
+            wanting = wanting or gap <= TAKE * reach
             continue
         o = places + PLACE_MEMORY * k
         memory[o + PLACE_PAIR] = float(p)
@@ -282,7 +292,7 @@ def list_roots(table, pool, watch, memory, p, roots, count, tracked):
         memory[o + PLACE_NUMBER] = memory[BORN]
         write_root(roots, best, tracked, table[watch + FIRST] + k)
         note(table, watch, memory, ADDED, CAME_NEAR, p, memory[BORN], roots[best, GAP])
-    return rest
+    return rest, wanting
 
 
 @kernel(inner=True)
@@ -310,16 +320,18 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, r
     lengths = table[watch + LENGTHS]
     reach = memory[at + REACH]
     e = quaternion_from(q, i, j)
+    root = table[table[pair + TREE_G] + NODE_POOL]
     if not math.isnan(memory[at + TURN]):
-        root = table[table[pair + TREE_G] + NODE_POOL]
-        center = (pool[root + CENTER], pool[root + CENTER + 1], pool[root + CENTER + 2])
-        pace = way(memory, at, e, shift, center, pool[root + RADIUS]) / max(memory[CALLS] - memory[at + CALLED], 1.0)
+        pace = moved_from(pool, root + CENTER, memory, at + PLACE, turn, shift)
+        pace += 2.0 * pool[root + RADIUS] * turned_by(memory, at, e)
+        pace /= max(memory[CALLS] - memory[at + CALLED], 1.0)
         reach = min(max(MOVES * pace, pool[lengths + FIRST_REACH]), pool[lengths + LAST_REACH])
     memory[at + CALLED] = memory[CALLS]
+    center = add(matvec(turn, load(pool, root + CENTER)), shift)
     for k in range(4):
         memory[at + TURN + k] = e[k]
     for k in range(3):
-        memory[at + SHIFT + k] = shift[k]
+        memory[at + PLACE + k] = center[k]
     found = np.int64(-1)
     while True:
         found = pairs_within(
@@ -382,7 +394,7 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, r
             # The far sides of two bodies oppose each other, too.
             alien = gap > reach + least or (gap < 0.0 and is_outside(table, pool, scene, roots, before, margin))
             roots[before, ORIGIN] = USELESS if alien else NEW
-    rest = list_roots(table, pool, watch, memory, p, roots, count, tracked)
+    rest, wanting = list_roots(table, pool, watch, memory, p, roots, count, tracked)
     listed = 0
     for k in range(table[pair + LOW], table[pair + HIGH]):
         if memory[memory_places(table, watch)[1] + PLACE_MEMORY * k] == p:
@@ -391,15 +403,18 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, r
     if fertile < math.inf:
         d = sub(hi, lo)
         memory[at + BALL_RADIUS] = 0.5 * math.sqrt(dot(d, d))
+        center = scale(0.5, add(lo, hi))
+        place = add(matvec(turn, center), shift)
         for k in range(3):
-            memory[at + BALL + k] = 0.5 * (lo[k] + hi[k])
+            memory[at + BALL + k] = center[k]
+            memory[at + BALL_PLACE + k] = place[k]
     if found == 0:
         # Nothing faces the other body within reach: the boxes tell how far that is so.
         trees = scene[3]
         reach = max(reach, least_distance(table, pool, trees[0], trees[1], turn, shift, math.inf, stack) - least)
-    memory[at + ALLOWANCE] = min(min(reach, rest), free) if count < ROOTS else 0.0
+    memory[at + ALLOWANCE] = max(min(min(reach, rest), free), LEAST_ALLOWANCE)
     memory[at + STATE] = float(TRACKING if listed > 0 else (NEAR if found > 0 else FAR))
-    if rest <= 0.0 or count == ROOTS:
+    if wanting or count == ROOTS:
         memory[CROWDED] = 1.0
 
 
@@ -412,15 +427,15 @@ def look(table, pool, watch, memory, q, tracked, everything):
     """
     before = memory[EVENT_COUNT]
     memory[CALLS] += 1.0
-    memory[CROWDED] = 0.0
     ready = False
     stack = np.empty((1, 2), np.int64)
     candidates = stack
     roots = np.empty((1, ROOT))
     work = (roots, roots)
     next_pair, _part = largest_part(table, pool, watch, memory, q)
+    at = memory_places(table, watch)[0]
     for p in range(table[watch + PAIRS]):
-        part = part_used(table, pool, watch, memory, p, q)
+        part = memory[at + PAIR_MEMORY * p + PART]
         if everything:
             due = part > 0.0
         else:

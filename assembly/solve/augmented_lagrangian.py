@@ -230,10 +230,10 @@ def solve_program(table, pool, settings, state, history, tips):
     results[CURVED] = 0.0
     lost = start_contacts(table, pool, here[0], here[1], free, loose[1])
     if watched:
-        place_guards(table, memory, y, better_y, free)
+        place_guards(table, memory, here, y, better_y, free)
         if lost < 0:
             look_around(table, pool, memory, here, 0)
-            place_guards(table, memory, y, better_y, free)
+            place_guards(table, memory, here, y, better_y, free)
     place_rows(table, free, bases, one_sided)
     envelope(table, bases, rows, n, last, last_row)
     count = free_folds(table, pool, here[2], here[1], active, free, loose[1], -1.0, -1, free_trims)
@@ -250,11 +250,11 @@ def solve_program(table, pool, settings, state, history, tips):
             here[1][k, 0] = math.nan
         if watched:
             forget_guards(table, memory)
-            place_guards(table, memory, y, better_y, free)
+            place_guards(table, memory, here, y, better_y, free)
         start_contacts(table, pool, here[0], here[1], free, loose[1])
         if watched:
             look_around(table, pool, memory, here, 0)
-            place_guards(table, memory, y, better_y, free)
+            place_guards(table, memory, here, y, better_y, free)
             place_rows(table, free, bases, one_sided)
             envelope(table, bases, rows, n, last, last_row)
         if table[IMPLICIT] == 1:
@@ -274,7 +274,7 @@ def solve_program(table, pool, settings, state, history, tips):
         if watched and not changed:
             changed = look_around(table, pool, memory, here, 0)
         if changed:
-            place_guards(table, memory, y, better_y, free)
+            place_guards(table, memory, here, y, better_y, free)
         weigh_rows(rows, one_sided, here[3], y, mu, forces, active)
         if pairs > 0:
             count = free_folds(table, pool, here[2], here[1], active, free, loose[1], below, lost, free_trims)
@@ -525,7 +525,7 @@ def solve_program(table, pool, settings, state, history, tips):
         results[HELD] = 1.0
         if watched:
             forget_guards(table, memory)
-            place_guards(table, memory, y, better_y, free)
+            place_guards(table, memory, here, y, better_y, free)
     write_pose(table, pool, here[0], state)
     if status != CONTACT_LOST and not (tick and results[HELD] == 0.0):
         # A tick that went well ends at a pose that was just evaluated.

@@ -21,6 +21,7 @@ from assembly.constraints.layout import (
     SURFACE_F,
     WATCH,
 )
+from assembly.proximity.solid_contact import FOLD
 from assembly.proximity.watch import (
     PAIR_F,
     PAIR_G,
@@ -62,7 +63,7 @@ def forget_guards(table, memory):
 
 
 @kernel(inner=True)
-def place_guards(table, memory, y, better_y, free):
+def place_guards(table, memory, here, y, better_y, free):
     """Make every row the contact that its place has; multipliers of one that is new are zero."""
     watch = table[WATCH]
     places = memory_places(table, watch)[1]
@@ -77,6 +78,9 @@ def place_guards(table, memory, y, better_y, free):
         y[r] = 0.0
         better_y[r] = 0.0
         free[r] = -1
+        # Nothing is known of it yet.
+        here[2][r, FOLD] = 1.0
+        here[3][r] = 1.0
         if p < 0:
             table[row + BODY_F] = -1
             table[row + BODY_G] = -1
