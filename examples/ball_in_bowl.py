@@ -23,7 +23,7 @@ PLACES = np.array(
         (6, -11, 5),
         (14, 2, 12),
         (20, 4, 17),
-        (29, 4, 14),
+        (23, 4, 13),
         (24, 8, 19),
         (8, 8, 12),
         (0, 0, 8),
@@ -57,7 +57,7 @@ def main() -> asm.TrackLog:
     trace = asm.Trace.through(PLACES, TIMES)
     log = scene.tracker(follow=scene.body("ball").point(0, 0, 0)).run(trace, stride=10)
     print(log)
-    print("the hand is at               the ball's center at        it touches")
+    print("where the hand is           where the ball's center is")
     for k in range(0, len(log.q), 40):
         hand, center = trace.targets[10 * k], log.q[k, 1, :3]
         print("".join(f"{x:8.2f}" for x in (*hand, *center)))
