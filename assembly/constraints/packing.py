@@ -189,7 +189,7 @@ class Packed:
     def listed(self, state: Array) -> list[tuple[int, int]]:
         """Of every place of a watch in a state: its pair of bodies, or -1, and the number of its contact."""
         pairs = sum(map(len, self.guarded))
-        at = self.memory_at + watch.MEMORY_HEADER + watch.BODY_MEMORY * self.count + watch.PAIR_MEMORY * pairs
+        at = self.memory_at + watch.MEMORY_HEADER + watch.PAIR_MEMORY * pairs
         places = state[at : at + watch.PLACE_MEMORY * self.guards].reshape(-1, watch.PLACE_MEMORY)
         return [(int(pair), int(number)) for pair, number in places.tolist()]
 

@@ -130,7 +130,7 @@ class FacetTree:
 
     @property
     def least_radius(self) -> float:
-        """About the smallest radius of curvature: of the patches' widths over the angles by which their normals turn."""
+        """About the smallest radius of curvature: widths of patches over the angles by which their normals turn."""
         turns = self.half_angle[: len(self.corners)]
         sides = np.linalg.norm(self.corners - np.roll(self.corners, 1, axis=1), axis=2)
         # Where a side is a point, at a pole, the others tell.

@@ -50,8 +50,7 @@ CODE_F, CODE_G, ROOT_NORMAL, GAP, ORIGIN, POINT_F, POINT_G, ROOT_FOLD, ROOT = 4,
 USELESS, GIVEN_CONTACT, NEW, LISTED = -3.0, -2.0, -1.0, 0
 # What became of a start: nothing there, a root that is known, a saddle, a minimum.
 NOTHING, ALIKE, SADDLE, MINIMUM_FOUND = 0, 1, 2, 3
-# A root this far from a fold is the only one in its patches and those beside them, which turn by less than half a radian
-# each.
+# A root this far from a fold is the only one in its patches and those beside them, which turn by half a radian at most.
 ALONE, BESIDE = 0.05, 3.0
 # Steps down the slope of a gap.
 SLIDES = 24
@@ -129,7 +128,7 @@ def surfaces_root(table, pool, scene, start, roots, k):
 
 @kernel(inner=True)
 def foot_of(table, pool, g, y, s, t):
-    """Parameters of the point of surface g nearest to y, by Newton's method from (s, t); its signed distance, the normal.
+    """The foot on surface g of a point y, by Newton's method from (s, t): parameters, signed distance, normal.
 
     Positive outside. A step is never longer than what brings the tangent plane's foot.
     """

@@ -57,13 +57,13 @@ NEGLECT, FIRST_REACH, LAST_REACH, LENGTH_COUNT = 0, 1, 2, 3
 # rows of given contacts between the two (row, 1 if the bodies are the other way round).
 PAIR_F, PAIR_G, TREE_F, TREE_G, PAIR_SURFACE_F, PAIR_SURFACE_G, PAIR_SHELL_F, PAIR_SHELL_G = 0, 1, 2, 3, 4, 5, 6, 7
 PAIR_MINIMUM, LOW, HIGH, GIVEN, GIVEN_COUNT, PAIR_RECORD = 8, 9, 10, 11, 12, 13
-# Memory. Header: events so far, looks so far, contacts so far, the time of the caller, whether a near root ever found no
-# place, calls so far.
+# Memory. Header: events, looks and contacts so far, the time of the caller, whether a near root ever found no place,
+# calls so far.
 EVENT_COUNT, LOOKS, BORN, TIME, CROWDED, CALLS, MEMORY_HEADER = 0, 1, 2, 3, 4, 5, 6
-# Of a pair: how g was turned, seen from f, at its last look (a quaternion, NaN before there was one), and where the middle
-# of its tree was; how far g may go from there, its reach, its state, calls at its last look; a ball on g, where its
-# middle was, and how far what is in it may go; which part of its allowances is used; whether it is looked at after every
-# move, because a contact may be born at a fold beside one that touches.
+# Of a pair: how g was turned, seen from f, at its last look (a quaternion, NaN before there was one), and where the
+# middle of its tree was; how far g may go from there, its reach, its state, calls at its last look; a ball on g, where
+# its middle was, and how far what is in it may go; which part of its allowances is used; whether it is looked at after
+# every move, because a contact may be born at a fold beside one that touches.
 TURN, PLACE, ALLOWANCE, REACH, STATE, CALLED = 0, 4, 7, 8, 9, 10
 BALL, BALL_RADIUS, BALL_PLACE, BALL_ALLOWANCE, PART, URGENT, PAIR_MEMORY = 11, 14, 15, 18, 19, 20, 21
 FAR, NEAR, TRACKING = 0, 1, 2
@@ -75,7 +75,7 @@ PLACE_PAIR, PLACE_NUMBER, PLACE_MEMORY = 0, 1, 2
 EVENT, EVENTS = 6, 64
 ADDED, REMOVED, HANDED_OFF, MERGED = 0, 1, 2, 3
 CAME_NEAR, WENT_AWAY, LOST, SAME_ROOT, NO_PLACE = 0, 1, 2, 3, 4
-# The pair that used most of its allowance is looked at again when that is this part of it; others can wait until so much.
+# The pair that used most of its allowance is looked at again when that is this part of it; others can wait longer.
 USED, SPENT = 0.5, 0.85
 # Roots nearer than this part of the reach are listed; those that are, stay so up to the second.
 TAKE, KEEP = 0.4, 0.8
@@ -164,7 +164,9 @@ def part_used(table, pool, watch, memory, p, q):
         return 0.0
     part = moved / memory[o + ALLOWANCE]
     if memory[o + BALL_ALLOWANCE] < memory[o + ALLOWANCE]:
-        moved = moved_from(memory, o + BALL, memory, o + BALL_PLACE, turn, shift) + 2.0 * memory[o + BALL_RADIUS] * angle
+        moved = (
+            moved_from(memory, o + BALL, memory, o + BALL_PLACE, turn, shift) + 2.0 * memory[o + BALL_RADIUS] * angle
+        )
         part = max(part, moved / memory[o + BALL_ALLOWANCE])
     return part
 
@@ -305,7 +307,8 @@ def near_enough(table, pool, scene, bulk, least, enough, candidates, found, dist
     """A distance within which so few of the pairs of patches are that each can be looked into; at most `enough`."""
     for c in range(found):
         distances[c] = (
-            element_distance(table, pool, scene[3], scene[0], scene[1], bulk, candidates[c, 0], candidates[c, 1]) - least
+            element_distance(table, pool, scene[3], scene[0], scene[1], bulk, candidates[c, 0], candidates[c, 1])
+            - least
         )
     for _ in range(6):
         count = 0
@@ -361,6 +364,11 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, d
             table, pool, table[pair + TREE_F], table[pair + TREE_G], turn, shift, reach + least, stack, candidates
         )
         if 0 <= found <= candidates.shape[0]:
+            break
+        if reach < LEAST_ALLOWANCE:
+            # There is no room for what is as near as it should not be.
+            found = candidates.shape[0] if found > 0 else 0
+            memory[CROWDED] = 1.0
             break
         # Out of room: what is nearer is looked at more often.
         reach *= 0.5

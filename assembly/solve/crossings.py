@@ -53,7 +53,7 @@ def crossings(solution: Solution) -> tuple[tuple[str, str], ...]:
     for depth in DEPTHS:
         state = packed.new_state()
         memory = state[packed.memory_at :]
-        pairs = memory[watch.MEMORY_HEADER + watch.BODY_MEMORY * packed.count :]
+        pairs = memory[watch.MEMORY_HEADER :]
         pairs[watch.REACH : watch.PAIR_MEMORY * len(packed.guarded[0]) : watch.PAIR_MEMORY] = depth
         tracked = np.full((packed.pair_rows, TRACK), np.nan)
         tracked[: len(contacts)] = solution._parameters[: len(contacts)]

@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 
 from assembly._kernel import kernel
-from assembly.constraints.guards import bound_moves
 from assembly.constraints.layout import (
     ANGLE,
     BODIES,

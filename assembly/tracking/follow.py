@@ -14,7 +14,6 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly.constraints.guards import look_around, place_guards
 from assembly.constraints.layout import (
     BODIES,
     BODY_F,
@@ -37,6 +36,7 @@ from assembly.proximity.extremal import BEND, CONVERGED, SINGULAR, into_domain
 from assembly.proximity.solid_contact import FOLD, PAIR_GAP, PROPER, TRACK
 from assembly.proximity.velocity import ARM_F, GAP, RATES, ZED
 from assembly.proximity.watch import ALLOWANCE, EVENT_COUNT, LENGTHS, NEGLECT, PAIR_MEMORY, PLACE_MEMORY, memory_places
+from assembly.solve.guards import look_around, place_guards
 
 # A correction by more than this part of the prediction and of the surface's domain puts the root in doubt; so does a
 # root as near as this to a fold (det H over |H|^2), where others are born.
@@ -210,7 +210,7 @@ def follow(table, pool, q, poses, tracked, records, room, free, memory):
     look_around(table, pool, memory, (poses, tracked), 0)
     for k in range(table[GUARDS]):
         before[first + k, 0] = float(table[table[ROW_TABLE] + ROW * (first + k) + GUARD_NUMBER])
-    place_guards(table, memory, rows[0], rows[1], free)
+    place_guards(table, memory, (poses, tracked, records, rows[0]), rows[0], rows[1], free)
     for k in range(table[GUARDS]):
         r = first + k
         row = table[ROW_TABLE] + ROW * r

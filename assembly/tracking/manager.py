@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from math import inf
+from math import inf, nan
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -146,21 +146,21 @@ class Manager:
         self._set_up(2 * old[0].guards)
         pairs, places, events = self._parts(*old[:2])
         new_pairs, new_places, new_events = self._parts(self._packed, self._memory)
-        head = watch.MEMORY_HEADER + watch.BODY_MEMORY * self._packed.count
+        head = watch.MEMORY_HEADER
         self._memory[:head] = old[1][:head]
         new_pairs[:] = pairs
         new_places[: len(places)] = places
         new_places[len(places) :] = (-1.0, 0.0)
         new_events[:] = events
         # Every pair is looked at once more.
-        new_pairs[:, watch.LOOKED], new_pairs[:, watch.ALLOWANCE] = -inf, 0.0
+        new_pairs[:, watch.TURN] = nan
         self._poses[:] = old[2]
         self._tracked[: len(places)] = old[3]
 
     @staticmethod
     def _parts(packed: Packed, memory: Array) -> tuple[Array, Array, Array]:
         """Views of what a memory knows of pairs, of places, and of events."""
-        pairs_at = watch.MEMORY_HEADER + watch.BODY_MEMORY * packed.count
+        pairs_at = watch.MEMORY_HEADER
         places_at = pairs_at + watch.PAIR_MEMORY * len(packed.guarded[0])
         events_at = places_at + watch.PLACE_MEMORY * packed.guards
         return (
@@ -276,11 +276,7 @@ class Manager:
         holds for bodies that are apart, or cross no deeper than looks see; minus infinity before the first update.
         """
         pairs = self._parts(self._packed, self._memory)[0]
-        ways = self._memory[watch.MEMORY_HEADER :][: watch.BODY_MEMORY * len(self._bodies)].reshape(
-            -1, watch.BODY_MEMORY
-        )
-        both = [float(a + b) for a, b in combinations(ways[:, watch.WAY].tolist(), 2)]
-        left = pairs[:, watch.ALLOWANCE] - (np.array(both) - pairs[:, watch.LOOKED])
+        left = np.where(np.isnan(pairs[:, watch.TURN]), -inf, pairs[:, watch.ALLOWANCE] * (1.0 - pairs[:, watch.PART]))
         bounds = dict(zip(self._pairs, (self._reach + self._packed.scale * left).tolist(), strict=True))
         for contact in self.contacts:
             bounds[contact.bodies] = min(bounds[contact.bodies], contact.gap)

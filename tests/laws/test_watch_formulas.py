@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from assembly.proximity.watch import BODY_MEMORY, MEMORY_HEADER, farthest_move
+from assembly.proximity.watch import PAIR_MEMORY, PLACE, TURN, turned_by
 
 
 def quaternions(rng, count, angle):
@@ -25,9 +25,9 @@ def test_no_point_moves_farther_than_the_bound():
         for e, f, a in zip(first, second, turned, strict=True):
             x, y = rng.normal(size=(2, 3)) * rng.choice([0.0, 1e-3, 1.0])
             radius = rng.uniform(0.1, 2.0)
-            memory = np.zeros(MEMORY_HEADER + BODY_MEMORY)
-            memory[MEMORY_HEADER : MEMORY_HEADER + 7] = [*x, *e]
-            bound = farthest_move(np.array([[*y, *f]]), 0, memory, MEMORY_HEADER, radius)
+            memory = np.zeros(PAIR_MEMORY)
+            memory[TURN : TURN + 4], memory[PLACE : PLACE + 3] = e, x
+            bound = np.linalg.norm(y - x) + 2.0 * radius * turned_by(memory, 0, tuple(f))
             points = rng.normal(size=(50, 3))
             points *= radius / np.linalg.norm(points, axis=1)[:, None]
             here = Rotation.from_quat(e, scalar_first=True).apply(points) + x
