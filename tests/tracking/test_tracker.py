@@ -65,7 +65,7 @@ def circling(center, radius, ticks, turns=1.0):
         asm.Pose(),
         10**400,
     ],
-    ids=repr,
+    ids=lambda value: type(value).__name__,
 )
 def test_a_target_that_is_none_moves_nothing(target):
     tracker = ball_on_ball()
