@@ -72,7 +72,7 @@ from assembly.solve.multipliers import (
     toward_rows,
     weigh_rows,
 )
-from assembly.solve.report import bring_back, judge, keep, write_pose, write_rows
+from assembly.solve.report import bring_back, is_clear, judge, keep, write_pose, write_rows
 from assembly.solve.rows import (
     add_transposed,
     carry,
@@ -343,7 +343,8 @@ def solve_program(table, pool, settings, state, history, tips):
                 # Rows that depend on each other: of all multipliers that balance the objective, the least.
                 dual = least_multipliers(shape, rows, here, active, gradient, descent, gram, dual, y, better_y)
             break
-        if tick and violation <= feasible:
+        # Of a tick, what holds; of a solve with clearances, the last pose at which nothing crosses.
+        if (tick and violation <= feasible) or (watched and not tick and is_clear(table, residual)):
             holds = True
             keep(here, y, rows, held)
             if watched:
@@ -543,7 +544,8 @@ def solve_program(table, pool, settings, state, history, tips):
             radius = max(2.0 * alpha * longest, SHORTEST)
         iteration += 1
 
-    if tick and holds and not violation <= feasible:
+    crosses = watched and not tick and status != SOLVED and not is_clear(table, here[3])
+    if holds and ((tick and not violation <= feasible) or crosses):
         # Back to the last pose that held; what is near there is looked for again.
         bring_back(held, rows, here, y)
         results[HELD] = 1.0

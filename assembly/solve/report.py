@@ -39,6 +39,15 @@ def write_pose(table, pool, q, state):
 
 
 @kernel(inner=True)
+def is_clear(table, residual):
+    """Whether no contact, given or of a clearance, is one of bodies in each other."""
+    for r in range(table[CONTACTS]):
+        if residual[r] < -TOUCHING:
+            return False
+    return True
+
+
+@kernel(inner=True)
 def keep(here, y, rows, held):
     """Copy poses, tracked values and multipliers of a point."""
     for b in range(held[0].shape[0]):
