@@ -15,20 +15,10 @@ import assembly as asm
 
 STEEPNESS, RIM, RADIUS = 0.03, 20.0, 5.0  # z = steepness (x^2 + y^2) up to the rim; of the ball [mm]
 # Where the hand goes, in mm, and when, in seconds.
-PLACES = np.array(
-    [
-        (2, 1, 8),
-        (2, 1, 3),
-        (-9, 3, 4),
-        (6, -11, 5),
-        (14, 2, 12),
-        (20, 4, 17),
-        (23, 4, 13),
-        (24, 8, 19),
-        (8, 8, 12),
-        (0, 0, 8),
-    ]
-)
+PLACES = np.array([
+    (2, 1, 8), (2, 1, 3), (-9, 3, 4), (6, -11, 5), (14, 2, 12), (20, 4, 17), (23, 4, 13), (24, 8, 19),
+    (8, 8, 12), (0, 0, 8),
+])  # fmt: skip
 TIMES = np.array([0.0, 0.5, 1.1, 1.7, 2.3, 2.8, 3.4, 4.0, 4.7, 5.2])
 
 
