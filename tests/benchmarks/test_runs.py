@@ -17,7 +17,9 @@ from benchmarks.scenes import bicubic, torus_pairs
 from benchmarks.wires import Tally, linked_wires
 
 
-@pytest.mark.parametrize("name", ["evaluation", "pairs", "controllers", "facets", "wires", "mechanisms", "laws"])
+@pytest.mark.parametrize(
+    "name", ["evaluation", "pairs", "controllers", "facets", "wires", "tracking", "mechanisms", "laws"]
+)
 def test_quick_runs(name):
     result = import_module(f"benchmarks.{name}").run(True)
     # As it comes back from the JSON.
