@@ -22,8 +22,8 @@ Three paper clips, threaded through each other and touching, with a clearance, f
 `examples/follow_the_hand.py` over and over again, a tick a millisecond of the hand, as fast as possible: what a tick
 takes is what Python waits for `tracker.step`. The wire's radius is 0.5 mm. Gaps anywhere are those of the center
 curves, found without the library from polynomials, at every hundredth tick. A tick that is HELD found no further pose
-that holds and stays where it was. The long run is the same chain behind a hand that goes around a circle of 3 mm ten
-times a second: lengths of quaternions at every hundredth tick, violations of the last tenth of all ticks against those
+that holds and stays where it was. The long run is the same chain behind a hand that goes around a circle of 3 mm twice
+a second: lengths of quaternions at every hundredth tick, violations of the last tenth of all ticks against those
 of the first, and the memory of the process after all against that after a tenth. Linked rings are those of "Wires",
 without their contacts and with a clearance; linking numbers are Gauss's integrals. The manager's twelve rings make a
 chain; from call to call each moves and turns a little, a fiftieth of the wire's radius a step."""
@@ -88,7 +88,7 @@ def drift(ticks: int) -> list[dict[str, Any]]:
     violations, lengths, memory = np.empty(ticks), 0.0, float("nan")
     statuses: Counter[str] = Counter()
     for k in range(ticks):
-        angle = 2e-2 * np.pi * k
+        angle = 4e-3 * np.pi * k
         step = tracker.step(begin + 3.0 * np.array([np.cos(angle) - 1.0, np.sin(angle), 0.0]))
         violations[k] = step.feasibility
         statuses[step.status.name] += 1
