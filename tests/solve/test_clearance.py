@@ -21,7 +21,7 @@ HOLDS = 1e-11
 
 # Taut scenes that are not solved, and how they end.
 UNSOLVED = {
-    3: "stalls clear, with a gradient that is not at its tolerance",
+    3: "stalls clear and with a gradient at its tolerance",
     4: "stalls clear, with a gradient that is not at its tolerance",
     9: "is at its iteration limit, 2e-7 from clear",
 }
