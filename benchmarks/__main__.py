@@ -29,6 +29,7 @@ BENCHMARKS = (
     "features",
     "facets",
     "wires",
+    "tracking",
     "mechanisms",
     "laws",
     "step",

@@ -54,7 +54,7 @@ def _chain(count: int) -> Array:
     return poses
 
 
-def _walk(start: Array, steps: int, length: float, size: float) -> Array:
+def walk(start: Array, steps: int, length: float, size: float) -> Array:
     """Poses (steps, n, 7) of bodies that move by about a length a step, and turn so that their size moves by it."""
     rng = np.random.default_rng(31)
     poses = np.empty((steps, *start.shape))
@@ -202,7 +202,7 @@ def _two_clips(quick: bool, coal: Any | None) -> tuple[list[dict[str, Any]], lis
     building = perf_counter() - begin
     trees = [tree, tree]
     descents = _Descents(trees)
-    poses = _walk(CLIPS, 100 if quick else 4_000, 0.02 * CLIP_RADIUS, 15.0)
+    poses = walk(CLIPS, 100 if quick else 4_000, 0.02 * CLIP_RADIUS, 15.0)
     peers: dict[str, float | None] = {f"{COAL} distance": None, f"{COAL} crossing facets": None}
     if coal is not None:
         meshes = _Meshes(coal, trees)
@@ -228,7 +228,7 @@ def _wires(quick: bool, coal: Any | None) -> tuple[list[dict[str, Any]], list[di
     count = 200 if quick else 1_000
     trees = [FacetTree.of((Face(asm.shapes.torus(MAJOR, MINOR)),), count=count)] * 12
     descents = _Descents(trees)
-    poses = _walk(_chain(12), 100 if quick else 2_000, 0.02 * MINOR, MAJOR)
+    poses = walk(_chain(12), 100 if quick else 2_000, 0.02 * MINOR, MAJOR)
     peers: dict[str, float | None] = {COAL: None}
     if coal is not None:
         meshes = _Meshes(coal, trees)

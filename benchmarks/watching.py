@@ -98,5 +98,6 @@ class Watch:
             for side, body in enumerate(pair):
                 local = self.surfaces[body].evaluate(*row[2 * side : 2 * side + 2])
                 points[k, side] = Rotation.from_quat(q[body, 3:], scalar_first=True).apply(local) + q[body, :3]
-        reach = watch.TAKE * pairs[:, watch.REACH] * packed.scale
-        return Listed(bodies, points, tracked[:, PAIR_GAP] * packed.scale, reach, looked)
+        # A look that meets many patches takes what is as near as its allowance, which says what it left out.
+        take = np.minimum(watch.TAKE * pairs[:, watch.REACH], pairs[:, watch.ALLOWANCE]) * packed.scale
+        return Listed(bodies, points, tracked[:, PAIR_GAP] * packed.scale, take, looked)

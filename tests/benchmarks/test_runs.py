@@ -17,7 +17,9 @@ from benchmarks.scenes import bicubic, torus_pairs
 from benchmarks.wires import Tally, linked_wires
 
 
-@pytest.mark.parametrize("name", ["evaluation", "pairs", "controllers", "facets", "wires", "mechanisms", "laws"])
+@pytest.mark.parametrize(
+    "name", ["evaluation", "pairs", "controllers", "facets", "wires", "tracking", "mechanisms", "laws"]
+)
 def test_quick_runs(name):
     result = import_module(f"benchmarks.{name}").run(True)
     # As it comes back from the JSON.
@@ -28,8 +30,8 @@ def test_quick_runs(name):
     assert len({row["what"] for row in figures}) == len(figures)
     assert all(np.isfinite(row["measured"]) and row["measured"] >= 0.0 for row in figures if row["unit"] != "error")
     # Goals of a benchmark may be missed, and the page says so; what the library promises may not. A solve promises its
-    # tolerance times the scene's size, and the absolute 1e-12 of these rows is a goal.
-    goals = ("solved to 1e-12", "largest violation of the solved")
+    # tolerance times the scene's size, and the absolute 1e-12 of these rows is a goal. Some rings out of reach stall.
+    goals = ("solved to 1e-12", "largest violation of the solved", "targets out of reach: solved")
     judged = [row for row in figures if row["unit"] in ("count", "error") and not row["what"].endswith(goals)]
     assert judged
     assert [row["what"] for row in judged if met(row) is False] == []
