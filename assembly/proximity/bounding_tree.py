@@ -231,6 +231,41 @@ def box_distance(pool, o, p, seen, rotation, bulk):
 
 
 @kernel(inner=True)
+def overlapping(table, pool, tree_f, tree_g, rotation, shift, stack, out):
+    """Elements (k, 2) of two trees whose boxes meet; how many `out` holds of them."""
+    node_f = table[tree_f + NODE_POOL]
+    node_g = table[tree_g + NODE_POOL]
+    ints_f = table[tree_f + NODE_TABLE]
+    ints_g = table[tree_g + NODE_TABLE]
+    bulk = magnitudes(rotation)
+    count = 0
+    stack[0, 0] = 0
+    stack[0, 1] = 0
+    used = 1
+    while used > 0 and count < out.shape[0]:
+        used -= 1
+        i = stack[used, 0]
+        j = stack[used, 1]
+        o = node_f + NODE * i
+        p = node_g + NODE * j
+        if box_distance(pool, o, p, seen_from(pool, p, rotation, bulk, shift), rotation, bulk) > 0.0:
+            continue
+        child_f = table[ints_f + NODE_INTS * i + CHILD]
+        child_g = table[ints_g + NODE_INTS * j + CHILD]
+        if child_f < 0 and child_g < 0:
+            out[count, 0] = -1 - child_f
+            out[count, 1] = -1 - child_g
+            count += 1
+        elif used + 2 <= stack.shape[0]:
+            down_f = child_g < 0 or (child_f >= 0 and pool[o + RADIUS] >= pool[p + RADIUS])
+            for k in range(2):
+                stack[used, 0] = child_f + k if down_f else i
+                stack[used, 1] = j if down_f else child_g + k
+                used += 1
+    return count
+
+
+@kernel(inner=True)
 def least_distance(table, pool, tree_f, tree_g, rotation, shift, upper, stack):
     """A lower bound of the distance of two trees' elements, at most `upper`: that of their boxes.
 

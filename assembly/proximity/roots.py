@@ -13,16 +13,19 @@ import numpy as np
 
 from assembly._kernel import call_address, kernel
 from assembly.geometry.spline import BREAKS_U, BREAKS_V, CLOSED_U, CLOSED_V, SIGN, SPANS_U, SPANS_V, surface_point
+from assembly.geometry.trim import trim_side
 from assembly.geometry.vec import add, cross, dot, matvec, matvec_t, scale, sub
 from assembly.kinematics.motion import rotation
 from assembly.proximity.bounding_tree import (
     AXIS,
     CENTER,
     CHILD,
+    COS,
     ELEMENT,
     ELEMENT_FEATURE,
     ELEMENT_NODE,
     ELEMENT_POOL,
+    ELEMENTS,
     FEATURE,
     HALF,
     NODE,
@@ -32,11 +35,12 @@ from assembly.proximity.bounding_tree import (
     RADIUS,
     SIN,
     box_distance,
+    overlapping,
     seen_from,
     three,
 )
 from assembly.proximity.extremal import CONVERGED, SINGULAR, into_domain, solve_pair
-from assembly.proximity.shell import FACES
+from assembly.proximity.shell import FACE_RECORD, FACE_TABLE, FACE_TRIM, FACES
 from assembly.proximity.solid_contact import FEATURE_F, FEATURE_G, FOLD, PAIR_NORMAL, PROPER
 from assembly.proximity.start import opposed
 from assembly.proximity.switching import feature_at
@@ -301,6 +305,8 @@ def element_distance(table, pool, trees, turn, shift, bulk, e, d):
     seen = seen_from(pool, p, turn, bulk, shift)
     square = box_distance(pool, o, p, seen, turn, bulk)
     apart = sub(seen[0], three(pool, o + CENTER))
+    if pool[o + COS] <= 0.0 or pool[p + COS] <= 0.0:
+        return math.sqrt(square)
     n = sub(three(pool, o + AXIS), seen[2])
     length = math.sqrt(dot(n, n))
     if length < 1.0:
@@ -427,6 +433,112 @@ def is_cut(table, pool, tree, surface, shell, a, d, end):
         if cuts(a, d, p, q, s, end) or cuts(a, d, p, s, t, end):
             return True
     return False
+
+
+@kernel(inner=True)
+def surface_of(table, shell, surface, code):
+    """The surface record of an element's feature, or -1 where it is no face."""
+    if surface >= 0:
+        return surface
+    return feature_at(table, shell, code) if code < table[shell + FACES] else -1
+
+
+@kernel(inner=True)
+def in_trim(table, pool, shell, code, u, v):
+    """Whether parameters are within the boundary of a face; of a surface without one they always are."""
+    if shell < 0:
+        return True
+    trim = table[table[shell + FACE_TABLE] + FACE_RECORD * code + FACE_TRIM]
+    return trim < 0 or trim_side(table, pool, trim, u, v) > 0
+
+
+@kernel(inner=True)
+def is_deep(table, pool, scene, e, d, margin):
+    """Whether the middle of a patch of f is farther than a margin inside g at a patch, or the other way round."""
+    turn, shift = scene[0], scene[1]
+    o = table[scene[3][0] + ELEMENT_POOL] + ELEMENT * e
+    p = table[scene[3][1] + ELEMENT_POOL] + ELEMENT * d
+    f = surface_of(table, scene[2][2], scene[2][0], np.int64(pool[o + ELEMENT_FEATURE]))
+    g = surface_of(table, scene[2][3], scene[2][1], np.int64(pool[p + ELEMENT_FEATURE]))
+    if f < 0 or g < 0:
+        return False
+    shell_f, shell_g = scene[2][2], scene[2][3]
+    code_f = np.int64(pool[o + ELEMENT_FEATURE])
+    code_g = np.int64(pool[p + ELEMENT_FEATURE])
+    if in_trim(table, pool, shell_f, code_f, pool[o], pool[o + 1]):
+        y = matvec_t(turn, sub(surface_point(table, pool, f, pool[o], pool[o + 1])[0], shift))
+        s, t, distance, _n = foot_of(table, pool, g, y, pool[p], pool[p + 1])
+        if distance < -margin and in_trim(table, pool, shell_g, code_g, s, t):
+            return True
+    if in_trim(table, pool, shell_g, code_g, pool[p], pool[p + 1]):
+        y = add(matvec(turn, surface_point(table, pool, g, pool[p], pool[p + 1])[0]), shift)
+        s, t, distance, _n = foot_of(table, pool, f, y, pool[o], pool[o + 1])
+        return distance < -margin and in_trim(table, pool, shell_f, code_f, s, t)
+    return False
+
+
+@kernel(inner=True, allocates=True)
+def is_within_body(table, pool, tree, surface, shell, a, d):
+    """Whether facets of a body cut a ray from a, out of its box along d, an odd number of times."""
+    stack = np.empty(DEPTH, np.int64)
+    stack[0] = 0
+    used = 1
+    count = 0
+    while used > 0:
+        used -= 1
+        i = stack[used]
+        if not meets_box(pool, table[tree + NODE_POOL] + NODE * i, a, d):
+            continue
+        at = table[tree + NODE_TABLE] + NODE_INTS * i
+        child = table[at + CHILD]
+        if child >= 0:
+            if used + 2 <= DEPTH:
+                stack[used] = child
+                stack[used + 1] = child + 1
+                used += 2
+            continue
+        r = surface_of(table, shell, surface, table[at + FEATURE])
+        if r < 0:
+            continue
+        e = table[tree + ELEMENT_POOL] + ELEMENT * (-1 - child)
+        p = surface_point(table, pool, r, pool[e] - pool[e + 2], pool[e + 1] - pool[e + 3])[0]
+        q = surface_point(table, pool, r, pool[e] + pool[e + 2], pool[e + 1] - pool[e + 3])[0]
+        s = surface_point(table, pool, r, pool[e] + pool[e + 2], pool[e + 1] + pool[e + 3])[0]
+        t = surface_point(table, pool, r, pool[e] - pool[e + 2], pool[e + 1] + pool[e + 3])[0]
+        count += int(cuts(a, d, p, q, s, 0.0)) + int(cuts(a, d, p, s, t, 0.0))
+    return count % 2 == 1
+
+
+@kernel(inner=True)
+def first_point(table, pool, tree, surface, shell):
+    """A point of a body's faces, in its axes, and whether there is one."""
+    for e in range(table[tree + ELEMENTS]):
+        o = table[tree + ELEMENT_POOL] + ELEMENT * e
+        r = surface_of(table, shell, surface, np.int64(pool[o + ELEMENT_FEATURE]))
+        if r >= 0:
+            return surface_point(table, pool, r, pool[o], pool[o + 1])[0], True
+    return (0.0, 0.0, 0.0), False
+
+
+@kernel(inner=True)
+def crosses(table, pool, scene, stack, candidates, margin):
+    """Whether two bodies are in each other, whatever extrema there are; of smooth ones also whether one is wholly."""
+    turn, shift = scene[0], scene[1]
+    count = overlapping(table, pool, scene[3][0], scene[3][1], turn, shift, stack, candidates)
+    for c in range(count):
+        if is_deep(table, pool, scene, candidates[c, 0], candidates[c, 1], margin):
+            return True
+    if scene[2][0] < 0:
+        # Facets of trimmed faces say nothing of what is inside.
+        return False
+    # Some direction that no face is likely to lie along, and far enough.
+    far = 10.0 * (pool[table[scene[3][0] + NODE_POOL] + RADIUS] + pool[table[scene[3][1] + NODE_POOL] + RADIUS])
+    ray = (0.6012 * far, 0.3517 * far, 0.7174 * far)
+    a, some = first_point(table, pool, scene[3][0], scene[2][0], scene[2][2])
+    if some and is_within_body(table, pool, scene[3][1], scene[2][1], scene[2][3], matvec_t(turn, sub(a, shift)), ray):
+        return True
+    b, some = first_point(table, pool, scene[3][1], scene[2][1], scene[2][3])
+    return some and is_within_body(table, pool, scene[3][0], scene[2][0], scene[2][2], add(matvec(turn, b), shift), ray)
 
 
 @kernel(inner=True)

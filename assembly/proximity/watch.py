@@ -38,6 +38,7 @@ from assembly.proximity.roots import (
     USELESS,
     add_given,
     add_root,
+    crosses,
     element_ball,
     element_distance,
     is_known,
@@ -63,9 +64,10 @@ EVENT_COUNT, LOOKS, BORN, TIME, CROWDED, CALLS, MEMORY_HEADER = 0, 1, 2, 3, 4, 5
 # Of a pair: how g was turned, seen from f, at its last look (a quaternion, NaN before there was one), and where the
 # middle of its tree was; how far g may go from there, its reach, its state, calls at its last look; a ball on g, where
 # its middle was, and how far what is in it may go; which part of its allowances is used; whether it is looked at after
-# every move, because a contact may be born at a fold beside one that touches.
+# every move, because a contact may be born at a fold beside one that touches; whether the bodies are in each other
+# where no contact says so.
 TURN, PLACE, ALLOWANCE, REACH, STATE, CALLED = 0, 4, 7, 8, 9, 10
-BALL, BALL_RADIUS, BALL_PLACE, BALL_ALLOWANCE, PART, URGENT, PAIR_MEMORY = 11, 14, 15, 18, 19, 20, 21
+BALL, BALL_RADIUS, BALL_PLACE, BALL_ALLOWANCE, PART, URGENT, CROSSED, PAIR_MEMORY = 11, 14, 15, 18, 19, 20, 21, 22
 FAR, NEAR, TRACKING = 0, 1, 2
 # Looks: at pairs that used up their allowance, at urgent ones too, at all that moved.
 AS_NEEDED, EVERYTHING, CAREFUL = 0, 1, 2
@@ -85,6 +87,8 @@ CANDIDATES, ROOTS, STACK = 8192, 96, 1024
 SLIDES_A_LOOK = 6
 # So many pairs of patches are looked into, if there are others that are farther apart.
 FEW = 40
+# Bodies cross that are in each other by more than this.
+CROSSING = 1e-6
 # Where nothing may move a pair is looked at after every step.
 LEAST_ALLOWANCE = 1e-12
 # A reach is for so many moves as the last ones.
@@ -322,8 +326,8 @@ def near_enough(table, pool, scene, bulk, least, enough, candidates, found, dist
 
 
 @kernel(inner=True)
-def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, distances, roots, work):
-    """Find and list the roots of pair p."""
+def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, distances, roots, work, thorough):
+    """Find and list the roots of pair p; a `thorough` look tells whether the bodies cross elsewhere."""
     pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
     at = memory_places(table, watch)[0] + PAIR_MEMORY * p
     i = table[pair + PAIR_F]
@@ -440,6 +444,15 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, d
         if memory[memory_places(table, watch)[1] + PLACE_MEMORY * k] == p:
             listed += 1
     memory[at + BALL_ALLOWANCE] = fertile
+    if thorough:
+        deep = False
+        for k in range(count):
+            deep = deep or (roots[k, GAP] < least and roots[k, ORIGIN] != USELESS)
+        for k in range(table[pair + LOW], table[pair + HIGH]):
+            if memory[memory_places(table, watch)[1] + PLACE_MEMORY * k] == p:
+                deep = deep or tracked[table[watch + FIRST] + k, PAIR_GAP] < 0.0
+        crossed = not deep and crosses(table, pool, scene, stack, candidates, CROSSING)
+        memory[at + CROSSED] = 1.0 if crossed else 0.0
     memory[at + URGENT] = 1.0 if folding and fertile < math.inf else 0.0
     if fertile < math.inf:
         d = sub(hi, lo)
@@ -457,6 +470,16 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, d
     memory[at + STATE] = float(TRACKING if listed > 0 else (NEAR if found > 0 else FAR))
     if wanting or count == ROOTS:
         memory[CROWDED] = 1.0
+
+
+@kernel(inner=True)
+def any_crossed(table, watch, memory):
+    """Whether bodies were in each other at their last thorough look, where no contact says so."""
+    at = memory_places(table, watch)[0]
+    for p in range(table[watch + PAIRS]):
+        if memory[at + PAIR_MEMORY * p + CROSSED] == 1.0:
+            return True
+    return False
 
 
 @kernel
@@ -492,5 +515,6 @@ def look(table, pool, watch, memory, q, tracked, how):
             distances = np.empty(CANDIDATES)
             roots = np.empty((ROOTS, ROOT))
             work = (np.empty((1, CONTACT_RECORD)), np.empty((1, TRACK)))
-        look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, distances, roots, work)
+        thorough = how == EVERYTHING or math.isnan(memory[at + PAIR_MEMORY * p + TURN])
+        look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, distances, roots, work, thorough)
     return np.int64(memory[EVENT_COUNT] - before)

@@ -49,7 +49,7 @@ from assembly.constraints.terms import objective, recenter
 from assembly.proximity.extremal import BEND
 from assembly.proximity.free_pair import VARIABLES, VECTORS
 from assembly.proximity.solid_contact import CONTACT_RECORD, FOLD, TRACK
-from assembly.proximity.watch import AS_NEEDED, CAREFUL, EVERYTHING
+from assembly.proximity.watch import AS_NEEDED, CAREFUL, EVERYTHING, any_crossed
 from assembly.solve.contacts import free_folds, is_of_surfaces, start_contacts
 from assembly.solve.gather import gather, scattered
 from assembly.solve.guards import (
@@ -337,7 +337,12 @@ def solve_program(table, pool, settings, state, history, tips):
             if watched and settings[LAST_LOOK] == 1.0:
                 changed = look_around(table, pool, memory, here, EVERYTHING)
                 if changed:
+                    iteration += 1
                     continue
+                if any_crossed(table, table[WATCH], memory):
+                    # Deeper than looks reach: no row tells.
+                    status = STALLED
+                    break
             status = SOLVED
             if strongest(y, rows) > EXCESS * strongest(gradient, n):
                 # Rows that depend on each other: of all multipliers that balance the objective, the least.

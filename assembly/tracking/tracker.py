@@ -344,7 +344,7 @@ class Tracker:
                 if row.shape != (7,):
                     return None
                 hand.target = Pose(row[:3], row[3:])
-        except (TypeError, ValueError, OverflowError):
+        except Exception:  # whatever a target of the user's own does when it is read
             return None
         if self._others or not isinstance(hand, PointDistance):
             packed.refresh()
