@@ -56,6 +56,7 @@ def small_document():
         asm.TrimContact(touch, a.face().face.outer, "outside", name="t"),
         asm.TrimContact(touch, a.face().face.holes[0], name="n"),
         asm.TrimContact(touch, inner, form="cartesian", side="b"),
+        asm.Clearance([a, b], 0.1, exclude=[(a, b)]),
         asm.Expression(f, [b]),
     )
     scene.minimize(

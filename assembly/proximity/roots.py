@@ -468,12 +468,15 @@ def is_deep(table, pool, scene, e, d, margin):
     if in_trim(table, pool, shell_f, code_f, pool[o], pool[o + 1]):
         y = matvec_t(turn, sub(surface_point(table, pool, f, pool[o], pool[o + 1])[0], shift))
         s, t, distance, _n = foot_of(table, pool, g, y, pool[p], pool[p + 1])
-        if distance < -margin and in_trim(table, pool, shell_g, code_g, s, t):
+        beside = is_within(table, pool, g, s, t, pool[p], pool[p + 1], BESIDE * pool[p + 2], BESIDE * pool[p + 3])
+        # A foot farther off may be on the far side.
+        if distance < -margin and beside and in_trim(table, pool, shell_g, code_g, s, t):
             return True
     if in_trim(table, pool, shell_g, code_g, pool[p], pool[p + 1]):
         y = add(matvec(turn, surface_point(table, pool, g, pool[p], pool[p + 1])[0]), shift)
         s, t, distance, _n = foot_of(table, pool, f, y, pool[o], pool[o + 1])
-        return distance < -margin and in_trim(table, pool, shell_f, code_f, s, t)
+        beside = is_within(table, pool, f, s, t, pool[o], pool[o + 1], BESIDE * pool[o + 2], BESIDE * pool[o + 3])
+        return distance < -margin and beside and in_trim(table, pool, shell_f, code_f, s, t)
     return False
 
 

@@ -197,6 +197,8 @@ def solve_program(table, pool, settings, state, history, tips):
         tracked[2],
         memory,
     )
+    place_rows(table, free, bases, one_sided)
+    envelope(table, bases, rows, n, last, last_row)
     o_room = table[TAPE_ROOM]
     room = (np.empty(table[o_room]), np.empty(table[o_room + 1]), np.empty(table[o_room + 2]))
     gram = np.empty((most, most))
@@ -241,10 +243,11 @@ def solve_program(table, pool, settings, state, history, tips):
         if lost < 0:
             look_around(table, pool, memory, here, AS_NEEDED)
             place_guards(table, memory, here, y, better_y, free)
-    place_rows(table, free, bases, one_sided)
-    envelope(table, bases, rows, n, last, last_row)
     count = free_folds(table, pool, here[2], here[1], active, free, loose[1], -1.0, -1, free_trims)
     if lost < 0 and count == 0:
+        if watched:
+            place_rows(table, free, bases, one_sided)
+            envelope(table, bases, rows, n, last, last_row)
         lost = evaluate(table, pool, here[1], math.inf, loose, room, here)
     if lost >= 0:
         status = CONTACT_LOST
@@ -262,8 +265,6 @@ def solve_program(table, pool, settings, state, history, tips):
         if watched:
             look_around(table, pool, memory, here, AS_NEEDED)
             place_guards(table, memory, here, y, better_y, free)
-            place_rows(table, free, bases, one_sided)
-            envelope(table, bases, rows, n, last, last_row)
         if table[IMPLICIT] == 1:
             recenter(table, pool, here[0])
         for r in range(m):
@@ -279,7 +280,7 @@ def solve_program(table, pool, settings, state, history, tips):
     ended = RUNNING
     settled_by = 0
     # Whether other contacts are near now than rows were placed for.
-    changed = False
+    changed = watched and settings[GATHER] == 1.0 and results[SCATTER] == 1.0
     while status == RUNNING:
         if watched and not changed:
             holds_now = violation_of(here[3], one_sided, rows) <= TOUCHING
@@ -431,7 +432,9 @@ def solve_program(table, pool, settings, state, history, tips):
             if used < 0.0 or restoring:
                 break
             if (
-                foresee(shape, rows, residual, jacobian, y, mu, step, is_fresh, active, foreseen, descent, lagrangian)
+                foresee(
+                    table, shape, rows, residual, jacobian, y, mu, step, is_fresh, active, foreseen, descent, lagrangian
+                )
                 == 0
             ):
                 break

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
+from assembly.constraints.layout import CONTACTS, TRIMS
 from assembly.constraints.program import add_gram
 from assembly.solve.linear import factorize, factorize_shifted, substitute
 from assembly.solve.rows import add_row, add_transposed, clear_row, times
@@ -24,7 +25,7 @@ def weigh_rows(rows, one_sided, residual, y, mu, forces, active):
 
 
 @kernel(inner=True)
-def foresee(shape, rows, residual, jacobian, y, mu, step, in_matrix, active, foreseen, descent, lagrangian):
+def foresee(table, shape, rows, residual, jacobian, y, mu, step, in_matrix, active, foreseen, descent, lagrangian):
     """Let one-sided rows count that are idle here and would push at the end of the step; those that would not, no more.
 
     Their sign is that of y + (c + J step) / mu. Descent changes with them, and so does the Lagrangian, if it holds the
@@ -34,6 +35,9 @@ def foresee(shape, rows, residual, jacobian, y, mu, step, in_matrix, active, for
     changed = 0
     for r in range(rows):
         if one_sided[r] == 0 or (active[r] > 0.0 and foreseen[r] == 0.0):
+            continue
+        if table[CONTACTS] <= r < table[CONTACTS] + table[TRIMS]:
+            # Their slopes change too fast for that.
             continue
         pushes = y[r] + (residual[r] + times(bases, jacobian, r, step)) / mu < 0.0
         if pushes == (foreseen[r] == 1.0):

@@ -11,6 +11,7 @@ from assembly.constraints import layout, program
 from assembly.geometry.curve import NurbsCurve
 from assembly.geometry.face import Face
 from assembly.proximity.free_pair import coordinate_lengths
+from assembly.proximity.solid_contact import TRACK
 from assembly.solve.rows import envelope, place_rows
 from tests.laws.loop_point import LoopPoint
 from tests.laws.scenes import dome, placed
@@ -87,7 +88,7 @@ class TrimScene:
 
     def tracked(self, x=None):
         """The solve's values of the contact: coordinates, no features, no normal."""
-        return np.concatenate([self.x if x is None else x, np.zeros(5)])[None]
+        return np.concatenate([self.x if x is None else x, np.zeros(TRACK - 4)])[None]
 
     def at(self, q, x=None):
         """A point of the solve with the contact tracked from x."""
