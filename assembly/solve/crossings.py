@@ -58,6 +58,10 @@ def crossings(solution: Solution) -> tuple[tuple[str, str], ...]:
         tracked = np.full((packed.pair_rows, TRACK), np.nan)
         tracked[: len(contacts)] = solution._parameters[: len(contacts)]
         watch.look(packed.table, packed.pool, packed.table[layout.WATCH], memory, q, tracked, 1)
+        each = memory[watch.MEMORY_HEADER :][: watch.PAIR_MEMORY * len(packed.guarded[0])].reshape(
+            -1, watch.PAIR_MEMORY
+        )
+        found |= set(np.flatnonzero(each[:, watch.CROSSED] == 1.0).tolist())
         gaps = tracked[len(contacts) :, PAIR_GAP]
         found |= {
             pair for gap, (pair, _) in zip(gaps, packed.listed(state), strict=True) if pair >= 0 and gap < -CROSSING
