@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly.constraints.constraint import Constraint, structure_changes
 from assembly.constraints.expression import Expression
+from assembly.constraints.layout import DEEPEST_AT
 from assembly.constraints.objectives import Objective
 from assembly.constraints.packing import Packed, lone_surfaces, pack, structure_of
 from assembly.constraints.trim_contact import TrimContact
@@ -216,7 +217,8 @@ class Assembly:
             settings = _WARM_SETTINGS if warm else _SETTINGS
         state = self._start(packed, q0, starts)
         history = np.empty((min(int(settings[ITERATIONS]), MOST_HISTORY) + 1, HISTORY))
-        arguments = (packed.table, packed.pool)
+        # The loop writes contacts of clearances into its table: every solve has its own, also in another thread.
+        arguments = (packed.table.copy() if packed.guards else packed.table, packed.pool)
         tips = packed.tips
         if tips not in Assembly._loaded:
             # Loading the kernel, or compiling it, is no part of a solve's time.
@@ -230,6 +232,7 @@ class Assembly:
         code = solve_program(*arguments, settings, state, history, tips)
         if code == CONTACT_LOST and packed.seek_penetration():
             # Perhaps solids cross at the start.
+            arguments[0][DEEPEST_AT] = packed.table[DEEPEST_AT]
             state = self._start(packed, q0, starts)
             code = solve_program(*arguments, settings, state, history, tips)
         if code != 0 and packed.trims:
@@ -246,7 +249,7 @@ class Assembly:
             other, rows = self._start(packed, q0, starts), np.empty_like(history)
             if solve_program(*arguments, settings, other, rows, tips) == 0:
                 code, state, history = 0, other, rows
-        if code != 0 and packed.is_crowded(state) and self._crowding < MOST_CROWDING and not warm:
+        if packed.is_crowded(state) and self._crowding < MOST_CROWDING and not warm:
             self._crowding *= 2
             self._packed = None
             return self.solve(q0, starts=starts, **options)

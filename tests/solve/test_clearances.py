@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import pickle
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ import pytest
 import assembly as asm
 from assembly.errors import InputError
 from benchmarks.center_lines import torus_wire
+from benchmarks.hands import NEAR, linked_rings
 from benchmarks.wire_oracle import WireOracle
 
 BALL = asm.shapes.sphere(1.0)
@@ -134,3 +136,14 @@ def test_contacts_that_hold_do_not_cross_and_clearances_are_not_looked_at():
     solution = scene.solve()
     assert solution.success and solution.crossings == ()
     assert WireOracle([torus_wire(1.0, 0.1)] * 3).deepest(solution.q) > -1e-9
+
+
+def test_solves_in_threads_are_those_of_one():
+    rings_ = linked_rings(4, NEAR)
+    scene = rings_.drag.scene
+    scene.constrain(asm.Clearance())
+    alone = [scene.solve(q).q for q in rings_.q]
+    with ThreadPoolExecutor(2) as pool:
+        together = list(pool.map(lambda q: scene.solve(q).q, [*rings_.q] * 3))
+    # The same to the last bit: the target is one for all, and nothing else is shared.
+    assert all((q == alone[k % 4]).all() for k, q in enumerate(together))
