@@ -18,7 +18,12 @@ class Clearance(Constraint):
     each is a row gap >= minimum as long as it is near, and a step is never longer than to where something that is not
     listed could touch. A solve ends SOLVED only after a look at its pose found no contact that is violated.
 
-    Pairs of points that a `Contact` of the same two bodies has are that contact's: its gap of zero is no violation.
+    Pairs of points that a `Contact` of the same two bodies has are that contact's: its gap of zero is no violation. Of
+    bodies with edges the contact counts for both, so a `minimum` above zero contradicts it there.
+
+    Bodies that cross at the start are pushed apart where they are in each other by less than a twentieth of the scene's
+    size and less than their radii of curvature. Deeper ones stay, and the solve ends STALLED, never SOLVED; a tracker
+    does not begin there. Not told is a solid with edges that is wholly inside another body.
 
     Parameters
     ----------
