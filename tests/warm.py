@@ -6,7 +6,7 @@ import assembly as asm
 
 
 def main() -> None:
-    """Solve a scene of solids, and one of a contact with a trim."""
+    """Solve a scene of solids, one of a contact with a trim, and one with a clearance."""
     floor = asm.Body("floor", asm.shapes.plate(4.0, 4.0, 1.0, holes=[(0.0, 0.0, 0.5)]), fixed=True)
     ball = asm.Body("ball", asm.shapes.sphere(0.5), position=(1.2, 0.2, 2.0))
     solids = asm.Assembly([floor, ball])
@@ -17,6 +17,9 @@ def main() -> None:
     touch = asm.Contact(top, ball)
     trimmed.constrain(touch, asm.TrimContact(touch, top.face.holes[0], keep="outside"))
     assert trimmed.solve().success
+    apart = asm.Assembly([floor, ball])
+    apart.constrain(asm.Clearance())
+    assert apart.solve().success
     # What tests in fresh interpreters ask for: there the first compile says so, among what they print.
     pair = asm.proximity.extremal_pair(ball.face(), ball.q, ball.face(), floor.q)
     asm.proximity.gap_hessian(ball.face(), ball.q, ball.face(), floor.q, pair.parameters)

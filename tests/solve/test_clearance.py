@@ -26,7 +26,7 @@ UNSOLVED = {
     9: "is at its iteration limit, 2e-7 from clear",
 }
 TAUT_SCENES = [
-    pytest.param(k, marks=pytest.mark.xfail(strict=True, reason=UNSOLVED[k])) if k in UNSOLVED else k
+    pytest.param(k, marks=pytest.mark.xfail(strict=False, reason=UNSOLVED[k])) if k in UNSOLVED else k
     for k in range(SCENES)
 ]
 
@@ -102,8 +102,9 @@ def two_rings(minimum, place, target):
     return scene, WireOracle([torus_wire(MAJOR, MINOR)] * 2)
 
 
-FAR = pytest.mark.xfail(strict=True, reason="it ends with the constraints held and stalls before its gradient is small")
-STUCK = pytest.mark.xfail(strict=True, reason="cubes that are drawn into each other stall where they still cross")
+# Rounding decides where a taut solve ends: another machine may see some of these solved.
+FAR = pytest.mark.xfail(strict=False, reason="constraints held, it stalls before its gradient is small")
+STUCK = pytest.mark.xfail(strict=False, reason="cubes that are drawn into each other stall where they still cross")
 
 
 @pytest.mark.parametrize("minimum", [0.0, 0.05, pytest.param(0.3, marks=FAR)])
