@@ -395,46 +395,6 @@ def cuts(a, d, p, q, r, end):
     return u >= 0.0 and v >= 0.0 and u + v <= 1.0 and end < t < 1.0 - end
 
 
-@kernel(inner=True, allocates=True)
-def is_cut(table, pool, tree, surface, shell, a, d, end):
-    """Whether facets of a body's faces cut the segment from a to a + d, but for that part at its ends; body axes."""
-    stack = np.empty(DEPTH, np.int64)
-    stack[0] = 0
-    used = 1
-    while used > 0:
-        used -= 1
-        i = stack[used]
-        o = table[tree + NODE_POOL] + NODE * i
-        if not meets_box(pool, o, a, d):
-            continue
-        at = table[tree + NODE_TABLE] + NODE_INTS * i
-        child = table[at + CHILD]
-        if child >= 0:
-            if used + 2 <= DEPTH:
-                stack[used] = child
-                stack[used + 1] = child + 1
-                used += 2
-            continue
-        code = table[at + FEATURE]
-        r = surface
-        if r < 0:
-            if code >= table[shell + FACES]:
-                continue
-            r = feature_at(table, shell, code)
-        e = table[tree + ELEMENT_POOL] + ELEMENT * (-1 - child)
-        u0 = pool[e] - pool[e + 2]
-        u1 = pool[e] + pool[e + 2]
-        v0 = pool[e + 1] - pool[e + 3]
-        v1 = pool[e + 1] + pool[e + 3]
-        p = surface_point(table, pool, r, u0, v0)[0]
-        q = surface_point(table, pool, r, u1, v0)[0]
-        s = surface_point(table, pool, r, u1, v1)[0]
-        t = surface_point(table, pool, r, u0, v1)[0]
-        if cuts(a, d, p, q, s, end) or cuts(a, d, p, s, t, end):
-            return True
-    return False
-
-
 @kernel(inner=True)
 def surface_of(table, shell, surface, code):
     """The surface record of an element's feature, or -1 where it is no face."""
@@ -481,8 +441,8 @@ def is_deep(table, pool, scene, e, d, margin):
 
 
 @kernel(inner=True, allocates=True)
-def is_within_body(table, pool, tree, surface, shell, a, d):
-    """Whether facets of a body cut a ray from a, out of its box along d, an odd number of times."""
+def facets_cut(table, pool, tree, surface, shell, a, d, end):
+    """How many facets of a body's faces cut the segment from a to a + d, but for that part at its ends; body axes."""
     stack = np.empty(DEPTH, np.int64)
     stack[0] = 0
     used = 1
@@ -508,8 +468,8 @@ def is_within_body(table, pool, tree, surface, shell, a, d):
         q = surface_point(table, pool, r, pool[e] + pool[e + 2], pool[e + 1] - pool[e + 3])[0]
         s = surface_point(table, pool, r, pool[e] + pool[e + 2], pool[e + 1] + pool[e + 3])[0]
         t = surface_point(table, pool, r, pool[e] - pool[e + 2], pool[e + 1] + pool[e + 3])[0]
-        count += int(cuts(a, d, p, q, s, 0.0)) + int(cuts(a, d, p, s, t, 0.0))
-    return count % 2 == 1
+        count += int(cuts(a, d, p, q, s, end)) + int(cuts(a, d, p, s, t, end))
+    return count
 
 
 @kernel(inner=True)
@@ -538,10 +498,15 @@ def crosses(table, pool, scene, stack, candidates, margin):
     far = 10.0 * (pool[table[scene[3][0] + NODE_POOL] + RADIUS] + pool[table[scene[3][1] + NODE_POOL] + RADIUS])
     ray = (0.6012 * far, 0.3517 * far, 0.7174 * far)
     a, some = first_point(table, pool, scene[3][0], scene[2][0], scene[2][2])
-    if some and is_within_body(table, pool, scene[3][1], scene[2][1], scene[2][3], matvec_t(turn, sub(a, shift)), ray):
+    if (
+        some
+        and facets_cut(table, pool, scene[3][1], scene[2][1], scene[2][3], matvec_t(turn, sub(a, shift)), ray, 0.0) % 2
+        == 1
+    ):
         return True
     b, some = first_point(table, pool, scene[3][1], scene[2][1], scene[2][3])
-    return some and is_within_body(table, pool, scene[3][0], scene[2][0], scene[2][2], add(matvec(turn, b), shift), ray)
+    b = add(matvec(turn, b), shift)
+    return some and facets_cut(table, pool, scene[3][0], scene[2][0], scene[2][2], b, ray, 0.0) % 2 == 1
 
 
 @kernel(inner=True)
@@ -556,8 +521,8 @@ def is_outside(table, pool, scene, roots, k, margin):
     turn, shift = scene[0], scene[1]
     a = (roots[k, POINT_F], roots[k, POINT_F + 1], roots[k, POINT_F + 2])
     b = (roots[k, POINT_G], roots[k, POINT_G + 1], roots[k, POINT_G + 2])
-    if is_cut(table, pool, scene[3][0], scene[2][0], scene[2][2], a, sub(b, a), end):
+    if facets_cut(table, pool, scene[3][0], scene[2][0], scene[2][2], a, sub(b, a), end) > 0:
         return True
     a = matvec_t(turn, sub(a, shift))
     b = matvec_t(turn, sub(b, shift))
-    return is_cut(table, pool, scene[3][1], scene[2][1], scene[2][3], a, sub(b, a), end)
+    return facets_cut(table, pool, scene[3][1], scene[2][1], scene[2][3], a, sub(b, a), end) > 0

@@ -269,7 +269,7 @@ class Tracker:
         packed = self._packed
         self._names = [(a.name, b.name) for pairs in packed.guarded for a, b in pairs]
         self._seen = 0.0
-        self._pool = memoryview(packed.pool)  # type: ignore[arg-type]
+        self._pool = memoryview(packed.pool)  # type: ignore[arg-type]  # as above
         self._reference = packed.reference.tolist()
         self._at = next(at for target, at in packed._targets if target is self._hand)
         # Whatever else may change between ticks is written by the scene itself.

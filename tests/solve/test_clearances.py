@@ -147,3 +147,24 @@ def test_solves_in_threads_are_those_of_one():
         together = list(pool.map(lambda q: scene.solve(q).q, [*rings_.q] * 3))
     # The same to the last bit: the target is one for all, and nothing else is shared.
     assert all((q == alone[k % 4]).all() for k, q in enumerate(together))
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "x"),
+    [
+        *((BALL, BALL, x) for x in (1.8, 1.0, 0.3)),
+        (BALL, asm.shapes.sphere(0.3), 0.05),
+        (asm.shapes.box(1, 1, 1), asm.shapes.box(1, 1, 1), 0.7),
+        (RING, RING, 1.0),
+    ],
+    ids=["balls-1.8", "balls-1.0", "balls-0.3", "ball-in-ball", "boxes", "rings"],
+)
+def test_bodies_deep_in_each_other_are_never_solved(a, b, x):
+    bodies = [asm.Body("a", a, fixed=True), asm.Body("b", b, (x, 0, 0))]
+    scene = asm.Assembly(bodies)
+    scene.constrain(asm.Clearance())
+    hold = bodies[1].point(0, 0, 0)
+    scene.minimize(asm.PointDistance(hold, (x, 0.01, 0)))
+    assert not scene.solve().success
+    with pytest.raises(InputError, match="q0"):
+        scene.tracker(hold)
