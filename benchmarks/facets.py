@@ -211,7 +211,7 @@ def _two_clips(quick: bool, coal: Any | None) -> tuple[list[dict[str, Any]], lis
         peers[f"{COAL} crossing facets"] = float(np.median(_seconds(meshes.crossing, moves)[0]))
     rows, figures = [], []
     for name, part in (("a quarter of", 0.25), ("one", 1.0)):
-        seconds, found = _seconds(lambda q, part=part: descents.pairs(q, part * CLIP_RADIUS), list(poses))  # type: ignore[misc]
+        seconds, found = _seconds(lambda q, part=part: descents.pairs(q, part * CLIP_RADIUS), list(poses))  # type: ignore[misc]  # defaults bind the loop's values
         what = f"two clips of {2 * count:,} facets each, reach {name} radius"
         rows.append({"what": what, "pairs, median": float(np.median(found)), "pairs, most": float(np.max(found))})
         figures.append(figure(what, "seconds", float(np.median(seconds)), reach=1e-4, peers=peers))
@@ -235,7 +235,7 @@ def _wires(quick: bool, coal: Any | None) -> tuple[list[dict[str, Any]], list[di
         peers = {COAL: float(np.median(_seconds(meshes.manager(), meshes.placements(poses[:: 1 if quick else 4]))[0]))}
     rows, figures = [], []
     for name, part in (("a quarter of", 0.25), ("one", 1.0)):
-        seconds, found = _seconds(lambda q, part=part: descents.pairs(q, part * MINOR), list(poses))  # type: ignore[misc]
+        seconds, found = _seconds(lambda q, part=part: descents.pairs(q, part * MINOR), list(poses))  # type: ignore[misc]  # defaults bind the loop's values
         what = f"twelve wires, {2 * count:,} facets each, all 66 pairs of bodies, reach {name} radius"
         rows.append({"what": what, "pairs, median": float(np.median(found)), "pairs, most": float(np.max(found))})
         figures.append(figure(what, "seconds", float(np.median(seconds)), peers=peers))

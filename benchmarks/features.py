@@ -167,7 +167,7 @@ def _judged(name: str, pairs: list[Pair], wanted: list[float], reach: float | No
         length = float(np.linalg.norm(found.points[1] - found.points[0]))
         off = abs(abs(found.gap) - length)
         right += int(found.status is FeatureStatus.APART and length <= distance + 1e-12 * size and off < 1e-12 * size)
-        times.append(measure(lambda a=a, b=b, q=q: closest_features(a, b, q_b=q), repeats=3, duration=1e-3).seconds)  # type: ignore[misc]
+        times.append(measure(lambda a=a, b=b, q=q: closest_features(a, b, q_b=q), repeats=3, duration=1e-3).seconds)  # type: ignore[misc]  # defaults bind the loop's values
         search = _occt_search((a, b, q))
         if search is not None:
             their_right += int(abs(search() - min(distance, length)) <= _OCCT_RIGHT * size)
