@@ -385,6 +385,10 @@ if config.DISABLE_JIT:
         """One component of a four-lane value."""
         return float(value[index])
 
+    def store_lanes(value: Any, array: np.ndarray, offset: int) -> None:
+        """Write all four lanes to a flat array."""
+        array[offset : offset + 4] = value
+
     def store_xyz(value: Any, array: np.ndarray, offset: int) -> None:
         """Write lanes 0 to 2 to a flat array."""
         array[offset : offset + 3] = value[:3]
@@ -425,6 +429,18 @@ else:
             return builder.extract_element(arguments[0], _I32(signature.args[1].literal_value))
 
         return types.float64(value, index), generate
+
+    @intrinsic
+    def store_lanes(_typing: Any, value: Any, array: Any, offset: Any) -> Any:
+        """Write all four lanes to a flat array."""
+
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            data = context.make_array(signature.args[1])(context, builder, arguments[1]).data
+            pointer = builder.bitcast(builder.gep(data, [arguments[2]]), _VECTOR.as_pointer())
+            builder.store(arguments[0], pointer, align=8)
+            return context.get_dummy_value()
+
+        return types.none(value, array, offset), generate
 
     @intrinsic
     def store_xyz(_typing: Any, value: Any, array: Any, offset: Any) -> Any:

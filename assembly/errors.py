@@ -13,7 +13,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["AssemblyError", "InputError", "checked_color", "integer", "number", "positive", "real_array", "vector"]
+__all__ = [
+    "AssemblyError",
+    "InputError",
+    "checked_color",
+    "extent",
+    "integer",
+    "number",
+    "positive",
+    "real_array",
+    "vector",
+]
 
 
 class AssemblyError(Exception):
@@ -94,6 +104,14 @@ def positive(name: str, value: Any) -> float:
     result = number(name, value)
     if result <= 0.0:
         raise InputError(f"{name} is {result:g}; expected a positive number")
+    return result
+
+
+def extent(name: str, value: Any) -> float:
+    """A length whose volumes neither overflow nor vanish."""
+    result = positive(name, value)
+    if not 1e-100 <= result <= 1e100:
+        raise InputError(f"{name} is {result:g}; expected a length from 1e-100 to 1e+100")
     return result
 
 

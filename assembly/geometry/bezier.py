@@ -11,6 +11,7 @@ form with f(t, ..., t) = C(t), gives the Bezier points of the span [a, b] as
 from __future__ import annotations
 
 from functools import lru_cache
+from itertools import groupby, pairwise
 from math import comb
 
 import numpy as np
@@ -18,7 +19,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly.errors import InputError, integer, real_array
 
+# Where power tables are used, which lose digits with the degree; curves beyond are evaluated in Bernstein form.
 MAX_DEGREE = 15
+MAX_CURVE_DEGREE = 50
 # Distinct knots closer than this part of the domain would make a span that doubles cannot resolve.
 _MIN_SPAN = 1e-14
 
@@ -39,38 +42,41 @@ def checked_knots(name: str, value: ArrayLike, degree: int, count: int) -> Array
             f"{name} has {knots.size} values; expected {count + degree + 1} "
             f"({count} control points + degree {degree} + 1)"
         )
-    steps = np.diff(knots)
-    if (steps < 0.0).any():
-        k = int(np.argmax(steps < 0.0))
-        raise InputError(
-            f"{name} decreases from {knots[k]:g} to {knots[k + 1]:g} at index {k + 1}; expected nondecreasing knots"
-        )
-    low, high = knots[degree], knots[count]
+    # Plain floats: most vectors have a dozen knots, for which every call of numpy costs more than all of this.
+    values = knots.tolist()
+    for k, (knot, following) in enumerate(pairwise(values)):
+        if following < knot:
+            raise InputError(
+                f"{name} decreases from {knot:g} to {following:g} at index {k + 1}; expected nondecreasing knots"
+            )
+    low, high = values[degree], values[count]
     if not high > low:
         raise InputError(
             f"{name} has the empty domain [{low:g}, {high:g}]; expected knots[degree] < knots[-degree - 1]"
         )
-    distinct, times = np.unique(knots, return_counts=True)
-    inside = (distinct > low) & (distinct < high)
-    allowed = np.where(inside, degree, degree + 1)
-    if (times > allowed).any():
-        k = int(np.argmax(times > allowed))
+    distinct = []
+    for knot, run in groupby(values):
+        times = sum(1 for _ in run)
+        allowed = degree if low < knot < high else degree + 1
+        if times > allowed:
+            raise InputError(
+                f"{name} holds {knot:g} {times} times; expected at most {allowed} "
+                f"(more would tear the spline of degree {degree})"
+            )
+        if low <= knot <= high:
+            distinct.append(knot)
+    shortest = min(following - knot for knot, following in pairwise(distinct))
+    if shortest < _MIN_SPAN * (high - low):
         raise InputError(
-            f"{name} holds {distinct[k]:g} {times[k]} times; expected at most {allowed[k]} "
-            f"(more would tear the spline of degree {degree})"
-        )
-    spans = np.diff(distinct[(distinct >= low) & (distinct <= high)])
-    if spans.min() < _MIN_SPAN * (high - low):
-        raise InputError(
-            f"{name} has a span of {spans.min():g}; expected distinct knots at least {_MIN_SPAN:g} of the domain apart"
+            f"{name} has a span of {shortest:g}; expected distinct knots at least {_MIN_SPAN:g} of the domain apart"
         )
     knots.flags.writeable = False
     return knots
 
 
-def checked_degree(name: str, value: int, count: int) -> int:
+def checked_degree(name: str, value: int, count: int, highest: int = MAX_DEGREE) -> int:
     """A degree that `count` control points can carry."""
-    degree = integer(name, value, 1, MAX_DEGREE)
+    degree = integer(name, value, 1, highest)
     if count < degree + 1:
         raise InputError(f"{name} is {degree}; expected at most {count - 1} with {count} control points")
     return degree

@@ -3,7 +3,8 @@
     C(t) = sum_i N_i,p(t) w_i P_i / sum_i N_i,p(t) w_i
 
 (Piegl & Tiller, The NURBS Book, equation 4.1), on the domain [knots[p], knots[n]], so that clamped and
-unclamped knots both work. It is evaluated from one power table per span (`geometry/spline.py`).
+unclamped knots both work. It is evaluated from one power table per span (`geometry/spline.py`), above degree 15 in
+Bernstein form (`geometry/bezier_pieces.py`).
 """
 
 from __future__ import annotations
@@ -16,6 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly.errors import InputError, integer, number, real_array, vector
 from assembly.geometry import bezier
+from assembly.geometry.bezier_packing import pack_pieces
+from assembly.geometry.bezier_pieces import evaluate_pieces
 from assembly.geometry.spline import CURVE_RECORD, evaluate_curve
 
 __all__ = ["NurbsCurve"]
@@ -68,6 +71,14 @@ def similarity(rotation: ArrayLike | None, translation: ArrayLike, scale: float)
     return factor * matrix, vector("translation", translation)
 
 
+def checked_table_degree(curve: NurbsCurve) -> None:
+    """Raise where a curve's degree is too high for power tables."""
+    if curve.degree > bezier.MAX_DEGREE:
+        raise InputError(
+            f"{curve!r} is of degree {curve.degree}; expected at most {bezier.MAX_DEGREE} for trims and contacts"
+        )
+
+
 class NurbsCurve:
     """A rational B-spline curve.
 
@@ -78,7 +89,7 @@ class NurbsCurve:
     knots : (n + degree + 1,) array
         Nondecreasing; the domain is [knots[degree], knots[n]].
     degree : int
-        1 to 15.
+        1 to 50; trims and contacts take curves up to 15.
     weights : (n,) array, optional
         Positive; ones by default.
     name : str, optional
@@ -113,11 +124,27 @@ class NurbsCurve:
             raise InputError(f"control_points has shape {points.shape}; expected (n, 2) or (n, 3)")
         points.flags.writeable = False
         self.control_points: Array = points
-        self.degree: int = bezier.checked_degree("degree", degree, points.shape[0])
+        self.degree: int = bezier.checked_degree("degree", degree, points.shape[0], bezier.MAX_CURVE_DEGREE)
         self.knots: Array = bezier.checked_knots("knots", knots, self.degree, points.shape[0])
         self.weights: Array = checked_weights(weights, points.shape[:1])
         self.name: str | None = checked_name(name)
         self.domain: tuple[float, float] = (float(self.knots[self.degree]), float(self.knots[points.shape[0]]))
+
+    @classmethod
+    def bezier(
+        cls, control_points: ArrayLike, weights: ArrayLike | None = None, *, name: str | None = None
+    ) -> NurbsCurve:
+        """The Bezier curve of n control points on [0, 1]: degree n - 1."""
+        points = real_array("control_points", control_points, ("n", "d"))
+        knots = np.repeat([0.0, 1.0], points.shape[0])
+        return cls(points, knots, points.shape[0] - 1, weights, name=name)
+
+    @classmethod
+    def polyline(cls, points: ArrayLike, *, name: str | None = None) -> NurbsCurve:
+        """Straight segments through n points; point i stands at the parameter i."""
+        corners = real_array("points", points, ("n", "d"))
+        last = corners.shape[0] - 1.0
+        return cls(corners, np.concatenate([[0.0], np.arange(last + 1.0), [last]]), 1, name=name)
 
     def __repr__(self) -> str:
         label = "" if self.name is None else f"{self.name!r}, "
@@ -158,13 +185,13 @@ class NurbsCurve:
 
     def insert_knot(self, value: float, times: int = 1) -> NurbsCurve:
         """The same curve with a knot inserted (The NURBS Book, A5.1)."""
-        times = integer("times", times, 1, bezier.MAX_DEGREE)
+        times = integer("times", times, 1, bezier.MAX_CURVE_DEGREE)
         points, knots = bezier.insert(self._homogeneous, self.knots, self.degree, number("value", value), times)
         return self._from_homogeneous(points, knots, self.degree)
 
     def elevate(self, degree: int) -> NurbsCurve:
         """The same curve in a higher degree; interior knots get full multiplicity."""
-        degree = integer("degree", degree, self.degree, bezier.MAX_DEGREE)
+        degree = integer("degree", degree, self.degree, bezier.MAX_CURVE_DEGREE)
         raised = bezier.elevation(self.degree, degree) @ self.bezier_pieces()
         return self._from_homogeneous(bezier.joined(raised), bezier.full_knots(self.breaks(), degree), degree)
 
@@ -191,7 +218,13 @@ class NurbsCurve:
         )
 
     @cached_property
+    def packed_pieces(self) -> tuple[NDArray[np.int64], Array]:
+        """Bezier pieces as certified queries read them (`geometry/bezier_pieces.py`); not to be changed."""
+        return pack_pieces(self)
+
+    @cached_property
     def _packed(self) -> tuple[NDArray[np.int64], Array]:
+        checked_table_degree(self)
         pieces = self.bezier_pieces()
         at = self.breaks()
         lanes = np.zeros(pieces.shape[:2] + (4,))
@@ -239,10 +272,12 @@ class NurbsCurve:
         """
         order = integer("order", order, 0, 2)
         at = parameters("t", t)
-        record, pool = self._packed
         row = flat(at)
         out = np.empty(3 * (order + 1) * at.size)
-        bad = evaluate_curve(record, pool, row, order, out)
+        if self.degree <= bezier.MAX_DEGREE:
+            bad = evaluate_curve(*self._packed, row, order, out)
+        else:
+            bad = evaluate_pieces(*self.packed_pieces, row, self.closed, order, out)
         if bad >= 0:
             low, high = self.domain
             raise InputError(f"t is {row[bad]}; expected a parameter in the domain [{low:g}, {high:g}]")

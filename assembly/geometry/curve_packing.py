@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from assembly.errors import InputError
 from assembly.geometry.bezier import MAX_DEGREE, power_matrix
-from assembly.geometry.curve import COINCIDENT, NurbsCurve
+from assembly.geometry.curve import COINCIDENT, NurbsCurve, checked_table_degree
 from assembly.geometry.curve_tables import bezier_tables, swept_area
 from assembly.geometry.spline import CURVE_RECORD
 
@@ -24,6 +24,8 @@ def packed_curves(curves: Sequence[NurbsCurve]) -> tuple[Array, Array, Ints]:
     """Bezier points, pool and records of plane curves."""
     if not curves:
         return np.empty(0), np.empty(0), np.empty((0, CURVE_RECORD), dtype=np.int64)
+    for curve in curves:
+        checked_table_degree(curve)
     shape = np.array([(curve.degree, len(curve.weights)) for curve in curves], dtype=np.int64).reshape(-1, 2)
     points = np.concatenate([curve.control_points for curve in curves])
     weights = np.concatenate([curve.weights for curve in curves])

@@ -13,7 +13,7 @@ from math import ceil, cos, pi, sin
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.errors import InputError, positive, vector
+from assembly.errors import InputError, extent, positive, vector
 
 __all__ = ["Path"]
 
@@ -169,7 +169,7 @@ class Path:
         ValueError
             The length is not positive.
         """
-        return self._extended(Piece(self.end, self.end_direction, positive("length", length)))
+        return self._extended(Piece(self.end, self.end_direction, extent("length", length)))
 
     def arc(self, radius: float, angle: float, toward: ArrayLike) -> Path:
         """Turn along a circle.
@@ -188,7 +188,7 @@ class Path:
         ValueError
             An angle outside (0, 2 pi], or `toward` along the path.
         """
-        radius = positive("radius", radius)
+        radius = extent("radius", radius)
         angle = positive("angle", angle)
         if angle > 2.0 * pi * (1.0 + 1e-12):
             raise InputError(f"angle is {angle:g}; expected at most a full turn, 2 pi")

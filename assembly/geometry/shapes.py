@@ -12,7 +12,7 @@ from math import pi, sqrt
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.errors import InputError, number, positive, vector
+from assembly.errors import InputError, extent, number, vector
 from assembly.geometry.bezier import full_knots
 from assembly.geometry.face import Face
 from assembly.geometry.path import Path
@@ -76,8 +76,13 @@ def plane(width: float, height: float, *, name: str | None = None) -> NurbsSurfa
     width, height : float
         Extents in x and y.
     """
-    x, y = 0.5 * positive("width", width), 0.5 * positive("height", height)
-    points = [[[-x, -y, 0.0], [-x, y, 0.0]], [[x, -y, 0.0], [x, y, 0.0]]]
+    return _rectangle(extent("width", width), extent("height", height), np.eye(3), np.zeros(3), name)
+
+
+def _rectangle(width: float, height: float, rotation: Array, offset: Array, name: str | None) -> NurbsSurface:
+    """A rectangle moved by x -> rotation x + offset."""
+    x, y = 0.5 * width, 0.5 * height
+    points = np.array([[[-x, -y, 0.0], [-x, y, 0.0]], [[x, -y, 0.0], [x, y, 0.0]]]) @ rotation.T + offset
     return NurbsSurface(points, (_line_knots(-x, x), _line_knots(-y, y)), (1, 1), name=name)
 
 
@@ -86,7 +91,7 @@ def sphere(radius: float, *, name: str | None = None) -> NurbsSurface:
 
     The domain is [0, 2 pi radius] x [0, pi radius], from the +x side; u is closed, and Su = 0 at the poles.
     """
-    r = positive("radius", radius)
+    r = extent("radius", radius)
     return _revolution(r * _MERIDIAN, _MERIDIAN_WEIGHTS, 2.0 * pi * r, _arc_knots(pi * r, 2), 2, name)
 
 
@@ -95,7 +100,7 @@ def ellipsoid(a: float, b: float, c: float, *, name: str | None = None) -> Nurbs
 
     The domain is [0, 2 pi m] x [0, pi n] with the mean squares m^2 = (a^2 + b^2)/2 and n^2 = (m^2 + c^2)/2.
     """
-    a, b, c = positive("a", a), positive("b", b), positive("c", c)
+    a, b, c = extent("a", a), extent("b", b), extent("c", c)
     m = sqrt(0.5 * (a * a + b * b))
     n = sqrt(0.5 * (m * m + c * c))
     ball = _revolution(_MERIDIAN, _MERIDIAN_WEIGHTS, 2.0 * pi * m, _arc_knots(pi * n, 2), 2, name)
@@ -107,7 +112,7 @@ def cylinder(radius: float, height: float, *, name: str | None = None) -> NurbsS
 
     The domain is [0, 2 pi radius] x [0, height]; u runs around the axis and is closed.
     """
-    r, h = positive("radius", radius), positive("height", height)
+    r, h = extent("radius", radius), extent("height", height)
     profile = np.array([[r, -0.5 * h], [r, 0.5 * h]])
     return _revolution(profile, np.ones(2), 2.0 * pi * r, _line_knots(0.0, h), 1, name)
 
@@ -125,10 +130,11 @@ def cone(radius: float, height: float, top_radius: float = 0.0, *, name: str | N
     top_radius : float
         0 for a cone, else the radius of the top.
     """
-    r, h = positive("radius", radius), positive("height", height)
+    r, h = extent("radius", radius), extent("height", height)
     top = number("top_radius", top_radius)
     if top < 0.0:
         raise InputError(f"top_radius is {top:g}; expected zero or a positive number")
+    top = extent("top_radius", top) if top > 0.0 else top
     profile = np.array([[r, -0.5 * h], [top, 0.5 * h]])
     slant = float(np.hypot(h, r - top))
     return _revolution(profile, np.ones(2), pi * (r + top), _line_knots(0.0, slant), 1, name)
@@ -146,7 +152,7 @@ def torus(major_radius: float, minor_radius: float, *, name: str | None = None) 
     minor_radius : float
         Of the tube, smaller than the major radius.
     """
-    major, minor = positive("major_radius", major_radius), positive("minor_radius", minor_radius)
+    major, minor = extent("major_radius", major_radius), extent("minor_radius", minor_radius)
     if minor >= major:
         raise InputError(f"minor_radius is {minor:g}; expected less than major_radius, {major:g}")
     profile = minor * _CIRCLE + [major, 0.0]
@@ -163,7 +169,7 @@ def box(x: float, y: float, z: float) -> tuple[Face, ...]:
     x, y, z : float
         Extents along the axes.
     """
-    extents = np.array([positive("x", x), positive("y", y), positive("z", z)])
+    extents = np.array([extent("x", x), extent("y", y), extent("z", z)])
     faces = []
     for axis, names in enumerate((("left", "right"), ("front", "back"), ("bottom", "top"))):
         for side, name in zip((-1.0, 1.0), names, strict=True):
@@ -174,7 +180,7 @@ def box(x: float, y: float, z: float) -> tuple[Face, ...]:
             rotation = np.zeros((3, 3))
             rotation[first, 0], rotation[second, 1], rotation[axis, 2] = 1.0, 1.0, side
             offset = rotation[:, 2] * 0.5 * extents[axis]
-            faces.append(Face(plane(extents[first], extents[second], name=name).transformed(rotation, offset)))
+            faces.append(Face(_rectangle(extents[first], extents[second], rotation, offset, name)))
     return tuple(faces)
 
 
@@ -212,7 +218,7 @@ def pipe(path: Path, radius: float, caps: bool = True, *, name: str | None = Non
     """
     if not isinstance(path, Path):
         raise TypeError(f"path is {path!r}; expected a Path")
-    r = positive("radius", radius)
+    r = extent("radius", radius)
     if not path.pieces:
         raise InputError("path has no pieces; expected at least one line or arc")
     if path.smallest_radius <= r:
@@ -283,9 +289,9 @@ def paper_clip(
     ValueError
         Dimensions that leave no room, or with which the wire would run into itself.
     """
-    r = positive("wire_radius", wire_radius)
-    outer_length, outer_width = positive("length", length), positive("width", width)
-    pitch = 2.0 * r + (r if gap is None else positive("gap", gap))
+    r = extent("wire_radius", wire_radius)
+    outer_length, outer_width = extent("length", length), extent("width", width)
+    pitch = 2.0 * r + (r if gap is None else extent("gap", gap))
     # Radii of the center line's bends: over the top, around the bottom, and the inner one.
     top = 0.5 * outer_width - r
     bottom, inner = top - 0.5 * pitch, top - pitch

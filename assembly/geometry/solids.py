@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.errors import InputError, number, positive, real_array, vector
+from assembly.errors import InputError, extent, number, real_array, vector
 from assembly.geometry.bezier import full_knots
 from assembly.geometry.curve import NurbsCurve
 from assembly.geometry.curve_parts import smooth_parts
@@ -172,7 +172,7 @@ def extrusion(profile: Profile, height: float, holes: Iterable[Profile] = ()) ->
     for k, hole in enumerate(inner):
         label = "hole" if len(inner) == 1 else f"hole {k + 1}"
         hole_names.append(_numbered(label if len(hole) == 1 else f"{label} wall", len(hole)))
-    return _extruded(outer, inner, positive("height", height), _numbered("wall", len(outer)), hole_names)
+    return _extruded(outer, inner, extent("height", height), _numbered("wall", len(outer)), hole_names)
 
 
 def solid_cylinder(radius: float, height: float) -> tuple[Face, ...]:
@@ -180,7 +180,7 @@ def solid_cylinder(radius: float, height: float) -> tuple[Face, ...]:
 
     The wall is that of `cylinder`; the ends are planes trimmed by circles.
     """
-    return extrusion(_circle((0.0, 0.0), positive("radius", radius)), height)
+    return extrusion(_circle((0.0, 0.0), extent("radius", radius)), height)
 
 
 def plate(x: float, y: float, z: float, holes: Iterable[ArrayLike] = ()) -> tuple[Face, ...]:
@@ -200,14 +200,14 @@ def plate(x: float, y: float, z: float, holes: Iterable[ArrayLike] = ()) -> tupl
     ValueError
         Extents or radii that are not positive, holes that leave the plate or run into each other.
     """
-    extents = positive("x", x), positive("y", y)
-    height = positive("z", z)
+    extents = extent("x", x), extent("y", y)
+    height = extent("z", z)
     if isinstance(holes, (str, bytes)) or not isinstance(holes, Iterable):
         raise TypeError(f"holes is {holes!r}; expected a sequence of (center_x, center_y, radius)")
     circles: list[tuple[float, float, float]] = []
     for k, hole in enumerate(holes):
         cx, cy, r = vector(f"holes[{k}]", hole).tolist()
-        positive(f"holes[{k}][2]", r)
+        extent(f"holes[{k}][2]", r)
         if abs(cx) + r >= 0.5 * extents[0] or abs(cy) + r >= 0.5 * extents[1]:
             raise InputError(f"holes[{k}] is ({cx:g}, {cy:g}, {r:g}); expected a circle inside the plate")
         for j, (ox, oy, other) in enumerate(circles):
@@ -250,9 +250,9 @@ def plate_with_slot(
     ValueError
         Extents that are not positive, a slot that is not longer than wide or leaves the plate.
     """
-    extents = positive("x", x), positive("y", y)
-    height = positive("z", z)
-    long, wide = positive("length", length), positive("width", width)
+    extents = extent("x", x), extent("y", y)
+    height = extent("z", z)
+    long, wide = extent("length", length), extent("width", width)
     if long <= wide:
         raise InputError(f"length is {long:g}; expected more than the width of the slot, {wide:g}")
     middle = vector("center", center, 2)
@@ -302,7 +302,7 @@ def cam(radii: ArrayLike, height: float, bore: float) -> tuple[Face, ...]:
     distances = real_array("radii", radii, ("n",))
     if distances.size < 4 or (distances <= 0.0).any():
         raise InputError(f"radii is {distances.tolist()}; expected four or more positive numbers")
-    r = positive("bore", bore)
+    r = extent("bore", bore)
     count = distances.size
     angles = 2.0 * pi * np.arange(count) / count
     points = distances[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
@@ -318,4 +318,4 @@ def cam(radii: ArrayLike, height: float, bore: float) -> tuple[Face, ...]:
     nearest = float(np.linalg.norm(profile.evaluate(np.linspace(*profile.domain, 16 * count)), axis=1).min())
     if r >= nearest:
         raise InputError(f"bore is {r:g}; expected less than the least radius of the profile, {nearest:g}")
-    return _extruded([profile], [[_circle((0.0, 0.0), r)]], positive("height", height), ("cam",), [["bore"]])
+    return _extruded([profile], [[_circle((0.0, 0.0), r)]], extent("height", height), ("cam",), [["bore"]])

@@ -26,11 +26,24 @@ CURVE_RECORD = 5
 CURVE_DEGREE, CURVE_SPANS, CURVE_BREAKS, CURVE_COEFFICIENTS, CURVE_CLOSED = 0, 1, 2, 3, 4
 
 
+# So many spans are searched without a guess.
+FEW_SPANS = 8
+
+
 @kernel(inline=True)
 def find_span(pool, breaks, count, u):
     """Index of the span that holds u; the first or last one beyond the ends."""
     lo = 0
     hi = count
+    if count > FEW_SPANS and pool[breaks] <= u < pool[breaks + count]:
+        # Where knots are evenly spaced no search is needed.
+        lo = int(count * ((u - pool[breaks]) / (pool[breaks + count] - pool[breaks])))
+        lo = min(lo, count - 1)
+        if u < pool[breaks + lo]:
+            hi = lo
+            lo = 0
+        elif u < pool[breaks + lo + 1]:
+            return lo
     while hi - lo > 1:
         mid = (lo + hi) >> 1
         if u >= pool[breaks + mid]:

@@ -218,9 +218,15 @@ class NurbsSurface:
     ) -> NurbsSurface:
         """The surface moved by x -> scale rotation x + translation."""
         matrix, offset = similarity(rotation, translation, scale)
-        return NurbsSurface(
-            self.control_points @ matrix.T + offset, self.knots, self.degree, self.weights, name=self.name
+        moved = object.__new__(NurbsSurface)
+        # Nothing else changes, and that was looked at when this surface was made.
+        moved.control_points = real_array(
+            "control_points", self.control_points @ matrix.T + offset, self.control_points.shape
         )
+        moved.control_points.flags.writeable = False
+        moved.degree, moved.knots, moved.weights = self.degree, self.knots, self.weights
+        moved.name, moved.domain = self.name, self.domain
+        return moved
 
     @cached_property
     def _tables(self) -> tuple[NDArray[np.int64], Array]:

@@ -222,3 +222,17 @@ def test_a_tiny_and_a_huge_domain_give_the_same_points():
         np.testing.assert_allclose(got, want, rtol=0, atol=1e-13)
     with pytest.raises(ValueError, match="knots span"):
         NurbsCurve(points, 1e-200 * knots, 3).evaluate(0.0)
+
+
+def test_bezier_and_polyline_are_what_they_say() -> None:
+    corners = np.array([[0.0, 0.0, 1.0], [1.0, 2.0, 0.5], [4.0, 1.0, 0.0]])
+    parabola = NurbsCurve.bezier(corners)
+    assert parabola.degree == 2 and parabola.domain == (0.0, 1.0)
+    # By hand, (1 - t)^2 P0 + 2 t (1 - t) P1 + t^2 P2; a few roundings of numbers up to 4.
+    assert (
+        np.abs(parabola.evaluate(0.25) - (0.5625 * corners[0] + 0.375 * corners[1] + 0.0625 * corners[2])).max() < 2e-15
+    )
+    path = NurbsCurve.polyline(corners)
+    assert path.domain == (0.0, 2.0)
+    assert np.abs(path.evaluate([0.0, 1.0, 2.0]) - corners).max() < 2e-15
+    assert np.abs(path.evaluate(1.25) - (0.75 * corners[1] + 0.25 * corners[2])).max() < 2e-15

@@ -1,0 +1,229 @@
+"""A curve of Bezier pieces, as kernels read it: points, and bounds over a part of a piece.
+
+Homogeneous points (w x, w y, w z, w) of a piece on s in [0, 1], and those of its first three derivatives, are
+restricted to [s0, s1] by de Casteljau's algorithm twice. The values of a polynomial are between its least and its
+greatest Bezier point there; of the quotient C = X / w,
+
+    C' = (X' - C w') / w,    C'' = (X'' - 2 C' w' - C w'') / w,    C''' = (X''' - 3 C'' w' - 3 C' w'' - C w''') / w.
+
+Weights are positive, so that of a part C is between the least and the greatest of its Bezier points X_i / w_i.
+
+Rounding: a step of de Casteljau is a mean of two numbers and errs by 3 units of 2^-53 of the larger; n steps, twice,
+and the means that made the piece from knots, by less than (16 n + 32) 2^-52 M with M the largest of the points.
+Sums of positive terms, as w, have relative errors of so many units, and X, each of whose points is at most w_i R, one
+of so many units of w R: X / w is off by parts of R, whatever the weights. The ends of a part are rounded, too; where
+weights differ much C moves far between two doubles, and the part is a few units longer.
+"""
+
+from __future__ import annotations
+
+import math
+
+from assembly._kernel import kernel
+from assembly.geometry.interval import UNIT, idifference, iproduct, iquotient, up, widened
+
+# Record: dimension, degree, pieces, whether it is rational; where in the pool the points of C, C', C'', C''' begin
+# (four numbers each, (degree + 1 - order) a piece), then the largest of each order and R, the Gram matrix, the knots.
+DIMENSION, DEGREE, PIECES, RATIONAL, POINTS, LARGEST, GRAM, BREAKS, BEZIER_RECORD = 0, 1, 2, 3, 4, 8, 9, 10, 11
+# Room: 24 numbers of the ranges, 18 of values in the middle, 3 + 3 of the ends, the width, then Bezier points.
+RANGES, MIDDLE, FIRST, LAST, WIDTH, BEZIER_AT = 0, 24, 42, 45, 48, 52
+# Of the largest numbers: that of the positions.
+_SIZE = 4
+
+
+@kernel(inner=True, exact=True)
+def restrict(pool, o, n, s0, s1, room, at):
+    """Bezier points of [s0, s1] of a polynomial of degree n, whose points begin at pool[o], to room[at:]."""
+    for k in range(4 * (n + 1)):
+        room[at + k] = pool[o + k]
+    if s1 < 1.0:
+        c = 1.0 - s1
+        for r in range(1, n + 1):
+            for i in range(n, r - 1, -1):
+                p = at + 4 * i
+                for k in range(4):
+                    room[p + k] = c * room[p - 4 + k] + s1 * room[p + k]
+    if s0 > 0.0:
+        s = s0 / s1
+        c = 1.0 - s
+        for r in range(1, n + 1):
+            for i in range(n - r + 1):
+                p = at + 4 * i
+                for k in range(4):
+                    room[p + k] = c * room[p + k] + s * room[p + 4 + k]
+
+
+@kernel(inner=True, exact=True)
+def value(pool, o, n, s, room, at):
+    """Values of a polynomial at s to room[at:], four; with room for its points there."""
+    for k in range(4 * (n + 1)):
+        room[at + k] = pool[o + k]
+    c = 1.0 - s
+    for r in range(1, n + 1):
+        for i in range(n - r + 1):
+            p = at + 4 * i
+            for k in range(4):
+                room[p + k] = c * room[p + k] + s * room[p + 4 + k]
+
+
+@kernel(inline=True)
+def piece_points(table, span, order):
+    """Where the points of a derivative of a piece begin, and their degree; a degree below zero is none."""
+    n = table[DEGREE] - order
+    return table[POINTS + order] + 4 * (n + 1) * span, n
+
+
+@kernel(inline=True)
+def error_of(table, pool, order):
+    """How far values and Bezier points of a derivative may be off."""
+    return units(table) * pool[table[LARGEST] + order]
+
+
+@kernel(inline=True)
+def units(table):
+    """Roundings of a value, as a part of the largest."""
+    return (16.0 * table[DEGREE] + 32.0) * UNIT
+
+
+@kernel(inner=True, exact=True)
+def project(table, pool, free, count, room, at):
+    """Pairs of C and of w from homogeneous points at room[free:], to room[at:], eight numbers."""
+    part = units(table)
+    off = 4.0 * part * pool[table[LARGEST] + _SIZE]
+    for k in range(4):
+        lo = math.inf
+        hi = -math.inf
+        for i in range(count):
+            o = free + 4 * i
+            x = room[o + k] / room[o + 3] if k < 3 else room[o + 3]
+            lo = min(lo, x)
+            hi = max(hi, x)
+        if k < 3:
+            room[at + 2 * k], room[at + 2 * k + 1] = widened(lo - off, hi + off, 2.0 * UNIT)
+        else:
+            room[at + 6], room[at + 7] = lo * (1.0 - 2.0 * part), hi * (1.0 + 2.0 * part)
+
+
+@kernel(inner=True, exact=True)
+def quotients(room, at, orders):
+    """Derivatives of C from pairs (lo, hi) of C, w and of X, w by order (eight numbers each) at room[at:], in place.
+
+    Six numbers an order are written to room[at + 6 order:], behind what is still to be read.
+    """
+    w = (room[at + 6], room[at + 7])
+    w1 = (room[at + 14], room[at + 15])
+    w2 = (room[at + 22], room[at + 23])
+    w3 = (room[at + 30], room[at + 31]) if orders > 3 else (0.0, 0.0)
+    for k in range(3):
+        c = (room[at + 2 * k], room[at + 2 * k + 1])
+        x1 = (room[at + 8 + 2 * k], room[at + 9 + 2 * k])
+        c1 = iquotient(idifference(x1, iproduct(c, w1)), w)
+        x2 = (room[at + 16 + 2 * k], room[at + 17 + 2 * k])
+        twice = iproduct(c1, (2.0 * w1[0], 2.0 * w1[1]))
+        c2 = iquotient(idifference(idifference(x2, twice), iproduct(c, w2)), w)
+        room[at + 8 + 2 * k], room[at + 9 + 2 * k] = c1
+        room[at + 16 + 2 * k], room[at + 17 + 2 * k] = c2
+        if orders > 3:
+            x3 = (room[at + 24 + 2 * k], room[at + 25 + 2 * k])
+            thrice = iproduct(c2, (3.0 * w1[0], 3.0 * w1[1]))
+            c3 = idifference(idifference(x3, thrice), iproduct(c1, (3.0 * w2[0], 3.0 * w2[1])))
+            c3 = iquotient(idifference(c3, iproduct(c, w3)), w)
+            room[at + 24 + 2 * k], room[at + 25 + 2 * k] = c3
+    for order in range(1, orders):
+        for k in range(6):
+            room[at + 6 * order + k] = room[at + 8 * order + k]
+
+
+@kernel(inner=True, exact=True)
+def bezier_point_bounds(table, pool, span, s, room, at):
+    """Intervals of C, C', C'' (by s) at s of a piece to room[at:], nine pairs; room behind them is used."""
+    free = at + 32
+    for order in range(3):
+        o, n = piece_points(table, span, order)
+        error = error_of(table, pool, order)
+        for k in range(4):
+            room[free + k] = 0.0
+        if n >= 0:
+            value(pool, o, n, s, room, free)
+        if order == 0 and table[RATIONAL] != 0:
+            project(table, pool, free, 1, room, at)
+            continue
+        for k in range(4):
+            lo, hi = room[free + k] - error, room[free + k] + error
+            room[at + 8 * order + 2 * k], room[at + 8 * order + 2 * k + 1] = widened(lo, hi, UNIT)
+    if table[RATIONAL] == 0:
+        for order in range(1, 3):
+            for k in range(6):
+                room[at + 6 * order + k] = room[at + 8 * order + k]
+    else:
+        quotients(room, at, 3)
+
+
+@kernel(inner=True, exact=True)
+def bezier_range_bounds(table, pool, span, s0, s1, room):
+    """Intervals of C, C', C'', C''' (by s) over [s0, s1] of a piece to room, twelve pairs, and the width of an arc.
+
+    The width of a polynomial piece is (s1 - s0) int |C' - chi / (s1 - s0)|^2 ds by the closed form of its Bezier
+    points, a quadratic form in differences and so free of cancellation; of a rational piece it is infinite here.
+    """
+    polynomial = table[RATIONAL] == 0
+    room[WIDTH] = math.inf
+    free = BEZIER_AT
+    if not polynomial:
+        s0 *= 1.0 - 4.0 * UNIT
+        s1 = min(s1 * (1.0 + 4.0 * UNIT), 1.0)
+    for order in range(4):
+        o, n = piece_points(table, span, order)
+        error = error_of(table, pool, order)
+        if n < 0:
+            for k in range(8):
+                room[RANGES + 8 * order + k] = 0.0
+            continue
+        restrict(pool, o, n, s0, s1, room, free)
+        if order == 0 and not polynomial:
+            project(table, pool, free, n + 1, room, RANGES)
+            continue
+        for k in range(4):
+            lo = room[free + k]
+            hi = lo
+            for i in range(1, n + 1):
+                x = room[free + 4 * i + k]
+                lo = min(lo, x)
+                hi = max(hi, x)
+            place = RANGES + 8 * order + 2 * k
+            room[place], room[place + 1] = widened(lo - error, hi + error, UNIT)
+        if polynomial and order == 1:
+            room[WIDTH] = gram_width(table, pool, n, s1 - s0, room, free, error)
+    if polynomial:
+        for order in range(1, 4):
+            for k in range(6):
+                room[RANGES + 6 * order + k] = room[RANGES + 8 * order + k]
+    else:
+        quotients(room, RANGES, 4)
+
+
+@kernel(inner=True, exact=True)
+def gram_width(table, pool, n, step, room, at, error):
+    """(step)^2 times the variance of C' from its Bezier points at room[at:], of degree n; rounded up."""
+    total = 0.0
+    off = 0.0
+    for k in range(3):
+        mean = 0.0
+        for i in range(n + 1):
+            mean += room[at + 4 * i + k]
+        mean /= n + 1
+        for i in range(n + 1):
+            room[at + 4 * i + k] -= mean
+    g = table[GRAM]
+    for i in range(n + 1):
+        for j in range(n + 1):
+            p = at + 4 * i
+            q = at + 4 * j
+            scalar = room[p] * room[q] + room[p + 1] * room[q + 1] + room[p + 2] * room[q + 2]
+            total += pool[g + (n + 1) * i + j] * scalar
+            off += pool[g + (n + 1) * i + j] * abs(scalar)
+    # Points are off by `error` each, and a mean by as much: in the norm of the variance, which is at most the largest
+    # of them. Sums of (n + 1)^2 positive and negative terms are off by that many units of their absolute sum.
+    root = math.sqrt(max(total, 0.0) + UNIT * (n + 2.0) * (n + 2.0) * off) * (1.0 + 8.0 * UNIT)
+    root += 2.0 * math.sqrt(3.0) * (error + UNIT * (n + 2.0) * pool[table[LARGEST] + 1])
+    return up(up(step * root) * up(step * root))
