@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from assembly._lazy import lazy_names
 
 if TYPE_CHECKING:
+    from assembly.proximity.collision_queries import collisions as collisions
     from assembly.proximity.control import Controller as Controller
     from assembly.proximity.control import ControlRun as ControlRun
     from assembly.proximity.control import ControlStatus as ControlStatus
@@ -33,10 +34,22 @@ if TYPE_CHECKING:
     from assembly.proximity.pairs import extremal_pair as extremal_pair
     from assembly.proximity.pairs import gap_gradient as gap_gradient
     from assembly.proximity.pairs import gap_hessian as gap_hessian
+    from assembly.proximity.piece_enclosure import Enclosure as Enclosure
+    from assembly.proximity.piece_enclosure import enclosure as enclosure
+    from assembly.proximity.queries import closest_points as closest_points
+    from assembly.proximity.queries import collides as collides
+    from assembly.proximity.queries import is_separated as is_separated
+    from assembly.proximity.queries import minimum_distance as minimum_distance
+    from assembly.proximity.queries import minimum_distances as minimum_distances
+    from assembly.proximity.separation import Separation as Separation
+    from assembly.proximity.separation import SeparationStatus as SeparationStatus
 else:
     __getattr__, __dir__, __all__ = lazy_names(
         __name__,
         {
+            "collisions": "assembly.proximity.collision_queries",
+            "Enclosure": "assembly.proximity.piece_enclosure",
+            "enclosure": "assembly.proximity.piece_enclosure",
             "ControlRun": "assembly.proximity.control",
             "ControlStatus": "assembly.proximity.control",
             "Controller": "assembly.proximity.control",
@@ -63,5 +76,12 @@ else:
             "extremal_pair": "assembly.proximity.pairs",
             "gap_gradient": "assembly.proximity.pairs",
             "gap_hessian": "assembly.proximity.pairs",
+            "closest_points": "assembly.proximity.queries",
+            "collides": "assembly.proximity.queries",
+            "is_separated": "assembly.proximity.queries",
+            "minimum_distance": "assembly.proximity.queries",
+            "minimum_distances": "assembly.proximity.queries",
+            "Separation": "assembly.proximity.separation",
+            "SeparationStatus": "assembly.proximity.separation",
         },
     )

@@ -17,6 +17,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from assembly._kernel import kernel
 from assembly.geometry.vec import add, dot, matvec, matvec_t, neg, scale, sub
 
@@ -106,11 +108,11 @@ def seen_from(pool, p, rotation, bulk, shift):
 
 
 @kernel(inline=True)
-def admits(pool, o, p, seen, rotation, bulk, reach, slack):
+def admits(pool, o, p, seen, rotation, bulk, reach, slack, tilt):
     """Whether the nodes at o of one tree and at p of the other, seen from the one, may hold a pair.
 
-    `rotation` is that of the other tree, `bulk` its magnitudes; `slack` the rounding of coordinates. What excludes
-    most pairs for little comes first.
+    `rotation` is that of the other tree, `bulk` its magnitudes; `slack` is how far points may be off, and `tilt` unit
+    vectors. What excludes most pairs for little comes first.
     """
     center, around, axis_p = seen
     axis_o = three(pool, o + AXIS)
@@ -118,7 +120,7 @@ def admits(pool, o, p, seen, rotation, bulk, reach, slack):
     so = pool[o + SIN]
     cp = pool[p + COS]
     sp = pool[p + SIN]
-    if so * cp + co * sp > ROUNDING and -dot(axis_o, axis_p) < co * cp - so * sp - ROUNDING:
+    if so * cp + co * sp > ROUNDING and -dot(axis_o, axis_p) < co * cp - so * sp - tilt:
         return False
     d = sub(center, three(pool, o + CENTER))
     dd = dot(d, d)
@@ -129,6 +131,7 @@ def admits(pool, o, p, seen, rotation, bulk, reach, slack):
     ho = three(pool, o + HALF)
     if excess(d, ho, around) > square:
         return False
+    r += tilt * (r + reach)
     if off_axis(d, dd, axis_o, co, so, r) or off_axis(d, dd, axis_p, cp, sp, r):
         return False
     return excess(matvec_t(rotation, d), matvec_t(bulk, ho), three(pool, p + HALF)) <= square
@@ -147,6 +150,12 @@ def facing(pool, o, p, rotation, shift, slack):
 
 
 @kernel(inline=True)
+def node_of(table, pool, tree, e):
+    """Where the node of element e is in the pool."""
+    return table[tree + NODE_POOL] + NODE * np.int64(pool[table[tree + ELEMENT_POOL] + ELEMENT * e + ELEMENT_NODE])
+
+
+@kernel(inline=True)
 def rounding(pool, root_f, root_g, shift):
     """By how much coordinates may be off."""
     size = pool[root_f + RADIUS] + pool[root_g + RADIUS]
@@ -157,8 +166,11 @@ def rounding(pool, root_f, root_g, shift):
 
 
 @kernel(inner=True)
-def pairs_within(table, pool, tree_f, tree_g, rotation, shift, reach, stack, out):
-    """Elements (k, 2) of two trees that may hold an extremal pair with |gap| <= reach; their number.
+def pairs_about(table, pool, tree_f, tree_g, rotation, shift, reach, ring, tilt, stack, out):
+    """Elements (k, 2) that may hold an extremal pair with |gap| <= reach at this pose, or at one near it; their number.
+
+    Near are poses at which no point of g is farther than `ring` from where it is now, and no unit vector farther than
+    `tilt`: then the difference g - f of a pair's points is off by as much, and once more by what a cone of g turned.
 
     -1 where the stack (n, 2) is too short; more than `out` holds where `out` is: then what it holds are the first.
     """
@@ -166,8 +178,9 @@ def pairs_within(table, pool, tree_f, tree_g, rotation, shift, reach, stack, out
     node_g = table[tree_g + NODE_POOL]
     ints_f = table[tree_f + NODE_TABLE]
     ints_g = table[tree_g + NODE_TABLE]
-    slack = rounding(pool, node_f, node_g, shift)
+    slack = ring + rounding(pool, node_f, node_g, shift)
     reach += slack
+    tilt += ROUNDING
     bulk = magnitudes(rotation)
     back = transposed(rotation)
     back_bulk = transposed(bulk)
@@ -176,7 +189,8 @@ def pairs_within(table, pool, tree_f, tree_g, rotation, shift, reach, stack, out
     count = 0
     if room < 1:
         return -1
-    if not admits(pool, node_f, node_g, seen_from(pool, node_g, rotation, bulk, shift), rotation, bulk, reach, slack):
+    seen = seen_from(pool, node_g, rotation, bulk, shift)
+    if not admits(pool, node_f, node_g, seen, rotation, bulk, reach, slack, tilt):
         return 0
     stack[0, 0] = 0
     stack[0, 1] = 0
@@ -190,7 +204,7 @@ def pairs_within(table, pool, tree_f, tree_g, rotation, shift, reach, stack, out
         child_f = table[ints_f + NODE_INTS * i + CHILD]
         child_g = table[ints_g + NODE_INTS * j + CHILD]
         if child_f < 0 and child_g < 0:
-            if facing(pool, o, p, rotation, shift, slack):
+            if facing(pool, o, p, rotation, shift, slack + tilt * reach):
                 if count < out.shape[0]:
                     out[count, 0] = -1 - child_f
                     out[count, 1] = -1 - child_g
@@ -201,18 +215,50 @@ def pairs_within(table, pool, tree_f, tree_g, rotation, shift, reach, stack, out
         if child_g < 0 or (child_f >= 0 and pool[o + RADIUS] >= pool[p + RADIUS]):
             seen = seen_from(pool, p, rotation, bulk, shift)
             for k in range(2):
-                if admits(pool, node_f + NODE * (child_f + k), p, seen, rotation, bulk, reach, slack):
+                if admits(pool, node_f + NODE * (child_f + k), p, seen, rotation, bulk, reach, slack, tilt):
                     stack[used, 0] = child_f + k
                     stack[used, 1] = j
                     used += 1
         else:
             seen = seen_from(pool, o, back, back_bulk, back_shift)
             for k in range(2):
-                if admits(pool, node_g + NODE * (child_g + k), o, seen, back, back_bulk, reach, slack):
+                if admits(pool, node_g + NODE * (child_g + k), o, seen, back, back_bulk, reach, slack, tilt):
                     stack[used, 0] = i
                     stack[used, 1] = child_g + k
                     used += 1
     return count
+
+
+@kernel(inner=True)
+def pairs_within(table, pool, tree_f, tree_g, rotation, shift, reach, stack, out):
+    """Elements (k, 2) of two trees that may hold an extremal pair with |gap| <= reach; see `pairs_about`."""
+    return pairs_about(table, pool, tree_f, tree_g, rotation, shift, reach, 0.0, 0.0, stack, out)
+
+
+@kernel(inner=True)
+def still_within(table, pool, tree_f, tree_g, rotation, shift, reach, listed, count, out):
+    """Which of the elements in a list, count of them from its place `listed` in the table, `pairs_within` would find.
+
+    As long as `out` holds them; their number.
+    """
+    slack = rounding(pool, table[tree_f + NODE_POOL], table[tree_g + NODE_POOL], shift)
+    reach += slack
+    bulk = magnitudes(rotation)
+    found = 0
+    for k in range(count):
+        e = table[listed + 2 * k]
+        d = table[listed + 2 * k + 1]
+        o = node_of(table, pool, tree_f, e)
+        p = node_of(table, pool, tree_g, d)
+        seen = seen_from(pool, p, rotation, bulk, shift)
+        if admits(pool, o, p, seen, rotation, bulk, reach, slack, ROUNDING) and facing(
+            pool, o, p, rotation, shift, slack
+        ):
+            if found < out.shape[0]:
+                out[found, 0] = e
+                out[found, 1] = d
+            found += 1
+    return found
 
 
 @kernel

@@ -8,7 +8,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.proximity import watch
+from assembly.proximity import watch_memory
 
 __all__ = ["Event", "EventKind", "EventReason", "PairState", "events_of", "fresh_memory"]
 
@@ -23,6 +23,7 @@ class EventKind(Enum):
     REMOVED = "removed"
     HANDED_OFF = "handed off"
     MERGED = "merged"
+    REFUSED = "refused"
 
 
 class EventReason(Enum):
@@ -74,13 +75,13 @@ _KINDS, _REASONS = tuple(EventKind), tuple(EventReason)
 
 def fresh_memory(pairs: int, places: int, reach: float) -> Array:
     """What a watch knows that has seen nothing yet; `reach` is that of its first looks."""
-    pairs_at = watch.MEMORY_HEADER
-    places_at = pairs_at + watch.PAIR_MEMORY * pairs
-    events_at = places_at + watch.PLACE_MEMORY * places
-    memory = np.zeros(events_at + watch.EVENT * watch.EVENTS)
-    memory[pairs_at + watch.TURN : places_at : watch.PAIR_MEMORY] = np.nan
-    memory[pairs_at + watch.REACH : places_at : watch.PAIR_MEMORY] = reach
-    memory[places_at : events_at : watch.PLACE_MEMORY] = -1.0
+    pairs_at = watch_memory.MEMORY_HEADER
+    places_at = pairs_at + watch_memory.PAIR_MEMORY * pairs
+    events_at = places_at + watch_memory.PLACE_MEMORY * places
+    memory = np.zeros(events_at + watch_memory.EVENT * watch_memory.EVENTS)
+    memory[pairs_at + watch_memory.TURN : places_at : watch_memory.PAIR_MEMORY] = np.nan
+    memory[pairs_at + watch_memory.REACH : places_at : watch_memory.PAIR_MEMORY] = reach
+    memory[places_at : events_at : watch_memory.PLACE_MEMORY] = -1.0
     return memory
 
 
@@ -96,11 +97,11 @@ def events_of(memory: Array, names: list[tuple[str, str]], scale: float, since: 
         Length of one.
     since : int
     """
-    count = int(memory[watch.EVENT_COUNT])
-    rows = memory[-watch.EVENT * watch.EVENTS :].reshape(-1, watch.EVENT)
+    count = int(memory[watch_memory.EVENT_COUNT])
+    rows = memory[-watch_memory.EVENT * watch_memory.EVENTS :].reshape(-1, watch_memory.EVENT)
     return tuple(
         Event(_KINDS[int(kind)], _REASONS[int(reason)], names[int(pair)], int(contact), gap * scale)
         for kind, reason, pair, contact, gap, _ in rows[
-            [k % watch.EVENTS for k in range(max(since, count - watch.EVENTS), count)]
+            [k % watch_memory.EVENTS for k in range(max(since, count - watch_memory.EVENTS), count)]
         ].tolist()
     )

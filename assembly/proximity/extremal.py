@@ -44,6 +44,8 @@ POLE = 1e-9
 RANK = 1e-7
 # Newton's steps: four or five near a solution, more while steps are cut.
 LIMIT = 40
+# After so many steps a singular pair whose residual vanishes is one.
+PATIENCE = 12
 # The most, in radians, that a step may turn a normal.
 BEND = 0.5
 # Steps below this many radians that do not shrink any more are rounding.
@@ -254,6 +256,50 @@ def advance(table, pool, r, u, v, du, dv, step):
     return into_domain(table, pool, r, u + du, v + dv)
 
 
+@kernel(inline=True)
+def pair_step(a, c, r, k, inverse, size):
+    """Newton's step along the tangents of f and of g, and by how much either turns its surface's normal."""
+    s0 = c[0] * r[0] + c[1] * r[1] - r[2]
+    s1 = c[1] * r[0] + c[2] * r[1] - r[3]
+    ax = inverse[0] * s0 + inverse[1] * s1
+    ay = inverse[2] * s0 + inverse[3] * s1
+    bx = k[0] * ax + k[1] * ay - r[0]
+    by = k[1] * ax + k[2] * ay - r[1]
+    bend_f = (abs(ax) + abs(ay)) * max(curvature_bound(a), 2.0 / size)
+    bend_g = (abs(bx) + abs(by)) * max(curvature_bound(c), 2.0 / size)
+    return ax, ay, bx, by, bend_f, bend_g
+
+
+@kernel(inline=True)
+def bent_at_most(bend):
+    """The part of a step that turns a normal by `BEND` at most."""
+    return 1.0 if bend <= BEND else BEND / bend
+
+
+@kernel(inline=True)
+def move_pair(table, pool, f, g, rotation, x, e, t, tx, ty, step_f, step_g):
+    """Parameters after steps along the tangents of either surface; whether either was clamped; how far they were to go.
+
+    The steps are in the tangent frame of f, (tx, ty), for both.
+    """
+    ax, ay = step_f
+    bx, by = step_g
+    du = e[0] * ax + e[1] * ay
+    dv = e[2] * ay
+    ds = t[0] * bx + t[1] * by
+    dt = t[2] * bx + t[3] * by
+    uf, vf, clamped_f = advance(table, pool, f, x[0], x[1], du, dv, blend(ax, tx, ay, ty))
+    move = matvec_t(rotation, blend(bx, tx, by, ty))
+    ug, vg, clamped_g = advance(table, pool, g, x[2], x[3], ds, dt, move)
+    return (uf, vf, ug, vg), clamped_f or clamped_g, abs(du) + abs(dv) + abs(ds) + abs(dt)
+
+
+@kernel(inline=True)
+def vanishes(r, size):
+    """Whether a residual is as good as zero."""
+    return abs(r[2]) + abs(r[3]) < 1e-9 and abs(r[0]) + abs(r[1]) < 1e-9 * size
+
+
 @kernel(inner=True)
 def solve_pair(table, pool, f, g, rotation, shift, x, size, turn, close):
     """Newton from x to the extremal pair: status, parameters, iterations, frame, and H as `pair_matrix` gives it.
@@ -274,45 +320,33 @@ def solve_pair(table, pool, f, g, rotation, shift, x, size, turn, close):
         if not regular:
             # An apex or a crease: there is no tangent plane to go on.
             break
-        s0 = c[0] * r[0] + c[1] * r[1] - r[2]
-        s1 = c[1] * r[0] + c[2] * r[1] - r[3]
-        ax = inverse[0] * s0 + inverse[1] * s1
-        ay = inverse[2] * s0 + inverse[3] * s1
-        bx = k[0] * ax + k[1] * ay - r[0]
-        by = k[1] * ax + k[2] * ay - r[1]
-        step_f = abs(ax) + abs(ay)
-        step_g = abs(bx) + abs(by)
-        step = max(step_f, step_g)
-        bend_f = step_f * max(curvature_bound(a), 2.0 / size)
-        bend_g = step_g * max(curvature_bound(c), 2.0 / size)
+        ax, ay, bx, by, bend_f, bend_g = pair_step(a, c, r, k, inverse, size)
+        step = max(abs(ax) + abs(ay), abs(bx) + abs(by))
         bend = max(bend_f, bend_g)
         small = bend < close and isolated
         # Small against the scene and against the bodies' own curvature; or as small as rounding lets it become.
         if (step <= tolerance and bend < 1e-9) or (bend < STAGNANT and step > 0.25 * previous):
             # In a singular system a vanishing step is a solution only if the residual vanishes too.
-            done = abs(r[2]) + abs(r[3]) < 1e-9 and abs(r[0]) + abs(r[1]) < 1e-9 * size
-            status = CONVERGED if isolated else (SINGULAR if done else NOT_CONVERGED)
+            status = CONVERGED if isolated else (SINGULAR if vanishes(r, size) else NOT_CONVERGED)
+            break
+        if iteration >= PATIENCE and not isolated and vanishes(r, size):
+            # Along the valley of a fold there is nothing to tell places apart; steps need not shrink.
+            status = SINGULAR
             break
         if iteration == LIMIT or not step < 1e300 or bend > turn:
             break
         previous = step
         # Each surface by its own measure: a pebble turns while the hill beside it is crossed.
-        factor_f = 1.0 if bend_f <= BEND else BEND / bend_f
-        factor_g = 1.0 if bend_g <= BEND else BEND / bend_g
-        du = factor_f * (e[0] * ax + e[1] * ay)
-        dv = factor_f * e[2] * ay
-        ds = factor_g * (t[0] * bx + t[1] * by)
-        dt = factor_g * (t[2] * bx + t[3] * by)
-        move_f = blend(factor_f * ax, tx, factor_f * ay, ty)
-        move_g = matvec_t(rotation, blend(factor_g * bx, tx, factor_g * by, ty))
-        uf, vf, clamped_f = advance(table, pool, f, x[0], x[1], du, dv, move_f)
-        ug, vg, clamped_g = advance(table, pool, g, x[2], x[3], ds, dt, move_g)
+        factor_f = bent_at_most(bend_f)
+        factor_g = bent_at_most(bend_g)
+        step_f = (factor_f * ax, factor_f * ay)
+        step_g = (factor_g * bx, factor_g * by)
+        y, clamped, way = move_pair(table, pool, f, g, rotation, x, e, t, tx, ty, step_f, step_g)
         status = NOT_CONVERGED
-        if clamped_f or clamped_g:
+        if clamped:
             status = LEFT_PATCH
             # Held at the end of the patch and nothing else moves: the pair has left.
-            still = abs(uf - x[0]) + abs(vf - x[1]) + abs(ug - x[2]) + abs(vg - x[3])
-            if still <= 1e-12 * (abs(du) + abs(dv) + abs(ds) + abs(dt)):
+            if abs(y[0] - x[0]) + abs(y[1] - x[1]) + abs(y[2] - x[2]) + abs(y[3] - x[3]) <= 1e-12 * way:
                 break
         elif small:
             wx = a[0] * ax + a[1] * ay
@@ -324,10 +358,10 @@ def solve_pair(table, pool, f, g, rotation, shift, x, size, turn, close):
             tx = sub(tx, scale(wx, n))
             ty = sub(ty, scale(wy, n))
             n = add(n, lean)
-            x = (uf, vf, ug, vg)
+            x = y
             status = CONVERGED
             iteration += 1
             break
-        x = (uf, vf, ug, vg)
+        x = y
         iteration += 1
     return status, x, iteration, (n, tx, ty, pf, pg, e, t, a, c, r, beta, regular), (k, h, inverse, isolated)

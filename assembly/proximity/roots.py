@@ -12,7 +12,17 @@ import math
 import numpy as np
 
 from assembly._kernel import call_address, kernel
-from assembly.geometry.spline import BREAKS_U, BREAKS_V, CLOSED_U, CLOSED_V, SIGN, SPANS_U, SPANS_V, surface_point
+from assembly.geometry.spline import (
+    BREAKS_U,
+    BREAKS_V,
+    CLOSED_U,
+    CLOSED_V,
+    SIGN,
+    SPANS_U,
+    SPANS_V,
+    find_span,
+    surface_point,
+)
 from assembly.geometry.trim import trim_side
 from assembly.geometry.vec import add, cross, dot, matvec, matvec_t, scale, sub
 from assembly.kinematics.motion import rotation
@@ -39,7 +49,16 @@ from assembly.proximity.bounding_tree import (
     seen_from,
     three,
 )
-from assembly.proximity.extremal import CONVERGED, SINGULAR, into_domain, solve_pair
+from assembly.proximity.controller import descend_pair
+from assembly.proximity.extremal import (
+    CONVERGED,
+    NOT_CONVERGED,
+    SINGULAR,
+    into_domain,
+    pair_frame,
+    pair_matrix,
+    solve_pair,
+)
 from assembly.proximity.shell import FACE_RECORD, FACE_TABLE, FACE_TRIM, FACES
 from assembly.proximity.solid_contact import FEATURE_F, FEATURE_G, FOLD, PAIR_NORMAL, PROPER
 from assembly.proximity.start import opposed
@@ -47,16 +66,19 @@ from assembly.proximity.switching import feature_at
 from assembly.proximity.velocity import ARM_F
 from assembly.proximity.velocity import GAP as RECORD_GAP
 
-# A root: parameters, features, normal in the axes of f, gap, where it is from, its points in the axes of f, and how far
-# it is from a fold (det H / |H|^2).
-CODE_F, CODE_G, ROOT_NORMAL, GAP, ORIGIN, POINT_F, POINT_G, ROOT_FOLD, ROOT = 4, 5, 6, 9, 10, 11, 14, 17, 18
-# Where it is from: of no use, a given contact, new, or from LISTED on the place it has.
-USELESS, GIVEN_CONTACT, NEW, LISTED = -3.0, -2.0, -1.0, 0
+# A root: parameters, features, normal in the axes of f, gap, where it is from, its points in the axes of f, how far it
+# is from a fold (det H / |H|^2), and how far so beyond the knot lines beside it (NaN: not looked at).
+CODE_F, CODE_G, ROOT_NORMAL, GAP, ORIGIN, POINT_F, POINT_G, ROOT_FOLD, ROOT_BEYOND, ROOT = (
+    4, 5, 6, 9, 10, 11, 14, 17, 18, 19
+)  # fmt: skip
+# Where it is from: of no use, new, from LISTED on the place it has, down from GIVEN_CONTACT which given contact it is.
+USELESS, NEW, LISTED, GIVEN_CONTACT = -2.0, -1.0, 0, -3.0
 # What became of a start: nothing there, a root that is known, a saddle, a minimum.
 NOTHING, ALIKE, SADDLE, MINIMUM_FOUND = 0, 1, 2, 3
 # A root this far from a fold is the only one in its patches and those beside them, which turn by half a radian at most.
 ALONE, BESIDE = 0.05, 3.0
-# Steps down the slope of a gap.
+# Steps of the controller where Newton's method fails, and down the slope of a gap.
+DESCENTS = 40
 SLIDES = 24
 # Room for the descent of a segment.
 DEPTH = 256
@@ -112,12 +134,77 @@ def are_one(table, pool, scene, roots, i, k, neglect):
     return True
 
 
+@kernel(inline=True)
+def fold_of(h):
+    """How far a pair with this H is from a fold."""
+    norm2 = h[0] * h[0] + h[1] * h[1] + h[2] * h[2] + h[3] * h[3]
+    return (h[0] * h[3] - h[1] * h[2]) / norm2 if norm2 > 1e-18 else 0.0
+
+
+@kernel(inline=True)
+def across(table, pool, r, breaks, spans, closed, x, most):
+    """A parameter just beyond the knot line nearest to x, or x itself where none is within `most`."""
+    o = table[r + breaks]
+    count = table[r + spans]
+    k = find_span(pool, o, count, x)
+    lo = pool[o + k]
+    hi = pool[o + k + 1]
+    end = lo if x - lo < hi - x else hi
+    if abs(x - end) > most:
+        return x
+    first = pool[o]
+    last = pool[o + count]
+    if end == lo:
+        if k > 0:
+            return lo - 1e-9 * (lo - pool[o + k - 1])
+        return last - 1e-9 * (last - pool[o + count - 1]) if table[r + closed] == 1 else x
+    if k + 1 < count:
+        return hi + 1e-9 * (pool[o + k + 2] - hi)
+    return first + 1e-9 * (pool[o + 1] - first) if table[r + closed] == 1 else x
+
+
+@kernel(inner=True)
+def fold_beyond(table, pool, scene, x, half):
+    """The least distance from a fold of a root with the curvatures beyond knot lines within BESIDE half widths.
+
+    Across them the curvature of a smooth surface may jump, as where a straight wire begins to bend.
+    """
+    f, g = scene[2][0], scene[2][1]
+    y = (
+        across(table, pool, f, BREAKS_U, SPANS_U, CLOSED_U, x[0], BESIDE * half[0]),
+        across(table, pool, f, BREAKS_V, SPANS_V, CLOSED_V, x[1], BESIDE * half[1]),
+        across(table, pool, g, BREAKS_U, SPANS_U, CLOSED_U, x[2], BESIDE * half[2]),
+        across(table, pool, g, BREAKS_V, SPANS_V, CLOSED_V, x[3], BESIDE * half[3]),
+    )
+    least = math.inf
+    for i in range(4):
+        u = y[0] if i % 2 == 1 else x[0]
+        v = y[1] if i >= 2 else x[1]
+        if i > 0 and (u, v) == (x[0], x[1]):
+            continue
+        for j in range(4):
+            s = y[2] if j % 2 == 1 else x[2]
+            t = y[3] if j >= 2 else x[3]
+            if (i == 0 and j == 0) or (j > 0 and (s, t) == (x[2], x[3])):
+                continue
+            frame = pair_frame(table, pool, f, g, scene[0], scene[1], (u, v, s, t))
+            if frame[11]:
+                least = min(least, fold_of(pair_matrix(frame[7], frame[8], frame[10], 1e-9)[1]))
+    return least
+
+
 @kernel(inner=True)
 def surfaces_root(table, pool, scene, start, roots, k):
-    """Newton on two surfaces from `start`; fills root k. NOTHING, SADDLE or MINIMUM_FOUND."""
+    """Newton on two surfaces from `start`, the controller where it fails; fills root k.
+
+    Returns NOTHING, SADDLE or MINIMUM_FOUND.
+    """
     turn, shift = scene[0], scene[1]
     f, g = scene[2][0], scene[2][1]
     status, x, _count, frame, curvature = solve_pair(table, pool, f, g, turn, shift, start, 1.0, math.inf, 0.0)
+    if status == NOT_CONVERGED:
+        # The controller leads down from anywhere, to a minimum of the distance.
+        status, x, _count, frame, curvature = descend_pair(table, pool, f, g, turn, shift, start, 1.0, DESCENTS)
     if status != CONVERGED and status != SINGULAR:
         return NOTHING
     if not opposed(frame, turn, table, pool, g, x):
@@ -125,8 +212,7 @@ def surfaces_root(table, pool, scene, start, roots, k):
     h = curvature[1]
     det = h[0] * h[3] - h[1] * h[2]
     norm2 = h[0] * h[0] + h[1] * h[1] + h[2] * h[2] + h[3] * h[3]
-    fold = det / norm2 if norm2 > 1e-18 else 0.0
-    write(roots, k, x, 0, 0, frame[0], frame[10], frame[3], frame[4], fold)
+    write(roots, k, x, 0, 0, frame[0], frame[10], frame[3], frame[4], fold_of(h))
     return MINIMUM_FOUND if det > -1e-9 * norm2 and h[0] + h[3] <= 0.0 else SADDLE
 
 
@@ -168,11 +254,12 @@ def foot_of(table, pool, g, y, s, t):
 
 
 @kernel(inner=True)
-def slide_down(table, pool, f, g, turn, shift, start, stride):
+def slide_down(table, pool, f, g, turn, shift, start, stride, half):
     """Parameters at which the gap is smaller than at the start: down its slope on f, the foot on g following.
 
-    Newton's method goes to saddles of the gap as well; this does not. The first step is `stride` times the sine of the
-    angle between the normals; then steps are those of Barzilai and Borwein, halved where the gap grows.
+    And whether they are beside the start, within BESIDE times half widths on f; it goes no farther. Newton's method
+    goes to saddles of the gap as well; this does not. The first step is `stride` times the sine of the angle between
+    the normals; then steps are those of Barzilai and Borwein, halved where the gap grows.
     """
     u, v, s, t = start
     p, su, sv, _uu, _uv, _vv = surface_point(table, pool, f, u, v)
@@ -209,7 +296,9 @@ def slide_down(table, pool, f, g, turn, shift, start, stride):
         bent = dot(moved, sub(there, slope))
         length = min(dot(moved, moved) / bent, 4.0 * length) if bent > 0.0 else 2.0 * length
         u, v, s, t, gap, p, su, sv, slope = u_new, v_new, s_new, t_new, gap_new, q, ru, rv, there
-    return (u, v, s, t)
+        if not is_within(table, pool, f, u, v, start[0], start[1], BESIDE * half[0], BESIDE * half[1]):
+            return (u, v, s, t), False
+    return (u, v, s, t), True
 
 
 @kernel(inner=True)
@@ -249,6 +338,7 @@ def write(roots, k, x, code_f, code_g, n, gap, pf, pg, fold):
     roots[k, POINT_F], roots[k, POINT_F + 1], roots[k, POINT_F + 2] = pf
     roots[k, POINT_G], roots[k, POINT_G + 1], roots[k, POINT_G + 2] = pg
     roots[k, ROOT_FOLD] = fold
+    roots[k, ROOT_BEYOND] = math.nan
 
 
 @kernel(inner=True)
@@ -281,9 +371,15 @@ def add_given(table, pool, scene, tracked, listed, many, roots, work):
         if table[listed + 2 * c + 1] == 1:
             x = (x[2], x[3], x[0], x[1])
         before = count
-        count, _found = add_root(table, pool, scene, (0, 0), x, (0.0, 0.0, 0.0), 0.0, roots, count, work)
+        count, found = add_root(table, pool, scene, (0, 0), x, (0.0, 0.0, 0.0), 0.0, roots, count, work)
+        if found == NOTHING and scene[2][0] >= 0:
+            # At a fold Newton's method may find nothing: there the contact still is.
+            frame = pair_frame(table, pool, scene[2][0], scene[2][1], scene[0], scene[1], x)
+            if frame[11] and opposed(frame, scene[0], table, pool, scene[2][1], x):
+                write(roots, before, x, 0, 0, frame[0], frame[10], frame[3], frame[4], 0.0)
+                count += 1
         if count > before:
-            roots[before, ORIGIN] = GIVEN_CONTACT
+            roots[before, ORIGIN] = GIVEN_CONTACT - c
     return count
 
 
@@ -334,29 +430,44 @@ def is_within(table, pool, surface, x, y, u, v, half_u, half_v):
     return du <= half_u and dv <= half_v
 
 
+@kernel(inline=True)
+def is_alone(roots, k):
+    """Whether root k is far from a fold, beyond knot lines too as far as it is known."""
+    return roots[k, ROOT_FOLD] > ALONE and not roots[k, ROOT_BEYOND] <= ALONE
+
+
 @kernel(inner=True)
 def is_known(table, pool, scene, e, d, roots, count):
-    """The features of elements e and d, the parameters of their middles, and whether a known root is in both."""
+    """The features of elements e and d, the parameters of their middles, whether a known root is all there is.
+
+    And whether one is there that is near a fold, on this side of a knot line or beyond: a second root may be beside it.
+    """
     o = table[scene[3][0] + ELEMENT_POOL] + ELEMENT * e
     p = table[scene[3][1] + ELEMENT_POOL] + ELEMENT * d
     codes = (np.int64(pool[o + ELEMENT_FEATURE]), np.int64(pool[p + ELEMENT_FEATURE]))
     start = (pool[o], pool[o + 1], pool[p], pool[p + 1])
+    half = (pool[o + 2], pool[o + 3], pool[p + 2], pool[p + 3])
     f = scene[2][0]
     g = scene[2][1]
+    folds = False
     for k in range(count):
         if roots[k, CODE_F] != codes[0] or roots[k, CODE_G] != codes[1]:
             continue
         if not roots[k, ROOT_FOLD] > ALONE:
-            # Near a fold there is a second root beside it.
             continue
-        wide = BESIDE
-        if is_within(
-            table, pool, f, roots[k, 0], roots[k, 1], pool[o], pool[o + 1], wide * pool[o + 2], wide * pool[o + 3]
-        ) and is_within(
-            table, pool, g, roots[k, 2], roots[k, 3], pool[p], pool[p + 1], wide * pool[p + 2], wide * pool[p + 3]
+        x = (roots[k, 0], roots[k, 1], roots[k, 2], roots[k, 3])
+        if not (
+            is_within(table, pool, f, x[0], x[1], start[0], start[1], BESIDE * half[0], BESIDE * half[1])
+            and is_within(table, pool, g, x[2], x[3], start[2], start[3], BESIDE * half[2], BESIDE * half[3])
         ):
-            return codes, start, True
-    return codes, start, False
+            continue
+        if f >= 0 and math.isnan(roots[k, ROOT_BEYOND]):
+            # Beyond a knot line curvatures may be others.
+            roots[k, ROOT_BEYOND] = fold_beyond(table, pool, scene, x, half)
+        if is_alone(roots, k):
+            return codes, start, True, False
+        folds = True
+    return codes, start, False, folds
 
 
 @kernel(inline=True)

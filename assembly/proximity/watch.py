@@ -5,11 +5,7 @@ pairs of patches that may hold an extremum of the distance within the pair's rea
 (`roots.py`). The near ones are listed: each has a place, from which it is tracked exactly. What is left out is farther
 than the pair's allowance: until a point of one body has moved by that much, seen from the other, nothing unlisted can
 touch. Where patches face each other and hold no root, a motion may bring one forth; there, a ball around these patches
-may move by less.
-
-The record of a watch is in the table of integers, what it knows in a memory of doubles:
-
-    header | of every pair PAIR_MEMORY | of every place PLACE_MEMORY | events
+may move by less. What it knows is in `watch_memory.py`.
 """
 
 from __future__ import annotations
@@ -22,97 +18,104 @@ from assembly._kernel import kernel
 from assembly.geometry.vec import add, dot, matvec, matvec_t, quaternion_matrix, quaternion_product, scale, sub
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.bounding_tree import CENTER, NODE_POOL, RADIUS, least_distance, magnitudes, pairs_within
+from assembly.proximity.near_root import BARREN, LEFT, PASSED, half_widths, stays
+from assembly.proximity.patch_list import LIST_INTS, listed_pairs
 from assembly.proximity.roots import (
     ALIKE,
-    ALONE,
-    CODE_F,
-    CODE_G,
     GAP,
-    LISTED,
     MINIMUM_FOUND,
     NEW,
+    NOTHING,
     ORIGIN,
     ROOT,
     ROOT_FOLD,
-    ROOT_NORMAL,
     USELESS,
-    add_given,
     add_root,
     crosses,
     element_ball,
     element_distance,
+    is_alone,
     is_known,
     is_outside,
     slide_down,
 )
-from assembly.proximity.solid_contact import CONTACT_RECORD, FEATURE_F, FEATURE_G, PAIR_GAP, PAIR_NORMAL, TRACK
+from assembly.proximity.solid_contact import CONTACT_RECORD, PAIR_GAP, TRACK
+from assembly.proximity.watch_memory import (
+    ALLOWANCE,
+    BALL,
+    BALL_ALLOWANCE,
+    BALL_PLACE,
+    BALL_RADIUS,
+    CALLED,
+    CALLS,
+    CROSSED,
+    CROWDED,
+    EVENT_COUNT,
+    FAR,
+    FIRST,
+    FIRST_REACH,
+    HIGH,
+    LAST_REACH,
+    LENGTHS,
+    LIST_TABLE,
+    LISTS,
+    LOOKS,
+    LOW,
+    NEAR,
+    NEGLECT,
+    PAIR_F,
+    PAIR_G,
+    PAIR_MEMORY,
+    PAIR_MINIMUM,
+    PAIR_RECORD,
+    PAIR_SHELL_F,
+    PAIR_SHELL_G,
+    PAIR_SURFACE_F,
+    PAIR_SURFACE_G,
+    PAIR_TABLE,
+    PAIRS,
+    PART,
+    PLACE,
+    PLACE_MEMORY,
+    REACH,
+    ROOTS,
+    STATE,
+    TAKE,
+    TRACK_SOLIDS,
+    TRACKING,
+    TREE_F,
+    TREE_G,
+    TURN,
+    URGENT,
+    any_lost,
+    known_roots,
+    list_roots,
+    memory_places,
+    seat_given,
+)
 
-# The record of a watch: counts; where pairs begin; the row of `tracked` that is the first place; address of
-# `track_solids`; where its lengths are in the pool.
-PAIRS, PLACES, PAIR_TABLE, FIRST, TRACK_SOLIDS, LENGTHS, WATCH_RECORD = 0, 1, 2, 3, 4, 5, 6
-# Its lengths: roots nearer to each other than the first, and along the surfaces, are one; the reach of a first look;
-# the largest.
-NEGLECT, FIRST_REACH, LAST_REACH, LENGTH_COUNT = 0, 1, 2, 3
-# A pair: bodies, trees, surfaces or else (-1) shells, where its least gap is in the pool (behind it how far it may
-# go between looks where contacts may be born, and how far facets are from their surfaces), its places from and to, and
-# rows of given contacts between the two (row, 1 if the bodies are the other way round).
-PAIR_F, PAIR_G, TREE_F, TREE_G, PAIR_SURFACE_F, PAIR_SURFACE_G, PAIR_SHELL_F, PAIR_SHELL_G = 0, 1, 2, 3, 4, 5, 6, 7
-PAIR_MINIMUM, LOW, HIGH, GIVEN, GIVEN_COUNT, PAIR_RECORD = 8, 9, 10, 11, 12, 13
-# Memory. Header: events, looks and contacts so far, the time of the caller, whether a near root ever found no place,
-# calls so far.
-EVENT_COUNT, LOOKS, BORN, TIME, CROWDED, CALLS, MEMORY_HEADER = 0, 1, 2, 3, 4, 5, 6
-# Of a pair: how g was turned, seen from f, at its last look (a quaternion, NaN before there was one), and where the
-# middle of its tree was; how far g may go from there, its reach, its state, calls at its last look; a ball on g, where
-# its middle was, and how far what is in it may go; which part of its allowances is used; whether it is looked at after
-# every move, because a contact may be born at a fold beside one that touches; whether the bodies are in each other
-# where no contact says so.
-TURN, PLACE, ALLOWANCE, REACH, STATE, CALLED = 0, 4, 7, 8, 9, 10
-BALL, BALL_RADIUS, BALL_PLACE, BALL_ALLOWANCE, PART, URGENT, CROSSED, PAIR_MEMORY = 11, 14, 15, 18, 19, 20, 21, 22
-FAR, NEAR, TRACKING = 0, 1, 2
 # Looks: at pairs that used up their allowance, at urgent ones too, at all that moved.
 AS_NEEDED, EVERYTHING, CAREFUL = 0, 1, 2
-# Of a place: its pair (-1: none), the number of its contact.
-PLACE_PAIR, PLACE_NUMBER, PLACE_MEMORY = 0, 1, 2
-# An event: kind, reason, pair, number of the contact, gap, time. The last so many are kept.
-EVENT, EVENTS = 6, 64
-ADDED, REMOVED, HANDED_OFF, MERGED = 0, 1, 2, 3
-CAME_NEAR, WENT_AWAY, LOST, SAME_ROOT, NO_PLACE = 0, 1, 2, 3, 4
 # The pair that used most of its allowance is looked at again when that is this part of it; others can wait longer.
 USED, SPENT = 0.5, 0.85
-# Roots nearer than this part of the reach are listed; those that are, stay so up to the second.
-TAKE, KEEP = 0.4, 0.8
-# Room: pairs of patches of a look, roots.
-CANDIDATES, ROOTS, STACK = 8192, 96, 1024
+# Room: pairs of patches of a look.
+CANDIDATES, STACK = 8192, 1024
 # Starts that a look leads down the slope of the gap, because Newton's method found no minimum from there.
 SLIDES_A_LOOK = 6
+# Folds nearer than this part of a first reach are looked at after every move.
+FLAT = 0.2
+# Ways of Newton's method that are remembered in a look.
+WAYS = 64
 # So many pairs of patches are looked into, if there are others that are farther apart.
 FEW = 40
 # Bodies cross that are in each other by more than this.
 CROSSING = 1e-6
 # Where nothing may move a pair is looked at after every step.
 LEAST_ALLOWANCE = 1e-12
+# Lists of patches that face each other are for motions up to so many first reaches.
+RINGS = 2.0
 # A reach is for so many moves as the last ones.
 MOVES = 12.0
-
-
-@kernel(inline=True)
-def memory_places(table, watch):
-    """Where pairs, places and events begin in the memory."""
-    places = MEMORY_HEADER + PAIR_MEMORY * table[watch + PAIRS]
-    return MEMORY_HEADER, places, places + PLACE_MEMORY * table[watch + PLACES]
-
-
-@kernel(inner=True)
-def note(table, watch, memory, kind, reason, p, number, gap):
-    """Write an event into the log."""
-    at = memory_places(table, watch)[2] + EVENT * (np.int64(memory[EVENT_COUNT]) % EVENTS)
-    memory[at] = float(kind)
-    memory[at + 1] = float(reason)
-    memory[at + 2] = float(p)
-    memory[at + 3] = number
-    memory[at + 4] = gap
-    memory[at + 5] = memory[TIME]
-    memory[EVENT_COUNT] += 1.0
 
 
 @kernel(inline=True)
@@ -190,123 +193,6 @@ def largest_part(table, pool, watch, memory, q):
 
 
 @kernel(inner=True)
-def any_lost(table, watch, memory, p, tracked):
-    """Whether a listed contact of pair p has lost its root."""
-    pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
-    places = memory_places(table, watch)[1]
-    for k in range(table[pair + LOW], table[pair + HIGH]):
-        if memory[places + PLACE_MEMORY * k] == p and math.isnan(tracked[table[watch + FIRST] + k, 0]):
-            return True
-    return False
-
-
-@kernel(inner=True)
-def release(table, watch, memory, k, tracked):
-    """Make place k free."""
-    o = memory_places(table, watch)[1] + PLACE_MEMORY * k
-    memory[o + PLACE_PAIR] = -1.0
-    tracked[table[watch + FIRST] + k, 0] = math.nan
-
-
-@kernel(inner=True)
-def free_place(table, watch, memory, pair):
-    """A place without a contact among those of a pair, or -1."""
-    places = memory_places(table, watch)[1]
-    for k in range(table[pair + LOW], table[pair + HIGH]):
-        if memory[places + PLACE_MEMORY * k] < 0.0:
-            return k
-    return -1
-
-
-@kernel(inner=True)
-def write_root(roots, i, tracked, r):
-    """Track root i in row r."""
-    for k in range(4):
-        tracked[r, k] = roots[i, k]
-    tracked[r, FEATURE_F] = roots[i, CODE_F]
-    tracked[r, FEATURE_G] = roots[i, CODE_G]
-    for k in range(3):
-        tracked[r, PAIR_NORMAL + k] = roots[i, ROOT_NORMAL + k]
-    tracked[r, PAIR_GAP] = roots[i, GAP]
-
-
-@kernel(inner=True)
-def known_roots(table, pool, watch, memory, p, scene, tracked, roots, work):
-    """The roots that contacts of pair p have now: given ones, then listed ones. Returns how many roots there are.
-
-    A listed contact that lost its root, or came to that of another one, gives up its place.
-    """
-    pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
-    places = memory_places(table, watch)[1]
-    count = add_given(table, pool, scene, tracked, table[pair + GIVEN], table[pair + GIVEN_COUNT], roots, work)
-    for k in range(table[pair + LOW], table[pair + HIGH]):
-        o = places + PLACE_MEMORY * k
-        if memory[o] != p:
-            continue
-        r = table[watch + FIRST] + k
-        lost = math.isnan(tracked[r, 0])
-        before = count
-        if not lost and count < ROOTS:
-            start = (tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3])
-            codes = (np.int64(tracked[r, FEATURE_F]), np.int64(tracked[r, FEATURE_G]))
-            n = (tracked[r, PAIR_NORMAL], tracked[r, PAIR_NORMAL + 1], tracked[r, PAIR_NORMAL + 2])
-            neglect = pool[table[watch + LENGTHS] + NEGLECT]
-            count, found = add_root(table, pool, scene, codes, start, n, neglect, roots, count, work)
-            lost = found != ALIKE and found != MINIMUM_FOUND
-        if count > before and not lost:
-            roots[before, ORIGIN] = LISTED + k
-            write_root(roots, before, tracked, r)
-        else:
-            kind, reason = (HANDED_OFF, LOST) if lost else (MERGED, SAME_ROOT)
-            note(table, watch, memory, kind, reason, p, memory[o + PLACE_NUMBER], tracked[r, PAIR_GAP])
-            release(table, watch, memory, k, tracked)
-    return count
-
-
-@kernel(inner=True)
-def list_roots(table, pool, watch, memory, p, roots, count, tracked):
-    """Give places to the near roots of pair p and take them from the far ones.
-
-    Returns the least gap that is not listed, and whether a place was wanting.
-    """
-    wanting = False
-    pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
-    places, reach = memory_places(table, watch)[1], memory[memory_places(table, watch)[0] + PAIR_MEMORY * p + REACH]
-    least = pool[table[pair + PAIR_MINIMUM]]
-    rest = math.inf
-    for i in range(count):
-        origin = np.int64(roots[i, ORIGIN])
-        if origin >= LISTED and roots[i, GAP] - least > KEEP * reach:
-            k = origin - LISTED
-            number = memory[places + PLACE_MEMORY * k + PLACE_NUMBER]
-            note(table, watch, memory, REMOVED, WENT_AWAY, p, number, roots[i, GAP])
-            release(table, watch, memory, k, tracked)
-            rest = min(rest, roots[i, GAP] - least)
-    # The nearest first, so that it is the far ones for which places may be wanting.
-    while True:
-        best = -1
-        for i in range(count):
-            if roots[i, ORIGIN] == NEW and (best < 0 or roots[i, GAP] < roots[best, GAP]):
-                best = i
-        if best < 0:
-            break
-        gap = roots[best, GAP] - least
-        roots[best, ORIGIN] = USELESS
-        k = free_place(table, watch, memory, pair) if gap <= TAKE * reach else -1
-        if k < 0:
-            rest = min(rest, gap)
-            wanting = wanting or gap <= TAKE * reach
-            continue
-        o = places + PLACE_MEMORY * k
-        memory[o + PLACE_PAIR] = float(p)
-        memory[BORN] += 1.0
-        memory[o + PLACE_NUMBER] = memory[BORN]
-        write_root(roots, best, tracked, table[watch + FIRST] + k)
-        note(table, watch, memory, ADDED, CAME_NEAR, p, memory[BORN], roots[best, GAP])
-    return rest, wanting
-
-
-@kernel(inner=True)
 def near_enough(table, pool, scene, bulk, least, enough, candidates, found, distances):
     """A distance within which so few of the pairs of patches are that each can be looked into; at most `enough`."""
     for c in range(found):
@@ -325,8 +211,20 @@ def near_enough(table, pool, scene, bulk, least, enough, candidates, found, dist
     return enough
 
 
+@kernel(inline=True)
+def around(table, pool, tree, e, lo, hi):
+    """A box (lo, hi) made larger so that the ball around an element is in it."""
+    center, radius = element_ball(table, pool, tree, e)
+    return (
+        (min(lo[0], center[0] - radius), min(lo[1], center[1] - radius), min(lo[2], center[2] - radius)),
+        (max(hi[0], center[0] + radius), max(hi[1], center[1] + radius), max(hi[2], center[2] + radius)),
+    )
+
+
 @kernel(inner=True)
-def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, distances, roots, work, thorough):
+def look_at_pair(
+    table, pool, watch, memory, p, q, tracked, stack, candidates, distances, roots, passed, work, thorough
+):
     """Find and list the roots of pair p; a `thorough` look tells whether the bodies cross elsewhere."""
     pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
     at = memory_places(table, watch)[0] + PAIR_MEMORY * p
@@ -363,7 +261,12 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, d
     for k in range(3):
         memory[at + PLACE + k] = center[k]
     found = np.int64(-1)
-    while True:
+    lists = table[watch + LISTS]
+    ring = RINGS * pool[lengths + FIRST_REACH]
+    if lists > 0 and reach <= ring:
+        at_list = table[watch + LIST_TABLE] + LIST_INTS * (p % lists)
+        found = listed_pairs(table, pool, at_list, p, scene[3], turn, shift, e, reach + least, ring, stack, candidates)
+    while not 0 <= found <= candidates.shape[0]:
         found = pairs_within(
             table, pool, table[pair + TREE_F], table[pair + TREE_G], turn, shift, reach + least, stack, candidates
         )
@@ -385,9 +288,11 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, d
     free = math.inf
     fertile = math.inf
     slides = 0
+    visited = 0
+    smooth = scene[2][0] >= 0
     folding = False
     for k in range(count):
-        folding = folding or not roots[k, ROOT_FOLD] > ALONE
+        folding = folding or not is_alone(roots, k)
     lo = (math.inf, math.inf, math.inf)
     hi = (-math.inf, -math.inf, -math.inf)
     for c in range(found):
@@ -400,27 +305,40 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, d
             continue
         if bound > enough:
             fertile = flank
-            center, radius = element_ball(table, pool, table[pair + TREE_G], candidates[c, 1])
-            lo = (min(lo[0], center[0] - radius), min(lo[1], center[1] - radius), min(lo[2], center[2] - radius))
-            hi = (max(hi[0], center[0] + radius), max(hi[1], center[1] + radius), max(hi[2], center[2] + radius))
+            lo, hi = around(table, pool, scene[3][1], candidates[c, 1], lo, hi)
             continue
-        codes, start, inside = is_known(table, pool, scene, candidates[c, 0], candidates[c, 1], roots, count)
+        codes, start, inside, folds = is_known(table, pool, scene, candidates[c, 0], candidates[c, 1], roots, count)
+        folding = folding or folds
         if inside:
             continue
         before = count
-        count, result = add_root(
-            table, pool, scene, codes, start, (0.0, 0.0, 0.0), pool[lengths + NEGLECT], roots, count, work
-        )
+        stayed, near, half, mine = True, start, (0.0, 0.0, 0.0, 0.0), visited
+        if smooth:
+            half = half_widths(table, pool, scene[3], candidates[c])
+            way, near, visited = stays(table, pool, scene[2], turn, shift, start, half, passed, visited)
+            stayed = way != LEFT
+            if way >= 0:
+                if folding or passed[way, BARREN] == 1.0:
+                    fertile = min(fertile, max(bound, flank))
+                    lo, hi = around(table, pool, scene[3][1], candidates[c, 1], lo, hi)
+                continue
+        result = NOTHING
+        if stayed or not folding:
+            # Where nothing folds, it tells whether it goes to a root that is known.
+            count, result = add_root(
+                table, pool, scene, codes, near, (0.0, 0.0, 0.0), pool[lengths + NEGLECT], roots, count, work
+            )
         if count > before:
-            folding = folding or not roots[before, ROOT_FOLD] > ALONE
-        if folding and scene[2][0] >= 0 and slides < SLIDES_A_LOOK and (count == before or result != MINIMUM_FOUND):
+            folding = folding or not is_alone(roots, before)
+        minimum = result == MINIMUM_FOUND or (result == ALIKE and roots[count, ROOT_FOLD] > 0.0)
+        if folding and smooth and stayed and not minimum and slides < SLIDES_A_LOOK:
             # Near a fold Newton's method may go to the saddle, past the minimum beside it.
             if count > before:
                 before += 1
             slides += 1
             stride = element_ball(table, pool, table[pair + TREE_F], candidates[c, 0])[1]
-            start = slide_down(table, pool, scene[2][0], scene[2][1], turn, shift, start, stride)
-            if count < ROOTS:
+            start, stayed = slide_down(table, pool, scene[2][0], scene[2][1], turn, shift, start, stride, half)
+            if stayed and count < ROOTS:
                 count, result = add_root(
                     table, pool, scene, codes, start, (0.0, 0.0, 0.0), pool[lengths + NEGLECT], roots, count, work
                 )
@@ -430,19 +348,29 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, d
         if count == before or result != MINIMUM_FOUND:
             # Patches that face each other and hold no root of their own: a motion may bring one forth.
             fertile = min(fertile, max(bound, flank))
-            center, radius = element_ball(table, pool, table[pair + TREE_G], candidates[c, 1])
-            lo = (min(lo[0], center[0] - radius), min(lo[1], center[1] - radius), min(lo[2], center[2] - radius))
-            hi = (max(hi[0], center[0] + radius), max(hi[1], center[1] + radius), max(hi[2], center[2] + radius))
+            lo, hi = around(table, pool, scene[3][1], candidates[c, 1], lo, hi)
+            if visited > mine:
+                passed[mine, BARREN] = 1.0
         else:
             gap = roots[before, GAP]
             # The far sides of two bodies oppose each other, too.
             alien = abs(gap) > reach + least or (gap < 0.0 and is_outside(table, pool, scene, roots, before, margin))
             roots[before, ORIGIN] = USELESS if alien else NEW
+    if smooth:
+        seat_given(table, watch, memory, p, roots, count, tracked)
     rest, wanting = list_roots(table, pool, watch, memory, p, roots, count, tracked)
     listed = 0
     for k in range(table[pair + LOW], table[pair + HIGH]):
         if memory[memory_places(table, watch)[1] + PLACE_MEMORY * k] == p:
             listed += 1
+    # What is born at a fold is about as far away as that.
+    low = math.inf
+    for k in range(count):
+        if not is_alone(roots, k) and abs(roots[k, GAP] - least) <= reach:
+            low = min(low, max(roots[k, GAP] - least, 0.0))
+    urgent = fertile < math.inf and low <= FLAT * pool[lengths + FIRST_REACH]
+    if fertile < math.inf and not urgent:
+        fertile = min(fertile, low)
     memory[at + BALL_ALLOWANCE] = fertile
     if thorough:
         deep = False
@@ -453,7 +381,7 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, d
                 deep = deep or tracked[table[watch + FIRST] + k, PAIR_GAP] < 0.0
         crossed = not deep and crosses(table, pool, scene, stack, candidates, CROSSING)
         memory[at + CROSSED] = 1.0 if crossed else 0.0
-    memory[at + URGENT] = 1.0 if folding and fertile < math.inf else 0.0
+    memory[at + URGENT] = 1.0 if urgent else 0.0
     if fertile < math.inf:
         d = sub(hi, lo)
         memory[at + BALL_RADIUS] = 0.5 * math.sqrt(dot(d, d))
@@ -496,6 +424,7 @@ def look(table, pool, watch, memory, q, tracked, how):
     candidates = stack
     distances = np.empty(1)
     roots = np.empty((1, ROOT))
+    passed = np.empty((1, PASSED))
     work = (roots, roots)
     next_pair, _part = largest_part(table, pool, watch, memory, q)
     at = memory_places(table, watch)[0]
@@ -514,7 +443,10 @@ def look(table, pool, watch, memory, q, tracked, how):
             candidates = np.empty((CANDIDATES, 2), np.int64)
             distances = np.empty(CANDIDATES)
             roots = np.empty((ROOTS, ROOT))
+            passed = np.empty((WAYS, PASSED))
             work = (np.empty((1, CONTACT_RECORD)), np.empty((1, TRACK)))
         thorough = how == EVERYTHING or math.isnan(memory[at + PAIR_MEMORY * p + TURN])
-        look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, distances, roots, work, thorough)
+        look_at_pair(
+            table, pool, watch, memory, p, q, tracked, stack, candidates, distances, roots, passed, work, thorough
+        )
     return np.int64(memory[EVENT_COUNT] - before)

@@ -1,0 +1,74 @@
+"""Whether an extremal pair may be near where Newton's method starts: it goes on only as long as it stays there.
+
+The patches of two bodies that face each other are tiles of where they may touch. What is in a tile is found from its
+middle in a few steps; a sequence that leaves it, and those beside it, is on its way to what other tiles have.
+"""
+
+from __future__ import annotations
+
+from assembly._kernel import kernel
+from assembly.proximity.bounding_tree import ELEMENT, ELEMENT_POOL
+from assembly.proximity.extremal import bent_at_most, move_pair, pair_frame, pair_matrix, pair_step
+from assembly.proximity.roots import BESIDE, is_within
+
+# Steps; and below so many radians, that a step turns a normal, it is as good as there.
+STEPS, CLOSE = 6, 0.02
+# What became of it.
+LEFT, STAYED = -1, -2
+# Sequences whose first steps lead as close together as this part of a patch go the same way. Of one that was followed:
+# where its first step led, and whether it came to no root of its own.
+TOGETHER, BARREN, PASSED = 0.25, 4, 5
+
+
+@kernel(inline=True)
+def half_widths(table, pool, trees, pair):
+    """Half the widths, in parameters, of the patches of a pair of elements."""
+    o = table[trees[0] + ELEMENT_POOL] + ELEMENT * pair[0]
+    p = table[trees[1] + ELEMENT_POOL] + ELEMENT * pair[1]
+    return (pool[o + 2], pool[o + 3], pool[p + 2], pool[p + 3])
+
+
+@kernel(inline=True)
+def is_beside(table, pool, surfaces, x, y, half, part):
+    """Whether parameters x are within a part of half widths from y, on both surfaces."""
+    f, g = surfaces[0], surfaces[1]
+    return is_within(table, pool, f, x[0], x[1], y[0], y[1], part * half[0], part * half[1]) and is_within(
+        table, pool, g, x[2], x[3], y[2], y[3], part * half[2], part * half[3]
+    )
+
+
+@kernel(inner=True)
+def stays(table, pool, surfaces, turn, shift, start, half, passed, count):
+    """Whether Newton's method from `start` stays beside it, within BESIDE times half widths in (u, v) and (s, t).
+
+    Returns STAYED or LEFT, or which of the `count` sequences in `passed` (n, PASSED) it goes along with; where it came
+    to; and how many sequences there are now.
+    """
+    f, g = surfaces[0], surfaces[1]
+    x = start
+    for step in range(STEPS):
+        _n, tx, ty, _pf, _pg, e, t, a, c, r, beta, regular = pair_frame(table, pool, f, g, turn, shift, x)
+        if not regular:
+            return STAYED, x, count
+        k, _h, inverse, _isolated = pair_matrix(a, c, beta, 1e-9)
+        ax, ay, bx, by, bend_f, bend_g = pair_step(a, c, r, k, inverse, 1.0)
+        if not max(bend_f, bend_g) > CLOSE:
+            return STAYED, x, count
+        # Each surface by its own measure, as in `solve_pair`.
+        factor_f = bent_at_most(bend_f)
+        factor_g = bent_at_most(bend_g)
+        step_f = (factor_f * ax, factor_f * ay)
+        step_g = (factor_g * bx, factor_g * by)
+        x, _held, _way = move_pair(table, pool, f, g, turn, x, e, t, tx, ty, step_f, step_g)
+        if not is_beside(table, pool, surfaces, x, start, half, BESIDE):
+            return LEFT, x, count
+        if step == 0:
+            for way in range(count):
+                there = (passed[way, 0], passed[way, 1], passed[way, 2], passed[way, 3])
+                if is_beside(table, pool, surfaces, x, there, half, TOGETHER):
+                    return way, x, count
+            if count < passed.shape[0]:
+                passed[count, 0], passed[count, 1], passed[count, 2], passed[count, 3] = x
+                passed[count, BARREN] = 0.0
+                count += 1
+    return STAYED, x, count

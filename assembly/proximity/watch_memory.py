@@ -1,0 +1,264 @@
+"""What a watch (`watch.py`) knows: the layout of its record and its memory, places for contacts, and the log.
+
+The record of a watch is in the table of integers, what it knows in a memory of doubles:
+
+    header | of every pair PAIR_MEMORY | of every place PLACE_MEMORY | events
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from assembly._kernel import kernel
+from assembly.proximity.roots import (
+    ALIKE,
+    CODE_F,
+    CODE_G,
+    GAP,
+    GIVEN_CONTACT,
+    LISTED,
+    MINIMUM_FOUND,
+    NEW,
+    ORIGIN,
+    POINT_F,
+    ROOT_FOLD,
+    ROOT_NORMAL,
+    USELESS,
+    add_given,
+    add_root,
+)
+from assembly.proximity.solid_contact import FEATURE_F, FEATURE_G, PAIR_GAP, PAIR_NORMAL
+
+# The record of a watch: counts; where pairs begin; the row of `tracked` that is the first place; address of
+# `track_solids`; where its lengths are in the pool; how many lists there are, where they begin.
+PAIRS, PLACES, PAIR_TABLE, FIRST, TRACK_SOLIDS, LENGTHS, LISTS, LIST_TABLE, WATCH_RECORD = (
+    0, 1, 2, 3, 4, 5, 6, 7, 8
+)  # fmt: skip
+# Its lengths: roots nearer to each other than the first, and along the surfaces, are one; the reach of a first look;
+# the largest.
+NEGLECT, FIRST_REACH, LAST_REACH, LENGTH_COUNT = 0, 1, 2, 3
+# A pair: bodies, trees, surfaces or else (-1) shells, where its least gap is in the pool (behind it how far it may
+# go between looks where contacts may be born, and how far facets are from their surfaces), its places from and to, and
+# rows of given contacts between the two (row, 1 if the bodies are the other way round).
+PAIR_F, PAIR_G, TREE_F, TREE_G, PAIR_SURFACE_F, PAIR_SURFACE_G, PAIR_SHELL_F, PAIR_SHELL_G = 0, 1, 2, 3, 4, 5, 6, 7
+PAIR_MINIMUM, LOW, HIGH, GIVEN, GIVEN_COUNT, PAIR_RECORD = 8, 9, 10, 11, 12, 13
+# Memory. Header: events, looks and contacts so far, the time of the caller, whether a near root ever found no place,
+# calls so far.
+EVENT_COUNT, LOOKS, BORN, TIME, CROWDED, CALLS, MEMORY_HEADER = 0, 1, 2, 3, 4, 5, 6
+# Of a pair: how g was turned, seen from f, at its last look (a quaternion, NaN before there was one), and where the
+# middle of its tree was; how far g may go from there, its reach, its state, calls at its last look; a ball on g, where
+# its middle was, and how far what is in it may go; which part of its allowances is used; whether it is looked at after
+# every move, because a contact may be born at a fold beside one that touches; whether the bodies are in each other
+# where no contact says so; whether a near root found no place at the last look.
+TURN, PLACE, ALLOWANCE, REACH, STATE, CALLED = 0, 4, 7, 8, 9, 10
+BALL, BALL_RADIUS, BALL_PLACE, BALL_ALLOWANCE, PART, URGENT, CROSSED, WANTING, PAIR_MEMORY = (
+    11, 14, 15, 18, 19, 20, 21, 22, 23
+)  # fmt: skip
+FAR, NEAR, TRACKING = 0, 1, 2
+# Of a place: its pair (-1: none), the number of its contact.
+PLACE_PAIR, PLACE_NUMBER, PLACE_MEMORY = 0, 1, 2
+# An event: kind, reason, pair, number of the contact, gap, time. The last so many are kept.
+EVENT, EVENTS = 6, 64
+ADDED, REMOVED, HANDED_OFF, MERGED, REFUSED = 0, 1, 2, 3, 4
+CAME_NEAR, WENT_AWAY, LOST, SAME_ROOT, NO_PLACE = 0, 1, 2, 3, 4
+# Roots nearer than this part of the reach are listed; those that are, stay so up to the second.
+TAKE, KEEP = 0.4, 0.8
+# Room for roots of a look.
+ROOTS = 96
+# A given contact goes from a saddle to a minimum that is lower by no more than this.
+SHALLOW = 1e-7
+
+
+@kernel(inline=True)
+def memory_places(table, watch):
+    """Where pairs, places and events begin in the memory."""
+    places = MEMORY_HEADER + PAIR_MEMORY * table[watch + PAIRS]
+    return MEMORY_HEADER, places, places + PLACE_MEMORY * table[watch + PLACES]
+
+
+@kernel(inner=True)
+def note(table, watch, memory, kind, reason, p, number, gap):
+    """Write an event into the log."""
+    at = memory_places(table, watch)[2] + EVENT * (np.int64(memory[EVENT_COUNT]) % EVENTS)
+    memory[at] = float(kind)
+    memory[at + 1] = float(reason)
+    memory[at + 2] = float(p)
+    memory[at + 3] = number
+    memory[at + 4] = gap
+    memory[at + 5] = memory[TIME]
+    memory[EVENT_COUNT] += 1.0
+
+
+@kernel(inner=True)
+def any_lost(table, watch, memory, p, tracked):
+    """Whether a listed contact of pair p has lost its root."""
+    pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
+    places = memory_places(table, watch)[1]
+    for k in range(table[pair + LOW], table[pair + HIGH]):
+        if memory[places + PLACE_MEMORY * k] == p and math.isnan(tracked[table[watch + FIRST] + k, 0]):
+            return True
+    return False
+
+
+@kernel(inner=True)
+def release(table, watch, memory, k, tracked):
+    """Make place k free."""
+    o = memory_places(table, watch)[1] + PLACE_MEMORY * k
+    memory[o + PLACE_PAIR] = -1.0
+    tracked[table[watch + FIRST] + k, 0] = math.nan
+
+
+@kernel(inner=True)
+def free_place(table, watch, memory, pair):
+    """A place without a contact among those of a pair, or -1."""
+    places = memory_places(table, watch)[1]
+    for k in range(table[pair + LOW], table[pair + HIGH]):
+        if memory[places + PLACE_MEMORY * k] < 0.0:
+            return k
+    return -1
+
+
+@kernel(inner=True)
+def write_root(roots, i, tracked, r):
+    """Track root i in row r."""
+    for k in range(4):
+        tracked[r, k] = roots[i, k]
+    tracked[r, FEATURE_F] = roots[i, CODE_F]
+    tracked[r, FEATURE_G] = roots[i, CODE_G]
+    for k in range(3):
+        tracked[r, PAIR_NORMAL + k] = roots[i, ROOT_NORMAL + k]
+    tracked[r, PAIR_GAP] = roots[i, GAP]
+
+
+@kernel(inner=True)
+def known_roots(table, pool, watch, memory, p, scene, tracked, roots, work):
+    """The roots that contacts of pair p have now: given ones, then listed ones. Returns how many roots there are.
+
+    A listed contact that lost its root, or came to that of another one, gives up its place.
+    """
+    pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
+    places = memory_places(table, watch)[1]
+    count = add_given(table, pool, scene, tracked, table[pair + GIVEN], table[pair + GIVEN_COUNT], roots, work)
+    for k in range(table[pair + LOW], table[pair + HIGH]):
+        o = places + PLACE_MEMORY * k
+        if memory[o] != p:
+            continue
+        r = table[watch + FIRST] + k
+        lost = math.isnan(tracked[r, 0])
+        before = count
+        if not lost and count < ROOTS:
+            start = (tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3])
+            codes = (np.int64(tracked[r, FEATURE_F]), np.int64(tracked[r, FEATURE_G]))
+            n = (tracked[r, PAIR_NORMAL], tracked[r, PAIR_NORMAL + 1], tracked[r, PAIR_NORMAL + 2])
+            neglect = pool[table[watch + LENGTHS] + NEGLECT]
+            count, found = add_root(table, pool, scene, codes, start, n, neglect, roots, count, work)
+            lost = found != ALIKE and found != MINIMUM_FOUND
+        if count > before and not lost:
+            roots[before, ORIGIN] = LISTED + k
+            write_root(roots, before, tracked, r)
+        else:
+            kind, reason = (HANDED_OFF, LOST) if lost else (MERGED, SAME_ROOT)
+            note(table, watch, memory, kind, reason, p, memory[o + PLACE_NUMBER], tracked[r, PAIR_GAP])
+            release(table, watch, memory, k, tracked)
+    return count
+
+
+@kernel(inner=True)
+def list_roots(table, pool, watch, memory, p, roots, count, tracked):
+    """Give places to the near roots of pair p and take them from the far ones.
+
+    Returns the least gap that is not listed, and whether a place was wanting.
+    """
+    wanting = False
+    pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
+    at = memory_places(table, watch)[0] + PAIR_MEMORY * p
+    places, reach = memory_places(table, watch)[1], memory[at + REACH]
+    least = pool[table[pair + PAIR_MINIMUM]]
+    rest = math.inf
+    for i in range(count):
+        origin = np.int64(roots[i, ORIGIN])
+        if origin >= LISTED and roots[i, GAP] - least > KEEP * reach:
+            k = origin - LISTED
+            number = memory[places + PLACE_MEMORY * k + PLACE_NUMBER]
+            note(table, watch, memory, REMOVED, WENT_AWAY, p, number, roots[i, GAP])
+            release(table, watch, memory, k, tracked)
+            rest = min(rest, roots[i, GAP] - least)
+    # The nearest first, so that it is the far ones for which places may be wanting.
+    while True:
+        best = -1
+        for i in range(count):
+            if roots[i, ORIGIN] == NEW and (best < 0 or roots[i, GAP] < roots[best, GAP]):
+                best = i
+        if best < 0:
+            break
+        gap = roots[best, GAP] - least
+        roots[best, ORIGIN] = USELESS
+        k = free_place(table, watch, memory, pair) if gap <= TAKE * reach else -1
+        if k < 0:
+            rest = min(rest, gap)
+            if gap <= TAKE * reach and not wanting:
+                wanting = True
+                if memory[at + WANTING] == 0.0:
+                    note(table, watch, memory, REFUSED, NO_PLACE, p, 0.0, roots[best, GAP])
+            continue
+        o = places + PLACE_MEMORY * k
+        memory[o + PLACE_PAIR] = float(p)
+        memory[BORN] += 1.0
+        memory[o + PLACE_NUMBER] = memory[BORN]
+        write_root(roots, best, tracked, table[watch + FIRST] + k)
+        note(table, watch, memory, ADDED, CAME_NEAR, p, memory[BORN], roots[best, GAP])
+    memory[at + WANTING] = 1.0 if wanting else 0.0
+    return rest, wanting
+
+
+@kernel(inner=True)
+def minimum_beside(roots, count, i):
+    """The minimum nearest to root i, a saddle, that is hardly lower, or -1."""
+    best = -1
+    least = math.inf
+    for k in range(count):
+        origin = roots[k, ORIGIN]
+        lower = roots[i, GAP] - roots[k, GAP]
+        if not (origin == NEW or origin >= LISTED) or not roots[k, ROOT_FOLD] > 0.0 or not 0.0 <= lower <= SHALLOW:
+            continue
+        square = 0.0
+        for l in range(3):
+            d = roots[i, POINT_F + l] - roots[k, POINT_F + l]
+            square += d * d
+        if square < least:
+            best = k
+            least = square
+    return best
+
+
+@kernel(inner=True)
+def seat_given(table, watch, memory, p, roots, count, tracked):
+    """Given contacts of surfaces whose minimum has become a saddle go to one of those that it parted into.
+
+    A contact that stayed would hold the surfaces at the saddle, and they would cross beside it.
+    """
+    given = table[table[watch + PAIR_TABLE] + PAIR_RECORD * p + GIVEN]
+    places = memory_places(table, watch)[1]
+    for i in range(count):
+        if roots[i, ORIGIN] > GIVEN_CONTACT or not roots[i, ROOT_FOLD] < 0.0:
+            continue
+        k = minimum_beside(roots, count, i)
+        if k < 0:
+            continue
+        c = np.int64(GIVEN_CONTACT - roots[i, ORIGIN])
+        r = table[given + 2 * c]
+        swap = 2 * table[given + 2 * c + 1]
+        for l in range(4):
+            tracked[r, l] = roots[k, (l + swap) % 4]
+        tracked[r, PAIR_GAP] = roots[k, GAP]
+        if roots[k, ORIGIN] == NEW:
+            note(table, watch, memory, HANDED_OFF, LOST, p, 0.0, roots[k, GAP])
+        else:
+            place = np.int64(roots[k, ORIGIN]) - LISTED
+            number = memory[places + PLACE_MEMORY * place + PLACE_NUMBER]
+            note(table, watch, memory, MERGED, SAME_ROOT, p, number, roots[k, GAP])
+            release(table, watch, memory, place, tracked)
+        roots[k, ORIGIN] = roots[i, ORIGIN]
+        roots[i, ORIGIN] = USELESS

@@ -1,0 +1,317 @@
+"""Every bound of the certified queries encloses what it says, at samples: models, boxes, pairs, convexity."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from math import comb
+
+import numpy as np
+import pytest
+
+import assembly as asm
+from assembly.geometry.bezier_pieces import CENTER, ERROR
+from assembly.proximity import bezier_capsules as bc
+from assembly.proximity import bezier_nodes as bn
+from assembly.proximity import patch_nodes as pn
+from assembly.proximity import patch_pair as pp
+from assembly.proximity.bezier_bounds import box_bound, convexity, hull_bound, least_change, model_bound, square_minimum
+from assembly.proximity.patch_newton import patch_derivatives
+from assembly.proximity.patch_packing import pack_patches
+from tests.laws.curve_queries import CURVES, least_distances, piece_values, random_curve
+
+SLACK = 1e-15
+
+
+class Tree:
+    """A random node of a curve's tree, some halvings down."""
+
+    def __init__(self, curve, rng, depth):
+        self.record, self.pool = curve.packed_pieces
+        self.stride = bn.node_stride(self.record)
+        self.nodes = np.full(self.stride * (2 * depth + 40), np.nan)
+        self.ints = np.zeros(bn.NODE_INTS * (2 * depth + 40), dtype=np.int64)
+        bn.start_nodes(self.record, self.pool, self.ints, self.nodes)
+        k, used = 0, 1
+        while depth > 0 or not self.is_piece(k):
+            depth -= self.is_piece(k)
+            bn.split_node(self.record, self.pool, self.ints, self.nodes, k, used)
+            k, used = used + int(rng.integers(2)), used + 2
+        self.o = self.stride * k
+        i = bn.NODE_INTS * k
+        self.interval = self.nodes[self.o + bn.BEGIN], self.nodes[self.o + bn.END]
+        self.net = curve.bezier_pieces()[self.ints[i + bn.FIRST]]
+        # About the center, as the nodes are.
+        self.net = self.net.copy()
+        d = self.net.shape[1] - 1
+        self.net[:, :d] -= self.net[:, d:] * self.pool[CENTER : CENTER + d]
+
+    def is_piece(self, k):
+        return bool(self.ints[bn.NODE_INTS * k + bn.LAST] - self.ints[bn.NODE_INTS * k + bn.FIRST] == 1)
+
+    def values(self, x):
+        """Point and derivatives (m, 3) at x in the node's own parameter."""
+        low, high = self.interval
+        rows = piece_values(np.repeat(self.net[None], len(x), axis=0), low + x * (high - low))
+        return [np.pad(row, ((0, 0), (0, 3 - row.shape[1]))) * (high - low) ** k for k, row in enumerate(rows)]
+
+    def field(self, at, size=3):
+        return self.nodes[self.o + at : self.o + at + size]
+
+
+# The oracle's own rounding, a part of the curve's size: the degree times some units of the last place.
+ORACLE = 1e-13
+
+
+@pytest.mark.parametrize("kind", CURVES)
+def test_models_of_pieces(kind):
+    rng = np.random.default_rng(1)
+    x = np.linspace(0.0, 1.0, 33)
+    d = (x - 0.5)[:, None]
+    for depth in (0, 1, 3, 6, 12):
+        node = Tree(random_curve(rng, kind, 3), rng, depth)
+        c, c1, c2 = node.values(x)
+        a0, a1, a2 = (node.field(at) for at in (bn.A0, bn.A1, bn.A2))
+        away = node.nodes[node.o + bn.AWAY] + ORACLE
+        e0, e1, e2, speed = node.field(bn.E0, 4)
+        assert np.linalg.norm(c - (a0 + a1 * d + 0.5 * a2 * d * d), axis=1).max() <= e0 + away
+        assert np.linalg.norm(c1 - (a1 + a2 * d), axis=1).max() <= e1 + away
+        assert np.linalg.norm(c2 - a2, axis=1).max() <= e2 + 100.0 * away
+        assert np.linalg.norm(c1, axis=1).max() <= speed + away
+        assert (np.abs(c - node.field(bn.BOX_CENTER)) <= node.field(bn.BOX_HALF) + away).all()
+        # Remainders are of third order: an eighth at every halving, but for rounding.
+        assert e0 <= 5000.0 * 0.2**depth + 1e-13
+
+
+@pytest.mark.parametrize("kind", CURVES)
+def test_packed_curves_are_what_was_given(kind):
+    """In exact arithmetic, at the ends and the middle of every span; the error that the record states."""
+    curve = random_curve(np.random.default_rng(2), kind, 3)
+    record, pool = curve.packed_pieces
+    n = curve.degree
+    net = pool[record[6] : record[6] + 4 * (n + 1) * record[1]].reshape(record[1], n + 1, 4)
+    knots = [Fraction(t) for t in curve.knots.tolist()]
+    for span, (low, high) in enumerate(zip(curve.breaks()[:-1], curve.breaks()[1:], strict=True)):
+        j = int(np.searchsorted(curve.knots, low, side="right")) - 1
+        for x in (Fraction(0), Fraction(1, 2), Fraction(1)):
+            t = Fraction(low) + x * (Fraction(high) - Fraction(low))
+            exact = [
+                [Fraction(float(p)) * Fraction(float(w)) for p in point] + [Fraction(float(w))]
+                for point, w in zip(curve.control_points[j - n : j + 1], curve.weights[j - n : j + 1], strict=True)
+            ]
+            for r in range(1, n + 1):
+                for i in range(n, r - 1, -1):
+                    left, right = knots[j - n + i], knots[j + 1 + i - r]
+                    a = (t - left) / (right - left)
+                    exact[i] = [(1 - a) * u + a * v for u, v in zip(exact[i - 1], exact[i], strict=True)]
+            point = [float(v / exact[n][3] - Fraction(float(c))) for v, c in zip(exact[n][:3], pool[2:5], strict=True)]
+            basis = [comb(n, i) * x**i * (1 - x) ** (n - i) for i in range(n + 1)]
+            rows = [sum(b * Fraction(float(v)) for b, v in zip(basis, net[span, :, c], strict=True)) for c in range(4)]
+            packed = [float(v / rows[3]) for v in rows[:3]]
+            assert np.linalg.norm(np.subtract(point, packed)) <= pool[ERROR]
+
+
+@pytest.mark.parametrize("depth", [0, 2, 5])
+@pytest.mark.parametrize("kinds", [("segment", "polyline"), ("quintic", "degree 10"), ("arc", "rational of degree 6")])
+def test_bounds_of_pairs(kinds, depth):
+    rng = np.random.default_rng(3)
+    x = np.linspace(0.0, 1.0, 41)
+    tight = proven = 0
+    for round_ in range(30):
+        a, b = (Tree(random_curve(rng, kind, 3), rng, depth) for kind in kinds)
+        # Anywhere, or near: there the distance is convex.
+        shift = b.pool[CENTER : CENTER + 3] - a.pool[CENTER : CENTER + 3]
+        if round_ % 2:
+            shift = a.field(bn.A0) - b.field(bn.A0) + 1e-3 * rng.normal(size=3)
+        shift = tuple(shift.tolist())
+        (u, du, hu), (v, dv, hv) = a.values(x), b.values(x)
+        d = u[:, None] - v[None] - np.array(shift)
+        least = np.linalg.norm(d, axis=2).min()
+        pair = a.nodes, a.o, b.nodes, b.o, shift, SLACK
+        box = box_bound(*pair)
+        model, s, t = model_bound(*pair)
+        hull = hull_bound(a.record, a.nodes, a.o, b.record, b.nodes, b.o, shift, SLACK, s, t)
+        assert max(box, model, hull) <= least + ORACLE
+        tight += max(model, hull) > 0.8 * least
+        lambdas = convexity(a.record, a.nodes, a.o, b.record, b.nodes, b.o, shift)
+        if lambdas[0] > 0.0:
+            proven += 1
+            ss = (du * du).sum(1)[:, None] + (d * hu[:, None]).sum(2)
+            tt = (dv * dv).sum(1)[None] - (d * hv[None]).sum(2)
+            st = -du @ dv.T
+            # H - diag(lambda) is positive semidefinite.
+            assert ((ss - lambdas[0]) * (tt - lambdas[1]) - st * st >= -1e-12 * ss * tt).all()
+            assert (ss >= lambdas[0]).all() and (tt >= lambdas[1]).all()
+    # The law has something to say: bounds that are near, boxes that are convex.
+    assert depth < 5 or tight >= 12
+    assert depth < 5 or proven >= 10
+
+
+def test_a_quadratic_on_the_square_and_on_a_line():
+    rng = np.random.default_rng(4)
+    x = np.linspace(-0.5, 0.5, 41)
+    for _ in range(300):
+        c, g, h, p, q, r = rng.normal(size=6)
+        values = c + 2 * g * x[:, None] + 2 * h * x + p * x[:, None] ** 2 + 2 * q * x[:, None] * x + r * x**2
+        least, s, t = square_minimum(c, g, h, p, q, r)
+        assert least <= values.min() + 1e-14 and abs(s) <= 0.5 and abs(t) <= 0.5
+        assert least == pytest.approx(c + 2 * g * s + 2 * h * t + p * s * s + 2 * q * s * t + r * t * t, abs=1e-13)
+        # Forms of rank one but for rounding, as along parallel lines, and nearly so.
+        u, v, d = rng.normal(size=(3, 3))
+        v = rng.normal() * u + rng.choice([0.0, 1e-9, 1e-6, 1e-3]) * v
+        least, s, t = square_minimum(d @ d, d @ u, -d @ v, u @ u, -u @ v, v @ v)
+        squares = ((d + x[:, None, None] * u - x[:, None] * v) ** 2).sum(axis=-1)
+        at_place = ((d + s * u - t * v) ** 2).sum()
+        assert least <= squares.min() + 1e-14 and abs(s) <= 0.5 and abs(t) <= 0.5
+        # One step of refinement leaves the rounding of the slope.
+        assert at_place - 1e-12 * (d @ d + u @ u + v @ v) <= least <= at_place + 1e-14
+        slope, error, curvature, at = rng.normal(), 0.3 * rng.random(), rng.random(), rng.random()
+        ahead = rng.uniform(0.0, 1.0 - at)
+        d = np.linspace(-at, ahead, 101)
+        lowest = min((k * d + 0.5 * curvature * d * d).min() for k in (slope - error, slope, slope + error))
+        assert lowest - 1e-3 <= least_change(slope, error, curvature, at, ahead) <= lowest + 1e-15
+
+
+@pytest.mark.parametrize("kind", CURVES)
+def test_capsules(kind):
+    rng = np.random.default_rng(6)
+    x = np.linspace(0.0, 1.0, 201)
+    said = []
+    for trial in range(12):
+        dimension = 2 + trial % 2
+        curve, other = (random_curve(rng, kind, dimension, 3.0) for _ in range(2))
+        tree, far = (bc.capsule_tree(*c.packed_pieces) for c in (curve, other))
+        leaves = int(tree[bc.LEAVES])
+        rows = tree.reshape(-1, bc.STRIDE)
+        places = np.zeros((len(x), 3))
+        places[:, :dimension] = curve.evaluate(x)
+        places -= tree[bc.ORIGIN : bc.ORIGIN + 3]
+        distances = []
+        for k in range(1, 2 * leaves):
+            if rows[k, bc.RADIUS] >= 0.0:
+                m, u, r = rows[k, :3], rows[k, 3:6], rows[k, bc.RADIUS]
+                s = np.clip((places - m) @ u / max(u @ u, 1e-300), -0.5, 0.5)
+                distances.append(np.linalg.norm(places - m - s[:, None] * u, axis=1) - r)
+        # All is in the first one, and every point in one of each level, here of the lowest.
+        assert (distances[0] <= ORACLE).all()
+        pieces = (rows[leaves:, bc.RADIUS] >= 0.0).sum()
+        assert (np.min(distances[-pieces:], axis=0) <= ORACLE).all()
+        # Answers on both sides of the distance, near it too.
+        point = rng.uniform(0.0, 3.0, dimension)
+        y, z = least_distances([(curve, other)], 65)[0], least_distances([(curve, point)], 65)[0]
+        place = np.append(point, np.zeros(3 - dimension))
+        for part in (0.0, 0.5, 0.9, 0.99, 0.999, 1.001, 1.01, 1.1, 2.0):
+            answers = bc.compare_curves(tree, far, part * y), bc.compare_point(tree, *place, part * z)
+            assert (bc.NEARER if part < 1.0 else bc.FARTHER) not in answers
+            said += answers
+    assert {bc.FARTHER, bc.NEARER} <= set(said)
+
+
+SURFACES = {
+    "torus": lambda: asm.shapes.torus(2.0, 0.5),
+    "plane": lambda: asm.shapes.plane(2.0, 2.0),
+    "bicubic": lambda: asm.NurbsSurface(
+        np.random.default_rng(5).random((5, 6, 3)),
+        ([0, 0, 0, 0, 0.4, 1, 1, 1, 1], [0, 0, 0, 0, 0.3, 0.6, 1, 1, 1, 1]),
+        (3, 3),
+    ),
+}
+
+
+def patch_node(shape, rng, depth):
+    """Record, pool, nodes, offset of a random node, and its points with derivatives on a grid of its own parameters."""
+    record, pool = pack_patches(shape)
+    patches = record[pn.PATCHES_U] * record[pn.PATCHES_V]
+    stride = pn.patch_stride(record)
+    nodes = np.full(stride * (patches + 2 * depth), np.nan)
+    ints = np.zeros(pn.NODE_INTS * (patches + 2 * depth), dtype=np.int64)
+    for k in range(patches):
+        pn.fill_patch(record, pool, ints, nodes, k)
+    k, used, m = int(rng.integers(patches)), patches, np.zeros(32)
+    pn.describe_patch(record, pool, nodes, stride * k, m)
+    for _ in range(depth):
+        pn.split_patch(record, pool, ints, nodes, k, used)
+        k, used = used + int(rng.integers(2)), used + 2
+        pn.describe_patch(record, pool, nodes, stride * k, m)
+    return record, pool, nodes, stride * k
+
+
+def grid_values(record, nodes, o, x):
+    """(len(x)^2, 3) points and derivatives u, v, uu, uv, vv."""
+    w = np.zeros(pp.BASIS + 6 * (max(record[0], record[1]) + 1))
+    rows = []
+    for s in x:
+        for t in x if record[1] > 0 else [0.0]:
+            point = patch_derivatives(record, nodes, o, s, t, w)
+            rows.append([*point, *w[pp.PATCH_J : pp.PATCH_J + 15]])
+    return np.array(rows).reshape(-1, 6, 3)
+
+
+@pytest.mark.parametrize("depth", [0, 3, 8])
+@pytest.mark.parametrize("name", SURFACES)
+def test_models_of_patches(name, depth):
+    rng = np.random.default_rng(6)
+    x = np.linspace(0.0, 1.0, 9)
+    record, _pool, nodes, o = patch_node(SURFACES[name](), rng, depth)
+    values = grid_values(record, nodes, o, x)
+    s, t = (row.ravel()[:, None] - 0.5 for row in np.meshgrid(x, x, indexing="ij"))
+    a0, ju, jv, kuu, kuv, kvv = nodes[o + pn.A0 : o + pn.A0 + 18].reshape(6, 3)
+    e0, e1, e2, speed_u, speed_v = nodes[o + pn.E0 : o + pn.E0 + 5]
+    model = a0 + ju * s + jv * t + 0.5 * kuu * s * s + kuv * s * t + 0.5 * kvv * t * t
+
+    def largest(difference):
+        return np.linalg.norm(difference, axis=-1).max()
+
+    assert largest(values[:, 0] - model) <= e0 + SLACK
+    assert (
+        max(largest(values[:, 1] - ju - kuu * s - kuv * t), largest(values[:, 2] - jv - kuv * s - kvv * t))
+        <= e1 + SLACK
+    )
+    assert max(largest(values[:, 3 + i] - k) for i, k in enumerate((kuu, kuv, kvv))) <= e2 + SLACK
+    assert largest(values[:, 1]) <= speed_u and largest(values[:, 2]) <= speed_v
+    assert (np.abs(values[:, 0] - nodes[o : o + 3]) <= nodes[o + 3 : o + 6]).all()
+
+
+@pytest.mark.parametrize("depth", [0, 4, 14])
+@pytest.mark.parametrize("other", ["point", "quintic", "torus"])
+def test_bounds_of_pairs_of_patches(other, depth):
+    rng = np.random.default_rng(7)
+    x = np.linspace(0.0, 1.0, 7)
+    proven = 0
+    for round_ in range(12):
+        shape = {"point": lambda: 3.0 * rng.random(3), "torus": SURFACES["torus"]}.get(
+            other, lambda: random_curve(rng, "quintic", 3, 3.0)
+        )()
+        ra, qa, a, o = patch_node(SURFACES["bicubic" if round_ % 2 else "torus"](), rng, depth)
+        rb, qb, b, p = patch_node(shape, rng, 0 if other == "point" else depth)
+        na, nb = pp.free_count(ra), pp.free_count(rb)
+        n = na + nb
+        shift = qb[CENTER : CENTER + 3] - qa[CENTER : CENTER + 3]
+        if round_ > 5:
+            shift = a[o + pn.A0 : o + pn.A0 + 3] - b[p + pn.A0 : p + pn.A0 + 3] + 1e-3 * rng.normal(size=3)
+        shift = tuple(shift.tolist())
+        u, v = grid_values(ra, a, o, x), grid_values(rb, b, p, x) if nb else grid_values(rb, b, p, [0.0])
+        d = u[:, None, 0] - v[None, :, 0] - np.array(shift)
+        least = np.linalg.norm(d, axis=2).min()
+        w = np.zeros(pp.BASIS + 100)
+        pp.load_models(a, o, na, b, p, nb, shift, w)
+        pp.load_hessian(w, n)
+        box = pp.patch_box_bound(a, o, b, p, shift, SLACK)
+        model = pp.patch_model_bound(a, o, b, p, SLACK, n, w)
+        hull = pp.patch_hull_bound(ra, a, o, rb, b, p, shift, SLACK, n, w)
+        assert max(box, model, hull) <= least + SLACK
+        if not pp.patch_convexity(a, o, na, b, p, n, w):
+            continue
+        proven += 1
+        floor = pp.MARGIN * np.diag(w[pp.H : pp.H + 16].reshape(4, 4)[:n, :n].diagonal())
+        for i in rng.integers(len(u), size=5):
+            for j in rng.integers(len(v), size=5):
+                jac = np.concatenate([u[i, 1 : 1 + na], -v[j, 1 : 1 + nb]])
+                hessian = jac @ jac.T
+                bends = u[i, 3:] @ d[i, j], -v[j, 3:] @ d[i, j]
+                for k in range(na):
+                    hessian[k, :na] += bends[0][k : k + na]
+                for k in range(nb):
+                    hessian[na + k, na:] += bends[1][k : k + nb]
+                assert np.linalg.eigvalsh(hessian - floor).min() >= -1e-14 * np.abs(hessian).max()
+    # Where two surfaces all but meet, one of four directions is flat.
+    assert depth < 14 or other == "torus" or proven >= 3

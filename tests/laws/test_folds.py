@@ -1,0 +1,154 @@
+"""Contacts at folds and knot lines: what a gap gains by tangency, folds beyond knot lines, valleys, parted minima."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import assembly as asm
+from assembly.constraints.layout import FREE_COLUMN, WATCH
+from assembly.geometry.spline import SURFACE_RECORD
+from assembly.kinematics.motion import relative_pose, rotation
+from assembly.proximity import roots, watch_memory
+from assembly.proximity.extremal import SINGULAR, solve_pair
+from assembly.proximity.free_pair import VARIABLES, VECTORS, free_rows
+from assembly.proximity.pairs import _key, _packed, as_face, extremal_pair
+from assembly.proximity.solid_contact import PAIR_GAP, TRACK
+from assembly.solve.rows import untouched
+from benchmarks.running import example
+
+IDENTITY = [1.0, 0.0, 0.0, 0.0]
+
+
+def packed_pair(f, g):
+    """Two shapes as a table and a pool."""
+    table, pool, _size = _packed(*(_key(as_face("surface", side)) for side in (f, g)))
+    return np.asarray(table), np.asarray(pool)
+
+
+def test_what_a_gap_gains_by_tangency():
+    """|j T^-1 t| is twice what the gap changes by on the way to the pair, to leading order."""
+    rng = np.random.default_rng(1)
+    f, g = asm.shapes.ellipsoid(0.2, 0.3, 0.4), asm.shapes.torus(0.3, 0.1)
+    table, pool = packed_pair(f, g)
+    q = np.array([[0.0, 0.0, 0.0, *IDENTITY], [0.5, 0.3, 0.2, 0.9, 0.1, -0.3, 0.2]])
+    q[1, 3:] /= np.linalg.norm(q[1, 3:])
+    pair = extremal_pair(f, q[0], g, q[1])
+    residual, jacobian = np.zeros(5), np.zeros((5, VARIABLES))
+    work, square = np.empty((VECTORS, 3, VARIABLES)), np.empty((VARIABLES, VARIABLES))
+    for size in (1e-3, 1e-4):
+        for _ in range(20):
+            x = tuple(pair.parameters + size * rng.normal(size=4))
+            free_rows(table, pool, 0, SURFACE_RECORD, 0, 1, q, x, (1.0,) * 4, work, residual, jacobian, 0, 1)
+            gained = untouched(residual, jacobian, 0, 1, square)
+            # The next order is smaller by the step, times third derivatives of some tens.
+            assert gained == pytest.approx(2.0 * abs(pair.gap - residual[0]), rel=60.0 * size, abs=1e-15)
+    # A singular system says nothing.
+    jacobian[2] = jacobian[1]
+    jacobian[2, FREE_COLUMN:] = jacobian[1, FREE_COLUMN:]
+    assert untouched(residual, jacobian, 0, 1, square) > 1.0
+
+
+def root_at(table, pool, q, start):
+    """A root, and the scene it is of."""
+    turn, shift = relative_pose(q, 0, rotation(q, 0), 1, rotation(q, 1))
+    scene = (turn, shift, (0, SURFACE_RECORD))
+    out = np.full((1, roots.ROOT), np.nan)
+    assert roots.surfaces_root(table, pool, scene, tuple(start), out, 0) != roots.NOTHING
+    assert np.isnan(out[0, roots.ROOT_BEYOND])
+    return scene, out[0]
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_fold_beyond_a_knot_line_is_that_of_the_pair_there(side):
+    """A ball outside a wire where its bend begins: beyond the knot line the wire curves away from it."""
+    clip = asm.shapes.paper_clip(length=1.0, width=0.25, wire_radius=0.02)
+    ball = asm.shapes.sphere(0.06)
+    table, pool = packed_pair(clip, ball)
+    line = np.unique(clip.knots[0])[2]  # a straight part ends there
+    # Where the wire's middle line bends to, at the knot line.
+    around = np.linspace(*clip.domain[1], 9)[:-1]
+    ring = [clip.evaluate(u, around).mean(axis=0) for u in line + np.r_[-0.02, 0.0, 0.02]]
+    ahead = (ring[1] - ring[0]) / np.linalg.norm(ring[1] - ring[0])
+    outward = ring[1] - ring[2] + ahead * np.vdot(ring[2] - ring[1], ahead)
+    outward /= np.linalg.norm(outward)
+    folds = []
+    for offset in (-1e-6, 1e-6):
+        offset *= side
+        along_line = clip.evaluate(line + offset, 0.0) - clip.evaluate(line, 0.0)
+        q = np.array([[0.0, 0.0, 0.0, *IDENTITY], [*(ring[1] + 0.1 * outward + along_line), *IDENTITY]])
+        scene, root = root_at(table, pool, q, extremal_pair(clip, q[0], ball, q[1]).parameters)
+        near = (0.05, -1.0, -1.0, -1.0)  # no other knot lines
+        folds.append((root[roots.ROOT_FOLD], roots.fold_beyond(table, pool, scene, tuple(root[:4]), near)))
+    (here, beyond), (there, behind) = folds
+    assert abs(here - there) > 0.05
+    # The two places are 2e-6 apart, where curvatures change by some hundreds a unit.
+    assert beyond == pytest.approx(there, abs=1e-3)
+    assert behind == pytest.approx(here, abs=1e-3)
+
+
+def test_a_valley_of_fourth_order_is_a_pair_after_few_steps():
+    """A plane under z = x^4 + y^2: Newton's method gains a third a step there, for ever."""
+    quartic = np.array([1.0, -1.0, 1.0, -1.0, 1.0])  # x^4 over [-1, 1] in Bezier's form
+    square = np.array([1.0, -1.0, 1.0])
+    x, y = np.meshgrid(np.linspace(-1.0, 1.0, 5), np.linspace(-1.0, 1.0, 3), indexing="ij")
+    bowl = asm.NurbsSurface(
+        np.dstack([x, y, quartic[:, None] + square[None, :]]), ([-1.0] * 5 + [1.0] * 5, [-1.0] * 3 + [1.0] * 3), (4, 2)
+    )
+    ends = np.array([-2.0, 2.0])
+    a, b = np.meshgrid(ends, ends, indexing="ij")
+    plane = asm.NurbsSurface(np.dstack([a, b, 0.0 * a]), ([-2, -2, 2, 2], [-2, -2, 2, 2]), (1, 1))
+    table, pool = packed_pair(plane, bowl)
+    identity = rotation(np.array([[0.0, 0.0, 0.0, *IDENTITY]]), 0)
+    for start in (0.3, 0.02):
+        x = (start, 0.1, start, 0.1)
+        status, x, count, frame, _h = solve_pair(
+            table, pool, 0, SURFACE_RECORD, identity, (0.0, 0.0, 0.01), x, 1.0, np.inf, 0.0
+        )
+        assert status == SINGULAR
+        # x^4 where the slope 4 x^3 is 1e-9.
+        assert frame[10] == pytest.approx(0.01, abs=2e-13)
+        assert count <= 25
+
+
+@pytest.mark.parametrize("swapped", [0, 1])
+@pytest.mark.parametrize("listed", [False, True])
+def test_a_given_contact_goes_from_a_saddle_to_the_nearest_minimum(swapped, listed):
+    chain = example("paper_clips").paper_clips()
+    chain.constrain(asm.Clearance())
+    packed = chain.packed()
+    table = packed.table.copy()
+    watch, pair = int(table[WATCH]), 1
+    at = table[watch + watch_memory.PAIR_TABLE] + watch_memory.PAIR_RECORD * pair
+    given = table[at + watch_memory.GIVEN]
+    assert table[at + watch_memory.GIVEN_COUNT] == 1
+    table[given + 1] = swapped
+    row, place = table[given], table[at + watch_memory.LOW]
+    memory = packed.new_state()[packed.memory_at :].copy()
+    places = watch_memory.memory_places(table, watch)[1]
+    tracked = np.zeros((row + place + int(table[watch + watch_memory.FIRST]) + 30, TRACK))
+    found = np.zeros((3, roots.ROOT))
+    found[:, roots.ROOT_BEYOND] = np.nan
+    found[:, roots.ROOT_FOLD] = -1e-4, 2e-4, 1e-4
+    found[:, roots.GAP] = 0.0, -2e-10, -1e-10
+    found[:, roots.POINT_F] = 0.0, 0.02, 0.01
+    found[:, :4] = np.arange(12.0).reshape(3, 4)
+    found[:, roots.ORIGIN] = roots.GIVEN_CONTACT, roots.NEW, place if listed else roots.NEW
+    if listed:
+        memory[places + watch_memory.PLACE_MEMORY * place] = pair
+        memory[places + watch_memory.PLACE_MEMORY * place + watch_memory.PLACE_NUMBER] = 7.0
+    watch_memory.seat_given(table, watch, memory, pair, found, 3, tracked)
+    expected = [8.0, 9.0, 10.0, 11.0]
+    assert tracked[row, :4].tolist() == (expected[2:] + expected[:2] if swapped else expected)
+    assert tracked[row, PAIR_GAP] == -1e-10
+    assert found[:, roots.ORIGIN].tolist() == [roots.USELESS, roots.NEW, roots.GIVEN_CONTACT]
+    assert memory[watch_memory.EVENT_COUNT] == 1.0
+    if listed:
+        assert memory[places + watch_memory.PLACE_MEMORY * place] == -1.0
+    # A minimum far below is another contact, and one that is a minimum stays.
+    for gap, fold in ((-1e-3, -1e-4), (0.0, 1e-4)):
+        found[:, roots.ORIGIN] = roots.GIVEN_CONTACT, roots.NEW, roots.USELESS
+        found[0, roots.ROOT_FOLD], found[1, roots.GAP] = fold, gap
+        before = tracked.copy()
+        watch_memory.seat_given(table, watch, memory, pair, found, 3, tracked)
+        assert np.array_equal(before, tracked, equal_nan=True) and found[0, roots.ORIGIN] == roots.GIVEN_CONTACT

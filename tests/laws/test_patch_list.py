@@ -1,0 +1,56 @@
+"""A list of facing patches that allows for motions has what a descent finds after any of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from assembly.geometry.vec import quaternion_matrix
+from assembly.proximity.bounding_tree import CENTER, NODE_POOL, RADIUS, pairs_within
+from assembly.proximity.patch_list import COUNT, LIST_INTS, OWNER, listed_pairs
+from tests.laws.test_facet_enclosure import BODIES, Descent, placed, sample
+
+REACH, RING = 0.1, 0.15
+
+
+def around(rng, descent, turn, shift):
+    """A pose at which no point of g's ball is farther than RING from where it is at this one."""
+    root = descent.table[descent.g + NODE_POOL]
+    middle = descent.pool[root + CENTER : root + CENTER + 3]
+    share = rng.uniform(0.0, 1.0)
+    # A turn by an angle a moves what is at a distance r by a r at most.
+    angle = share * RING / descent.pool[root + RADIUS]
+    axis, way = (v / np.linalg.norm(v) for v in rng.normal(size=(2, 3)))
+    turned = Rotation.from_rotvec(angle * axis).as_matrix() @ turn
+    return turned, turn @ middle + shift - turned @ middle + (1.0 - share) * RING * way
+
+
+@pytest.mark.parametrize("names", [("torus", "torus"), ("torus", "ellipsoid, inside out"), ("box", "cylinder")])
+def test_a_list_has_what_is_in_reach_at_poses_near_its_own(names):
+    rng = np.random.default_rng(4)
+    descent = Descent(*(BODIES[name] for name in names))
+    table = np.append(descent.table, np.full(LIST_INTS, -1))
+    pool, at = descent.pool, descent.table.size
+    room = np.empty((4_000, 2), dtype=np.int64)
+    kept = sifted = 0
+    for _ in range(2):
+        (_, _, f, n), (_, _, g, m) = (sample(tree, rng) for tree in descent.trees)
+        pose = placed(rng, f, n, g, m, rng.uniform(0.0, 0.5 * REACH))
+        table[at + OWNER] = -1
+        for k in range(4):
+            turn, shift = pose if k == 0 else around(rng, descent, *pose)
+            e = tuple(Rotation.from_matrix(turn).as_quat(scalar_first=True).tolist())
+            there = quaternion_matrix(*e), tuple(shift.tolist())
+            trees = descent.f, descent.g
+            before = table[at:].copy()
+            count = listed_pairs(table, pool, at, 0, trees, *there, e, REACH, 1.01 * RING, descent.stack, room)
+            if count < 0:
+                assert table[at + COUNT] == -1
+                break
+            listed = {tuple(row) for row in room[:count].tolist()}
+            count = pairs_within(table, pool, *trees, *there, REACH, descent.stack, room)
+            assert {tuple(row) for row in room[:count].tolist()} <= listed
+            sifted += len(listed)
+            kept += int(k > 0 and (before == table[at:]).all())
+    assert kept > 1 and sifted > 0
