@@ -40,9 +40,11 @@ if TYPE_CHECKING:
     from assembly.constraints.placements import PointOnLine as PointOnLine
     from assembly.constraints.placements import PointOnPlane as PointOnPlane
     from assembly.constraints.trim_contact import TrimContact as TrimContact
+    from assembly.geometry import curves as curves
     from assembly.geometry import shapes as shapes
     from assembly.geometry.curve import NurbsCurve as NurbsCurve
     from assembly.geometry.face import Face as Face
+    from assembly.geometry.formula_curve import FormulaCurve as FormulaCurve
     from assembly.geometry.loop import Loop as Loop
     from assembly.geometry.surface import NurbsSurface as NurbsSurface
     from assembly.kinematics.body import Body as Body
@@ -86,6 +88,7 @@ else:
             "Expression": "assembly.constraints.expression",
             "Face": "assembly.geometry.face",
             "Fixed": "assembly.constraints.joints",
+            "FormulaCurve": "assembly.geometry.formula_curve",
             "FrameDistance": "assembly.constraints.objectives",
             "Gear": "assembly.constraints.couplings",
             "Loop": "assembly.geometry.loop",
@@ -116,6 +119,7 @@ else:
             "TrimContact": "assembly.constraints.trim_contact",
             "Universal": "assembly.constraints.joints",
             "Wrench": "assembly.solve.statics",
+            "curves": "assembly.geometry.curves",
             "dexterity_ellipsoid": "assembly.solve.tip",
             "dexterity_value": "assembly.solve.tip",
             "errors": "assembly.errors",

@@ -68,7 +68,9 @@ class Assembly:
 
     def __init__(self, bodies: Iterable[Body] = ()) -> None:
         self._bodies: list[Body] = []
+        self._named: dict[str, Body] = {}
         self._constraints: list[Constraint] = []
+        self._taken: set[str] = set()  # names of constraints
         self._objectives: list[tuple[float, Objective]] = []
         self._packed: Packed | None = None
         self._crowding = 1  # how many times as many places as clearances ask for
@@ -96,9 +98,8 @@ class Assembly:
 
     def body(self, name: str) -> Body:
         """The body of that name."""
-        for body in self._bodies:
-            if body.name == name:
-                return body
+        if isinstance(name, str) and name in self._named:
+            return self._named[name]
         known = ", ".join(repr(body.name) for body in self._bodies)
         raise InputError(f"name is {name!r}; expected " + (f"one of {known}" if known else "a body, but there is none"))
 
@@ -106,11 +107,13 @@ class Assembly:
         """Add a body and return it."""
         if not isinstance(body, Body):
             raise TypeError(f"body is {body!r}; expected a Body")
-        if any(other is body for other in self._bodies):
+        other = self._named.get(body.name)
+        if other is body:
             raise InputError(f"body {body.name!r} is in the assembly already; expected each body once")
-        if any(other.name == body.name for other in self._bodies):
+        if other is not None:
             raise InputError(f"body has the name {body.name!r} of another body; expected distinct names")
         self._bodies.append(body)
+        self._named[body.name] = body
         self._packed = None
         return body
 
@@ -123,7 +126,7 @@ class Assembly:
                     "a coupling or an Expression"
                 )
             self._check_bodies(constraint.name, constraint.bodies)
-            if any(other.name == constraint.name for other in self._constraints):
+            if constraint.name in self._taken:
                 raise InputError(f"constraint name {constraint.name!r} is taken; expected distinct names, say name=...")
             if isinstance(constraint, TrimContact) and constraint.contact not in self._constraints:
                 raise InputError(
@@ -133,6 +136,7 @@ class Assembly:
             if constraint.bodies and all(body.fixed for body in constraint.bodies):
                 raise InputError(f"constraint {constraint.name!r} is between two fixed bodies; expected one that moves")
             self._constraints.append(constraint)
+            self._taken.add(constraint.name)
             self._packed = None
 
     def minimize(self, *objectives: Objective) -> None:
@@ -155,14 +159,14 @@ class Assembly:
 
     def _check_bodies(self, what: str, bodies: Iterable[Body]) -> None:
         for body in bodies:
-            if not any(other is body for other in self._bodies):
+            if self._named.get(body.name) is not body:
                 known = ", ".join(repr(other.name) for other in self._bodies) or "no bodies yet"
                 raise InputError(f"{what} is on body {body.name!r}; expected a body of this assembly: {known}")
 
     @property
     def q(self) -> Array:
         """Where the bodies stand, (n, 7)."""
-        return np.array([body.q for body in self._bodies]).reshape(-1, 7)
+        return np.array([body.pose.row for body in self._bodies]).reshape(-1, 7)
 
     def packed(self) -> Packed:
         """The scene as the compiled loop reads it; made at first use."""

@@ -2,12 +2,12 @@
 
 A scalar CasADi function is a list of elementary instructions. So are its derivatives along twists, which CasADi
 finds once: with v(t) the values at the poses retracted by the twists t (`kinematics/motion.py`), rows are v and dv/dt
-at t = 0, and the Hessian is that of y . v for multipliers y. `constraints/tape.py` runs both lists.
+at t = 0, and the Hessian is that of y . v for multipliers y. `geometry/tape.py` runs both lists.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
@@ -16,8 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly.constraints.constraint import Constraint
 from assembly.constraints.objectives import Objective
-from assembly.constraints.tape import CONST, HEAD, OPERATIONS
 from assembly.errors import InputError, positive
+from assembly.geometry.instructions import Tape, compact, instructions, packed
+from assembly.geometry.tape import OPERATIONS
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import pose_rows
 
@@ -33,13 +34,6 @@ _BINARY = frozenset(
         *("LE", "EQ", "NE", "AND", "OR", "IF_ELSE_ZERO", "FMOD", "REMAINDER"),
     )
 )
-
-
-class Tape(NamedTuple):
-    """A packed list of instructions, as in `constraints/tape.py`; constants begin at 0 of their own array."""
-
-    table: NDArray[np.int64]
-    constants: Array
 
 
 class Tapes(NamedTuple):
@@ -163,19 +157,19 @@ class Expression(Constraint, Objective):
             [ca.vertcat(values, ca.vec(jacobian.T)), ca.triu(hessian)], [t], [ca.SX.zeros(6 * bodies)]
         )
         return Tapes(
-            _packed(_compact("rows", x, rows)),
-            _packed(_compact("hessian", ca.vertcat(x, y), ca.vec(ca.triu2symm(upper)))),
+            packed(compact("rows", x, rows)),
+            packed(compact("hessian", ca.vertcat(x, y), ca.vec(ca.triu2symm(upper)))),
         )
 
     def document(self) -> str:
         """The function as text, a line an instruction, for files; `from_document` reads it.
 
         The first line says how many bodies and values there are and the function's name. Then stand the instructions
-        of `constraints/tape.py` by name, with the place of the result and those of the arguments (the constant's
+        of `geometry/tape.py` by name, with the place of the result and those of the arguments (the constant's
         value). CasADi's own serialization is not used: reading one can load code, and many damaged ones are read.
         """
         lines = [f"{len(self.bodies)} {self.count} {self._function.name()}"]
-        for operation, out, arguments in _instructions(self._expanded):
+        for operation, out, arguments in instructions(self._expanded):
             lines.append(" ".join([operation.lower(), str(out), *map(repr, arguments)]))
         return "\n".join(lines)
 
@@ -256,17 +250,10 @@ def _expanded(function: ca.Function) -> ca.Function:
     except RuntimeError as error:
         reason = str(error).strip().splitlines()[-1]
         raise InputError(f"function {function} does not expand to SX ({reason}); expected one that does") from None
-    expanded = _compact(function.name(), x, values)
-    for _ in _instructions(expanded):
+    expanded = compact(function.name(), x, values)
+    for _ in instructions(expanded):
         pass  # names an instruction that tapes do not have
     return expanded
-
-
-def _compact(name: str, x: ca.SX, y: ca.SX) -> ca.Function:
-    """A function of one column whose common parts are computed once."""
-    import casadi as ca
-
-    return ca.Function(name, [x], [ca.densify(y)], {"cse": True})
 
 
 def _retracted(pose: ca.SX, twist: ca.SX) -> ca.SX:
@@ -276,48 +263,6 @@ def _retracted(pose: ca.SX, twist: ca.SX) -> ca.SX:
     w, u, turn = pose[3], pose[4:], twist[3:]
     c, s = 1 - ca.dot(turn, turn) / 8, turn / 2
     return ca.vertcat(pose[:3] + twist[:3], c * w - ca.dot(s, u), c * u + w * s + ca.cross(s, u))
-
-
-def _instructions(function: ca.Function) -> Iterator[tuple[str, int, tuple[int, ...] | tuple[float]]]:
-    """Operation, place of the result, and places of the arguments (or the constant) of every instruction."""
-    import casadi as ca
-
-    names = {getattr(ca, f"OP_{name}"): name for name in OPERATIONS}
-    for k in range(function.n_instructions()):
-        code = function.instruction_id(k)
-        if code not in names:
-            unknown = next(name for name in dir(ca) if name.startswith("OP_") and getattr(ca, name) == code)
-            raise InputError(
-                f"function {function.name()!r} has the instruction {unknown}; expected elementary functions alone"
-            )
-        name, out, arguments = names[code], function.instruction_output(k), function.instruction_input(k)
-        if name == "CONST":
-            yield name, out[0], (function.instruction_constant(k),)
-        elif name == "INPUT":
-            yield name, out[0], (arguments[1],)
-        elif name == "OUTPUT":
-            yield name, out[1], (arguments[0],)
-        else:
-            yield name, out[0], tuple(arguments)
-
-
-def _packed(function: ca.Function) -> Tape:
-    """The instructions of a function of one column as integers and constants."""
-    codes = {name: code for code, name in enumerate(OPERATIONS)}
-    constants: list[float] = []
-    table: list[tuple[int, int, int, int]] = []
-    for name, out, arguments in _instructions(function):
-        code = codes[name]
-        if code == CONST:
-            table.append((code, out, len(constants), 0))
-            constants.append(arguments[0])
-        else:
-            a, b = (*arguments, 0)[:2]
-            table.append((code, out, int(a), int(b)))
-    packed = np.empty(HEAD + 4 * len(table), dtype=np.int64)
-    packed[:HEAD] = len(table), 0, function.sz_w()
-    packed[HEAD:] = np.ravel(table)
-    return Tape(packed, np.array(constants, dtype=np.float64))
 
 
 def _read_header(line: str) -> tuple[int, int, str]:

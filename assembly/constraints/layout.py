@@ -30,7 +30,9 @@ TRACK_AT, SEARCH_AT, NEAREST_AT, DEEPEST_AT, TRIM_ROWS_AT, TRIM_TERMS_AT = 20, 2
 # without bodies is idle. The record of the watch (`proximity/watch.py`; -1: no clearance), and its kernel's address.
 FIRST_GUARD, GUARDS, WATCH, LOOK_AT = 26, 27, 28, 29
 # What tells the time in nanoseconds (0: nothing does).
-CLOCK_AT, HEADER = 30, 31
+CLOCK_AT = 30
+# The record of the blocks that the Hessian of a large scene has (`blocks.py`), and its length; 0: it is dense.
+BLOCK_RECORD, BLOCK_LENGTH, HEADER = 31, 32, 33
 # A row: kind, its two bodies (-1: none), whether it is one-sided (residual >= 0), whether it prescribes a freedom, and
 # whether its residual is a length. Row k is that of contact k.
 ROW = 14
@@ -40,9 +42,9 @@ CONTACT_ROW, JOINT_ROW, TAPE_ROW, TRIM_ROW = 0, 1, 2, 3
 # pool; of a clearance's the number of the contact it has now (0: none).
 SURFACE_F, SURFACE_G, SHELL_F, SHELL_G, MINIMUM, GUARD_NUMBER = 6, 7, 8, 9, 10, 11
 # Of a trim: its contact, on which of its sides, the loop, where the factor is in the pool, the form, how many rows it
-# has (its first one says), the records of the loop's curves as edges, whether rows of vectors are one-sided.
+# has (its first one says), the records of the loop's curves as edges, whether a vector counts by its signed length.
 TRIM_PAIR, TRIM_SIDE, TRIM_LOOP, TRIM_FACTOR = 6, 7, 8, 9
-TRIM_FORM, TRIM_COUNT, TRIM_EDGES, TRIM_ONE_SIDED = 10, 11, 12, 13
+TRIM_FORM, TRIM_COUNT, TRIM_EDGES, TRIM_LENGTH = 10, 11, 12, 13
 # Its forms (`trim_rows.py`).
 SIGNED, PARAMETRIC, CARTESIAN, BETWEEN = 0, 1, 2, 3
 # Of a joint: kind and component of the coordinate, the joint that has its frames, where its angle is tracked (-1: it is

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from math import prod, sqrt
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.constraints import addresses, layout, tape, terms
+from assembly.constraints import addresses, layout, terms
 from assembly.constraints.clearance import Clearance
 from assembly.constraints.constraint import Constraint, Coordinate, Equation, FramePair, structure_changes
 from assembly.constraints.contact import Contact
 from assembly.constraints.couplings import Coupling
 from assembly.constraints.dexterity import MEASURES, TASKS, Dexterity
+from assembly.constraints.elimination import FEW, block_record
 from assembly.constraints.expression import Expression
 from assembly.constraints.joint import Joint
 from assembly.constraints.numbering import gathering_order, number_bodies
@@ -25,15 +27,17 @@ from assembly.constraints.primitives import coordinate as coordinate_value
 from assembly.constraints.trim_contact import FORMS, TrimContact
 from assembly.constraints.turns import Turns
 from assembly.errors import InputError
+from assembly.geometry import tape
 from assembly.geometry.face import Face
 from assembly.geometry.pieces import TRIM_FIRST
 from assembly.geometry.spline import CURVE_RECORD, SURFACE_RECORD
 from assembly.geometry.surface import NurbsSurface
 from assembly.kinematics.body import Body, BodyFace
-from assembly.proximity import watch
+from assembly.proximity import watch_memory
 from assembly.proximity.events import fresh_memory
 from assembly.proximity.facet_tree import FacetTree
 from assembly.proximity.pairs import OFFSETS
+from assembly.proximity.patch_list import LIST_INTS
 from assembly.proximity.shell import EDGE_CURVE, EDGE_END, EDGE_RECORD, EDGE_START, EDGE_SURFACE
 from assembly.proximity.shell_packing import pack_shell
 from assembly.proximity.solid import is_one_smooth, solid_of
@@ -49,6 +53,8 @@ FIRST_REACH, LAST_REACH = 0.005, 0.05
 # How far bodies may go between looks where contacts may be born, in parts of the smallest radius of curvature of the
 # two; in parts of the scene's size, it is no less than this.
 FLANK, LEAST_FLANK = 0.5, 1e-4
+# Lists of facing patches are kept for so many pairs of bodies at a time.
+MOST_LISTS = 64
 
 
 class Packed:
@@ -116,6 +122,7 @@ class Packed:
         self._turns: list[tuple[FrameDistance, int]] = []
         self._values: list[tuple[Equation, int, float]] = []
         self._angles: list[Coordinate] = []
+        self._angle_places: dict[int, int] = {}
         self._room = [0, 0, 0]
         self._frames: dict[int, tuple[int, FramePair]] = {}
         self._table: list[Table] = []
@@ -129,7 +136,7 @@ class Packed:
         self.tips = 1 if self._header[layout.DEXTERITIES] else None
         self.table = np.concatenate(self._table)
         if self.guards:
-            self.table[self.table[layout.WATCH] + watch.TRACK_SOLIDS] = self.table[layout.TRACK_AT]
+            self.table[self.table[layout.WATCH] + watch_memory.TRACK_SOLIDS] = self.table[layout.TRACK_AT]
         self.pool = np.concatenate(self._pool)
         self._sources = [item for item in self._values if item[0].source is not None]
         self._turned = Turns(self._angles, [(equation, at) for equation, at, _ in self._values])
@@ -154,7 +161,7 @@ class Packed:
 
     def is_crowded(self, state: Array) -> bool:
         """Whether contacts of clearances were near that found no place."""
-        return self.guards > 0 and state[self.memory_at + watch.CROWDED] == 1.0
+        return self.guards > 0 and state[self.memory_at + watch_memory.CROWDED] == 1.0
 
     def new_state(self) -> Array:
         """The state of a solve that knows nothing yet."""
@@ -176,21 +183,25 @@ class Packed:
             table = table.copy()
             record = table[layout.WATCH]
             rows = table[table[layout.ROW_TABLE] + layout.ROW * table[layout.FIRST_GUARD] :][: layout.ROW * self.guards]
-            pairs = table[table[record + watch.PAIR_TABLE] :][: watch.PAIR_RECORD * table[record + watch.PAIRS]]
-            pairs = pairs.reshape(-1, watch.PAIR_RECORD)
+            pairs = table[table[record + watch_memory.PAIR_TABLE] :][
+                : watch_memory.PAIR_RECORD * table[record + watch_memory.PAIRS]
+            ]
+            pairs = pairs.reshape(-1, watch_memory.PAIR_RECORD)
             for row, (place, number) in zip(rows.reshape(-1, layout.ROW), self.listed(state), strict=True):
                 if place >= 0:
                     pair = pairs[place]
-                    row[[layout.BODY_F, layout.BODY_G]] = pair[[watch.PAIR_F, watch.PAIR_G]]
-                    row[layout.SURFACE_F : layout.SHELL_G + 1] = pair[watch.PAIR_SURFACE_F : watch.PAIR_SHELL_G + 1]
-                    row[layout.MINIMUM], row[layout.GUARD_NUMBER] = pair[watch.PAIR_MINIMUM], number
+                    row[[layout.BODY_F, layout.BODY_G]] = pair[[watch_memory.PAIR_F, watch_memory.PAIR_G]]
+                    row[layout.SURFACE_F : layout.SHELL_G + 1] = pair[
+                        watch_memory.PAIR_SURFACE_F : watch_memory.PAIR_SHELL_G + 1
+                    ]
+                    row[layout.MINIMUM], row[layout.GUARD_NUMBER] = pair[watch_memory.PAIR_MINIMUM], number
         return table
 
     def listed(self, state: Array) -> list[tuple[int, int]]:
         """Of every place of a watch in a state: its pair of bodies, or -1, and the number of its contact."""
         pairs = sum(map(len, self.guarded))
-        at = self.memory_at + watch.MEMORY_HEADER + watch.PAIR_MEMORY * pairs
-        places = state[at : at + watch.PLACE_MEMORY * self.guards].reshape(-1, watch.PLACE_MEMORY)
+        at = self.memory_at + watch_memory.MEMORY_HEADER + watch_memory.PAIR_MEMORY * pairs
+        places = state[at : at + watch_memory.PLACE_MEMORY * self.guards].reshape(-1, watch_memory.PLACE_MEMORY)
         return [(int(pair), int(number)) for pair, number in places.tolist()]
 
     def _add(self, table: Sequence[int] | Table = (), pool: Sequence[float] | Array = ()) -> tuple[int, int]:
@@ -288,6 +299,12 @@ class Packed:
         header[layout.EXTRA] = extra
         header[layout.TERMS] = len(terms_)
         header[layout.DEXTERITIES] = sum(term[0] == terms.DEXTERITY for term in terms_)
+        if header[layout.MOVING] > FEW and not (self.guards or self.trims or header[layout.DEXTERITIES]):
+            # Rows of clearances are of any bodies, those of trims and dexterities are not by blocks.
+            shared = [term for _, term in objectives if isinstance(term, Expression)]
+            groups += [[self._places[id(body)] for body in term.bodies] for term in shared]
+            record = block_record(int(header[layout.MOVING]), [slots[group].tolist() for group in groups])
+            header[layout.BLOCK_RECORD], header[layout.BLOCK_LENGTH] = self._add(record)[0], record.size
         self._take_addresses(header)
         self._table[0] = header
         table = np.array([row[:6] for row in rows], dtype=np.int64).reshape(-1, 6)
@@ -299,7 +316,9 @@ class Packed:
         self.pairs = np.where(kinds == layout.CONTACT_ROW, np.arange(len(rows)), -1)
         trims = np.flatnonzero(kinds == layout.TRIM_ROW)
         self.pairs[trims] = [rows[r][layout.TRIM_PAIR] for r in trims]
-        self.spans = [np.flatnonzero(self.owners == k) for k in range(len(constraints))]
+        by_owner = np.argsort(self.owners, kind="stable")
+        ends = np.searchsorted(self.owners[by_owner], np.arange(len(constraints) + 1))
+        self.spans = [by_owner[first:last] for first, last in pairwise(ends)]
 
     def _take_addresses(self, header: Table) -> None:
         """Where the kernels are that only contacts of solids, or trims, ask for."""
@@ -317,7 +336,7 @@ class Packed:
         self.table[layout.DEEPEST_AT] = 0
         self._take_addresses(self.table)
         if self.guards:
-            self.table[self.table[layout.WATCH] + watch.TRACK_SOLIDS] = self.table[layout.TRACK_AT]
+            self.table[self.table[layout.WATCH] + watch_memory.TRACK_SOLIDS] = self.table[layout.TRACK_AT]
 
     def seek_penetration(self) -> bool:
         """From now on contacts of solids that cross at the start are looked for; whether that is new.
@@ -332,11 +351,13 @@ class Packed:
     def _gathering(self, bodies: Sequence[Body], rows: list[list[int]]) -> int:
         """Pack the order in which scattered bodies are put together; where it begins."""
         groups = []
+        table = np.concatenate(self._table)
         for row in rows:
             places = row[1:3] if row[0] == layout.JOINT_ROW else []
             if places and row[layout.SECOND] >= 0:
-                second = np.concatenate(self._table)[row[layout.SECOND] :]
-                places = [*places, *second[layout.SECOND_BODY_F : layout.SECOND_RECORD].tolist()]
+                second = row[layout.SECOND]
+                bodies_at = slice(second + layout.SECOND_BODY_F, second + layout.SECOND_RECORD)
+                places = [*places, *table[bodies_at].tolist()]
             groups.append(list(dict.fromkeys(places)))
         order = gathering_order([body.fixed for body in bodies], groups)
         fields = [field for body, held in order for field in (body, len(held), *held)]
@@ -366,9 +387,10 @@ class Packed:
         number, _ = self._frames.setdefault(id(frames), (len(self._frames), frames))
         angle = -1
         if coordinate.kind in (TURN, AZIMUTH):
-            if not any(other is coordinate for other in self._angles):
+            place = self._angle_places.setdefault(id(coordinate), len(self._angles))
+            if place == len(self._angles):
                 self._angles.append(coordinate)
-            angle = self.pair_rows + next(k for k, other in enumerate(self._angles) if other is coordinate)
+            angle = self.pair_rows + place
         bodies = [self._places[id(frame.body)] for frame in (frames.frame_a, frames.frame_b)]
         return [coordinate.kind, coordinate.component, number, angle], bodies
 
@@ -470,14 +492,17 @@ class Packed:
                 listed += given
             first += count
         given_at, _ = self._add(listed)
-        table = np.array(records, dtype=np.int64).reshape(-1, watch.PAIR_RECORD)
-        table[:, watch.GIVEN] += given_at
+        table = np.array(records, dtype=np.int64).reshape(-1, watch_memory.PAIR_RECORD)
+        table[:, watch_memory.GIVEN] += given_at
         pair_table, _ = self._add(table.ravel())
-        lengths = np.zeros(watch.LENGTH_COUNT)
-        lengths[watch.NEGLECT] = min(clearance.neglect for clearance in self.clearances)
-        lengths[watch.FIRST_REACH], lengths[watch.LAST_REACH] = FIRST_REACH, LAST_REACH
+        lengths = np.zeros(watch_memory.LENGTH_COUNT)
+        lengths[watch_memory.NEGLECT] = min(clearance.neglect for clearance in self.clearances)
+        lengths[watch_memory.FIRST_REACH], lengths[watch_memory.LAST_REACH] = FIRST_REACH, LAST_REACH
         _, lengths_at = self._add(pool=lengths)
-        return self._add([len(table), self.guards, pair_table, len(self.contacts), 0, lengths_at])[0]
+        lists = min(len(table), MOST_LISTS)
+        list_table, _ = self._add([-1] * (LIST_INTS * lists))
+        counts = [len(table), self.guards, pair_table, len(self.contacts), 0, lengths_at]
+        return self._add([*counts, lists, list_table])[0]
 
     def _trim(self, trim: TrimContact, rows: list[list[int]]) -> list[list[int]]:
         """The records of a trim's rows."""
@@ -493,7 +518,7 @@ class Packed:
         edges = -1 if form == 0 else self._loop_edges(trim, loop, rows[pair][layout.SURFACE_F + trim.side])
         self._header[layout.VECTOR_TRIMS] |= int(form > 0)
         fields = [layout.TRIM_ROW, *places, side, 0, 1, pair, trim.side, loop, at, form]
-        return [[*fields, count, edges, side] for _ in range(count)]
+        return [[*fields, count, edges, int(trim.form in ("parametric", "cartesian"))] for _ in range(count)]
 
     def _loop_edges(self, trim: TrimContact, loop: int, surface: int) -> int:
         """Records of the curves of a trim's loop as edges on its surface; where they begin."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import call_address, kernel
+from assembly.constraints.blocks import add_patch, block_row, clear_patch, is_blocked, spot
 from assembly.constraints.layout import (
     BODY_F,
     BODY_G,
@@ -58,7 +59,7 @@ from assembly.constraints.layout import (
     TRIMS,
 )
 from assembly.constraints.primitives import add_coordinate_hessian, coordinate, place_frames, write_gradient
-from assembly.constraints.tape import run_tape
+from assembly.geometry.tape import run_tape
 from assembly.geometry.vec import dot, sub
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.extremal import CLOSE, CONVERGED, LEFT_PATCH, SINGULAR, solve_pair
@@ -389,6 +390,35 @@ def add_gram(bases, jacobian, r, weight, hessian):
 
 
 @kernel(inner=True)
+def add_gram_blocks(blocks, bases, jacobian, r, weight, hessian):
+    """As `add_gram`, for a Hessian by blocks; no pair has unknowns of its own."""
+    for b in range(bases.shape[1]):
+        at = bases[r, b]
+        if at < 0:
+            continue
+        column, _width = block_at(b)
+        for c in range(bases.shape[1]):
+            other = bases[r, c]
+            if other < at:
+                continue
+            across, _breadth = block_at(c)
+            row = block_row(blocks, at, other)
+            for i in range(6):
+                s = weight * jacobian[r, column + i]
+                for j in range(6):
+                    hessian[row + i, j] += s * jacobian[r, across + j]
+
+
+@kernel(inline=True)
+def add_square(order, bases, jacobian, r, weight, hessian):
+    """Upper triangle of hessian += weight J_r^T J_r, however it is kept."""
+    if is_blocked(order):
+        add_gram_blocks(order[3], bases, jacobian, r, weight, hessian)
+    else:
+        add_gram(bases, jacobian, r, weight, hessian)
+
+
+@kernel(inner=True)
 def add_free_terms(table, pool, r, loose, point, y, weights, hessian):
     """As `add_row_terms`, for the row of a free pair and its rows of tangency."""
     q, tracked, _records, _residual, jacobian = point
@@ -427,7 +457,7 @@ def add_free_terms(table, pool, r, loose, point, y, weights, hessian):
 
 
 @kernel(inner=True)
-def add_tape_hessian(table, pool, tape, q, room, y, hessian):
+def add_tape_hessian(table, pool, tape, q, room, order, y, hessian):
     """Upper triangle of hessian += second derivative of y . rows, for the rows of a tape."""
     inputs, outputs, work = room
     m = table[tape + TAPE_VALUES]
@@ -444,23 +474,38 @@ def add_tape_hessian(table, pool, tape, q, room, y, hessian):
             other = 6 * table[table[SLOTS] + table[table[tape + TAPE_LIST] + c]]
             if at < 0 or other < at:
                 continue
+            row, column = spot(order, at, other)
             for i in range(6):
                 for j in range(6):
                     factor = (size if i < 3 else 1.0) * (size if j < 3 else 1.0)
-                    hessian[at + i, other + j] += factor * outputs[6 * count * (6 * b + i) + 6 * c + j]
+                    hessian[row + i, column + j] += factor * outputs[6 * count * (6 * b + i) + 6 * c + j]
 
 
 @kernel(inner=True)
-def add_row_terms(table, pool, loose, room, bases, point, y, weights, hessian):
+def add_coordinate_blocks(kind, component, records, k, y, order, hessian, f, g):
+    """As `add_coordinate_hessian`, for a Hessian by blocks."""
+    at_f, at_g = clear_patch(order, f, g)
+    add_coordinate_hessian(kind, component, records, k, y, order[2][1:], at_f, at_g)
+    add_patch(order, f, g, hessian)
+
+
+@kernel(inner=True)
+def add_row_terms(table, pool, loose, room, shape, point, y, weights, hessian):
     """Upper triangle of hessian += second derivative of y . rows + J^T diag(weights) J.
 
     The rows of tangency of a free pair go with its row.
     """
     q, _tracked, records, _residual, jacobian = point
+    bases, order = shape[0], shape[2]
+    blocked = is_blocked(order)
     pairs = table[CONTACTS]
     for r in range(pairs):
         if loose[0][r] >= 0:
             add_free_terms(table, pool, r, loose, point, y, weights, hessian)
+        elif blocked and (y[r] != 0.0 or weights[r] != 0.0):
+            f, g = clear_patch(order, bases[r, 0], bases[r, 1])
+            add_gap_terms(records, r, jacobian, r, y[r], weights[r], order[2][1:], f, g)
+            add_patch(order, bases[r, 0], bases[r, 1], hessian)
         elif y[r] != 0.0 or weights[r] != 0.0:
             add_gap_terms(records, r, jacobian, r, y[r], weights[r], hessian, bases[r, 0], bases[r, 1])
     for r in range(pairs, pairs + table[TRIMS]):
@@ -472,7 +517,9 @@ def add_row_terms(table, pool, loose, room, bases, point, y, weights, hessian):
                 (table, pool, r, loose[0], loose[1], bases, point[1], records, jacobian, y[r], hessian),
             )
     for r in range(pairs + table[TRIMS], table[ROWS]):
-        if weights[r] != 0.0:
+        if weights[r] != 0.0 and blocked:
+            add_gram_blocks(order[3], bases, jacobian, r, weights[r], hessian)
+        elif weights[r] != 0.0:
             add_gram(bases, jacobian, r, weights[r], hessian)
         row = table[ROW_TABLE] + ROW * r
         if y[r] == 0.0 or table[row + KIND] != JOINT_ROW:
@@ -480,20 +527,18 @@ def add_row_terms(table, pool, loose, room, bases, point, y, weights, hessian):
         second = table[row + SECOND]
         for part in range(1 if second < 0 else 2):
             at = row + COORDINATE if part == 0 else second
-            add_coordinate_hessian(
-                table[at],
-                table[at + 1],
-                records,
-                pairs + table[at + 2],
-                y[r] * pool[table[row + PARAMETERS] + part],
-                hessian,
-                bases[r, 0 if part == 0 else 3],
-                bases[r, 1 if part == 0 else 4],
-            )
+            f = bases[r, 0 if part == 0 else 3]
+            g = bases[r, 1 if part == 0 else 4]
+            k = pairs + table[at + 2]
+            factor = y[r] * pool[table[row + PARAMETERS] + part]
+            if blocked:
+                add_coordinate_blocks(table[at], table[at + 1], records, k, factor, order, hessian, f, g)
+            else:
+                add_coordinate_hessian(table[at], table[at + 1], records, k, factor, hessian, f, g)
     for t in range(table[TAPES]):
         tape = table[TAPE_TABLE] + TAPE_RECORD * t
         idle = True
         for v in range(table[tape + TAPE_VALUES]):
             idle = idle and y[table[tape + TAPE_ROW_AT] + v] == 0.0
         if not idle:
-            add_tape_hessian(table, pool, tape, q, room, y, hessian)
+            add_tape_hessian(table, pool, tape, q, room, order, y, hessian)

@@ -10,9 +10,11 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
+from assembly.constraints.blocks import block_row, is_blocked, spot
 from assembly.constraints.layout import SCALE, SLOTS, TERM_TABLE, TERMS
 from assembly.constraints.program import place_tape
-from assembly.constraints.tape import run_tape
+from assembly.constraints.sparsity import clear_upper
+from assembly.geometry.tape import run_tape
 from assembly.geometry.vec import add, cross, dot, matvec, quaternion_product, sub
 from assembly.kinematics.motion import position, rotation
 
@@ -82,7 +84,7 @@ def posture(pool, o, q, body, s, order, gradient, hessian):
 
 
 @kernel(inner=True)
-def tape_term(table, pool, term, q, order, room, gradient, hessian):
+def tape_term(table, pool, term, q, order, room, entries, gradient, hessian):
     """Weight times the one value of a tape."""
     inputs, outputs, work = room
     weight = pool[table[term + TERM_PARAMETERS]]
@@ -110,11 +112,25 @@ def tape_term(table, pool, term, q, order, room, gradient, hessian):
             other = 6 * table[table[SLOTS] + table[bodies + c]]
             if at < 0 or other < at:
                 continue
+            row, column = spot(entries, at, other)
             for i in range(6):
                 for j in range(6):
                     factor = (size if i < 3 else 1.0) * (size if j < 3 else 1.0)
-                    hessian[at + i, other + j] += factor * outputs[6 * count * (6 * b + i) + 6 * c + j]
+                    hessian[row + i, column + j] += factor * outputs[6 * count * (6 * b + i) + 6 * c + j]
     return value
+
+
+@kernel(inner=True)
+def term_by_blocks(pool, o, kind, q, body, s, entries, gradient, hessian):
+    """A term of one body with its derivatives, for a Hessian by blocks."""
+    if s < 0:
+        slope, block, order = gradient[:0], hessian[:0], 0
+    else:
+        at = block_row(entries[3], s, s)
+        slope, block, order = gradient[s : s + 6], hessian[at : at + 6], 1
+    if kind == POINT_DISTANCE:
+        return point_distance(pool, o, q, body, 0, order, slope, block)
+    return posture(pool, o, q, body, 0, order, slope, block)
 
 
 @kernel(inner=True)
@@ -129,27 +145,30 @@ def recenter(table, pool, q):
 
 
 @kernel(inner=True)
-def objective(table, pool, q, order, room, last, gradient, hessian):
+def objective(table, pool, q, order, room, entries, gradient, hessian):
     """Value of the objective. From order 1 on the gradient and the upper triangle of the Hessian are overwritten.
 
-    `last` bounds the rows of the Hessian, as `linear.factorize` says.
+    `entries` says where the Hessian has any (`sparsity.py`).
     """
     if order > 0:
         for i in range(gradient.size):
             gradient[i] = 0.0
-            for j in range(i, last[i] + 1):
-                hessian[i, j] = 0.0
+        clear_upper(entries, gradient.size, hessian)
+    blocked = order > 0 and is_blocked(entries)
     value = 0.0
     for t in range(table[TERMS]):
         term = table[TERM_TABLE] + TERM * t
         kind = table[term + TERM_KIND]
         body = table[term + TERM_BODY]
-        if kind == POINT_DISTANCE:
+        if blocked and (kind == POINT_DISTANCE or kind == POSTURE):
+            s = 6 * table[table[SLOTS] + body]
+            value += term_by_blocks(pool, table[term + TERM_PARAMETERS], kind, q, body, s, entries, gradient, hessian)
+        elif kind == POINT_DISTANCE:
             s = 6 * table[table[SLOTS] + body]
             value += point_distance(pool, table[term + TERM_PARAMETERS], q, body, s, order, gradient, hessian)
         elif kind == POSTURE:
             s = 6 * table[table[SLOTS] + body]
             value += posture(pool, table[term + TERM_PARAMETERS], q, body, s, order, gradient, hessian)
         elif kind == TAPE_TERM:
-            value += tape_term(table, pool, term, q, order, room, gradient, hessian)
+            value += tape_term(table, pool, term, q, order, room, entries, gradient, hessian)
     return value

@@ -40,9 +40,9 @@ class TrimContact(Constraint):
     form : "signed", "parametric", "cartesian" or "between"
         The rows. "signed": the signed distance of the contact from the loop in (u, v), times the mean stretch of the
         surface over the loop, one row. The others are those of paper 001, section 3.4, with c the point of the
-        loop's own extremum against the other surface: u_f - c (2 rows), f(u_f) - f(c) (3) and g(u_g) - f(c)
-        (3). At a solution they depend on one another, which the loop of the solve bears. One-sided, the length of the
-        vector counts, negative on the wrong side; "between" contains the gap, and is for "on" alone.
+        loop's own extremum against the other surface: u_f - c, f(u_f) - f(c) and g(u_g) - f(c). The first two count
+        by their length, negative on the wrong side: the first row; their others are zero. "between" contains the gap
+        and is for "on" alone; its three rows depend on one another at a solution, which slows a solve.
     side : "a" or "b", optional
         Which of the contact's faces the loop is on; by default the one that has it, else "a".
     name : str, optional

@@ -10,8 +10,10 @@ a curve (appendix A, corrected):
 
 in the axes of the face's body, where f(u) and f(c) have no rates of their own. At a solution they depend on one
 another (the loop's extremum is then the contact's), each a multiple of s; so are their second derivatives taken to
-be. One-sided, a vector counts by its length, positive on the right side of the loop. The loop of a solve calls the two
-kernels at the end by their addresses.
+be. Off the loop the vector u - c = s n has two independent rates, n s_q and s n_q, of which the second forbids what the
+loop allows, to slide along it: the closer to the loop, the larger the multiplier that says so. So the first two forms
+count by their signed length, one row that is zero where the vector is. The third contains the gap and has no such sign.
+The loop of a solve calls the two kernels at the end by their addresses.
 """
 
 from __future__ import annotations
@@ -39,8 +41,8 @@ from assembly.constraints.layout import (
     TRIM_EDGES,
     TRIM_FACTOR,
     TRIM_FORM,
+    TRIM_LENGTH,
     TRIM_LOOP,
-    TRIM_ONE_SIDED,
     TRIM_PAIR,
     TRIM_SIDE,
     TRIMS,
@@ -246,7 +248,7 @@ def vector_rows(table, pool, first, loose, point):
             add_coordinate(loose, records, k, 3 - o, dot(axis, dv), jacobian, r)
         if moves:
             add_rate(records, scratch, o, -slope, jacobian, r)
-    if table[row + TRIM_ONE_SIDED] == 1:
+    if table[row + TRIM_LENGTH] == 1:
         signed_length(table, pool, first, table[row + TRIM_COUNT], 1.0 if kept * s >= 0.0 else -1.0, loose, point)
 
 

@@ -24,6 +24,7 @@ import math
 import numpy as np
 
 from assembly._kernel import call_address, kernel
+from assembly.constraints.blocks import BLOCKS, FACTORED, is_blocked
 from assembly.constraints.layout import (
     BODIES,
     CLOCK_AT,
@@ -45,6 +46,7 @@ from assembly.constraints.layout import (
     WATCH,
 )
 from assembly.constraints.program import add_row_terms, evaluate
+from assembly.constraints.sparsity import clear_upper
 from assembly.constraints.terms import objective, recenter
 from assembly.proximity.extremal import BEND
 from assembly.proximity.free_pair import VARIABLES, VECTORS
@@ -58,6 +60,7 @@ from assembly.solve.guards import (
     forget_guards,
     go_back,
     is_too_far,
+    look_again,
     look_around,
     numbers_of,
     place_guards,
@@ -72,13 +75,16 @@ from assembly.solve.multipliers import (
     toward_rows,
     weigh_rows,
 )
+from assembly.solve.recall import leave, recall
 from assembly.solve.report import bring_back, is_clear, judge, keep, write_pose, write_rows
 from assembly.solve.rows import (
     add_transposed,
+    arrange,
     carry,
-    envelope,
     move,
-    place_rows,
+    off_rows,
+    record_of_blocks,
+    shape_of,
     times,
     turned,
     violation_of,
@@ -91,8 +97,9 @@ SOLVED, INFEASIBLE, STALLED, ITERATION_LIMIT, CONTACT_LOST, OUT_OF_TIME, RUNNING
 FEASIBILITY, STATIONARITY, ITERATIONS, PENALTY, PENALTY_FLOOR, RADIUS, GATHER, FREE_TRIMS = 0, 1, 2, 3, 4, 5, 6, 7
 # Whether all that moved is looked at once more before a pose counts as solved. Of a tick: whether it is one, which ends
 # at a pose that holds after so many iterations, and at the last one that held where it ends otherwise; how long it may
-# take (0: as long as it takes); whether its end is tested for a minimum.
-LAST_LOOK, TICK, BUDGET, SECOND_ORDER, SETTINGS = 8, 9, 10, 11, 12
+# take (0: as long as it takes); whether its end is tested for a minimum; where in the state the rows are that the last
+# one left (0: nowhere).
+LAST_LOOK, TICK, BUDGET, SECOND_ORDER, RECALL, SETTINGS = 8, 9, 10, 11, 12, 13
 # Results at the end of the state.
 STATUS, COUNT, OBJECTIVE, VIOLATION, DUAL, CULPRIT, IMPROPER, SCATTER = 0, 1, 2, 3, 4, 5, 6, 7
 # Of a tick: whether it ended at a pose that held before; whether its end is a minimum (0: not tested, 1, or -1: no).
@@ -107,6 +114,12 @@ RESTORATIONS = 3
 TOUCHING = 1e-9
 # A step is computed so many times more for one-sided rows that it would break.
 FORESEEN = 4
+# Where so many whole steps in a row do not halve the violation, the floor of the penalty gives way, down to here:
+# rounding, times its inverse, must stay small against the objective's curvature.
+SLOW, HARDEST = 3, 1e-10
+# Back onto rows a step is shortened by this where it leads farther off; a tick's may lead off by this once, if the next
+# one leads back.
+SHORTENED, ASTRAY, LEAST_SHARE = 0.25, 10.0, 1e-4
 # Where a solve with clearances ends at a pose that does not hold, so many more steps lead back onto the rows.
 SETTLING = 30
 # A tick that does not hold after its iterations has so many times more of them.
@@ -119,11 +132,16 @@ SADDLE, KICK, KICKS = 1e-5, 1e-3, 3
 
 
 @kernel(inline=True, allocates=True)
-def unknowns(n):
+def unknowns(n, order):
     """Room for n unknowns: gradient, (right side or scratch, step, step before it was bent), Hessian, its factor."""
     vectors = np.empty((4, n))
-    matrices = np.empty((2, n, n))
-    return vectors[0], (vectors[1], vectors[2], vectors[3]), matrices[0], matrices[1]
+    if is_blocked(order):
+        hessian = np.empty((6 * order[3][BLOCKS], 6))
+        factor = np.empty((1, 36 * order[3][FACTORED]))
+    else:
+        matrices = np.empty((2, n, n))
+        hessian, factor = matrices[0], matrices[1]
+    return vectors[0], (vectors[1], vectors[2], vectors[3]), hessian, factor
 
 
 @kernel
@@ -181,12 +199,11 @@ def solve_program(table, pool, settings, state, history, tips):
         here[3][r] = math.inf
         y[r] = state[o_y + r]
         better_y[r] = y[r]
-    # Where rows stand: variables, sides, and the envelopes of matrices of variables and of rows.
-    integers = np.empty((4, max(most, n + 4 * pairs)), np.int64)
-    shape = (np.empty((most, 3 + table[EXTRA]), np.int64), integers[0], integers[1], integers[2])
-    bases, one_sided, last, last_row = shape
+    # Where rows stand: variables, sides, and where matrices of variables and of rows have entries.
+    shape = shape_of(table, most, n + 4 * pairs, record_of_blocks(table))
+    bases, one_sided, order, _of_rows = shape
     # What pairs need: which are free, the lengths of their coordinates, room for their derivatives; a guess of all.
-    free = integers[3]
+    free = np.empty(pairs, np.int64)
     for k in range(pairs):
         free[k] = -1
     loose = (
@@ -197,18 +214,23 @@ def solve_program(table, pool, settings, state, history, tips):
         tracked[2],
         memory,
     )
-    place_rows(table, free, bases, one_sided)
-    envelope(table, bases, rows, n, last, last_row)
+    arrange(table, free, shape, rows, n)
     o_room = table[TAPE_ROOM]
     room = (np.empty(table[o_room]), np.empty(table[o_room + 1]), np.empty(table[o_room + 2]))
-    gram = np.empty((most, most))
-    gradient, lines, lagrangian, matrix = unknowns(n)
+    gram = np.empty((most + 1, most))
+    gradient, lines, lagrangian, matrix = unknowns(n, order)
 
     reach = max(reach, turned(table, pool, here[1]))
     # What rounding of the user's coordinates, and of angles over many turns, alone can violate.
     feasible = max(settings[FEASIBILITY], 4e-16 * reach)
     limit = int(settings[ITERATIONS])
     mu = settings[PENALTY]
+    floor = settings[PENALTY_FLOOR]
+    slow_steps = 0
+    softness = 1.0
+    share = 1.0
+    lowest = math.inf
+    astray = False
     shift = 0.0
     radius = settings[RADIUS]
     violation = math.inf
@@ -238,21 +260,27 @@ def solve_program(table, pool, settings, state, history, tips):
     results[HELD] = 0.0
     results[CURVED] = 0.0
     lost = start_contacts(table, pool, here[0], here[1], free, loose[1])
+    recalled = int(settings[RECALL])
+    came = False
     if watched:
-        place_guards(table, memory, here, y, better_y, free)
+        place_guards(table, memory, here, y, better_y, free, True)
         if lost < 0:
-            look_around(table, pool, memory, here, AS_NEEDED)
-            place_guards(table, memory, here, y, better_y, free)
+            came = look_around(table, pool, memory, here, AS_NEEDED)
+            place_guards(table, memory, here, y, better_y, free, False)
     count = free_folds(table, pool, here[2], here[1], active, free, loose[1], -1.0, -1, free_trims)
+    folded = False
+    freed = 0
     if lost < 0 and count == 0:
         if watched:
-            place_rows(table, free, bases, one_sided)
-            envelope(table, bases, rows, n, last, last_row)
-        lost = evaluate(table, pool, here[1], math.inf, loose, room, here)
-    if lost >= 0:
+            arrange(table, free, shape, rows, n)
+        if recalled == 0 or came or not recall(table, state, recalled, here):
+            lost = evaluate(table, pool, here[1], math.inf, loose, room, here)
+            # A tick begins where the last one ended: there a pair that Newton's method loses is at a fold.
+            folded = tick and lost >= 0 and is_of_surfaces(table, lost)
+    if lost >= 0 and not folded:
         status = CONTACT_LOST
         results[CULPRIT] = float(lost)
-        value = objective(table, pool, here[0], 0, room, last, gradient, lagrangian)
+        value = objective(table, pool, here[0], 0, room, order, gradient, lagrangian)
     results[SCATTER] = 1.0 if status == RUNNING and scattered(table, here[3], one_sided) else 0.0
     if settings[GATHER] == 1.0 and results[SCATTER] == 1.0:
         gather(table, pool, bases, table[SLOTS], here)
@@ -260,11 +288,11 @@ def solve_program(table, pool, settings, state, history, tips):
             here[1][k, 0] = math.nan
         if watched:
             forget_guards(table, memory)
-            place_guards(table, memory, here, y, better_y, free)
+            place_guards(table, memory, here, y, better_y, free, False)
         start_contacts(table, pool, here[0], here[1], free, loose[1])
         if watched:
             look_around(table, pool, memory, here, AS_NEEDED)
-            place_guards(table, memory, here, y, better_y, free)
+            place_guards(table, memory, here, y, better_y, free, False)
         if table[IMPLICIT] == 1:
             recenter(table, pool, here[0])
         for r in range(m):
@@ -274,7 +302,8 @@ def solve_program(table, pool, settings, state, history, tips):
         if lost >= 0:
             status = CONTACT_LOST
             results[CULPRIT] = float(lost)
-    lost = np.int64(-1)
+    if not folded:
+        lost = np.int64(-1)
     below = FREE_BELOW
     # How a solve with clearances ended whose bodies are only pushed apart any more, and until when.
     ended = RUNNING
@@ -283,11 +312,15 @@ def solve_program(table, pool, settings, state, history, tips):
     changed = watched and settings[GATHER] == 1.0 and results[SCATTER] == 1.0
     while status == RUNNING:
         if watched and not changed:
-            holds_now = violation_of(here[3], one_sided, rows) <= TOUCHING
-            changed = look_around(table, pool, memory, here, CAREFUL if holds_now else AS_NEEDED)
+            holds_now = off_rows(table, loose, one_sided, here, tick) <= TOUCHING
+            how = CAREFUL if holds_now else AS_NEEDED
+            changed = look_again(table, pool, memory, here, how, free, loose[4])
         if changed:
-            place_guards(table, memory, here, y, better_y, free)
+            place_guards(table, memory, here, y, better_y, free, False)
         weigh_rows(rows, one_sided, here[3], y, mu, forces, active)
+        if folded:
+            # Nothing is known of its row yet.
+            active[lost] = 1.0 / mu
         if pairs > 0:
             count = free_folds(table, pool, here[2], here[1], active, free, loose[1], below, lost, free_trims)
         if m + 4 * count != rows or changed:
@@ -299,21 +332,29 @@ def solve_program(table, pool, settings, state, history, tips):
                 active[r] = 0.0
             rows = m + 4 * count
             n = 6 * table[MOVING] + 4 * count
-            place_rows(table, free, bases, one_sided)
-            envelope(table, bases, rows, n, last, last_row)
-            gradient, lines, lagrangian, matrix = unknowns(n)
+            arrange(table, free, shape, rows, n)
+            gradient, lines, lagrangian, matrix = unknowns(n, order)
             kept = False
             lost = evaluate(table, pool, here[1], math.inf, loose, room, here)
+            lowest = math.inf
+            astray = False
+            share = 1.0
+            if folded:
+                # Perhaps another one is lost.
+                folded = lost >= 0 and free[lost] < 0
+                freed += 1
+                if folded and freed <= pairs:
+                    continue
         below = FREE_BELOW
         if lost >= 0 and free[lost] < 0:
             # A pair that is lost and cannot be freed (an idle row, a pole): nothing moves any more.
             results[CULPRIT] = float(lost)
-            status = STALLED
+            status = CONTACT_LOST if folded else STALLED
         lost = np.int64(-1)
         residual = here[3]
         jacobian = here[4]
         descent, step, straight = lines
-        violation = violation_of(residual, one_sided, rows)
+        violation = off_rows(table, loose, one_sided, here, tick)
         value = goal(table, pool, shape, rows, loose, room, tips, here, 1, gradient, lagrangian)
         # Rows of vectors depend on one another: their multipliers drift where nothing keeps them short.
         shortened = iteration > 0 and (alpha < 1.0 or table[VECTOR_TRIMS] == 1)
@@ -336,7 +377,7 @@ def solve_program(table, pool, settings, state, history, tips):
             break
         if violation <= feasible and dual <= settings[STATIONARITY]:
             if watched and settings[LAST_LOOK] == 1.0:
-                changed = look_around(table, pool, memory, here, EVERYTHING)
+                changed = look_again(table, pool, memory, here, EVERYTHING, free, loose[4])
                 if changed:
                     iteration += 1
                     continue
@@ -370,20 +411,45 @@ def solve_program(table, pool, settings, state, history, tips):
             break
         if ended != RUNNING or (tick and iteration >= limit):
             # Its time is over: the shortest way back onto the rows.
+            if violation < lowest:
+                lowest = violation
+                astray = False
             weigh_rows(rows, one_sided, residual, y, mu, forces, active)
-            toward_rows(shape, rows, residual, jacobian, active, lagrangian, matrix, n, forces, step)
-            move(table, here[0], step, 1.0, trial[0])
-            carry(table, pool, bases, loose, here, step, 1.0)
+            softness = toward_rows(
+                shape,
+                m,
+                rows,
+                residual,
+                jacobian,
+                mu,
+                active,
+                softness,
+                0.1 * feasible,
+                lagrangian,
+                matrix,
+                n,
+                forces,
+                step,
+            )
+            move(table, here[0], step, share, trial[0])
+            carry(table, pool, bases, loose, here, step, share)
+            there = math.inf
             if (
-                (watched and is_too_far(table, pool, memory, trial))
-                or evaluate(table, pool, loose[4], BEND, loose, room, trial) >= 0
-                or not violation_of(trial[3], one_sided, rows) < violation
+                not (watched and is_too_far(table, pool, memory, trial))
+                and evaluate(table, pool, loose[4], BEND, loose, room, trial) < 0
             ):
-                status = STALLED if ended == RUNNING else ended
-                break
-            here, trial = trial, here
-            for r in range(rows):
-                better_y[r] = y[r]
+                there = off_rows(table, loose, one_sided, trial, tick)
+            if there < lowest or (tick and there < ASTRAY * lowest and not astray):
+                astray = not there < lowest
+                here, trial = trial, here
+                for r in range(rows):
+                    better_y[r] = y[r]
+                share = min(share / SHORTENED, 1.0)
+            else:
+                share *= SHORTENED
+                if share < LEAST_SHARE:
+                    status = STALLED if ended == RUNNING else ended
+                    break
             kept = False
             alpha = 1.0
             iteration += 1
@@ -407,8 +473,7 @@ def solve_program(table, pool, settings, state, history, tips):
                 y[r] = 0.0
             for i in range(n):
                 gradient[i] = 0.0
-                for j in range(i, last[i] + 1):
-                    lagrangian[i, j] = 0.0
+            clear_upper(order, n, lagrangian)
         # The right side and the matrix.
         weigh_rows(rows, one_sided, residual, y, mu, forces, active)
         for i in range(n):
@@ -421,13 +486,13 @@ def solve_program(table, pool, settings, state, history, tips):
             foreseen[r] = 0.0
         if is_fresh:
             curve_rows(rows, residual, y, active, restoring, forces)
-            add_row_terms(table, pool, loose, room, bases, here, forces, active, lagrangian)
+            add_row_terms(table, pool, loose, room, shape, here, forces, active, lagrangian)
             # What the inertia needs falls with the distance to the solution.
-            shift = factorize_shifted(lagrangian, n, last, max(min(0.25 * shift, dual), 1e-8), matrix)
+            shift = factorize_shifted(lagrangian, n, order, max(min(0.25 * shift, dual), 1e-8), matrix)
             if shift < 0.0:
                 status = STALLED
                 break
-        used, longest, turn = damped_step(table, lagrangian, n, last, shift, radius, matrix, descent, step, straight)
+        used, longest, turn = damped_step(table, lagrangian, n, order, shift, radius, matrix, descent, step, straight)
         for _ in range(FORESEEN):
             if used < 0.0 or restoring:
                 break
@@ -441,12 +506,12 @@ def solve_program(table, pool, settings, state, history, tips):
             if not is_fresh:
                 is_fresh = True
                 curve_rows(rows, residual, y, active, restoring, forces)
-                add_row_terms(table, pool, loose, room, bases, here, forces, active, lagrangian)
-            shift = factorize_shifted(lagrangian, n, last, max(shift, 1e-8), matrix)
+                add_row_terms(table, pool, loose, room, shape, here, forces, active, lagrangian)
+            shift = factorize_shifted(lagrangian, n, order, max(shift, 1e-8), matrix)
             used = shift
             if shift >= 0.0:
                 used, longest, turn = damped_step(
-                    table, lagrangian, n, last, shift, radius, matrix, descent, step, straight
+                    table, lagrangian, n, order, shift, radius, matrix, descent, step, straight
                 )
         if used < 0.0:
             status = STALLED
@@ -470,7 +535,7 @@ def solve_program(table, pool, settings, state, history, tips):
                 slope -= (y[r] + residual[r] / mu) * times(bases, jacobian, r, step)
         if restoring:
             if steepest <= 1e-9 * violation or longest < 1e-12:
-                if kicks < KICKS and factorize_shifted(lagrangian, n, last, 1e-8, matrix) > SADDLE:
+                if kicks < KICKS and factorize_shifted(lagrangian, n, order, 1e-8, matrix) > SADDLE:
                     # A saddle of the violations: axes that are parallel and are to stand at right angles, say.
                     kicks += 1
                     for i in range(n):
@@ -543,15 +608,22 @@ def solve_program(table, pool, settings, state, history, tips):
                     better_y[r] = min(better_y[r], 0.0)
         here, trial = trial, here
         if alpha == 1.0:
-            kept = cut == 1.0 and used == shift and mu == settings[PENALTY_FLOOR] and not restoring
+            kept = cut == 1.0 and used == shift and mu == floor and not restoring
             if cut == 1.0 and used == shift:
-                mu = max(0.1 * mu, settings[PENALTY_FLOOR])
+                # Rows whose slopes all but vanish, at a dead center say: only a harder penalty holds them.
+                slow = mu == floor and violation_of(here[3], one_sided, rows) > max(0.5 * violation, feasible)
+                slow_steps = slow_steps + 1 if slow else 0
+                if slow_steps >= SLOW and not tick:
+                    floor = max(0.1 * floor, HARDEST)
+                mu = max(0.1 * mu, floor)
             radius = min(2.0 * radius, 1e6)
         else:
             kept = False
             radius = max(2.0 * alpha * longest, SHORTEST)
         iteration += 1
 
+    if folded and status == CONTACT_LOST:
+        violation = math.inf
     crosses = watched and not tick and status != SOLVED and not is_clear(table, here[3])
     if holds and ((tick and not violation <= feasible) or crosses):
         # Back to the last pose that held; what is near there is looked for again.
@@ -559,19 +631,23 @@ def solve_program(table, pool, settings, state, history, tips):
         results[HELD] = 1.0
         if watched:
             go_back(table, memory, numbers)
-            place_guards(table, memory, here, y, better_y, free)
+            place_guards(table, memory, here, y, better_y, free, False)
     write_pose(table, pool, here[0], state)
     if status != CONTACT_LOST and not (tick and results[HELD] == 0.0):
         # A tick that went well ends at a pose that was just evaluated.
-        holds, violation = judge(table, pool, state, loose, room, shape, rows, here, trial, 1.25 * feasible)
+        holds, violation = judge(table, pool, state, loose, room, shape, rows, here, trial, 1.25 * feasible, tick)
         if status == SOLVED and not holds:
             status = STALLED
-    results[IMPROPER] = write_rows(table, here, y, free, size, state)
+    results[IMPROPER] = write_rows(table, here, y, loose, tick, size, state)
     if settings[SECOND_ORDER] == 1.0 and results[HELD] == 0.0 and status != CONTACT_LOST:
         goal(table, pool, shape, rows, loose, room, tips, here, 1, gradient, lagrangian)
         weigh_rows(rows, one_sided, here[3], y, settings[PENALTY_FLOOR], forces, active)
-        add_row_terms(table, pool, loose, room, bases, here, y, active, lagrangian)
-        results[CURVED] = 1.0 if factorize_shifted(lagrangian, n, last, 0.0, matrix) == 0.0 else -1.0
+        add_row_terms(table, pool, loose, room, shape, here, y, active, lagrangian)
+        results[CURVED] = 1.0 if factorize_shifted(lagrangian, n, order, 0.0, matrix) == 0.0 else -1.0
+    if recalled > 0:
+        # With clearances what a tick ends with depends on rounding where wires wedge: there, rows are evaluated afresh.
+        good = status == SOLVED if watched else status != CONTACT_LOST
+        leave(table, state, recalled, here, good and results[HELD] == 0.0 and rows == m)
     if watched:
         clear_guards(table)
     results[STATUS] = float(status)

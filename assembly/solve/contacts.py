@@ -24,8 +24,12 @@ from assembly.constraints.program import search_row
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.extremal import CONVERGED, SINGULAR, pair_frame
 from assembly.proximity.free_pair import coordinate_lengths
+from assembly.proximity.pole import limits
 from assembly.proximity.solid_contact import FEATURE_F, FOLD, TRACK
 from assembly.proximity.start import global_start
+
+# A parameter along which a point moves less, from end to end and over the scene's size, is one at a pole.
+POLAR = 1e-6
 
 
 @kernel(inline=True)
@@ -44,8 +48,11 @@ def free_pair(table, pool, row, k, contacts, free, lengths):
     if table[row + SHELL_F] >= 0:
         return False
     coordinate_lengths(table, pool, table[row + SURFACE_F], table[row + SURFACE_G], x, lengths, k)
-    if min(min(lengths[k, 0], lengths[k, 1]), min(lengths[k, 2], lengths[k, 3])) < 1e-6:
-        return False
+    for i in range(4):
+        # Over the whole domain, because a parameter has a unit of its own.
+        low, high, _closed = limits(table, pool, table[row + SURFACE_F + i // 2], i % 2)
+        if lengths[k, i] * (high - low) < POLAR:
+            return False
     free[k] = 0
     return True
 

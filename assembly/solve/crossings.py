@@ -13,7 +13,7 @@ from assembly.constraints.couplings import Coupling
 from assembly.constraints.joint import Joint
 from assembly.constraints.packing import pack
 from assembly.errors import InputError
-from assembly.proximity import watch
+from assembly.proximity import watch, watch_memory
 from assembly.proximity.solid_contact import PAIR_GAP, TRACK
 
 if TYPE_CHECKING:
@@ -53,15 +53,15 @@ def crossings(solution: Solution) -> tuple[tuple[str, str], ...]:
     for depth in DEPTHS:
         state = packed.new_state()
         memory = state[packed.memory_at :]
-        pairs = memory[watch.MEMORY_HEADER :]
-        pairs[watch.REACH : watch.PAIR_MEMORY * len(packed.guarded[0]) : watch.PAIR_MEMORY] = depth
+        pairs = memory[watch_memory.MEMORY_HEADER :]
+        pairs[watch_memory.REACH : watch_memory.PAIR_MEMORY * len(packed.guarded[0]) : watch_memory.PAIR_MEMORY] = depth
         tracked = np.full((packed.pair_rows, TRACK), np.nan)
         tracked[: len(contacts)] = solution._parameters[: len(contacts)]
         watch.look(packed.table, packed.pool, packed.table[layout.WATCH], memory, q, tracked, 1)
-        each = memory[watch.MEMORY_HEADER :][: watch.PAIR_MEMORY * len(packed.guarded[0])].reshape(
-            -1, watch.PAIR_MEMORY
+        each = memory[watch_memory.MEMORY_HEADER :][: watch_memory.PAIR_MEMORY * len(packed.guarded[0])].reshape(
+            -1, watch_memory.PAIR_MEMORY
         )
-        found |= set(np.flatnonzero(each[:, watch.CROSSED] == 1.0).tolist())
+        found |= set(np.flatnonzero(each[:, watch_memory.CROSSED] == 1.0).tolist())
         gaps = tracked[len(contacts) :, PAIR_GAP]
         found |= {
             pair for gap, (pair, _) in zip(gaps, packed.listed(state), strict=True) if pair >= 0 and gap < -CROSSING

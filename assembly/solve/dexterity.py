@@ -233,7 +233,7 @@ def bend(table, pool, record, shape, loose, room, point, forces, inputs, rates, 
     for r in range(n):
         for c in range(r, n):
             hessian[r, c] = 0.0
-    add_row_terms(table, pool, loose, room, shape[0], point, forces, shape[1], hessian)
+    add_row_terms(table, pool, loose, room, shape, point, forces, shape[1], hessian)
     for j in range(inputs.size):
         at = record + INPUT_LIST + INPUT * j
         add_coordinate_hessian(
@@ -279,7 +279,7 @@ def dexterity(table, pool, term, shape, rows, loose, room, point, order, gradien
     pull = np.empty(n)
     turn = np.empty(k)
     forces = np.zeros(rows)
-    none = (bases, np.zeros(rows))
+    none = (bases, np.zeros(rows), shape[2])
     hessian = np.empty((n, n))
     for i in range(k):
         for c in range(n):

@@ -21,8 +21,9 @@ from assembly.constraints.layout import (
     SURFACE_F,
     WATCH,
 )
-from assembly.proximity.solid_contact import FOLD
-from assembly.proximity.watch import (
+from assembly.proximity.solid_contact import FOLD, TRACK
+from assembly.proximity.watch import largest_part
+from assembly.proximity.watch_memory import (
     PAIR_F,
     PAIR_G,
     PAIR_MEMORY,
@@ -35,7 +36,6 @@ from assembly.proximity.watch import (
     PLACE_MEMORY,
     PLACE_NUMBER,
     TURN,
-    largest_part,
     memory_places,
 )
 from assembly.solve.rows import move
@@ -63,8 +63,11 @@ def forget_guards(table, memory):
 
 
 @kernel(inner=True)
-def place_guards(table, memory, here, y, better_y, free):
-    """Make every row the contact that its place has; multipliers of one that is new are zero."""
+def place_guards(table, memory, here, y, better_y, free, begins):
+    """Make every row the contact that its place has; multipliers of one that is new are zero.
+
+    Where a solve begins, rows know no contacts yet, and multipliers are those of the places.
+    """
     watch = table[WATCH]
     places = memory_places(table, watch)[1]
     for k in range(table[GUARDS]):
@@ -75,8 +78,9 @@ def place_guards(table, memory, here, y, better_y, free):
         if number == table[row + GUARD_NUMBER]:
             continue
         table[row + GUARD_NUMBER] = number
-        y[r] = 0.0
-        better_y[r] = 0.0
+        if not begins:
+            y[r] = 0.0
+            better_y[r] = 0.0
         free[r] = -1
         # Nothing is known of it yet.
         here[2][r, FOLD] = 1.0
@@ -98,6 +102,30 @@ def place_guards(table, memory, here, y, better_y, free):
 def look_around(table, pool, memory, point, how):
     """The watch's look at a point; whether rows changed."""
     return call_address(table[LOOK_AT], (table, pool, table[WATCH], memory, point[0], point[1], how)) > 0
+
+
+@kernel(inner=True)
+def look_again(table, pool, memory, point, how, free, scratch):
+    """The watch's look at a point that is evaluated; whether rows changed.
+
+    A look puts contacts on their extrema. Those whose coordinates are unknowns are on their way there: their rows have
+    been evaluated where they are, and they stay.
+    """
+    tracked = point[1]
+    first = table[FIRST_GUARD]
+    for r in range(first, first + table[GUARDS]):
+        if free[r] >= 0:
+            for i in range(TRACK):
+                scratch[r, i] = tracked[r, i]
+    changed = look_around(table, pool, memory, point, how)
+    places = memory_places(table, table[WATCH])[1]
+    for r in range(first, first + table[GUARDS]):
+        place = places + PLACE_MEMORY * (r - first)
+        number = np.int64(memory[place + PLACE_NUMBER]) if memory[place] >= 0.0 else 0
+        if free[r] >= 0 and number == table[table[ROW_TABLE] + ROW * r + GUARD_NUMBER]:
+            for i in range(TRACK):
+                tracked[r, i] = scratch[r, i]
+    return changed
 
 
 @kernel(inner=True)

@@ -1,7 +1,9 @@
 """The step: Cholesky factorization in an envelope, which says whether the matrix is positive definite.
 
 Row i of the upper triangle has entries up to column last[i], and last never falls: so fill-in stays inside. Bodies are
-numbered (`packing.py`) so that the envelope of a chain or a tree is narrow; that of a small scene is all.
+numbered (`packing.py`) so that the envelope of a chain or a tree is narrow; that of a small scene is all. Unknowns of
+pairs at folds stand elsewhere in the factor than in the step (`constraints/sparsity.py`), and `order` says where.
+Large scenes are factorized by blocks instead (`block_factor.py`).
 """
 
 from __future__ import annotations
@@ -9,6 +11,9 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
+from assembly.constraints.blocks import is_blocked
+from assembly.constraints.sparsity import listed_folds, place_upper
+from assembly.solve.block_factor import factorize_blocks, forward_blocks, greatest_diagonal, substitute_blocks
 
 
 @kernel(inline=True)
@@ -80,19 +85,64 @@ def substitute(m, n, last, b):
 
 
 @kernel(inner=True)
-def factorize_shifted(lagrangian, n, last, shift, matrix):
-    """Factorize lagrangian + d I with the first d from `shift` up that makes it positive definite; -1: none."""
-    scale = 1.0
+def forward_step(matrix, n, order, b):
+    """Solve U^T x = b in place, for the factor that `factorize_shifted` left; x in the order of the factor."""
+    places, vector, blocks = order[0], order[2][0], order[3]
+    place, ends = places[1], places[2]
+    if is_blocked(order):
+        forward_blocks(blocks, matrix[0], b, vector)
+        for i in range(n):
+            b[i] = vector[i]
+        return
+    if listed_folds(order) == 0:
+        forward(matrix, n, ends, b)
+        return
     for i in range(n):
-        scale = max(scale, abs(lagrangian[i, i]))
+        vector[place[i]] = b[i]
+    forward(matrix, n, ends, vector)
+    for i in range(n):
+        b[i] = vector[i]
+
+
+@kernel(inner=True)
+def solve_step(matrix, n, order, b):
+    """Solve (lagrangian + d I) x = b in place, for the factor that `factorize_shifted` left."""
+    places, vector, blocks = order[0], order[2][0], order[3]
+    place, ends = places[1], places[2]
+    if is_blocked(order):
+        substitute_blocks(blocks, matrix[0], b, vector)
+        return
+    if listed_folds(order) == 0:
+        substitute(matrix, n, ends, b)
+        return
+    for i in range(n):
+        vector[place[i]] = b[i]
+    substitute(matrix, n, ends, vector)
+    for i in range(n):
+        b[i] = vector[place[i]]
+
+
+@kernel(inner=True)
+def factorize_shifted(lagrangian, n, order, shift, matrix):
+    """Factorize lagrangian + d I with the first d from `shift` up that makes it positive definite; -1: none."""
+    blocked = is_blocked(order)
+    scale = 1.0
+    if blocked:
+        scale = greatest_diagonal(lagrangian, order[3])
+    else:
+        for i in range(n):
+            scale = max(scale, abs(lagrangian[i, i]))
     if not math.isfinite(scale):
         return -1.0
     while shift <= 1e8 * scale:
-        for i in range(n):
-            for j in range(i, last[i] + 1):
-                matrix[i, j] = lagrangian[i, j]
-            matrix[i, i] += shift
-        if factorize(matrix, n, last):
+        if blocked:
+            # What says where unknowns of pairs stand, and the vector, are free here.
+            if factorize_blocks(lagrangian, order[3], shift, matrix[0], order[0][1], order[2][0]):
+                return shift
+            shift = max(8.0 * shift, 1e-6)
+            continue
+        place_upper(lagrangian, n, order, shift, matrix)
+        if factorize(matrix, n, order[0][2]):
             return shift
         shift = max(8.0 * shift, 1e-6)
     return -1.0

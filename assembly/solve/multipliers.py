@@ -6,10 +6,16 @@ import math
 
 from assembly._kernel import kernel
 from assembly.constraints.layout import CONTACTS, TRIMS
-from assembly.constraints.program import add_gram
-from assembly.solve.linear import factorize, factorize_shifted, substitute
+from assembly.constraints.program import add_square
+from assembly.constraints.sparsity import clear_upper
+from assembly.solve.linear import factorize, factorize_shifted, solve_step, substitute
 from assembly.solve.rows import add_row, add_transposed, clear_row, times
 
+# So often a step back onto rows is computed again for rows that it breaks.
+BROKEN = 4
+# What such a step is weighed with: one, and less where it would leave more than this part of the violations, because
+# the rows all but depend on each other.
+LEFT_OVER, SOFTER, SOFTEST = 0.1, 1e-3, 1e-9
 # Multipliers below this count for nothing against the objective's curvature, which is of order one.
 WEAK = 1e-3
 
@@ -48,25 +54,49 @@ def foresee(table, shape, rows, residual, jacobian, y, mu, step, in_matrix, acti
         active[r] = 1.0 / mu if pushes else 0.0
         add_row(bases, jacobian, r, -sign * (y[r] + residual[r] / mu), descent)
         if in_matrix:
-            add_gram(bases, jacobian, r, sign / mu, lagrangian)
+            add_square(shape[2], bases, jacobian, r, sign / mu, lagrangian)
     return changed
 
 
 @kernel(inner=True)
-def toward_rows(shape, rows, residual, jacobian, active, lagrangian, matrix, n, forces, out):
-    """The shortest step after which the rows that bind hold to first order, into out; both matrices are overwritten."""
-    bases, _one_sided, last, _last_row = shape
-    for i in range(n):
-        out[i] = 0.0
-        for j in range(i, last[i] + 1):
-            lagrangian[i, j] = 0.0
-    for r in range(rows):
-        forces[r] = -residual[r] * active[r]
-        if active[r] > 0.0:
-            add_gram(bases, jacobian, r, active[r], lagrangian)
-    add_transposed(bases, jacobian, rows, forces, out)
-    if factorize_shifted(lagrangian, n, last, 1.0, matrix) > 0.0:
-        substitute(matrix, n, last, out)
+def toward_rows(shape, m, rows, residual, jacobian, mu, active, softness, enough, lagrangian, matrix, n, forces, out):
+    """The shortest step after which rows hold to first order, into out; both matrices are overwritten.
+
+    Idle one-sided rows that it would break count as well, now and until it breaks no more. Where rows all but depend on
+    each other it is long: `softness` weighs its square against theirs. What it leaves of the first `m` by that, those
+    of the program, is to be a small part or at most `enough`: the softness falls until it is. Returns the softness.
+    """
+    bases, one_sided, order, _of_rows = shape
+    broken = 0
+    while True:
+        for i in range(n):
+            out[i] = 0.0
+        clear_upper(order, n, lagrangian)
+        for r in range(rows):
+            forces[r] = -residual[r] * active[r]
+            if active[r] > 0.0:
+                add_square(order, bases, jacobian, r, active[r], lagrangian)
+        add_transposed(bases, jacobian, rows, forces, out)
+        if factorize_shifted(lagrangian, n, order, softness, matrix) > 0.0:
+            solve_step(matrix, n, order, out)
+        worst = 0.0
+        left = 0.0
+        found = 0
+        for r in range(rows):
+            there = residual[r] + times(bases, jacobian, r, out)
+            if active[r] > 0.0:
+                if r < m:
+                    worst = max(worst, abs(residual[r]))
+                    left = max(left, abs(there))
+            elif one_sided[r] == 1 and there < 0.0 and broken < BROKEN:
+                active[r] = 1.0 / mu
+                found += 1
+        if found > 0:
+            broken += 1
+        elif left <= max(LEFT_OVER * worst, enough) or softness <= SOFTEST:
+            return softness
+        else:
+            softness = max(SOFTER * softness, SOFTEST)
 
 
 @kernel(inner=True)
@@ -77,8 +107,9 @@ def curve_rows(rows, residual, y, active, restoring, forces):
         # Far from feasible, c / mu would drown the curvature of the objective; y is what it tends to.
         forces[r] = (residual[r] if active[r] > 0.0 else 0.0) if restoring else y[r]
         most = max(most, abs(forces[r]))
-    if most < WEAK:
-        # Forces on their way to zero: their curvature would only spoil the inertia, and cost the fast end.
+    if most < WEAK and not restoring:
+        # Forces on their way to zero: their curvature would only spoil the inertia, and cost the fast end. What is left
+        # of violations that cannot all vanish does not go to zero.
         for r in range(rows):
             forces[r] = 0.0
 
@@ -100,24 +131,31 @@ def dual_residual(bases, jacobian, rows, one_sided, residual, gradient, y, scrat
 
 
 @kernel(inner=True)
-def least_squares_multipliers(bases, jacobian, rows, one_sided, active, gradient, scratch, last_row, gram, y):
-    """The multipliers of the active rows that leave the smallest grad f + J^T y."""
+def least_squares_multipliers(bases, jacobian, rows, one_sided, active, gradient, scratch, of_rows, gram, y):
+    """The multipliers of the active rows that leave the smallest grad f + J^T y.
+
+    The last row of `gram` is room for the right side.
+    """
+    sequence, last_row = of_rows
+    side = gram[gram.shape[0] - 1]
     for i in range(gradient.size):
         scratch[i] = 0.0
-    for r in range(rows):
+    for k in range(rows):
+        r = sequence[k]
         if active[r] > 0.0:
             add_row(bases, jacobian, r, 1.0, scratch)
-        for s in range(r, last_row[r] + 1):
-            gram[r, s] = times(bases, jacobian, s, scratch) if active[s] > 0.0 else 0.0
-        gram[r, r] += 1e-10 if active[r] > 0.0 else 1.0
-        y[r] = -times(bases, jacobian, r, gradient) if active[r] > 0.0 else 0.0
+        for l in range(k, last_row[k] + 1):
+            s = sequence[l]
+            gram[k, l] = times(bases, jacobian, s, scratch) if active[s] > 0.0 else 0.0
+        gram[k, k] += 1e-10 if active[r] > 0.0 else 1.0
+        side[k] = -times(bases, jacobian, r, gradient) if active[r] > 0.0 else 0.0
         if active[r] > 0.0:
             clear_row(bases, r, scratch)
     if factorize(gram, rows, last_row):
-        substitute(gram, rows, last_row, y)
-    for r in range(rows):
-        if one_sided[r] == 1:
-            y[r] = min(y[r], 0.0)
+        substitute(gram, rows, last_row, side)
+    for k in range(rows):
+        r = sequence[k]
+        y[r] = min(side[k], 0.0) if one_sided[r] == 1 else side[k]
 
 
 @kernel(inner=True)
@@ -126,7 +164,7 @@ def choose_multipliers(shape, rows, here, shortened, good, active, gradient, scr
 
     Returns the dual residual.
     """
-    bases, one_sided, _last, last_row = shape
+    bases, one_sided, _order, of_rows = shape
     residual = here[3]
     jacobian = here[4]
     dual = dual_residual(bases, jacobian, rows, one_sided, residual, gradient, better_y, scratch)
@@ -140,7 +178,7 @@ def choose_multipliers(shape, rows, here, shortened, good, active, gradient, scr
     else:
         dual = other
     if shortened:
-        least_squares_multipliers(bases, jacobian, rows, one_sided, active, gradient, scratch, last_row, gram, better_y)
+        least_squares_multipliers(bases, jacobian, rows, one_sided, active, gradient, scratch, of_rows, gram, better_y)
         other = dual_residual(bases, jacobian, rows, one_sided, residual, gradient, better_y, scratch)
         if other < dual:
             dual = other
@@ -161,10 +199,10 @@ def strongest(values, count):
 @kernel(inner=True)
 def least_multipliers(shape, rows, here, active, gradient, scratch, gram, dual, y, better_y):
     """The shortest multipliers that balance the objective, if they do so as well as y; into y. The dual residual."""
-    bases, one_sided, _last, last_row = shape
+    bases, one_sided, _order, of_rows = shape
     residual = here[3]
     jacobian = here[4]
-    least_squares_multipliers(bases, jacobian, rows, one_sided, active, gradient, scratch, last_row, gram, better_y)
+    least_squares_multipliers(bases, jacobian, rows, one_sided, active, gradient, scratch, of_rows, gram, better_y)
     other = dual_residual(bases, jacobian, rows, one_sided, residual, gradient, better_y, scratch)
     if other > max(10.0 * dual, 1e-11):
         return dual

@@ -39,7 +39,7 @@ class Options:
     penalty : float
         First mu of the augmented Lagrangian; a smaller one holds constraints harder from the start.
     penalty_floor : float
-        Smallest mu.
+        Smallest mu while violations shrink; where they do not, it falls further, to 1e-10.
     radius : float
         First bound of a step: lengths relative to the scene's size, and radians.
     verbose : int

@@ -21,7 +21,7 @@ from assembly.constraints.program import evaluate
 from assembly.proximity.extremal import BEND
 from assembly.proximity.solid_contact import PROPER, TRACK
 from assembly.solve.contacts import free_pairs_hold
-from assembly.solve.rows import violation_of
+from assembly.solve.rows import off_rows, off_tangency
 
 # A gap that counts as touching where crossing surfaces are reported.
 TOUCHING = 1e-9
@@ -74,10 +74,11 @@ def bring_back(held, rows, here, y):
 
 
 @kernel(inner=True)
-def judge(table, pool, state, loose, room, shape, rows, here, trial, bound):
+def judge(table, pool, state, loose, room, shape, rows, here, trial, bound, lax):
     """The pose as it is returned, rounded to the user's coordinates, evaluated afresh into `trial`.
 
-    Residuals found are copied to `here`. Returns whether every row holds within the bound, and the largest violation.
+    Residuals found are copied to `here`. Returns whether every row holds within the bound, and the largest violation,
+    tangency counted by gaps if `lax`.
     """
     q = trial[0]
     for b in range(table[BODIES]):
@@ -90,15 +91,16 @@ def judge(table, pool, state, loose, room, shape, rows, here, trial, bound):
         return False, math.inf
     for r in range(rows):
         here[3][r] = trial[3][r]
-    violation = violation_of(trial[3], shape[1], rows)
+    violation = off_rows(table, loose, shape[1], trial, lax)
     holds = free_pairs_hold(table, pool, q, here[1], loose[0], 1e-9)
     return holds and violation <= bound, violation
 
 
 @kernel(inner=True)
-def write_rows(table, here, y, free, size, state):
+def write_rows(table, here, y, loose, lax, size, state):
     """Tracked values, multipliers and residuals into the state; returns at how many contacts surfaces cross."""
-    _q, tracked, records, residual, _jacobian = here
+    _q, tracked, records, residual, jacobian = here
+    free = loose[0]
     m = table[ROWS]
     o = 7 * table[BODIES]
     for k in range(table[TRACKED]):
@@ -112,9 +114,9 @@ def write_rows(table, here, y, free, size, state):
         if r < table[CONTACTS]:
             if free[r] >= 0:
                 # What a free pair lacks to be extremal is a violation of its contact, too.
-                for i in range(4):
-                    if abs(residual[m + 4 * free[r] + i]) > abs(worst):
-                        worst = -abs(residual[m + 4 * free[r] + i])
+                off = off_tangency(residual, jacobian, r, m + 4 * free[r], lax, loose[3])
+                if off > abs(worst):
+                    worst = -off
             elif records[r, PROPER] == 0.0 and abs(worst) <= TOUCHING:
                 crossing += 1.0
         state[o + m + r] = worst * size if table[table[ROW_TABLE] + ROW * r + IS_LENGTH] == 1 else worst

@@ -52,7 +52,7 @@ from assembly.proximity.free_pair import VARIABLES, VECTORS
 from assembly.proximity.solid_contact import CONTACT_RECORD, TRACK
 from assembly.solve.augmented_lagrangian import FREE_BELOW
 from assembly.solve.contacts import free_folds, start_contacts
-from assembly.solve.rows import envelope, place_rows
+from assembly.solve.rows import arrange, shape_of
 from assembly.solve.search import goal
 
 
@@ -192,14 +192,8 @@ def gradient_at(table, pool, state, free, gradient, tips):
     lost, count, point, loose, room = point_at(table, pool, state, free)
     rows = table[ROWS] + 4 * count
     n = 6 * table[MOVING] + 4 * count
-    shape = (
-        np.empty((rows, 3 + table[EXTRA]), np.int64),
-        np.empty(rows, np.int64),
-        np.empty(n, np.int64),
-        np.empty(rows, np.int64),
-    )
-    place_rows(table, free, shape[0], shape[1])
-    envelope(table, shape[0], rows, n, shape[2], shape[3])
+    shape = shape_of(table, rows, n, table[:0])
+    arrange(table, free, shape, rows, n)
     slopes = np.empty(n)
     curves = np.empty((n, n))
     if lost < 0:

@@ -6,16 +6,22 @@ coordinates, then twists of further bodies.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly.constraints.blocks import choose_storage
 from assembly.constraints.layout import (
     ANGLE,
+    BLOCK_LENGTH,
+    BLOCK_RECORD,
     BODIES,
     BODY_F,
     BODY_G,
     CONTACTS,
     DEXTERITIES,
+    EXTRA,
     EXTRA_COLUMN,
     FREE_COLUMN,
     JOINT_ROW,
@@ -44,6 +50,7 @@ from assembly.constraints.layout import (
     TRIM_PAIR,
     TRIMS,
 )
+from assembly.constraints.sparsity import close_envelope, place_folds
 from assembly.constraints.terms import TAPE_TERM, TERM, TERM_KIND, TERM_TABLE, TERM_TAPE
 from assembly.kinematics.motion import retract
 from assembly.proximity.extremal import into_domain
@@ -88,26 +95,41 @@ def place_rows(table, free, bases, one_sided):
                 bases[table[tape + TAPE_ROW_AT] + v, b + 1] = slot(table, table[table[tape + TAPE_LIST] + b])
 
 
+@kernel(inline=True, allocates=True)
+def record_of_blocks(table):
+    """The part of the table that has it; empty where the scene has none."""
+    return table[table[BLOCK_RECORD] : table[BLOCK_RECORD] + table[BLOCK_LENGTH]]
+
+
 @kernel(inline=True)
 def width(block):
     return 4 if block == 2 else 6
 
 
-@kernel(inner=True, allocates=True)
-def envelope(table, bases, rows, n, last, last_row):
-    """How far the rows of the Lagrangian's Hessian reach, and those of J J^T (see `linear.factorize`)."""
+@kernel(inner=True)
+def body_span(bases, r, n):
+    """First unknown and last one of the bodies of row r; n and -1 where it has none."""
+    low = n
+    high = -1
+    for b in range(bases.shape[1]):
+        at = bases[r, b]
+        if at >= 0 and b != 2:
+            low = min(low, at)
+            high = max(high, at + 5)
+    return low, high
+
+
+@kernel(inner=True)
+def place_unknowns(table, bases, rows, n, order):
+    """Where the Hessian of the Lagrangian has entries, and its factor (see `constraints/sparsity.py`)."""
+    places, folds = order[0], order[1]
+    last, ends = places[0], places[2]
+    choose_storage(order, n)
+    first = 6 * table[MOVING]
     for i in range(n):
-        last[i] = i
-    for i in range(0, 6 * table[MOVING], 6):
-        last[i] = i + 5
+        last[i] = first + (i - first) // 4 * 4 + 3 if i >= first else i // 6 * 6 + 5
     for r in range(rows):
-        low = n
-        high = -1
-        for b in range(bases.shape[1]):
-            at = bases[r, b]
-            if at >= 0:
-                low = min(low, at)
-                high = max(high, at + width(b) - 1)
+        low, high = body_span(bases, r, n)
         if high >= 0:
             last[low] = max(last[low], high)
     for t in range(table[TERMS]):
@@ -123,21 +145,69 @@ def envelope(table, bases, rows, n, last, last_row):
                     high = max(high, at + 5)
             if high >= 0:
                 last[low] = max(last[low], high)
-    if table[DEXTERITIES] > 0:
-        last[0] = n - 1
-    for i in range(1, n):
-        last[i] = max(last[i], last[i - 1])
-    # Rows meet in J J^T where they share a variable.
-    latest = np.empty(n, np.int64)
+    close_envelope(last, first)
+    count = (n - first) // 4
+    folds[folds.shape[0] - 1, 0] = 0
+    if count == 0 or table[DEXTERITIES] > 0:
+        for i in range(n):
+            if table[DEXTERITIES] > 0:
+                last[i] = n - 1
+            ends[i] = last[i]
+        return
+    for r in range(table[CONTACTS]):
+        if bases[r, 2] >= 0:
+            k = (bases[r, 2] - first) // 4
+            folds[k, 0] = bases[r, 0]
+            folds[k, 1] = bases[r, 1]
+    folds[folds.shape[0] - 1, 0] = count
+    place_folds(n, order)
+
+
+@kernel(inner=True, allocates=True)
+def order_rows(bases, rows, n, sequence, last_row):
+    """Rows in the order of their first bodies, and how far those of J J^T reach then (see `linear.factorize`)."""
+    # Rows meet in J J^T where they share a variable. First how many begin at each, then where the next one goes.
+    latest = np.zeros(n + 1, np.int64)
     for r in range(rows):
-        for b in range(bases.shape[1]):
-            if bases[r, b] >= 0:
-                latest[bases[r, b]] = r
+        latest[body_span(bases, r, n)[0]] += 1
+    total = 0
+    for i in range(n + 1):
+        total, latest[i] = total + latest[i], total
     for r in range(rows):
-        last_row[r] = r if r == 0 else max(r, last_row[r - 1])
+        low = body_span(bases, r, n)[0]
+        sequence[latest[low]] = r
+        latest[low] += 1
+    for at in range(rows):
         for b in range(bases.shape[1]):
-            if bases[r, b] >= 0:
-                last_row[r] = max(last_row[r], latest[bases[r, b]])
+            if bases[sequence[at], b] >= 0:
+                latest[bases[sequence[at], b]] = at
+    for at in range(rows):
+        last_row[at] = at
+        for b in range(bases.shape[1]):
+            if bases[sequence[at], b] >= 0:
+                last_row[at] = max(last_row[at], latest[bases[sequence[at], b]])
+    close_envelope(last_row, rows)
+
+
+@kernel(inner=True)
+def arrange(table, free, shape, rows, n):
+    """Where rows and unknowns stand, now that the pairs in `free` are at folds."""
+    bases, one_sided, order, (sequence, last_row) = shape
+    place_rows(table, free, bases, one_sided)
+    place_unknowns(table, bases, rows, n, order)
+    order_rows(bases, rows, n, sequence, last_row)
+
+
+@kernel(inline=True, allocates=True)
+def shape_of(table, most, n, blocks):
+    """Room for what `arrange` finds, for so many rows and unknowns: (bases, one_sided, order, order of rows).
+
+    `blocks` is the scene's record of them, `record_of_blocks`, or an empty one for a dense Hessian.
+    """
+    of_rows = np.empty((3, most), np.int64)
+    folds = np.empty((table[CONTACTS] + 1, 2), np.int64)
+    order = (np.empty((3, n), np.int64), folds, np.empty((13, max(n, 36)) if blocks.size > 0 else (1, n)), blocks)
+    return np.empty((most, 3 + table[EXTRA]), np.int64), of_rows[0], order, (of_rows[1], of_rows[2])
 
 
 @kernel(inner=True)
@@ -204,6 +274,65 @@ def violation_of(residual, one_sided, rows):
             c = min(c, 0.0)
         if not abs(c) <= worst:
             worst = abs(c)
+    return worst
+
+
+@kernel(inner=True)
+def untouched(residual, jacobian, r, e, work):
+    """To first order, how the gap in row r changes where the rows of tangency, from e on, come to hold.
+
+    By d = -T^-1 t in the coordinates, T and t those of the tangency. Infinite where T is singular.
+    """
+    c = FREE_COLUMN
+    for i in range(4):
+        for j in range(4):
+            work[i, j] = jacobian[e + i, c + j]
+        work[i, 4] = -residual[e + i]
+    for k in range(4):
+        pivot = k
+        for i in range(k + 1, 4):
+            if abs(work[i, k]) > abs(work[pivot, k]):
+                pivot = i
+        if not abs(work[pivot, k]) > 1e-300:
+            return math.inf
+        for j in range(k, 5):
+            work[k, j], work[pivot, j] = work[pivot, j], work[k, j]
+        for i in range(k + 1, 4):
+            factor = work[i, k] / work[k, k]
+            for j in range(k, 5):
+                work[i, j] -= factor * work[k, j]
+    change = 0.0
+    for k in range(3, -1, -1):
+        for j in range(k + 1, 4):
+            work[k, 4] -= work[k, j] * work[j, 4]
+        work[k, 4] /= work[k, k]
+        change += jacobian[r, c + k] * work[k, 4]
+    return abs(change)
+
+
+@kernel(inner=True)
+def off_tangency(residual, jacobian, r, e, lax, work):
+    """What a free pair whose rows of tangency begin at e is off them, at most, or what its gap in row r changes by it.
+
+    The latter if `lax`: no more than the former, times a way that is no longer than the scene.
+    """
+    off = 0.0
+    for i in range(4):
+        if not abs(residual[e + i]) <= off:
+            off = abs(residual[e + i])
+    return min(off, untouched(residual, jacobian, r, e, work)) if lax and off > 0.0 else off
+
+
+@kernel(inner=True)
+def off_rows(table, loose, one_sided, point, lax):
+    """The largest violation of rows and of the tangency of free pairs, which is counted as by `off_tangency`."""
+    free = loose[0]
+    worst = violation_of(point[3], one_sided, table[ROWS])
+    for k in range(table[CONTACTS]):
+        if free[k] >= 0:
+            off = off_tangency(point[3], point[4], k, table[ROWS] + 4 * free[k], lax, loose[3])
+            if not off <= worst:
+                worst = off
     return worst
 
 

@@ -13,7 +13,7 @@ from assembly.constraints.terms import objective
 from assembly.proximity.extremal import BEND
 from assembly.solve.dexterity import add_dexterities
 from assembly.solve.guards import is_too_far
-from assembly.solve.linear import factorize_shifted, forward, substitute
+from assembly.solve.linear import factorize_shifted, forward_step, solve_step
 from assembly.solve.rows import add_transposed, carry, merit, move
 
 # A step shorter than this decides nothing.
@@ -24,7 +24,7 @@ SHORTENINGS = 4
 
 
 @kernel(inner=True)
-def damped_step(table, lagrangian, n, last, shift, radius, matrix, descent, step, scratch):
+def damped_step(table, lagrangian, n, order, shift, radius, matrix, descent, step, scratch):
     """The step of the factor in `matrix`, its shift raised until the step is not much longer than the radius.
 
     Nor may a body turn by much more than a radian. Scaled down instead, a step would lose what its stiff directions
@@ -34,7 +34,7 @@ def damped_step(table, lagrangian, n, last, shift, radius, matrix, descent, step
     for attempt in range(SHORTENINGS + 1):
         for i in range(n):
             step[i] = descent[i]
-        substitute(matrix, n, last, step)
+        solve_step(matrix, n, order, step)
         longest = 0.0
         turn = 0.0
         for i in range(n):
@@ -47,13 +47,13 @@ def damped_step(table, lagrangian, n, last, shift, radius, matrix, descent, step
         # Newton's method on 1 / |step|, whose slope is |U^-T step|^2.
         for i in range(n):
             scratch[i] = step[i]
-        forward(matrix, n, last, scratch)
+        forward_step(matrix, n, order, scratch)
         square = 0.0
         slope = 0.0
         for i in range(n):
             square += step[i] * step[i]
             slope += scratch[i] * scratch[i]
-        shift = factorize_shifted(lagrangian, n, last, shift + square / slope * (excess - 1.0), matrix)
+        shift = factorize_shifted(lagrangian, n, order, shift + square / slope * (excess - 1.0), matrix)
         if shift < 0.0:
             break
     return shift, longest, turn
@@ -101,12 +101,13 @@ def search(
     The trial point is left in `trial`. Returns whether one was accepted, alpha, and the contact lost by the last trial
     or -1. `base` is the objective's part of the merit here, `longest` the largest component of the step.
     """
-    bases, one_sided, last, _last_row = shape
+    bases, one_sided, order, _of_rows = shape
     descent, step, straight = lines
     n = descent.size
     residual = here[3]
     here_merit = merit(residual, one_sided, rows, y, mu) + base
-    noise = 1e-14 * (abs(here_merit) + abs(value) + 1e-300)
+    # Of the violations alone no objective rounds anything off.
+    noise = 1e-14 * (abs(here_merit) + (0.0 if restoring else abs(value)) + 1e-300)
     # Rounding of the poses, of order one, is felt through the objective's slope and the rows' forces.
     for i in range(n):
         noise += 4e-16 * abs(gradient[i])
@@ -137,7 +138,7 @@ def search(
                 for r in range(rows):
                     forces[r] = -(trial[3][r] - (1.0 - alpha) * residual[r]) * active[r]
                 add_transposed(bases, here[4], rows, forces, descent)
-                substitute(matrix, n, last, descent)
+                solve_step(matrix, n, order, descent)
                 for i in range(n):
                     step[i] += descent[i] / alpha
                 continue

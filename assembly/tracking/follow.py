@@ -35,7 +35,15 @@ from assembly.geometry.vec import quaternion_product
 from assembly.proximity.extremal import BEND, CONVERGED, SINGULAR, into_domain
 from assembly.proximity.solid_contact import FOLD, PAIR_GAP, PROPER, TRACK
 from assembly.proximity.velocity import ARM_F, GAP, RATES, ZED
-from assembly.proximity.watch import ALLOWANCE, EVENT_COUNT, LENGTHS, NEGLECT, PAIR_MEMORY, PLACE_MEMORY, memory_places
+from assembly.proximity.watch_memory import (
+    ALLOWANCE,
+    EVENT_COUNT,
+    LENGTHS,
+    NEGLECT,
+    PAIR_MEMORY,
+    PLACE_MEMORY,
+    memory_places,
+)
 from assembly.solve.guards import look_around, place_guards
 
 # A correction by more than this part of the prediction and of the surface's domain puts the root in doubt; so does a
@@ -210,7 +218,7 @@ def follow(table, pool, q, poses, tracked, records, room, free, memory):
     look_around(table, pool, memory, (poses, tracked), 0)
     for k in range(table[GUARDS]):
         before[first + k, 0] = float(table[table[ROW_TABLE] + ROW * (first + k) + GUARD_NUMBER])
-    place_guards(table, memory, (poses, tracked, records, rows[0]), rows[0], rows[1], free)
+    place_guards(table, memory, (poses, tracked, records, rows[0]), rows[0], rows[1], free, False)
     for k in range(table[GUARDS]):
         r = first + k
         row = table[ROW_TABLE] + ROW * r

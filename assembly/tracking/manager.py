@@ -15,7 +15,7 @@ from assembly.constraints.packing import Packed
 from assembly.errors import InputError, number
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import pose_rows
-from assembly.proximity import watch
+from assembly.proximity import watch_memory
 from assembly.proximity.events import Event, PairState, events_of
 from assembly.proximity.solid_contact import CONTACT_RECORD, TRACK
 from assembly.proximity.velocity import ARM_F, GAP, NORMAL
@@ -146,26 +146,26 @@ class Manager:
         self._set_up(2 * old[0].guards)
         pairs, places, events = self._parts(*old[:2])
         new_pairs, new_places, new_events = self._parts(self._packed, self._memory)
-        head = watch.MEMORY_HEADER
+        head = watch_memory.MEMORY_HEADER
         self._memory[:head] = old[1][:head]
         new_pairs[:] = pairs
         new_places[: len(places)] = places
         new_places[len(places) :] = (-1.0, 0.0)
         new_events[:] = events
         # Every pair is looked at once more.
-        new_pairs[:, watch.TURN] = nan
+        new_pairs[:, watch_memory.TURN] = nan
         self._poses[:] = old[2]
         self._tracked[: len(places)] = old[3]
 
     @staticmethod
     def _parts(packed: Packed, memory: Array) -> tuple[Array, Array, Array]:
         """Views of what a memory knows of pairs, of places, and of events."""
-        pairs_at = watch.MEMORY_HEADER
-        places_at = pairs_at + watch.PAIR_MEMORY * len(packed.guarded[0])
-        events_at = places_at + watch.PLACE_MEMORY * packed.guards
+        pairs_at = watch_memory.MEMORY_HEADER
+        places_at = pairs_at + watch_memory.PAIR_MEMORY * len(packed.guarded[0])
+        events_at = places_at + watch_memory.PLACE_MEMORY * packed.guards
         return (
-            memory[pairs_at:places_at].reshape(-1, watch.PAIR_MEMORY),
-            memory[places_at:events_at].reshape(-1, watch.PLACE_MEMORY),
+            memory[pairs_at:places_at].reshape(-1, watch_memory.PAIR_MEMORY),
+            memory[places_at:events_at].reshape(-1, watch_memory.PLACE_MEMORY),
             memory[events_at:],
         )
 
@@ -212,7 +212,7 @@ class Manager:
             code += self._follow(pose_rows("q", q, len(self._bodies)))
         if code == 0:
             return ()
-        since, self._seen = int(self._seen), self._memory[watch.EVENT_COUNT]
+        since, self._seen = int(self._seen), self._memory[watch_memory.EVENT_COUNT]
         return events_of(self._memory, self._pairs, self._packed.scale, since)
 
     def _follow(self, q: Array) -> int:
@@ -234,7 +234,7 @@ class Manager:
 
     def _is_full(self) -> bool:
         """Whether every place has a contact."""
-        return bool((self._parts(self._packed, self._memory)[1][:, watch.PLACE_PAIR] >= 0.0).all())
+        return bool((self._parts(self._packed, self._memory)[1][:, watch_memory.PLACE_PAIR] >= 0.0).all())
 
     @property
     def contacts(self) -> tuple[ListedContact, ...]:
@@ -243,15 +243,15 @@ class Manager:
         places = self._parts(packed, self._memory)[1]
         index = {body: k for k, body in enumerate(body.name for body in self._bodies)}
         found = []
-        for k in np.flatnonzero(places[:, watch.PLACE_PAIR] >= 0.0).tolist():
-            bodies = self._pairs[int(places[k, watch.PLACE_PAIR])]
+        for k in np.flatnonzero(places[:, watch_memory.PLACE_PAIR] >= 0.0).tolist():
+            bodies = self._pairs[int(places[k, watch_memory.PLACE_PAIR])]
             record = self._records[k]
             gap, normal = float(record[GAP]), record[NORMAL : NORMAL + 3].copy()
             there = self._poses[index[bodies[0]], :3] + record[ARM_F : ARM_F + 3]
             found.append(
                 ListedContact(
                     bodies=bodies,
-                    number=int(places[k, watch.PLACE_NUMBER]),
+                    number=int(places[k, watch_memory.PLACE_NUMBER]),
                     parameters=self._tracked[k, :4].copy(),
                     points=np.array([there - gap * normal, there]) * packed.scale + packed.reference,
                     normal=normal,
@@ -265,7 +265,8 @@ class Manager:
         """How every pair of bodies is watched; far before the first update."""
         pairs = self._parts(self._packed, self._memory)[0]
         return {
-            names: _STATES[int(state)] for names, state in zip(self._pairs, pairs[:, watch.STATE].tolist(), strict=True)
+            names: _STATES[int(state)]
+            for names, state in zip(self._pairs, pairs[:, watch_memory.STATE].tolist(), strict=True)
         }
 
     @property
@@ -276,7 +277,11 @@ class Manager:
         holds for bodies that are apart, or cross no deeper than looks see; minus infinity before the first update.
         """
         pairs = self._parts(self._packed, self._memory)[0]
-        left = np.where(np.isnan(pairs[:, watch.TURN]), -inf, pairs[:, watch.ALLOWANCE] * (1.0 - pairs[:, watch.PART]))
+        left = np.where(
+            np.isnan(pairs[:, watch_memory.TURN]),
+            -inf,
+            pairs[:, watch_memory.ALLOWANCE] * (1.0 - pairs[:, watch_memory.PART]),
+        )
         bounds = dict(zip(self._pairs, (self._reach + self._packed.scale * left).tolist(), strict=True))
         for contact in self.contacts:
             bounds[contact.bodies] = min(bounds[contact.bodies], contact.gap)

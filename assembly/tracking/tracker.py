@@ -6,7 +6,7 @@ from enum import Enum
 from functools import cached_property
 from math import isfinite
 from time import perf_counter, sleep
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,9 +19,12 @@ from assembly.errors import InputError, integer, number, positive
 from assembly.kinematics.body import Body, Frame, Point
 from assembly.kinematics.pose import Pose, axes_quaternion, rotation_matrix
 from assembly.proximity.events import Event, events_of
-from assembly.proximity.watch import EVENT_COUNT
+from assembly.proximity.watch_memory import (
+    EVENT_COUNT,
+)
 from assembly.solve.augmented_lagrangian import (
     BUDGET,
+    CONTACT_LOST,
     COUNT,
     CURVED,
     DUAL,
@@ -33,6 +36,7 @@ from assembly.solve.augmented_lagrangian import (
     OBJECTIVE,
     OUT_OF_TIME,
     RADIUS,
+    RECALL,
     SECOND_ORDER,
     SOLVED,
     STATIONARITY,
@@ -41,6 +45,7 @@ from assembly.solve.augmented_lagrangian import (
     solve_program,
 )
 from assembly.solve.options import Options
+from assembly.solve.recall import recall_size
 from assembly.solve.solution import Scene, Solution, Status
 from assembly.tracking.log import TrackLog
 
@@ -52,7 +57,7 @@ __all__ = ["Step", "TrackStatus", "Tracker"]
 
 Array = NDArray[np.float64]
 # Steps of a tick may be bounded to this, in parts of the scene's size, after ticks that led nowhere.
-SHORTEST_RADIUS = 1e-5
+SHORTEST_RADIUS = 1e-7
 
 
 class TrackStatus(Enum):
@@ -241,6 +246,10 @@ class Tracker:
             (inner.minimize if sign > 0.0 else inner.maximize)(objective)
         inner.minimize(self._hand)
         self._inner = inner
+        # A solve packs anew where contacts found no place: what it ends with is what ticks go on with.
+        first = inner.solve(poses)
+        if not first.success:
+            raise InputError(f"q0 is a start that leads to no pose to begin at; expected one: {first.message}")
         self._packed: Packed = inner.packed()
         assert inner._scene is not None
         self._scene: Scene = inner._scene
@@ -257,18 +266,22 @@ class Tracker:
             self._packed.table[CLOCK_AT] = clock_address()
             if self._packed.table[CLOCK_AT] == 0:
                 raise InputError("budget is given, but this interpreter has no clock for compiled code; expected None")
-        self._history = np.empty((1, HISTORY))
-        first = inner.solve(poses)
-        if not first.success:
-            raise InputError(f"q0 is a start that leads to no pose to begin at; expected one: {first.message}")
-        self._state = first._state.copy()
-        # Numbers are read from a view in half the time it takes to read them from the array.
-        self._view = memoryview(self._state)  # type: ignore[arg-type]  # an array is a buffer
-        self._before = self._state.copy()
-        self._radius = float(self._settings[RADIUS])
+        self._history = np.zeros((1, HISTORY))
         packed = self._packed
         self._names = [(a.name, b.name) for pairs in packed.guarded for a, b in pairs]
-        self._seen = 0.0
+        # Behind the state of a solve are the rows of the last tick; steps have no copy of those.
+        self._size = first._state.size
+        recalled = recall_size(packed.count, packed.pair_rows)
+        self._state = np.concatenate([first._state, np.zeros(recalled)])
+        self._settings[RECALL] = self._size
+        self._pose = self._state[: self._size]
+        # Numbers are read from a view in half the time it takes to read them from the array.
+        self._view: Any = memoryview(self._state)  # type: ignore[arg-type]  # an array is a buffer
+        self._before = self._pose.copy()
+        self._knobs: Any = memoryview(self._settings)  # type: ignore[arg-type]  # as above
+        self._arguments = (packed.table, packed.pool, self._settings, self._state, self._history, packed.tips)
+        self._radius = float(self._settings[RADIUS])
+        self._seen = float(self._state[packed.memory_at + EVENT_COUNT]) if packed.guards else 0.0
         self._pool = memoryview(packed.pool)  # type: ignore[arg-type]  # as above
         self._reference = packed.reference.tolist()
         self._at = next(at for target, at in packed._targets if target is self._hand)
@@ -295,33 +308,34 @@ class Tracker:
             Where the hand is: a point, or the pose of the frame it holds.
         """
         begin = perf_counter()
-        packed, state = self._packed, self._state
+        packed = self._packed
         row = self._aimed(target)
         if row is None:
-            return Step(self, state.copy(), TrackStatus.BAD_TARGET, self._where(), (), perf_counter() - begin)
+            return Step(self, self._pose.copy(), TrackStatus.BAD_TARGET, self._where(), (), perf_counter() - begin)
         before, view = self._before, self._view
-        before[:] = state
-        code = solve_program(packed.table, packed.pool, self._settings, state, self._history, packed.tips)
+        before[:] = self._pose
+        code = solve_program(*self._arguments)
         at = packed.results_at
         status = _STATUSES.get(code, TrackStatus.APPROACHING)
-        if view[at + HELD] == 1.0:
-            status = TrackStatus.HELD
-        elif not view[at + VIOLATION] <= self._tolerance:
+        if not view[at + VIOLATION] <= self._tolerance:
             status = TrackStatus.VIOLATED
-            if before[at + VIOLATION] <= self._tolerance:
+            # Where a contact came up that the rows of the last tick did not know, there is nowhere to go back to.
+            if code == CONTACT_LOST or self._history[0, 1] * packed.scale <= self._tolerance:
                 status = TrackStatus.HELD
-                state[:] = before
+                self._pose[:] = before
+        elif view[at + HELD] == 1.0:
+            status = TrackStatus.HELD
         # After a step too far the next ones are shorter, until they do better.
-        radius = self._settings[RADIUS]
+        radius = self._knobs[RADIUS]
         if status is TrackStatus.HELD:
-            self._settings[RADIUS] = max(0.25 * radius, SHORTEST_RADIUS)
+            self._knobs[RADIUS] = max(0.25 * radius, SHORTEST_RADIUS)
         elif radius < self._radius:
-            self._settings[RADIUS] = min(2.0 * radius, self._radius)
+            self._knobs[RADIUS] = min(4.0 * radius, self._radius)
         events: tuple[Event, ...] = ()
         if packed.guards and view[packed.memory_at + EVENT_COUNT] != self._seen:
-            events = events_of(state[packed.memory_at :], self._names, packed.scale, int(self._seen))
+            events = events_of(self._pose[packed.memory_at :], self._names, packed.scale, int(self._seen))
             self._seen = view[packed.memory_at + EVENT_COUNT]
-        return Step(self, state.copy(), status, row, events, perf_counter() - begin)
+        return Step(self, self._pose.copy(), status, row, events, perf_counter() - begin)
 
     def _where(self) -> Array:
         """The target that the loop has."""

@@ -9,11 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from assembly._kernel import kernel
-from assembly.constraints import tape
 from assembly.constraints.constraint import Constraint
 from assembly.constraints.expression import Expression
 from assembly.constraints.objectives import Objective
 from assembly.errors import InputError
+from assembly.geometry import tape
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import quaternion_rate_map, retract
 

@@ -8,17 +8,18 @@ from __future__ import annotations
 import numpy as np
 
 from assembly.constraints import layout, program
+from assembly.constraints.blocks import BLOCKS, COLUMN, COUNT, FIRST, PLACE, is_blocked
 from assembly.proximity.free_pair import VARIABLES, VECTORS
 from assembly.proximity.solid_contact import CONTACT_RECORD, TRACK
 from assembly.solve.contacts import start_contacts
-from assembly.solve.rows import envelope, place_rows
+from assembly.solve.rows import arrange, record_of_blocks, shape_of
 from assembly.solve.search import goal
 
 
 class LoopPoint:
-    """The scene's program with every row evaluated at q (n, 7), no pair free."""
+    """The scene's program with every row evaluated at q (n, 7), no pair free; its Hessian by blocks, if it is to be."""
 
-    def __init__(self, scene, q, tracked=None):
+    def __init__(self, scene, q, tracked=None, blocks=False):
         packed = scene.packed()
         packed.refresh()
         self.packed, self.table, self.pool = packed, packed.table, packed.pool
@@ -34,19 +35,13 @@ class LoopPoint:
             np.empty(self.rows),
             np.zeros((self.rows, layout.EXTRA_COLUMN + 6 * int(table[layout.EXTRA]))),
         )
-        self.shape = (
-            np.empty((self.rows, 3 + int(table[layout.EXTRA])), dtype=np.int64),
-            np.empty(max(self.rows, 1), dtype=np.int64),
-            np.empty(self.n, dtype=np.int64),
-            np.empty(max(self.rows, 1), dtype=np.int64),
-        )
+        self.shape = shape_of(table, self.rows, self.n, record_of_blocks(table) if blocks else table[:0])
         free = np.full(pairs, -1, dtype=np.int64)
         room = (np.empty((VECTORS, 3, VARIABLES)), np.empty((VARIABLES, VARIABLES)))
         self.loose = (free, np.empty((pairs, 4)), *room, np.empty((tracks, TRACK)))
         at = table[layout.TAPE_ROOM]
         self.room = tuple(np.empty(size) for size in table[at : at + 3])
-        place_rows(table, free, self.shape[0], self.shape[1])
-        envelope(table, self.shape[0], self.rows, self.n, self.shape[2], self.shape[3])
+        arrange(table, free, self.shape, self.rows, self.n)
         if tracked is None:
             state = np.zeros(packed.results_at)
             state[packed.contacts_at : packed.angles_at] = np.nan
@@ -76,9 +71,27 @@ class LoopPoint:
                     out[r, at : at + 6] += self.point[4][r, column : column + 6]
         return out
 
+    def room_for_hessian(self):
+        """An array for it, dense or by blocks."""
+        order = self.shape[2]
+        return np.zeros((6 * order[3][BLOCKS], 6) if is_blocked(order) else (self.n, self.n))
+
+    def dense(self, hessian):
+        """The symmetric matrix of what was written to an array."""
+        order = self.shape[2]
+        if is_blocked(order):
+            parts, hessian = hessian, np.zeros((self.n, self.n))
+            blocks, first, column = order[3], order[3][FIRST], order[3][COLUMN]
+            slots = np.argsort(blocks[blocks[PLACE] : blocks[PLACE] + blocks[COUNT]])
+            for p in range(blocks[COUNT]):
+                for e in range(blocks[first + p], blocks[first + p + 1]):
+                    low, high = sorted((slots[p], slots[blocks[column + e]]))
+                    hessian[6 * low : 6 * low + 6, 6 * high : 6 * high + 6] = parts[6 * e : 6 * e + 6]
+        return np.triu(hessian) + np.triu(hessian, 1).T
+
     def goal(self, order=1):
         """Value, gradient (n,) and Hessian (n, n) of the objective."""
-        gradient, hessian = np.zeros(self.n), np.zeros((self.n, self.n))
+        gradient, hessian = np.zeros(self.n), self.room_for_hessian()
         value = goal(
             self.table,
             self.pool,
@@ -92,23 +105,23 @@ class LoopPoint:
             gradient,
             hessian,
         )
-        return value, gradient, np.triu(hessian) + np.triu(hessian, 1).T
+        return value, gradient, self.dense(hessian)
 
-    def row_terms(self, y):
-        """Second derivative of y . rows, (n, n)."""
-        hessian = np.zeros((self.n, self.n))
+    def row_terms(self, y, weights=None):
+        """Second derivative of y . rows + J^T diag(weights) J, (n, n)."""
+        hessian = self.room_for_hessian()
         program.add_row_terms(
             self.table,
             self.pool,
             self.loose,
             self.room,
-            self.shape[0],
+            self.shape,
             self.point,
             np.asarray(y, dtype=float),
-            np.zeros(self.rows),
+            np.zeros(self.rows) if weights is None else np.asarray(weights, dtype=float),
             hessian,
         )
-        return np.triu(hessian) + np.triu(hessian, 1).T
+        return self.dense(hessian)
 
 
 def moved(scene, q, step):

@@ -119,7 +119,9 @@ def objective_at(scene, q):
     assert packed.scale == 1.0 and not packed.reference.any()
     gradient, hessian = np.empty(6), np.empty((6, 6))
     room = (np.empty(0), np.empty(0), np.empty(0))
-    value = objective(packed.table, packed.pool, q, 1, room, np.full(6, 5), gradient, hessian)
+    places = np.stack([np.full(6, 5), np.arange(6), np.full(6, 5)])
+    whole = (places, np.zeros((1, 2), np.int64), np.empty((1, 6)), np.zeros(0, np.int64))
+    value = objective(packed.table, packed.pool, q, 1, room, whole, gradient, hessian)
     # The kernel writes the upper triangle.
     return value, gradient, np.triu(hessian) + np.triu(hessian, 1).T
 

@@ -12,7 +12,7 @@ from assembly.geometry.curve import NurbsCurve
 from assembly.geometry.face import Face
 from assembly.proximity.free_pair import coordinate_lengths
 from assembly.proximity.solid_contact import TRACK
-from assembly.solve.rows import envelope, place_rows
+from assembly.solve.rows import arrange, shape_of
 from tests.laws.loop_point import LoopPoint
 from tests.laws.scenes import dome, placed
 
@@ -155,11 +155,8 @@ class FreePoint:
             coordinate_lengths(self.table, self.pool, *surfaces, tuple(case.x), lengths, 0)
         self.lengths = lengths
         self.loose = (np.zeros(1, dtype=np.int64), lengths, *base.loose[2:])
-        self.bases = np.empty((self.rows, 3), dtype=np.int64)
-        sides = np.empty(self.rows, dtype=np.int64)
-        place_rows(self.table, self.loose[0], self.bases, sides)
-        last, last_row = np.empty(self.n, dtype=np.int64), np.empty(self.rows, dtype=np.int64)
-        envelope(self.table, self.bases, self.rows, self.n, last, last_row)
+        self.shape = shape_of(self.table, self.rows, self.n, self.table[:0])
+        arrange(self.table, self.loose[0], self.shape, self.rows, self.n)
         self.room = base.room
         start = case.tracked(x)
         assert program.evaluate(self.table, self.pool, start, np.inf, self.loose, self.room, self.point) < 0
@@ -175,5 +172,5 @@ class FreePoint:
     def row_terms(self, y, weights):
         """Second derivative of y . rows + J^T diag(weights) J, (n, n)."""
         hessian = np.zeros((self.n, self.n))
-        program.add_row_terms(self.table, self.pool, self.loose, self.room, self.bases, self.point, y, weights, hessian)
+        program.add_row_terms(self.table, self.pool, self.loose, self.room, self.shape, self.point, y, weights, hessian)
         return np.triu(hessian) + np.triu(hessian, 1).T

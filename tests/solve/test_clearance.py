@@ -17,28 +17,13 @@ from benchmarks.wire_oracle import WireOracle
 SCENES = 10
 # Gaps hold to 1e-12 of the scene's size, which is a few lengths here; the oracle's are good to 1e-14.
 HOLDS = 1e-11
-
-
-# Taut scenes that are not solved, and how they end.
-UNSOLVED = {
-    3: "stalls clear and with a gradient at its tolerance",
-    4: "stalls clear, with a gradient that is not at its tolerance",
-    9: "is at its iteration limit, 2e-7 from clear",
-}
-TAUT_SCENES = [
-    pytest.param(k, marks=pytest.mark.xfail(strict=False, reason=UNSOLVED[k])) if k in UNSOLVED else k
-    for k in range(SCENES)
-]
+# Of taut scenes rounding decides which stall at a fold: of 50 some 41 are solved.
+MOST = 7
 
 
 @pytest.fixture(scope="module")
 def near():
     return with_clearance(NEAR)
-
-
-@pytest.fixture(scope="module")
-def taut():
-    return with_clearance(TAUT)
 
 
 def with_clearance(distance):
@@ -61,18 +46,22 @@ def test_linked_rings_end_clear_and_linked(near, k):
     assert solution.success and deepest > -HOLDS and linked
 
 
-@pytest.mark.parametrize("k", TAUT_SCENES)
+@pytest.fixture(scope="module")
+def taut():
+    scenes = with_clearance(TAUT)
+    return [ended(scenes, k) for k in range(SCENES)]
+
+
+@pytest.mark.parametrize("k", range(SCENES))
 def test_linked_rings_out_of_reach_end_clear_and_linked(taut, k):
-    solution, deepest, linked = ended(taut, k)
-    assert solution.success and deepest > -HOLDS and linked
-
-
-@pytest.mark.parametrize("k", UNSOLVED)
-def test_rings_of_an_unsolved_scene_are_linked_and_all_but_clear(taut, k):
+    solution, deepest, linked = taut[k]
+    assert linked
     # The violation that is told is the deepest crossing.
-    solution, deepest, linked = ended(taut, k)
-    assert not solution.success and linked
-    assert deepest > -max(1e-6, 2.0 * solution.feasibility)
+    assert deepest > -(HOLDS if solution.success else max(1e-6, 2.0 * solution.feasibility))
+
+
+def test_most_rings_out_of_reach_are_solved(taut):
+    assert sum(solution.success for solution, _deepest, _linked in taut) >= MOST
 
 
 @pytest.mark.parametrize("k", range(0, SCENES, 3))
@@ -83,7 +72,7 @@ def test_rings_stay_linked_step_by_step(k):
     drag.scene.constrain(asm.Clearance())
     drag.grip.target = scenes.targets[k]
     solution = drag.scene.solve(scenes.q[k], max_iterations=1)
-    for _ in range(100):
+    for _ in range(200):
         assert (drag.links(solution.q) == scenes.links[k]).all()
         if solution.success:
             break
