@@ -1,6 +1,8 @@
-"""Run the benchmarks: ``python -m benchmarks [--quick] [--only NAME] [--output FOLDER]``.
+"""Run the benchmarks: ``python -m benchmarks [--quick] [--only NAME] [--output FOLDER] [--gate]``.
 
-A whole run, not quick, with its JSON where it belongs, writes ``docs/performance.md`` too.
+A run that is not quick, with its JSON where it belongs, writes ``docs/performance.md`` and its pictures too, of one
+benchmark that one's section. `--gate` compares a run with the stored one of its kind (``benchmarks/results``) and fails
+where something became worse.
 """
 
 from __future__ import annotations
@@ -11,11 +13,14 @@ import os
 import platform
 import sys
 from collections.abc import Sequence
+from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 from benchmarks import report as pages
+from benchmarks.gate import regressions
+from benchmarks.pictures import draw
 from benchmarks.running import run_apart
 from benchmarks.timing import calibration
 
@@ -25,17 +30,30 @@ BENCHMARKS = (
     "evaluation",
     "trims",
     "pairs",
+    "surface_errors",
     "controllers",
+    "curves",
+    "curve_errors",
+    "proximity_paper",
     "features",
     "facets",
     "wires",
+    "contact_errors",
     "tracking",
+    "tracking_errors",
     "mechanisms",
+    "joint_errors",
     "laws",
+    "accuracy",
     "step",
+    "growth",
+    "skip",
     "start",
 )
-LIBRARIES = ("assembly", "casadi", "meshcat", "numba", "numpy", "scipy", "cadquery-ocp", "coal", "python-fcl")
+LIBRARIES = (
+    *("assembly", "casadi", "meshcat", "numba", "numpy", "scipy"),
+    *("cadquery", "cadquery-ocp", "coal", "drake", "pin-pink", "splinepy"),
+)
 RESULTS = Path(__file__).resolve().parent / "results"
 
 
@@ -102,29 +120,50 @@ def table(result: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
+def write(report: dict[str, Any], output: Path, only: str | None) -> Path:
+    """Write what was measured so far; sections of the stored whole run that are not measured again stay."""
+    if report["quick"]:
+        path = output / f"{only or 'all'}-quick.json"
+        path.write_text(json.dumps(report, indent=1) + "\n")
+        return path
+    path = output / "all.json"
+    kept = json.loads(path.read_text())["benchmarks"] if path.exists() else {}
+    both = {**kept, **report["benchmarks"]}
+    whole = {**report, "benchmarks": {name: both[name] for name in BENCHMARKS if name in both}}
+    path.write_text(json.dumps(whole, indent=1) + "\n")
+    return path
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run, print and write; the number of benchmarks that failed."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("--quick", action="store_true", help="fewer repeats and cases: does everything still run?")
     parser.add_argument("--only", choices=BENCHMARKS, metavar="NAME", help=f"one of {', '.join(BENCHMARKS)}")
     parser.add_argument("--output", type=Path, default=RESULTS, metavar="FOLDER", help="where the JSON goes")
+    parser.add_argument("--gate", action="store_true", help="compare with the stored run, fail where it is worse")
     options = parser.parse_args(arguments)
 
     pin_to_one_core()
     report: dict[str, Any] = {"quick": options.quick, "machine": machine(), "benchmarks": {}}
+    stored = RESULTS / ("all-quick.json" if options.quick else "all.json")
+    before = json.loads(stored.read_text()) if options.gate else {}
+    options.output.mkdir(parents=True, exist_ok=True)
     for name in [options.only] if options.only else BENCHMARKS:
         result = run_apart(f"benchmarks.{name}", options.quick)
-        report["benchmarks"][name] = result
+        circumstances = {"date": f"{datetime.now(UTC):%Y-%m-%d}", "load": report["machine"]["load"]}
+        report["benchmarks"][name] = {**result, **circumstances}
         print("\n".join(["", name, table(result), *pages.lines(result)]), flush=True)
-    title = (options.only or "all") + ("-quick" if options.quick else "")
-    options.output.mkdir(parents=True, exist_ok=True)
-    path = options.output / f"{title}.json"
-    path.write_text(json.dumps(report, indent=1) + "\n")
+        # After each, for a whole run takes its time, and may be ended.
+        path = write(report, options.output, options.only)
     print(f"\nwritten to {path}")
-    if title == "all" and options.output == RESULTS:
-        pages.PAGE.write_text(pages.page(report))
-        print(f"and to {pages.PAGE}")
-    return sum("error" in result for result in report["benchmarks"].values())
+    worse = regressions(report, before) if options.gate else []
+    for name, what, then, now in worse:
+        print(f"worse: {name}: {what}: {then:.4g} became {now:.4g}")
+    if not options.quick and options.output == RESULTS:
+        for name, result in report["benchmarks"].items():
+            draw(name, result.get("curves", []), pages.PICTURES)
+        pages.main()
+    return sum("error" in result for result in report["benchmarks"].values()) + len(worse)
 
 
 if __name__ == "__main__":

@@ -67,10 +67,10 @@ def walk(start: Array, steps: int, length: float, size: float) -> Array:
     return poses
 
 
-class _Descents:
-    """Bodies' trees in one table and one pool."""
+class Descents:
+    """Bodies' trees in one table and one pool, and room for so many pairs of elements."""
 
-    def __init__(self, trees: list[FacetTree]) -> None:
+    def __init__(self, trees: list[FacetTree], most: int = 20_000) -> None:
         tables: list[Table] = []
         pools: list[Array] = []
         offsets = []
@@ -82,7 +82,7 @@ class _Descents:
         self.table, self.pool = np.concatenate(tables), np.concatenate(pools)
         self.offsets = np.array(offsets)
         self.stack = np.empty((256, 2), dtype=np.int64)
-        self.out = np.empty((20_000, 2), dtype=np.int64)
+        self.out = np.empty((most, 2), dtype=np.int64)
 
     def pairs(self, q: Array, reach: float) -> int:
         """How many pairs of elements there are; they are in `out`."""
@@ -177,7 +177,7 @@ def _coal() -> Any | None:
         return None
 
 
-def _held(descents: _Descents, trees: list[FacetTree], faces: tuple[Face, ...], poses: Array) -> tuple[int, int]:
+def _held(descents: Descents, trees: list[FacetTree], faces: tuple[Face, ...], poses: Array) -> tuple[int, int]:
     """Of poses where bodies are apart: how many of their nearest pairs are among those found, and how many poses."""
     right = cases = 0
     for q in poses:
@@ -201,7 +201,7 @@ def _two_clips(quick: bool, coal: Any | None) -> tuple[list[dict[str, Any]], lis
     tree = FacetTree.of(_clip(), count=count)
     building = perf_counter() - begin
     trees = [tree, tree]
-    descents = _Descents(trees)
+    descents = Descents(trees)
     poses = walk(CLIPS, 100 if quick else 4_000, 0.02 * CLIP_RADIUS, 15.0)
     peers: dict[str, float | None] = {f"{COAL} distance": None, f"{COAL} crossing facets": None}
     if coal is not None:
@@ -227,7 +227,7 @@ def _two_clips(quick: bool, coal: Any | None) -> tuple[list[dict[str, Any]], lis
 def _wires(quick: bool, coal: Any | None) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
     count = 200 if quick else 1_000
     trees = [FacetTree.of((Face(asm.shapes.torus(MAJOR, MINOR)),), count=count)] * 12
-    descents = _Descents(trees)
+    descents = Descents(trees)
     poses = walk(_chain(12), 100 if quick else 2_000, 0.02 * MINOR, MAJOR)
     peers: dict[str, float | None] = {COAL: None}
     if coal is not None:

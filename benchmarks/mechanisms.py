@@ -8,7 +8,7 @@ import os
 import statistics
 import subprocess
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from time import perf_counter
@@ -24,6 +24,7 @@ from assembly.kinematics.body import Point
 from benchmarks import linkages
 from benchmarks.figures import figure
 from benchmarks.laws import OFFSETS, SLOPE, deviation
+from benchmarks.pictures import exponent
 from benchmarks.running import example
 
 ABOUT = """\
@@ -39,9 +40,7 @@ its value, through closed loops as well, here against central differences of six
 that are solved again, relative to the largest slope. Contradictions: polygons of rods of which one is too
 long, drives, stops and gears that do not fit, goals out of reach, rings of three hinges; of each the only set that
 conflicts is known. Reference: the largest difference of a component of q, over the scene's size where that is above
-one; of paper clips drawn to nothing, by least moves (`Posture`), as a target in reach leaves them free to slide. Idle:
-time of the paper clips' solve with contacts given, over that without the part, which changes neither poses nor
-iterations."""
+one; of paper clips drawn to nothing, by least moves (`Posture`), as a target in reach leaves them free to slide."""
 
 Array = NDArray[np.float64]
 CADQUERY = "CadQuery"
@@ -78,7 +77,7 @@ def four_bar(turns: int) -> list[dict[str, Any]]:
     ]
 
 
-def _cadquery(chains: list[asm.Assembly]) -> list[list[float]] | None:
+def cadquery_boxes(chains: list[asm.Assembly]) -> list[list[float]] | None:
     """Seconds and distances left by CadQuery, a pair a chain; None where it is not installed."""
     starts = []
     for scene in chains:
@@ -102,18 +101,13 @@ def _cadquery(chains: list[asm.Assembly]) -> list[list[float]] | None:
     return None if found is None else found["chains"]
 
 
-def exponent(counts: Iterable[int], seconds: Iterable[float]) -> float:
-    """Of the power of counts that fits the times."""
-    return float(np.polyfit(np.log(list(counts)), np.log(list(seconds)), 1)[0])
-
-
 def boxes(quick: bool) -> list[dict[str, Any]]:
     """Scattered boxes, put on one another."""
     sizes = (2, 8, 16) if quick else (2, 8, 16, 32, 64)
     seeds, repeats = (2, 2) if quick else (10, 5)
     peers = 1 if quick else 3
     chains = {n: [linkages.boxes(n, seed) for seed in range(seeds)] for n in sizes}
-    found = _cadquery([scene for n in sizes for scene in chains[n][:peers]])
+    found = cadquery_boxes([scene for n in sizes for scene in chains[n][:peers]])
     chains[2][0].solve()
     figures, calls, kernels = [], [], []
     for k, n in enumerate(sizes):
@@ -269,13 +263,13 @@ def contradictions(count: int) -> list[dict[str, Any]]:
     ]
 
 
-def _clips() -> asm.Assembly:
+def clips() -> asm.Assembly:
     scene = example("paper_clips").paper_clips()
     assert isinstance(scene, asm.Assembly)
     return scene
 
 
-def _start(scene: asm.Assembly) -> dict[str, Array]:
+def nearest_pairs(scene: asm.Assembly) -> dict[str, Array]:
     """Parameters of the nearest pairs at the bodies' poses."""
     return {name: pair.parameters for name, pair in scene.solve(max_iterations=0).contacts.items()}
 
@@ -289,9 +283,9 @@ def _examples() -> dict[str, asm.Assembly]:
     crank.angle = 1.0
     pushed, crank, rail = example("gear_train").gear_train()
     crank.angle, rail.slide = None, 1.0
-    clips = _clips()
-    loose = asm.Assembly(clips.bodies)
-    loose.constrain(*clips.constraints)
+    three = clips()
+    loose = asm.Assembly(three.bodies)
+    loose.constrain(*three.constraints)
     loose.minimize(asm.Posture())
     return scenes | {
         "Bricard's ring": ring,
@@ -306,7 +300,7 @@ def agreement() -> list[dict[str, Any]]:
     """Poses of the examples against those of the reference, from the same starts."""
     figures = []
     for name, scene in _examples().items():
-        starts = _start(scene)
+        starts = nearest_pairs(scene)
         ours, theirs = scene.solve(starts=starts), asm.reference.solve(scene, starts=starts)
         scale = max(1.0, scene.packed().scale)
         a, b = ours.q.copy(), theirs.q.copy()
@@ -315,60 +309,6 @@ def agreement() -> list[dict[str, Any]]:
         off = deviation(a, b) if ours.success and theirs.success else math.inf
         figures.append(figure(f"against the reference: {name}", "error", off, reach=1e-8))
     return figures
-
-
-def _idle_parts() -> dict[str, Callable[[asm.Assembly], object]]:
-    """What may be in a scene and has nothing to say."""
-
-    def limit(scene: asm.Assembly) -> None:
-        scene.constrain(asm.Distance(scene.body("red"), scene.body("blue"), limits=(None, 1e3), name="leash"))
-
-    def angle(scene: asm.Assembly) -> None:
-        scene.constrain(asm.Angle(scene.body("red"), scene.body("blue"), limits=(None, 3.1), name="fan"))
-
-    def walls(count: int, scene: asm.Assembly) -> None:
-        for k in range(count):
-            scene.add(asm.Body(f"wall {k}", asm.shapes.box(5, 5, 5), (40 + 10 * k, 0, 0), fixed=True))
-
-    return {
-        "nothing (what noise does)": lambda scene: None,
-        "a far limit of a distance": limit,
-        "a far limit of an angle": angle,
-        "a fixed body": partial(walls, 1),
-        "ten fixed bodies": partial(walls, 10),
-    }
-
-
-def idle(quick: bool) -> list[dict[str, Any]]:
-    """Times of a solve with parts that do nothing, over those without, one call of each in turn."""
-    figures = []
-    for name, add in _idle_parts().items():
-        ratios = []
-        same = True
-        # Several instances: where their arrays lie in memory costs more than what is looked for.
-        for _ in range(1 if quick else 8):
-            bare, other = _clips(), _clips()
-            add(other)
-            starts = _start(bare)
-            a, b = bare.solve(starts=starts), other.solve(starts=starts)
-            same = same and a.success and b.success and a.iterations == b.iterations
-            same = same and deviation(a.q, b.q[: len(a.q)]) < 1e-12 * bare.packed().scale
-            for _ in range(20 if quick else 250):
-                with_it, without = _taken(other, starts), _taken(bare, starts)
-                ratios.append([with_it[0] / without[0], with_it[1] / without[1]])
-        call, kernel = np.median(ratios, axis=0).tolist() if same else (math.inf, math.inf)
-        figures += [
-            figure(f"idle: {name}, a call", "ratio", call, reach=1.05),
-            figure(f"idle: {name}, in the kernel", "ratio", kernel, reach=1.05),
-        ]
-    return figures
-
-
-def _taken(scene: asm.Assembly, starts: dict[str, Array]) -> tuple[float, float]:
-    """Seconds of a call, and of the loop in it."""
-    begin = perf_counter()
-    solution = scene.solve(starts=starts)
-    return perf_counter() - begin, solution.seconds
 
 
 def run(quick: bool) -> dict[str, Any]:
@@ -382,6 +322,5 @@ def run(quick: bool) -> dict[str, Any]:
             *dexterity(quick),
             *contradictions(48 if quick else 1000),
             *agreement(),
-            *idle(quick),
         ],
     }

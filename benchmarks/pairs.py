@@ -30,7 +30,7 @@ GAPS = (0.1, 1e-6, 0.0, -1e-6, -1e-4, -1e-3, -1e-2)
 TIMES = 10
 
 
-class _Solver:
+class Solver:
     """The kernel on a set of pairs, from starts that are off by `offset` each way at random."""
 
     def __init__(self, pairs: Pairs, offset: float, close: float) -> None:
@@ -38,6 +38,8 @@ class _Solver:
         self.table, self.pool, self.records = pairs.packed()
         self.close = close
         count = len(pairs.surfaces)
+        # Pairs solved by a call.
+        self.count = count * TIMES
         self.sizes = np.array([min(f.size, g.size) for f, g in pairs.surfaces])
         signs = np.random.default_rng(3).choice([-1.0, 1.0], (count, 4))
         periods = np.array([[high - low for side in pair for low, high in side.domain] for pair in pairs.surfaces])
@@ -73,7 +75,7 @@ class _Solver:
         return int(((self.statuses == CONVERGED) & (off <= 1e-12)).sum())
 
 
-def _occt(solver: _Solver) -> tuple[float | None, int | None]:
+def _occt(solver: Solver) -> tuple[float | None, int | None]:
     """OCCT on the same pairs: the median time of one, and how many distances are right to 1e-9."""
     searches = occt_pairs(solver.pairs.surfaces, solver.pairs.q, solver.starts)
     if searches is None:
@@ -89,7 +91,7 @@ def _occt(solver: _Solver) -> tuple[float | None, int | None]:
 def _warm(quick: bool) -> list[dict[str, Any]]:
     count = 16 if quick else 64
     pairs = dome_pairs(count)
-    exact, carried = _Solver(pairs, 0.01, 0.0), _Solver(pairs, 0.01, CLOSE)
+    exact, carried = Solver(pairs, 0.01, 0.0), Solver(pairs, 0.01, CLOSE)
     surface_f, surface_g = pairs.surfaces[0]
     q_f, q_g = pairs.q[0]
     occt = {"OCCT GenLocateExtSS": _occt(exact)[0]}
@@ -104,7 +106,7 @@ def _warm(quick: bool) -> list[dict[str, Any]]:
     seconds = {row["who"]: row["seconds"] for row in rows}
     each = {who: seconds[who] / (count * TIMES) for who in ("exact", "carried")}
     # Started at the pair itself, Newton can only polish.
-    converged = _Solver(pairs, 0.0, 0.0)
+    converged = Solver(pairs, 0.0, 0.0)
     iterations = {solver.close: solver(1) / count for solver in (exact, carried)}
     converged(1)
     errors = {s.close: float(np.abs(s.parameters - converged.parameters).max()) for s in (exact, carried)}
@@ -123,7 +125,7 @@ def _warm(quick: bool) -> list[dict[str, Any]]:
 
 def _at_contact(quick: bool) -> list[dict[str, Any]]:
     count = 60
-    solvers = {gap: _Solver(torus_pairs(count, gap), 0.01, 0.0) for gap in GAPS}
+    solvers = {gap: Solver(torus_pairs(count, gap), 0.01, 0.0) for gap in GAPS}
     theirs = {gap: _occt(solver) for gap, solver in solvers.items()}
     ours = compare({f"{gap:g}": solver for gap, solver in solvers.items()}, repeats=5 if quick else 25)
     apart = theirs[GAPS[0]][0]

@@ -1,6 +1,6 @@
 """The figures as a Markdown page, ``docs/performance.md``: ``python -m benchmarks.report`` writes it from the JSON.
 
-A whole run of ``python -m benchmarks`` writes it too.
+``python -m benchmarks`` writes it too.
 """
 
 from __future__ import annotations
@@ -13,17 +13,19 @@ from typing import Any
 
 from benchmarks.figures import met, quantity
 
-__all__ = ["PAGE", "lines", "page"]
+__all__ = ["PAGE", "PICTURES", "lines", "page"]
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "performance.md"
+PICTURES = PAGE.parent / "images" / "performance"
 RESULTS = Path(__file__).resolve().parent / "results" / "all.json"
 # Load of a machine on which nothing else runs.
 IDLE = 0.3
 HEADING = """\
 # Performance
 
-Written by `python -m benchmarks`; do not edit. Every figure is from one run on one core of the machine below, times are
-medians, and peers were measured in the same run. "Reach" is the figure we set out to reach."""
+Written by `python -m benchmarks`; do not edit. Every section is from one run on one core of the machine below, times
+are medians, and peers were measured in the same run. "Reach" is the figure we set out to reach. A load above that of
+an idle machine means that other programs ran: times there are too long and unsteady."""
 
 
 def _cells(row: Mapping[str, Any]) -> list[str]:
@@ -48,22 +50,35 @@ def lines(result: Mapping[str, Any]) -> list[str]:
     return ["| " + " | ".join(cell.replace("|", r"\|") for cell in row) + " |" for row in table]
 
 
+def _circumstances(result: Mapping[str, Any], cores: int) -> str:
+    """When a section was measured, and on how busy a machine."""
+    load = result.get("load")
+    busy = "" if load is None else f", load {load:.1f} on {cores} cores when the run began"
+    provisional = "**Provisional:** " if load is None or load > IDLE else ""
+    return f"{provisional}measured {result.get('date', 'with an earlier version')}{busy}."
+
+
 def page(report: Mapping[str, Any]) -> str:
     """The whole page."""
     machine = report["machine"]
     versions = ", ".join(f"{name} {version}" for name, version in machine["versions"].items() if version != "absent")
+    # The library itself may be run from its folder.
+    others = [name for name, version in machine["versions"].items() if version == "absent" and name != "assembly"]
+    absent = ", ".join(others)
     parts = [HEADING, f"Machine: {machine['processor']}. Python {machine['python']}, {versions}."]
-    load = machine.get("load")
-    if load is not None and load > IDLE:
-        parts.append(
-            f"**Provisional:** other programs ran on the machine (load {load:.1f} on {machine['cores']} cores when the "
-            "run began), so that times are too long and unsteady."
-        )
+    if absent:
+        parts.append(f"Not installed, and so absent from the tables: {absent}.")
     for name, result in report["benchmarks"].items():
         parts.append(f"## {name.capitalize()}")
+        parts.append(_circumstances(result, machine["cores"]))
         if "about" in result:
             parts.append(result["about"])
         parts.append("\n".join(lines(result)))
+        for k, diagram in enumerate(result.get("curves", [])):
+            # Drawn where matplotlib is installed; a page without them is one of another machine.
+            picture = PICTURES / f"{name}-{k + 1}.png"
+            if picture.exists():
+                parts.append(f"![{diagram['title']}]({picture.relative_to(PAGE.parent).as_posix()})")
     return "\n\n".join(parts) + "\n"
 
 

@@ -13,7 +13,18 @@ import assembly as asm
 from assembly.constraints.objectives import PointDistance
 from assembly.geometry.spline import BREAKS_U, BREAKS_V, CELLS, COEFFICIENTS
 
-__all__ = ["Pairs", "Wires", "bicubic", "crossing", "dome_pairs", "linked", "linked_wires", "torus_pairs"]
+__all__ = [
+    "Pairs",
+    "Wires",
+    "bicubic",
+    "crossing",
+    "dome_pairs",
+    "linked",
+    "linked_wires",
+    "placed",
+    "random_pose",
+    "torus_pairs",
+]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
@@ -22,13 +33,16 @@ MAJOR, MINOR = 1.0, 0.12
 CLEARANCE = 0.005
 
 
-def bicubic(seed: int, flip: float = 1.0) -> asm.NurbsSurface:
-    """A rational bicubic dome over a net of 8 x 8 points on [-1, 1]^2, with radii of curvature near one."""
+def bicubic(seed: int, flip: float = 1.0, net: int = 8) -> asm.NurbsSurface:
+    """A rational bicubic dome over a net of `net`^2 points on [-1, 1]^2, with radii of curvature near one."""
     rng = np.random.default_rng(seed)
-    x, y = np.meshgrid(*2 * [np.linspace(-1.0, 1.0, 8)], indexing="ij")
-    z = flip * (-0.5 * (x**2 + 0.8 * y**2) + 0.005 * rng.standard_normal(x.shape))
-    knots = np.concatenate([np.zeros(3), np.linspace(0.0, 1.0, 6), np.ones(3)])
-    return asm.NurbsSurface(np.stack([x, y, z], 2), (knots, knots), (3, 3), rng.uniform(0.95, 1.05, x.shape))
+    x, y = np.meshgrid(*2 * [np.linspace(-1.0, 1.0, net)], indexing="ij")
+    # Second differences of the net are what curvature is made of.
+    rough = (8.0 / max(net, 8)) ** 2
+    z = flip * (-0.5 * (x**2 + 0.8 * y**2) + 0.005 * rough * rng.standard_normal(x.shape))
+    knots = np.concatenate([np.zeros(3), np.linspace(0.0, 1.0, net - 2), np.ones(3)])
+    weights = 1.0 + rough * rng.uniform(-0.05, 0.05, x.shape)
+    return asm.NurbsSurface(np.stack([x, y, z], 2), (knots, knots), (3, 3), weights)
 
 
 @dataclass(frozen=True)
@@ -76,7 +90,7 @@ def _frame(surface: asm.NurbsSurface, u: float, v: float) -> tuple[Array, Array]
     return point, np.column_stack([tangent, np.cross(normal, tangent), normal])
 
 
-def _placed(f: asm.NurbsSurface, g: asm.NurbsSurface, x: Array, q_f: Array, gap: float, spin: float) -> Array:
+def placed(f: asm.NurbsSurface, g: asm.NurbsSurface, x: Array, q_f: Array, gap: float, spin: float) -> Array:
     """The pose of g at which x are the parameters of an extremal pair with this gap, normals opposed."""
     p, a = _frame(f, x[0], x[1])
     r, b = _frame(g, x[2], x[3])
@@ -88,19 +102,19 @@ def _placed(f: asm.NurbsSurface, g: asm.NurbsSurface, x: Array, q_f: Array, gap:
     return np.concatenate([position, turn.as_quat(scalar_first=True)])
 
 
-def _random_pose(rng: np.random.Generator) -> Array:
+def random_pose(rng: np.random.Generator) -> Array:
     e = rng.normal(size=4)
     return np.concatenate([rng.uniform(-1.0, 1.0, 3), e / np.linalg.norm(e)])
 
 
-def dome_pairs(count: int, seed: int = 1) -> Pairs:
+def dome_pairs(count: int, seed: int = 1, net: int = 8) -> Pairs:
     """Pairs of two bicubic domes at gap 0.1, well inside both patches."""
     rng = np.random.default_rng(seed)
-    f, g = bicubic(2), bicubic(3)
+    f, g = bicubic(2, net=net), bicubic(3, net=net)
     q, parameters = np.empty((count, 2, 7)), rng.uniform(0.25, 0.75, (count, 4))
     for i in range(count):
-        q[i, 0] = _random_pose(rng)
-        q[i, 1] = _placed(f, g, parameters[i], q[i, 0], 0.1, rng.uniform(0.0, 2.0 * np.pi))
+        q[i, 0] = random_pose(rng)
+        q[i, 1] = placed(f, g, parameters[i], q[i, 0], 0.1, rng.uniform(0.0, 2.0 * np.pi))
     return Pairs([(f, g)] * count, q, parameters, 0.1)
 
 
@@ -116,7 +130,7 @@ def torus_pairs(count: int, gap: float, seed: int = 2) -> Pairs:
         # Within one of the four arcs each way: where two meet, second derivatives jump and differences mean nothing.
         turns = 0.25 * (rng.integers(4, size=4) + rng.uniform(0.1, 0.9, 4))
         x = 2.0 * np.pi * turns * np.column_stack([major, minor]).ravel()
-        spin, pose = rng.uniform(0.0, np.pi), _random_pose(rng)
+        spin, pose = rng.uniform(0.0, np.pi), random_pose(rng)
         forms = []
         for k, surface in enumerate((f, g)):
             point = surface.evaluate(x[2 * k], x[2 * k + 1])
@@ -129,7 +143,7 @@ def torus_pairs(count: int, gap: float, seed: int = 2) -> Pairs:
             continue
         i = len(surfaces)
         parameters[i], q[i, 0] = x, pose
-        q[i, 1] = _placed(f, g, x, pose, gap, spin)
+        q[i, 1] = placed(f, g, x, pose, gap, spin)
         surfaces.append((f, g))
     return Pairs(surfaces, q, parameters, gap)
 

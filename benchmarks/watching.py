@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import assembly as asm
 from assembly.constraints import layout
-from assembly.proximity import watch
+from assembly.proximity import watch, watch_memory
 from assembly.proximity.solid_contact import PAIR_GAP, TRACK
 
 __all__ = ["Listed", "Watch"]
@@ -59,8 +59,8 @@ class Watch:
         self._packed = packed = scene.packed()
         self._at = int(packed.table[layout.WATCH])
         self.pairs = [(self.bodies.index(a), self.bodies.index(b)) for a, b in packed.guarded[0]]
-        self._pairs_at = watch.MEMORY_HEADER
-        self._places_at = self._pairs_at + watch.PAIR_MEMORY * len(self.pairs)
+        self._pairs_at = watch_memory.MEMORY_HEADER
+        self._places_at = self._pairs_at + watch_memory.PAIR_MEMORY * len(self.pairs)
         self.forget()
 
     def forget(self) -> None:
@@ -69,7 +69,7 @@ class Watch:
         self.tracked = np.full((self._packed.tracked, TRACK), np.nan)
 
     def _pairs(self) -> Array:
-        return self.memory[self._pairs_at : self._places_at].reshape(-1, watch.PAIR_MEMORY)
+        return self.memory[self._pairs_at : self._places_at].reshape(-1, watch_memory.PAIR_MEMORY)
 
     def look(self, q: Array, everything: bool = True) -> Listed:
         """Look at poses (n, 7); a pair that is not looked at lists nothing.
@@ -82,16 +82,18 @@ class Watch:
         packed, memory = self._packed, self.memory
         scaled = q.copy()
         scaled[:, :3] = (q[:, :3] - packed.reference) / packed.scale
-        calls = memory[watch.CALLS] + 1.0
+        calls = memory[watch_memory.CALLS] + 1.0
         watch.look(packed.table, packed.pool, self._at, memory, scaled, self.tracked, int(everything))
-        if memory[watch.CROWDED]:
+        if memory[watch_memory.CROWDED]:
             raise RuntimeError("contacts are near for which there is no place")
         pairs = self._pairs()
-        looked = pairs[:, watch.CALLED] == calls
-        places = memory[self._places_at :][: watch.PLACE_MEMORY * packed.guards].reshape(-1, watch.PLACE_MEMORY)
-        owner = places[:, watch.PLACE_PAIR].astype(int)
+        looked = pairs[:, watch_memory.CALLED] == calls
+        places = memory[self._places_at :][: watch_memory.PLACE_MEMORY * packed.guards].reshape(
+            -1, watch_memory.PLACE_MEMORY
+        )
+        owner = places[:, watch_memory.PLACE_PAIR].astype(int)
         rows = np.flatnonzero((owner >= 0) & looked[owner])
-        tracked = self.tracked[int(packed.table[self._at + watch.FIRST]) + rows]
+        tracked = self.tracked[int(packed.table[self._at + watch_memory.FIRST]) + rows]
         bodies = np.array(self.pairs)[owner[rows]]
         points = np.empty((rows.size, 2, 3))
         for k, (pair, row) in enumerate(zip(bodies, tracked, strict=True)):
@@ -99,5 +101,8 @@ class Watch:
                 local = self.surfaces[body].evaluate(*row[2 * side : 2 * side + 2])
                 points[k, side] = Rotation.from_quat(q[body, 3:], scalar_first=True).apply(local) + q[body, :3]
         # A look that meets many patches takes what is as near as its allowance, which says what it left out.
-        take = np.minimum(watch.TAKE * pairs[:, watch.REACH], pairs[:, watch.ALLOWANCE]) * packed.scale
+        take = (
+            np.minimum(watch_memory.TAKE * pairs[:, watch_memory.REACH], pairs[:, watch_memory.ALLOWANCE])
+            * packed.scale
+        )
         return Listed(bodies, points, tracked[:, PAIR_GAP] * packed.scale, take, looked)

@@ -34,3 +34,8 @@ def run_python() -> Callable[..., str]:
         return done.stdout + done.stderr
 
     return run
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """``--long``: the stress tests try for hours."""
+    parser.addoption("--long", action="store_true", help="stress tests: a hundred times as many random cases")

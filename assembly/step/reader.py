@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -26,6 +29,17 @@ __all__ = ["UNITS", "StepError", "StepWarning", "read_step"]
 UNITS = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1e3, "in": 25.4, "ft": 304.8}
 # A deviation [mm] below which a face is what the file says: OCCT takes nearer points for one.
 EXACT = 1e-7
+# Seconds that shapes of a damaged file may take.
+PATIENCE = 120.0
+# Exit codes from which on Windows means a crash; elsewhere they are negative.
+ENDED = 0xC0000000
+# What is raised in this one is raised again in the process that asked.
+_TRIAL = """
+import contextlib, sys
+from assembly.step.reader import document_of
+with contextlib.suppress(Exception):
+    document_of(sys.argv[1], True)
+"""
 
 
 class StepError(InputError):
@@ -54,8 +68,12 @@ def checked_unit(unit: str) -> float:
     return UNITS[unit]
 
 
-def document_of(path: str) -> tuple[Any, int]:
-    """The file as a document of OCCT, in millimeters, and the number of its faces."""
+def document_of(path: str, tried: bool = False) -> tuple[Any, int]:
+    """The file as a document of OCCT, in millimeters, and the number of its faces.
+
+    Entities that OCCT cannot load may end the process when it makes shapes of them. A file that has such ones is tried
+    in another process first.
+    """
     o = occt()
     # Settings exist once there is a reader.
     reader = o.STEPCAFControl_Reader()
@@ -65,6 +83,8 @@ def document_of(path: str) -> tuple[Any, int]:
         with settings({"read.stepcaf.subshapes.name": 1, "read.step.product.mode": 1}):
             if reader.ReadFile(path) != o.IFSelect_RetDone:
                 raise StepError(f"path is {path!r}; expected a STEP file, and OCCT cannot parse it")
+            if not tried and (broken := _broken_entities(reader)):
+                _try_apart(path, broken)
             document = o.TDocStd_Document(o.TCollection_ExtendedString("XmlOcaf"))
             o.XCAFDoc_DocumentTool.SetLengthUnit_s(document, 1e-3)
             for mode in ("SetColorMode", "SetNameMode"):
@@ -74,6 +94,36 @@ def document_of(path: str) -> tuple[Any, int]:
     finally:
         o.XCAFDoc_ShapeTool.SetAutoNaming_s(auto)
     return document, _face_count(reader)
+
+
+def _broken_entities(reader: Any) -> int:
+    """Number of entities that OCCT could not load."""
+    model = reader.Reader().WS().Model()
+    return sum(model.IsErrorEntity(k) for k in range(1, model.NbEntities() + 1))
+
+
+def _try_apart(path: str, broken: int) -> None:
+    """Raise where making shapes of a file ends the process that does so, or does not end."""
+    why = "OCCT cannot do without them"
+    try:
+        found = subprocess.run(
+            [sys.executable or "python", "-c", _TRIAL, path],
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, sys.path))},
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            check=False,
+            timeout=PATIENCE,
+            text=True,
+        )
+        code = found.returncode
+        if 0 < code < ENDED:
+            why = f"they cannot be tried in another process: {found.stderr.strip()[-200:]}"
+    except subprocess.TimeoutExpired:
+        code, why = -1, f"OCCT is not done with the others in {PATIENCE:g} seconds"
+    except OSError as error:
+        code, why = -1, f"they cannot be tried in another process: {error}"
+    if code:
+        raise StepError(f"path is {path!r}; {broken} of its entities are damaged, and {why}")
 
 
 def _face_count(reader: Any) -> int:

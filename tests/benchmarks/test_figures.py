@@ -8,6 +8,7 @@ import math
 import pytest
 
 from benchmarks import report
+from benchmarks.__main__ import write
 from benchmarks.figures import figure, met, quantity
 
 
@@ -84,7 +85,20 @@ def test_the_page_is_written_from_the_json(tmp_path, monkeypatch, capsys):
     assert str(tmp_path) in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(("load", "said"), [(0.1, False), (1.7, True), (None, False)])
+@pytest.mark.parametrize(("load", "said"), [(0.1, False), (1.7, True), (None, True)])
 def test_a_busy_machine_is_said(load, said):
-    machine = {"processor": "Abacus 3", "python": "3.11.1", "versions": {}, "cores": 2, "load": load}
-    assert ("**Provisional:**" in report.page({"machine": machine, "benchmarks": {}})) is said
+    machine = {"processor": "Abacus 3", "python": "3.11.1", "versions": {}, "cores": 2}
+    section = {"date": "2026-01-02", "load": load}
+    text = report.page({"machine": machine, "benchmarks": {"start": section}})
+    assert ("**Provisional:** measured 2026-01-02" in text) is said
+    assert ("load" in text.split("## Start")[1]) is (load is not None)
+
+
+def test_a_section_measured_anew_takes_the_place_of_the_stored_one(tmp_path):
+    first = {"quick": False, "machine": {}, "benchmarks": {"start": {"date": "then"}, "pairs": {"date": "then"}}}
+    write(first, tmp_path, None)
+    path = write({**first, "benchmarks": {"start": {"date": "now"}}}, tmp_path, "start")
+    stored = json.loads(path.read_text())["benchmarks"]
+    # In the order of the page.
+    assert list(stored.items()) == [("pairs", {"date": "then"}), ("start", {"date": "now"})]
+    assert write({**first, "quick": True}, tmp_path, "start").name == "start-quick.json"

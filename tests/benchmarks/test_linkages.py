@@ -12,7 +12,7 @@ import pytest
 
 import assembly as asm
 from benchmarks import cadquery_boxes, linkages
-from benchmarks.mechanisms import exponent
+from benchmarks.pictures import exponent
 
 
 @pytest.mark.parametrize("make", [linkages.bennett, linkages.bricard, linkages.planar_four_bar])

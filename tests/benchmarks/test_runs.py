@@ -18,7 +18,26 @@ from benchmarks.wires import Tally, linked_wires
 
 
 @pytest.mark.parametrize(
-    "name", ["evaluation", "pairs", "controllers", "facets", "wires", "tracking", "mechanisms", "laws"]
+    "name",
+    [
+        "evaluation",
+        "pairs",
+        "controllers",
+        "curves",
+        "proximity_paper",
+        "facets",
+        "wires",
+        "tracking",
+        "mechanisms",
+        "laws",
+        "accuracy",
+        "growth",
+        "skip",
+        "surface_errors",
+        "contact_errors",
+        "joint_errors",
+        "tracking_errors",
+    ],
 )
 def test_quick_runs(name):
     result = import_module(f"benchmarks.{name}").run(True)

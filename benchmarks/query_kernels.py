@@ -1,0 +1,84 @@
+# mypy: ignore-errors
+"""Loops around kernels of queries, so that a time is of the kernel and not of the call; and subdivision, to compare."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from assembly._kernel import kernel
+from assembly.proximity.bezier_capsules import OPEN, compare_curves, compare_point
+from assembly.proximity.bezier_point import point_distance
+from assembly.proximity.bezier_search import curve_distance
+
+
+@kernel
+def subdivide(squares, tolerance, stack):
+    """Upper bound of a distance to a tolerance from the Bernstein coefficients of its square, and the cuts made.
+
+    After Chang et al., "Computing the minimum distance between a point and a clamped B-spline curve" (2007) and its
+    kin: the coefficients bound the square from below, its ends from above; what cannot hold the minimum is cut off, the
+    rest halved.
+    """
+    m = squares.size
+    stack[0] = squares
+    top = 1
+    upper = np.sqrt(min(squares[0], squares[m - 1]))
+    cuts = 0
+    while top > 0 and cuts < 1_000_000:
+        top -= 1
+        row = stack[top]
+        least = row[0]
+        for k in range(1, m):
+            least = min(least, row[k])
+        limit = max(upper - tolerance, 0.0)
+        if least >= limit * limit or top + 2 > stack.shape[0]:
+            continue
+        # de Casteljau at 1/2: the high half in place, the low half behind it.
+        low = stack[top + 1]
+        for r in range(m):
+            low[r] = row[0]
+            for k in range(m - 1 - r):
+                row[k] = 0.5 * (row[k] + row[k + 1])
+        cuts += 1
+        upper = min(upper, np.sqrt(max(row[0], 0.0)))
+        top += 2
+    return upper, cuts
+
+
+@kernel
+def distance_often(ra, qa, rb, qb, plane, times, out):
+    for _ in range(times):
+        curve_distance(ra, qa, rb, qb, 1e-10, -1.0, 200_000, True, plane, out)
+
+
+@kernel
+def question_often(ra, qa, a, rb, qb, b, clearance, plane, times, out):
+    """As `is_separated` answers."""
+    for _ in range(times):
+        if compare_curves(a, b, clearance) == OPEN:
+            curve_distance(ra, qa, rb, qb, 1e-10, clearance, 200_000, True, plane, out)
+
+
+@kernel
+def point_distance_often(record, pool, points, clearance, times, out):
+    for _ in range(times):
+        for i in range(points.shape[0]):
+            point_distance(record, pool, points[i, 0], points[i, 1], points[i, 2], 1e-10, clearance[i], 1_000_000, out)
+
+
+@kernel
+def point_question_often(record, pool, tree, points, clearance, times, out):
+    for _ in range(times):
+        for i in range(points.shape[0]):
+            x, y, z = points[i, 0], points[i, 1], points[i, 2]
+            if compare_point(tree, x, y, z, clearance[i]) == OPEN:
+                point_distance(record, pool, x, y, z, 1e-10, clearance[i], 1_000_000, out)
+
+
+@kernel
+def subdivide_often(squares, times, stack):
+    total = 0.0
+    for _ in range(times):
+        for i in range(squares.shape[0]):
+            total += subdivide(squares[i], 1e-10, stack)[0]
+    return total
