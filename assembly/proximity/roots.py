@@ -360,8 +360,12 @@ def add_root(table, pool, scene, codes, start, n, neglect, roots, count, work):
 
 
 @kernel(inner=True)
-def add_given(table, pool, scene, tracked, listed, many, roots, work):
-    """Add the roots that given contacts of the two bodies have now. Returns how many."""
+def add_given(table, pool, scene, tracked, listed, many, neglect, roots, work):
+    """Add the roots at which given contacts of the two bodies are now. Returns how many.
+
+    A contact whose coordinates are unknowns of a solve may be on its way to another root than Newton's method goes to
+    from there: it does not stand for that one.
+    """
     count = 0
     for c in range(many):
         r = table[listed + 2 * c]
@@ -372,11 +376,14 @@ def add_given(table, pool, scene, tracked, listed, many, roots, work):
             x = (x[2], x[3], x[0], x[1])
         before = count
         count, found = add_root(table, pool, scene, (0, 0), x, (0.0, 0.0, 0.0), 0.0, roots, count, work)
-        if found == NOTHING and scene[2][0] >= 0:
-            # At a fold Newton's method may find nothing: there the contact still is.
+        if scene[2][0] >= 0 and (found == NOTHING or (count > before and count < roots.shape[0])):
             frame = pair_frame(table, pool, scene[2][0], scene[2][1], scene[0], scene[1], x)
-            if frame[11] and opposed(frame, scene[0], table, pool, scene[2][1], x):
-                write(roots, before, x, 0, 0, frame[0], frame[10], frame[3], frame[4], 0.0)
+            if frame[11]:
+                write(roots, count, x, 0, 0, frame[0], frame[10], frame[3], frame[4], 0.0)
+            if found != NOTHING:
+                count = count if are_one(table, pool, scene, roots, before, count, neglect) else before
+            elif frame[11] and opposed(frame, scene[0], table, pool, scene[2][1], x):
+                # At a fold Newton's method may find nothing: there the contact still is.
                 count += 1
         if count > before:
             roots[before, ORIGIN] = GIVEN_CONTACT - c
@@ -394,7 +401,8 @@ def element_ball(table, pool, tree, e):
 def element_distance(table, pool, trees, turn, shift, bulk, e, d):
     """About the least distance of two elements: that of their boxes, or across the planes of their middle normals.
 
-    A patch leaves its plane by no more than its radius times the sine of the angle by which its normals turn.
+    A patch leaves its plane by no more than its radius times the sine of the angle by which its normals turn. Where the
+    planes are in the wrong order by more than that, the bodies are in each other, and the distance is 0.
     """
     o = table[trees[0] + NODE_POOL] + NODE * np.int64(pool[table[trees[0] + ELEMENT_POOL] + ELEMENT * e + ELEMENT_NODE])
     p = table[trees[1] + NODE_POOL] + NODE * np.int64(pool[table[trees[1] + ELEMENT_POOL] + ELEMENT * d + ELEMENT_NODE])
@@ -412,7 +420,8 @@ def element_distance(table, pool, trees, turn, shift, bulk, e, d):
     off_g = add(n, seen[2])
     thick = pool[o + RADIUS] * (pool[o + SIN] + math.sqrt(dot(off_f, off_f)))
     thick += pool[p + RADIUS] * (pool[p + SIN] + math.sqrt(dot(off_g, off_g)))
-    return max(math.sqrt(square), abs(dot(n, apart)) - thick)
+    along = dot(n, apart)
+    return max(math.sqrt(square), along - thick) if along >= -thick else 0.0
 
 
 @kernel(inline=True)

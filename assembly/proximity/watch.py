@@ -110,6 +110,8 @@ WAYS = 64
 FEW = 40
 # Bodies cross that are in each other by more than this.
 CROSSING = 1e-6
+# Where contacts are in each other by d, others may be by this times d.
+DEEPER = 2.0
 # Where nothing may move a pair is looked at after every step.
 LEAST_ALLOWANCE = 1e-12
 # Lists of patches that face each other are for motions up to so many first reaches.
@@ -193,8 +195,11 @@ def largest_part(table, pool, watch, memory, q):
 
 
 @kernel(inner=True)
-def near_enough(table, pool, scene, bulk, least, enough, candidates, found, distances):
-    """A distance within which so few of the pairs of patches are that each can be looked into; at most `enough`."""
+def near_enough(table, pool, scene, bulk, least, enough, depth, candidates, found, distances):
+    """A distance within which so few of the pairs of patches are that each can be looked into; at most `enough`.
+
+    What is no farther than `depth` is looked into in any case.
+    """
     for c in range(found):
         distances[c] = (
             element_distance(table, pool, scene[3], scene[0], scene[1], bulk, candidates[c, 0], candidates[c, 1])
@@ -208,7 +213,7 @@ def near_enough(table, pool, scene, bulk, least, enough, candidates, found, dist
         if count <= FEW:
             break
         enough *= 0.5
-    return enough
+    return max(enough, depth)
 
 
 @kernel(inline=True)
@@ -223,9 +228,12 @@ def around(table, pool, tree, e, lo, hi):
 
 @kernel(inner=True)
 def look_at_pair(
-    table, pool, watch, memory, p, q, tracked, stack, candidates, distances, roots, passed, work, thorough
+    table, pool, watch, memory, p, q, tracked, stack, candidates, distances, roots, passed, work, thorough, depth
 ):
-    """Find and list the roots of pair p; a `thorough` look tells whether the bodies cross elsewhere."""
+    """Find and list the roots of pair p; a `thorough` look tells whether the bodies cross elsewhere.
+
+    Bodies that are in each other by up to `depth`, or by what contacts say, have no contact that is not found.
+    """
     pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
     at = memory_places(table, watch)[0] + PAIR_MEMORY * p
     i = table[pair + PAIR_F]
@@ -254,6 +262,10 @@ def look_at_pair(
         pace += 2.0 * pool[root + RADIUS] * turned_by(memory, at, e)
         pace /= max(memory[CALLS] - memory[at + CALLED], 1.0)
         reach = min(max(MOVES * pace, pool[lengths + FIRST_REACH]), pool[lengths + LAST_REACH])
+    count = known_roots(table, pool, watch, memory, p, scene, tracked, roots, work)
+    for k in range(count):
+        depth = max(depth, min(DEEPER * (least - roots[k, GAP]), pool[lengths + LAST_REACH]))
+    reach = max(reach, depth)
     memory[at + CALLED] = memory[CALLS]
     center = add(matvec(turn, load(pool, root + CENTER)), shift)
     for k in range(4):
@@ -280,11 +292,11 @@ def look_at_pair(
         # Out of room: what is nearer is looked at more often.
         reach *= 0.5
     memory[at + REACH] = reach
-    count = known_roots(table, pool, watch, memory, p, scene, tracked, roots, work)
     flank = pool[table[pair + PAIR_MINIMUM] + 1]
     margin = pool[table[pair + PAIR_MINIMUM] + 2]
     bulk = magnitudes(turn)
-    enough = near_enough(table, pool, scene, bulk, least, max(TAKE * reach, flank), candidates, found, distances)
+    enough = max(TAKE * reach, flank)
+    enough = near_enough(table, pool, scene, bulk, least, enough, depth, candidates, found, distances)
     free = math.inf
     fertile = math.inf
     slides = 0
@@ -375,12 +387,14 @@ def look_at_pair(
     if thorough:
         deep = False
         for k in range(count):
-            deep = deep or (roots[k, GAP] < least and roots[k, ORIGIN] != USELESS)
+            deep = deep or (roots[k, GAP] < least - CROSSING and roots[k, ORIGIN] != USELESS)
         for k in range(table[pair + LOW], table[pair + HIGH]):
             if memory[memory_places(table, watch)[1] + PLACE_MEMORY * k] == p:
-                deep = deep or tracked[table[watch + FIRST] + k, PAIR_GAP] < 0.0
+                deep = deep or tracked[table[watch + FIRST] + k, PAIR_GAP] < -CROSSING
         crossed = not deep and crosses(table, pool, scene, stack, candidates, CROSSING)
         memory[at + CROSSED] = 1.0 if crossed else 0.0
+    else:
+        memory[at + CROSSED] = math.nan
     memory[at + URGENT] = 1.0 if urgent else 0.0
     if fertile < math.inf:
         d = sub(hi, lo)
@@ -431,7 +445,7 @@ def look(table, pool, watch, memory, q, tracked, how):
     for p in range(table[watch + PAIRS]):
         part = memory[at + PAIR_MEMORY * p + PART]
         if how == EVERYTHING:
-            due = part > 0.0
+            due = part > 0.0 or math.isnan(memory[at + PAIR_MEMORY * p + CROSSED])
         else:
             due = part > SPENT or (p == next_pair and part > USED)
             due = due or (how == CAREFUL and part > 0.0 and memory[at + PAIR_MEMORY * p + URGENT] == 1.0)
@@ -446,7 +460,27 @@ def look(table, pool, watch, memory, q, tracked, how):
             passed = np.empty((WAYS, PASSED))
             work = (np.empty((1, CONTACT_RECORD)), np.empty((1, TRACK)))
         thorough = how == EVERYTHING or math.isnan(memory[at + PAIR_MEMORY * p + TURN])
-        look_at_pair(
-            table, pool, watch, memory, p, q, tracked, stack, candidates, distances, roots, passed, work, thorough
-        )
+        depth = 0.0
+        for _ in range(2):
+            look_at_pair(
+                table,
+                pool,
+                watch,
+                memory,
+                p,
+                q,
+                tracked,
+                stack,
+                candidates,
+                distances,
+                roots,
+                passed,
+                work,
+                thorough,
+                depth,
+            )
+            if memory[at + PAIR_MEMORY * p + CROSSED] != 1.0:
+                break
+            # In each other, and no contact says so: deep ones are looked for.
+            depth = pool[table[watch + LENGTHS] + LAST_REACH]
     return np.int64(memory[EVENT_COUNT] - before)

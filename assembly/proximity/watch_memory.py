@@ -51,7 +51,7 @@ EVENT_COUNT, LOOKS, BORN, TIME, CROWDED, CALLS, MEMORY_HEADER = 0, 1, 2, 3, 4, 5
 # middle of its tree was; how far g may go from there, its reach, its state, calls at its last look; a ball on g, where
 # its middle was, and how far what is in it may go; which part of its allowances is used; whether it is looked at after
 # every move, because a contact may be born at a fold beside one that touches; whether the bodies are in each other
-# where no contact says so; whether a near root found no place at the last look.
+# where no contact says so (NaN: its last look did not ask); whether a near root found no place at the last look.
 TURN, PLACE, ALLOWANCE, REACH, STATE, CALLED = 0, 4, 7, 8, 9, 10
 BALL, BALL_RADIUS, BALL_PLACE, BALL_ALLOWANCE, PART, URGENT, CROSSED, WANTING, PAIR_MEMORY = (
     11, 14, 15, 18, 19, 20, 21, 22, 23
@@ -140,7 +140,8 @@ def known_roots(table, pool, watch, memory, p, scene, tracked, roots, work):
     """
     pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
     places = memory_places(table, watch)[1]
-    count = add_given(table, pool, scene, tracked, table[pair + GIVEN], table[pair + GIVEN_COUNT], roots, work)
+    neglect = pool[table[watch + LENGTHS] + NEGLECT]
+    count = add_given(table, pool, scene, tracked, table[pair + GIVEN], table[pair + GIVEN_COUNT], neglect, roots, work)
     for k in range(table[pair + LOW], table[pair + HIGH]):
         o = places + PLACE_MEMORY * k
         if memory[o] != p:
@@ -152,7 +153,6 @@ def known_roots(table, pool, watch, memory, p, scene, tracked, roots, work):
             start = (tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3])
             codes = (np.int64(tracked[r, FEATURE_F]), np.int64(tracked[r, FEATURE_G]))
             n = (tracked[r, PAIR_NORMAL], tracked[r, PAIR_NORMAL + 1], tracked[r, PAIR_NORMAL + 2])
-            neglect = pool[table[watch + LENGTHS] + NEGLECT]
             count, found = add_root(table, pool, scene, codes, start, n, neglect, roots, count, work)
             lost = found != ALIKE and found != MINIMUM_FOUND
         if count > before and not lost:

@@ -314,7 +314,7 @@ def solve_program(table, pool, settings, state, history, tips):
         if watched and not changed:
             holds_now = off_rows(table, loose, one_sided, here, tick) <= TOUCHING
             how = CAREFUL if holds_now else AS_NEEDED
-            changed = look_again(table, pool, memory, here, how, free, loose[4])
+            changed = look_again(table, pool, memory, here, how, free, loose[1], loose[4])
         if changed:
             place_guards(table, memory, here, y, better_y, free, False)
         weigh_rows(rows, one_sided, here[3], y, mu, forces, active)
@@ -375,9 +375,11 @@ def solve_program(table, pool, settings, state, history, tips):
             # Only where the start is so: a step to such a place is not taken.
             status = STALLED
             break
-        if violation <= feasible and dual <= settings[STATIONARITY]:
-            if watched and settings[LAST_LOOK] == 1.0:
-                changed = look_again(table, pool, memory, here, EVERYTHING, free, loose[4])
+        looks_last = watched and settings[LAST_LOOK] == 1.0
+        # Where every last look finds other contacts, the limit ends it.
+        if violation <= feasible and dual <= settings[STATIONARITY] and not (looks_last and iteration > limit):
+            if looks_last:
+                changed = look_again(table, pool, memory, here, EVERYTHING, free, loose[1], loose[4])
                 if changed:
                     iteration += 1
                     continue
@@ -624,13 +626,21 @@ def solve_program(table, pool, settings, state, history, tips):
 
     if folded and status == CONTACT_LOST:
         violation = math.inf
-    crosses = watched and not tick and status != SOLVED and not is_clear(table, here[3])
+    tells = watched and not tick and status != SOLVED and status != CONTACT_LOST
+    if tells:
+        # Contacts that no row tells of yet.
+        look_around(table, pool, memory, here, EVERYTHING)
+        place_guards(table, memory, here, y, better_y, free, False)
+        evaluate(table, pool, here[1], math.inf, loose, room, here)
+    crosses = tells and not is_clear(table, here[3])
     if holds and ((tick and not violation <= feasible) or crosses):
         # Back to the last pose that held; what is near there is looked for again.
         bring_back(held, rows, here, y)
         results[HELD] = 1.0
         if watched:
             go_back(table, memory, numbers)
+            if not tick:
+                look_around(table, pool, memory, here, EVERYTHING)
             place_guards(table, memory, here, y, better_y, free, False)
     write_pose(table, pool, here[0], state)
     if status != CONTACT_LOST and not (tick and results[HELD] == 0.0):

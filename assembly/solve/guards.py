@@ -24,6 +24,8 @@ from assembly.constraints.layout import (
 from assembly.proximity.solid_contact import FOLD, TRACK
 from assembly.proximity.watch import largest_part
 from assembly.proximity.watch_memory import (
+    LENGTHS,
+    NEGLECT,
     PAIR_F,
     PAIR_G,
     PAIR_MEMORY,
@@ -105,11 +107,12 @@ def look_around(table, pool, memory, point, how):
 
 
 @kernel(inner=True)
-def look_again(table, pool, memory, point, how, free, scratch):
+def look_again(table, pool, memory, point, how, free, lengths, scratch):
     """The watch's look at a point that is evaluated; whether rows changed.
 
     A look puts contacts on their extrema. Those whose coordinates are unknowns are on their way there: their rows have
-    been evaluated where they are, and they stay.
+    been evaluated where they are, and they stay. One that is as far from the extremum that it stands for as two
+    contacts are from each other may be on its way to a saddle, and goes there.
     """
     tracked = point[1]
     first = table[FIRST_GUARD]
@@ -119,10 +122,18 @@ def look_again(table, pool, memory, point, how, free, scratch):
                 scratch[r, i] = tracked[r, i]
     changed = look_around(table, pool, memory, point, how)
     places = memory_places(table, table[WATCH])[1]
+    neglect = pool[table[table[WATCH] + LENGTHS] + NEGLECT]
     for r in range(first, first + table[GUARDS]):
         place = places + PLACE_MEMORY * (r - first)
         number = np.int64(memory[place + PLACE_NUMBER]) if memory[place] >= 0.0 else 0
         if free[r] >= 0 and number == table[table[ROW_TABLE] + ROW * r + GUARD_NUMBER]:
+            square = 0.0
+            for i in range(4):
+                d = (tracked[r, i] - scratch[r, i]) * lengths[r, i]
+                square += d * d
+            if square > neglect * neglect:
+                changed = True
+                continue
             for i in range(TRACK):
                 tracked[r, i] = scratch[r, i]
     return changed

@@ -9,13 +9,16 @@ import assembly as asm
 from assembly.constraints.layout import FREE_COLUMN, WATCH
 from assembly.geometry.spline import SURFACE_RECORD
 from assembly.kinematics.motion import relative_pose, rotation
-from assembly.proximity import roots, watch_memory
+from assembly.proximity import roots, watch, watch_memory
 from assembly.proximity.extremal import SINGULAR, solve_pair
 from assembly.proximity.free_pair import VARIABLES, VECTORS, free_rows
 from assembly.proximity.pairs import _key, _packed, as_face, extremal_pair
 from assembly.proximity.solid_contact import PAIR_GAP, TRACK
 from assembly.solve.rows import untouched
+from benchmarks.center_lines import torus_wire
 from benchmarks.running import example
+from benchmarks.scenes import MAJOR, MINOR
+from benchmarks.wire_oracle import WireOracle
 
 IDENTITY = [1.0, 0.0, 0.0, 0.0]
 
@@ -152,3 +155,73 @@ def test_a_given_contact_goes_from_a_saddle_to_the_nearest_minimum(swapped, list
         before = tracked.copy()
         watch_memory.seat_given(table, watch, memory, pair, found, 3, tracked)
         assert np.array_equal(before, tracked, equal_nan=True) and found[0, roots.ORIGIN] == roots.GIVEN_CONTACT
+
+
+@pytest.mark.parametrize("off", [0.0, 1e-9, 1e-3, 0.2])
+@pytest.mark.parametrize("swapped", [0, 1])
+def test_a_given_contact_stands_only_for_the_root_it_is_at(off, swapped):
+    f, g = asm.shapes.ellipsoid(0.2, 0.3, 0.4), asm.shapes.sphere(0.3)
+    table, pool = packed_pair(f, g)
+    q = np.array([[0.0, 0.0, 0.0, *IDENTITY], [0.5, 0.3, 0.2, *IDENTITY]])
+    pair = extremal_pair(f, q[0], g, q[1])
+    scene, root = root_at(table, pool, q, pair.parameters)
+    tracked = np.zeros((1, TRACK))
+    tracked[0, :4] = np.roll(pair.parameters + [off, 0.0, 0.0, 0.0], 2 * swapped)
+    listed = len(table)
+    found = np.full((4, roots.ROOT), np.nan)
+    count = roots.add_given(np.append(table, [0, swapped]), pool, scene, tracked, listed, 1, 1e-6, found, (found, found))
+    # A parameter of the ellipsoid is some tenth of a length long.
+    assert count == (off < 1e-6)
+    if count:
+        assert found[0, roots.ORIGIN] == roots.GIVEN_CONTACT
+        assert np.allclose(found[0, :4], root[:4], atol=1e-9)
+
+
+def test_contacts_of_rings_that_are_deep_in_each_other_are_listed():
+    rng = np.random.default_rng(3)
+    ring = asm.shapes.torus(MAJOR, MINOR)
+    bodies = [asm.Body("first", ring, fixed=True), asm.Body("second", ring)]
+    oracle = WireOracle([torus_wire(MAJOR, MINOR)] * 2)
+    listed = 0
+    for _ in range(600):
+        e = rng.normal(size=4)
+        q = np.array([[0.0, 0.0, 0.0, *IDENTITY], [*rng.uniform(-1.8, 1.8, 3), *e / np.linalg.norm(e)]])
+        extrema = oracle.extrema(q)
+        deep = extrema.gap[(extrema.index == 0) & (extrema.gap < -1e-3) & (extrema.gap > -1.2 * MINOR)]
+        if len(deep):
+            manager = asm.Manager(bodies)
+            manager.update(q)
+            found = np.array([contact.gap for contact in manager.contacts])
+            for gap in deep:
+                # Newton's method on lengths of order one.
+                assert np.abs(found - gap).min() < 1e-12
+                listed += 1
+    assert listed > 80
+
+
+def test_the_last_look_asks_of_every_pair_whether_it_crosses():
+    chain = example("paper_clips").paper_clips()
+    chain.constrain(asm.Clearance())
+    packed = chain.packed()
+    state = packed.new_state()
+    memory = state[packed.memory_at :]
+    q = np.array([body.q for body in chain.bodies])
+    q[:, :3] = (q[:, :3] - packed.reference) / packed.scale
+    tracked = np.full((packed.tracked, TRACK), np.nan)
+    pairs = int(packed.table[packed.table[WATCH] + watch_memory.PAIRS])
+
+    def looked(how):
+        before = memory[watch_memory.LOOKS]
+        watch.look(packed.table, packed.pool, packed.table[WATCH], memory, q, tracked, how)
+        return memory[watch_memory.LOOKS] - before
+
+    def unasked():
+        pair = memory[watch_memory.MEMORY_HEADER :][: pairs * watch_memory.PAIR_MEMORY]
+        return np.isnan(pair.reshape(pairs, -1)[:, watch_memory.CROSSED])
+
+    # A first look asks; one that a motion calls for does not; the last one asks where nothing moved since, and once.
+    assert looked(watch.AS_NEEDED) == pairs and not unasked().any()
+    q[1:, 0] += 0.05 * np.arange(1, len(q))
+    assert looked(watch.AS_NEEDED) > 0.0 and unasked().any()
+    assert looked(watch.EVERYTHING) == pairs and not unasked().any()
+    assert looked(watch.EVERYTHING) == 0.0

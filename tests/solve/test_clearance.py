@@ -14,11 +14,11 @@ from benchmarks.hands import NEAR, TAUT, linked_rings
 from benchmarks.scenes import MAJOR, MINOR
 from benchmarks.wire_oracle import WireOracle
 
-SCENES = 10
+SCENES = 50
 # Gaps hold to 1e-12 of the scene's size, which is a few lengths here; the oracle's are good to 1e-14.
 HOLDS = 1e-11
-# Of taut scenes rounding decides which stall at a fold: of 50 some 41 are solved.
-MOST = 7
+# Of taut scenes rounding decides which stall at a fold: of 50 some 48 are solved.
+MOST = 44
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +64,7 @@ def test_most_rings_out_of_reach_are_solved(taut):
     assert sum(solution.success for solution, _deepest, _linked in taut) >= MOST
 
 
-@pytest.mark.parametrize("k", range(0, SCENES, 3))
+@pytest.mark.parametrize("k", range(0, 10, 3))
 def test_rings_stay_linked_step_by_step(k):
     # The path of the iterates: every solve of a step starts where the one before ended.
     scenes = linked_rings(SCENES, NEAR)
@@ -91,12 +91,11 @@ def two_rings(minimum, place, target):
     return scene, WireOracle([torus_wire(MAJOR, MINOR)] * 2)
 
 
-# Rounding decides where a taut solve ends: another machine may see some of these solved.
-FAR = pytest.mark.xfail(strict=False, reason="constraints held, it stalls before its gradient is small")
+# Rounding decides where such a solve ends: another machine may see some of these solved.
 STUCK = pytest.mark.xfail(strict=False, reason="cubes that are drawn into each other stall where they still cross")
 
 
-@pytest.mark.parametrize("minimum", [0.0, 0.05, pytest.param(0.3, marks=FAR)])
+@pytest.mark.parametrize("minimum", [0.0, 0.05, 0.3])
 def test_the_gap_is_at_least_the_minimum(minimum):
     scene, oracle = two_rings(minimum, (1.0, 0.05, 0.1), (9.0, 0.3, 0.2))
     solution = scene.solve()
@@ -104,6 +103,20 @@ def test_the_gap_is_at_least_the_minimum(minimum):
     # The pull is beyond reach: it ends where the rings are as near as they may.
     assert oracle.deepest(solution.q) == pytest.approx(minimum, abs=HOLDS)
     assert oracle.links(solution.q).tolist() == oracle.links(scene.q).tolist() != [0]
+
+
+def test_no_pull_draws_rings_through_each_other():
+    # Where rings touch along an arc, contacts are born and merge at folds; rounding decides when.
+    rng = np.random.default_rng(0)
+    solved = 0
+    for shift in 1e-6 * rng.normal(size=(120, 3)):
+        scene, oracle = two_rings(0.0, (1.0, 0.05, 0.1) + shift, (9.0, 0.3, 0.2) - shift)
+        solution = scene.solve()
+        solved += solution.success
+        deepest = oracle.deepest(solution.q)
+        assert oracle.links(solution.q).tolist() == [1]
+        assert deepest > -HOLDS if solution.success else -deepest <= solution.feasibility + HOLDS
+    assert solved >= 90
 
 
 def test_a_start_that_crosses_ends_clear():
