@@ -77,6 +77,8 @@ USELESS, NEW, LISTED, GIVEN_CONTACT = -2.0, -1.0, 0, -3.0
 NOTHING, ALIKE, SADDLE, MINIMUM_FOUND = 0, 1, 2, 3
 # A root this far from a fold is the only one in its patches and those beside them, which turn by half a radian at most.
 ALONE, BESIDE = 0.05, 3.0
+# Roots of no use are the same within this radius, in parts of the scene's size.
+SAME = 1e-6
 # Steps of the controller where Newton's method fails, and down the slope of a gap.
 DESCENTS = 40
 SLIDES = 24
@@ -354,7 +356,9 @@ def add_root(table, pool, scene, codes, start, n, neglect, roots, count, work):
     if found == NOTHING:
         return count, found
     for k in range(count):
-        if are_one(table, pool, scene, roots, count, k, neglect):
+        # One of far sides, or a saddle, hides no contact beside it.
+        radius = min(neglect, SAME) if roots[k, ORIGIN] == USELESS else neglect
+        if are_one(table, pool, scene, roots, count, k, radius):
             return count, ALIKE
     return count + 1, found
 
@@ -402,7 +406,7 @@ def element_distance(table, pool, trees, turn, shift, bulk, e, d):
     """About the least distance of two elements: that of their boxes, or across the planes of their middle normals.
 
     A patch leaves its plane by no more than its radius times the sine of the angle by which its normals turn. Where the
-    planes are in the wrong order by more than that, the bodies are in each other, and the distance is 0.
+    planes are in the wrong order by more than that, the bodies are in each other, or these are far sides: -inf.
     """
     o = table[trees[0] + NODE_POOL] + NODE * np.int64(pool[table[trees[0] + ELEMENT_POOL] + ELEMENT * e + ELEMENT_NODE])
     p = table[trees[1] + NODE_POOL] + NODE * np.int64(pool[table[trees[1] + ELEMENT_POOL] + ELEMENT * d + ELEMENT_NODE])
@@ -421,7 +425,7 @@ def element_distance(table, pool, trees, turn, shift, bulk, e, d):
     thick = pool[o + RADIUS] * (pool[o + SIN] + math.sqrt(dot(off_f, off_f)))
     thick += pool[p + RADIUS] * (pool[p + SIN] + math.sqrt(dot(off_g, off_g)))
     along = dot(n, apart)
-    return max(math.sqrt(square), along - thick) if along >= -thick else 0.0
+    return max(math.sqrt(square), along - thick) if along >= -thick else -math.inf
 
 
 @kernel(inline=True)

@@ -198,7 +198,7 @@ def largest_part(table, pool, watch, memory, q):
 def near_enough(table, pool, scene, bulk, least, enough, depth, candidates, found, distances):
     """A distance within which so few of the pairs of patches are that each can be looked into; at most `enough`.
 
-    What is no farther than `depth` is looked into in any case.
+    What is no farther than `depth`, or in the wrong order, is looked into in any case.
     """
     for c in range(found):
         distances[c] = (
@@ -208,7 +208,7 @@ def near_enough(table, pool, scene, bulk, least, enough, depth, candidates, foun
     for _ in range(6):
         count = 0
         for c in range(found):
-            if distances[c] <= enough:
+            if -math.inf < distances[c] <= enough:
                 count += 1
         if count <= FEW:
             break
