@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 import subprocess
 import sys
 import warnings
@@ -10,6 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from os import PathLike, fspath
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -29,16 +31,22 @@ __all__ = ["UNITS", "StepError", "StepWarning", "read_step"]
 UNITS = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1e3, "in": 25.4, "ft": 304.8}
 # A deviation [mm] below which a face is what the file says: OCCT takes nearer points for one.
 EXACT = 1e-7
-# Seconds that shapes of a damaged file may take.
+# Seconds that a damaged file may take.
 PATIENCE = 120.0
 # Exit codes from which on Windows means a crash; elsewhere they are negative.
 ENDED = 0xC0000000
-# What is raised in this one is raised again in the process that asked.
-_TRIAL = """
-import contextlib, sys
-from assembly.step.reader import document_of
-with contextlib.suppress(Exception):
-    document_of(sys.argv[1], True)
+# What is raised in this one is raised again in the process that asked. It ends without OCCT's taking anything down.
+_APART = """
+import os, pickle, sys
+from assembly.step.reader import bodies_of
+path, unit, strict, answer = sys.argv[1:]
+try:
+    found = bodies_of(path, unit, strict == "True", True)
+except Exception as error:
+    found = error
+with open(answer, "wb") as file:
+    pickle.dump(found, file)
+os._exit(0)
 """
 
 
@@ -48,6 +56,10 @@ class StepError(InputError):
 
 class StepWarning(UserWarning):
     """Something of a STEP file was left out or approximated; the text says what, and why."""
+
+
+class _Damaged(StepError):
+    """A file with entities that OCCT could not load."""
 
 
 @dataclass
@@ -68,11 +80,11 @@ def checked_unit(unit: str) -> float:
     return UNITS[unit]
 
 
-def document_of(path: str, tried: bool = False) -> tuple[Any, int]:
+def document_of(path: str, damaged: bool = False) -> tuple[Any, int]:
     """The file as a document of OCCT, in millimeters, and the number of its faces.
 
-    Entities that OCCT cannot load may end the process when it makes shapes of them. A file that has such ones is tried
-    in another process first.
+    Entities that OCCT cannot load may end the process when it makes shapes of them, or some later time: a file that has
+    such ones is refused unless it may be `damaged`.
     """
     o = occt()
     # Settings exist once there is a reader.
@@ -83,8 +95,8 @@ def document_of(path: str, tried: bool = False) -> tuple[Any, int]:
         with settings({"read.stepcaf.subshapes.name": 1, "read.step.product.mode": 1}):
             if reader.ReadFile(path) != o.IFSelect_RetDone:
                 raise StepError(f"path is {path!r}; expected a STEP file, and OCCT cannot parse it")
-            if not tried and (broken := _broken_entities(reader)):
-                _try_apart(path, broken)
+            if not damaged and (broken := _broken_entities(reader)):
+                raise _Damaged(f"path is {path!r}; {broken} of its entities are damaged")
             document = o.TDocStd_Document(o.TCollection_ExtendedString("XmlOcaf"))
             o.XCAFDoc_DocumentTool.SetLengthUnit_s(document, 1e-3)
             for mode in ("SetColorMode", "SetNameMode"):
@@ -102,28 +114,33 @@ def _broken_entities(reader: Any) -> int:
     return sum(model.IsErrorEntity(k) for k in range(1, model.NbEntities() + 1))
 
 
-def _try_apart(path: str, broken: int) -> None:
-    """Raise where making shapes of a file ends the process that does so, or does not end."""
+def _read_apart(path: str, unit: str, strict: bool, damage: str) -> tuple[list[Body], list[str]]:
+    """`bodies_of` in another process, which OCCT may end, or not end."""
     why = "OCCT cannot do without them"
-    try:
-        found = subprocess.run(
-            [sys.executable or "python", "-c", _TRIAL, path],
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, sys.path))},
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            check=False,
-            timeout=PATIENCE,
-            text=True,
-        )
-        code = found.returncode
-        if 0 < code < ENDED:
-            why = f"they cannot be tried in another process: {found.stderr.strip()[-200:]}"
-    except subprocess.TimeoutExpired:
-        code, why = -1, f"OCCT is not done with the others in {PATIENCE:g} seconds"
-    except OSError as error:
-        code, why = -1, f"they cannot be tried in another process: {error}"
-    if code:
-        raise StepError(f"path is {path!r}; {broken} of its entities are damaged, and {why}")
+    with TemporaryDirectory() as folder:
+        answer = Path(folder) / "answer"
+        try:
+            ended = subprocess.run(
+                [sys.executable or "python", "-c", _APART, path, unit, str(strict), str(answer)],
+                env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, sys.path))},
+                stdin=subprocess.DEVNULL,
+                capture_output=True,
+                check=False,
+                timeout=PATIENCE,
+                text=True,
+            )
+            if ended.returncode == 0:
+                found = pickle.loads(answer.read_bytes())
+                if isinstance(found, Exception):
+                    raise found
+                return found  # type: ignore[no-any-return]  # It is what the child found.
+            if 0 < ended.returncode < ENDED:
+                why = f"they cannot be read in another process: {ended.stderr.strip()[-200:]}"
+        except subprocess.TimeoutExpired:
+            why = f"OCCT is not done with the others in {PATIENCE:g} seconds"
+        except OSError as error:
+            why = f"they cannot be read in another process: {error}"
+    raise StepError(f"{damage}, and {why}")
 
 
 def _face_count(reader: Any) -> int:
@@ -238,15 +255,28 @@ def read_step(path: str | PathLike[str], *, unit: str = "mm", strict: bool = Tru
     StepWarning
         Faces that are left out, or were approximated by more than 1e-7 mm (offset surfaces).
     """
-    scale = 1.0 / checked_unit(unit)
+    checked_unit(unit)
     if not isinstance(strict, (bool, np.bool_)):
         raise InputError(f"strict is {strict!r}; expected True or False")
     file = Path(fspath(path))
     if not file.is_file():
         raise FileNotFoundError(f"path is {str(file)!r}; no such file")
+    try:
+        bodies, left = bodies_of(str(file), unit, bool(strict))
+    except _Damaged as damage:
+        bodies, left = _read_apart(str(file), unit, bool(strict), str(damage))
+    for line in left:
+        warnings.warn(line, StepWarning, stacklevel=2)
+    return bodies
+
+
+def bodies_of(path: str, unit: str, strict: bool, damaged: bool = False) -> tuple[list[Body], list[str]]:
+    """The bodies of a file, and what there is to warn of."""
+    scale = 1.0 / checked_unit(unit)
+    file = Path(path)
     o = occt()
     with quiet():
-        document, count = document_of(str(file))
+        document, count = document_of(path, damaged)
         root = o.XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
         bodies: list[Body] = []
         missing: list[str] = []
@@ -283,10 +313,8 @@ def read_step(path: str | PathLike[str], *, unit: str = "mm", strict: bool = Tru
         raise StepError(f"path is {str(file)!r}; it has no faces")
     if built < count:
         missing.append(f"{count - built} of {count} faces, of which OCCT makes nothing")
-    for what, lines in (("not read", missing), ("approximated", inexact)):
-        if lines:
-            warnings.warn(f"{file.name}: {_listed(what, lines)}", StepWarning, stacklevel=2)
-    return bodies
+    lines = (("not read", missing), ("approximated", inexact))
+    return bodies, [f"{file.name}: {_listed(what, told)}" for what, told in lines if told]
 
 
 def _listed(what: str, lines: list[str], most: int = 10) -> str:

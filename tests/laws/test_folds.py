@@ -169,7 +169,9 @@ def test_a_given_contact_stands_only_for_the_root_it_is_at(off, swapped):
     tracked[0, :4] = np.roll(pair.parameters + [off, 0.0, 0.0, 0.0], 2 * swapped)
     listed = len(table)
     found = np.full((4, roots.ROOT), np.nan)
-    count = roots.add_given(np.append(table, [0, swapped]), pool, scene, tracked, listed, 1, 1e-6, found, (found, found))
+    count = roots.add_given(
+        np.append(table, [0, swapped]), pool, scene, tracked, listed, 1, 1e-6, found, (found, found)
+    )
     # A parameter of the ellipsoid is some tenth of a length long.
     assert count == (off < 1e-6)
     if count:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from math import pi
 
 import numpy as np
@@ -179,7 +180,7 @@ def test_faces_that_occt_drops_are_counted(tmp_path, monkeypatch):
     file.part(box(), "box")
     path = file.write(tmp_path / "box.step")
     known = reader.document_of
-    monkeypatch.setattr(reader, "document_of", lambda path: (known(path)[0], known(path)[1] + 2))
+    monkeypatch.setattr(reader, "document_of", lambda *given: (known(*given)[0], known(*given)[1] + 2))
     with pytest.warns(StepWarning, match="box.step: not read: 2 of 8 faces, of which OCCT makes nothing"):
         (body,) = asm.read_step(path)
     assert len(body.faces) == 6
@@ -238,3 +239,48 @@ def test_nothing_is_printed_and_occt_s_settings_are_left_as_they_were(nested, ca
     asm.read_step(nested)
     assert capfd.readouterr().out == ""
     assert (O.Interface_Static.IVal_s("read.stepcaf.subshapes.name"), O.XCAFDoc_ShapeTool.AutoNaming_s()) == before
+
+
+@pytest.fixture
+def damaged(tmp_path):
+    """A box whose third plane is without its placement."""
+    file = File()
+    file.part(box(), "box")
+    path = file.write(tmp_path / "box.step")
+    text = path.read_text()
+    third = list(re.finditer(r"= PLANE\('',#\d+\)", text))[2]
+    path.write_text(f"{text[: third.start()]}= PLANE(''){text[third.end() :]}")
+    return path
+
+
+def test_damaged_files_are_read_in_another_process(damaged):
+    with pytest.warns(StepWarning) as warned:
+        (body,) = asm.read_step(damaged, unit="cm", strict=False)
+    (here,), lines = reader.bodies_of(str(damaged), "cm", False, True)
+    assert [str(line.message) for line in warned] == lines != []
+    assert [side.name for side in body.faces] == [side.name for side in here.faces]
+    assert len(body.faces) == 5
+    for a, b in zip(body.faces, here.faces, strict=True):
+        assert np.array_equal(a.face.surface.control_points, b.face.surface.control_points)
+
+
+@pytest.mark.parametrize(
+    ("child", "why"),
+    [
+        ("import os; os.abort()", "OCCT cannot do without them"),
+        ("raise SystemExit('no such module')", "they cannot be read in another process: no such module"),
+        ("import time; time.sleep(60.0)", "OCCT is not done with the others in 1 seconds"),
+    ],
+)
+def test_damaged_files_that_end_the_process_are_refused(damaged, monkeypatch, child, why):
+    monkeypatch.setattr(reader, "_APART", child)
+    monkeypatch.setattr(reader, "PATIENCE", 1.0 if "sleep" in child else 60.0)
+    with pytest.raises(StepError, match=f"box.step'; 1 of its entities are damaged, and {why}"):
+        asm.read_step(damaged)
+
+
+def test_what_another_process_raises_is_raised(damaged, monkeypatch):
+    raised = "import pickle, sys; pickle.dump(ValueError('no'), open(sys.argv[-1], 'wb'))"
+    monkeypatch.setattr(reader, "_APART", raised)
+    with pytest.raises(ValueError, match="no"):
+        asm.read_step(damaged)
