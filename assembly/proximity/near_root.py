@@ -9,7 +9,8 @@ from __future__ import annotations
 from assembly._kernel import kernel
 from assembly.proximity.bounding_tree import ELEMENT, ELEMENT_POOL
 from assembly.proximity.extremal import bent_at_most, move_pair, pair_frame, pair_matrix, pair_step
-from assembly.proximity.roots import BESIDE, is_within
+from assembly.proximity.folds import BESIDE
+from assembly.proximity.roots import is_within
 
 # Steps; and below so many radians, that a step turns a normal, it is as good as there.
 STEPS, CLOSE = 6, 0.02

@@ -19,6 +19,7 @@ from assembly.geometry.vec import add, dot, matvec, matvec_t, quaternion_matrix,
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.bounding_tree import CENTER, NODE_POOL, RADIUS, least_distance, magnitudes, pairs_within
 from assembly.proximity.near_root import BARREN, LEFT, PASSED, half_widths, stays
+from assembly.proximity.overlap import crosses, is_outside
 from assembly.proximity.patch_list import LIST_INTS, listed_pairs
 from assembly.proximity.roots import (
     ALIKE,
@@ -31,12 +32,10 @@ from assembly.proximity.roots import (
     ROOT_FOLD,
     USELESS,
     add_root,
-    crosses,
     element_ball,
     element_distance,
     is_alone,
     is_known,
-    is_outside,
     slide_down,
 )
 from assembly.proximity.solid_contact import CONTACT_RECORD, PAIR_GAP, TRACK

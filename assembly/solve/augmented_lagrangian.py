@@ -48,7 +48,6 @@ from assembly.constraints.layout import (
 from assembly.constraints.program import add_row_terms, evaluate
 from assembly.constraints.sparsity import clear_upper
 from assembly.constraints.terms import objective, recenter
-from assembly.proximity.extremal import BEND
 from assembly.proximity.free_pair import VARIABLES, VECTORS
 from assembly.proximity.solid_contact import CONTACT_RECORD, FOLD, TRACK
 from assembly.proximity.watch import AS_NEEDED, CAREFUL, EVERYTHING, any_crossed
@@ -59,7 +58,6 @@ from assembly.solve.guards import (
     clear_guards,
     forget_guards,
     go_back,
-    is_too_far,
     look_again,
     look_around,
     numbers_of,
@@ -72,17 +70,16 @@ from assembly.solve.multipliers import (
     foresee,
     least_multipliers,
     strongest,
-    toward_rows,
     weigh_rows,
 )
 from assembly.solve.recall import leave, recall
 from assembly.solve.report import bring_back, is_clear, judge, keep, write_pose, write_rows
+from assembly.solve.restoration import way_back
 from assembly.solve.rows import (
     add_transposed,
     arrange,
     carry,
     move,
-    off_rows,
     record_of_blocks,
     shape_of,
     times,
@@ -90,6 +87,7 @@ from assembly.solve.rows import (
     violation_of,
 )
 from assembly.solve.search import SHORTEST, damped_step, goal, search
+from assembly.solve.tangency import off_rows
 
 # Outcomes; `solution.Status` gives each a sentence. RUNNING is none of them.
 SOLVED, INFEASIBLE, STALLED, ITERATION_LIMIT, CONTACT_LOST, OUT_OF_TIME, RUNNING = 0, 1, 2, 3, 4, 5, 6
@@ -362,13 +360,9 @@ def solve_program(table, pool, settings, state, history, tips):
         good = math.inf if iteration == 0 else 0.1 * last_dual
         dual = choose_multipliers(shape, rows, here, shortened, good, active, gradient, descent, gram, y, better_y)
         if iteration < history.shape[0]:
-            history[iteration, 0] = value
-            history[iteration, 1] = violation
-            history[iteration, 2] = dual
-            history[iteration, 3] = mu
-            history[iteration, 4] = shift
-            history[iteration, 5] = alpha
-            history[iteration, 6] = radius
+            figures = (value, violation, dual, mu, shift, alpha, radius)
+            for k in range(HISTORY):
+                history[iteration, k] = figures[k]
         if status != RUNNING:
             break
         if not math.isfinite(violation) or not math.isfinite(value) or not math.isfinite(dual):
@@ -416,31 +410,27 @@ def solve_program(table, pool, settings, state, history, tips):
             if violation < lowest:
                 lowest = violation
                 astray = False
-            weigh_rows(rows, one_sided, residual, y, mu, forces, active)
-            softness = toward_rows(
+            softness, there = way_back(
+                table,
+                pool,
+                memory,
                 shape,
-                m,
+                loose,
+                room,
+                here,
+                trial,
                 rows,
-                residual,
-                jacobian,
+                n,
+                (y, active, forces),
                 mu,
-                active,
                 softness,
+                share,
                 0.1 * feasible,
                 lagrangian,
                 matrix,
-                n,
-                forces,
                 step,
+                tick,
             )
-            move(table, here[0], step, share, trial[0])
-            carry(table, pool, bases, loose, here, step, share)
-            there = math.inf
-            if (
-                not (watched and is_too_far(table, pool, memory, trial))
-                and evaluate(table, pool, loose[4], BEND, loose, room, trial) < 0
-            ):
-                there = off_rows(table, loose, one_sided, trial, tick)
             if there < lowest or (tick and there < ASTRAY * lowest and not astray):
                 astray = not there < lowest
                 here, trial = trial, here

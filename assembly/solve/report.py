@@ -21,7 +21,7 @@ from assembly.constraints.program import evaluate
 from assembly.proximity.extremal import BEND
 from assembly.proximity.solid_contact import PROPER, TRACK
 from assembly.solve.contacts import free_pairs_hold
-from assembly.solve.rows import off_rows, off_tangency
+from assembly.solve.tangency import off_rows, off_tangency
 
 # A gap that counts as touching where crossing surfaces are reported.
 TOUCHING = 1e-9

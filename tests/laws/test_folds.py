@@ -11,10 +11,11 @@ from assembly.geometry.spline import SURFACE_RECORD
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity import roots, watch, watch_memory
 from assembly.proximity.extremal import SINGULAR, solve_pair
+from assembly.proximity.folds import fold_beyond
 from assembly.proximity.free_pair import VARIABLES, VECTORS, free_rows
 from assembly.proximity.pairs import _key, _packed, as_face, extremal_pair
 from assembly.proximity.solid_contact import PAIR_GAP, TRACK
-from assembly.solve.rows import untouched
+from assembly.solve.tangency import untouched
 from benchmarks.center_lines import torus_wire
 from benchmarks.running import example
 from benchmarks.scenes import MAJOR, MINOR
@@ -82,7 +83,7 @@ def test_a_fold_beyond_a_knot_line_is_that_of_the_pair_there(side):
         q = np.array([[0.0, 0.0, 0.0, *IDENTITY], [*(ring[1] + 0.1 * outward + along_line), *IDENTITY]])
         scene, root = root_at(table, pool, q, extremal_pair(clip, q[0], ball, q[1]).parameters)
         near = (0.05, -1.0, -1.0, -1.0)  # no other knot lines
-        folds.append((root[roots.ROOT_FOLD], roots.fold_beyond(table, pool, scene, tuple(root[:4]), near)))
+        folds.append((root[roots.ROOT_FOLD], fold_beyond(table, pool, scene, tuple(root[:4]), near)))
     (here, beyond), (there, behind) = folds
     assert abs(here - there) > 0.05
     # The two places are 2e-6 apart, where curvatures change by some hundreds a unit.
