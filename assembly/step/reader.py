@@ -31,8 +31,8 @@ __all__ = ["UNITS", "StepError", "StepWarning", "read_step"]
 UNITS = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1e3, "in": 25.4, "ft": 304.8}
 # A deviation [mm] below which a face is what the file says: OCCT takes nearer points for one.
 EXACT = 1e-7
-# Seconds that a damaged file may take.
-PATIENCE = 120.0
+# Seconds that a damaged file may take, kernels that are compiled for the first time included.
+PATIENCE = 240.0
 # Exit codes from which on Windows means a crash; elsewhere they are negative.
 ENDED = 0xC0000000
 # What is raised in this one is raised again in the process that asked. It ends without OCCT's taking anything down.

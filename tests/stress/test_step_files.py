@@ -25,7 +25,7 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 # Models of a file: few, so that one is read in some hundredths of a second.
 WHOLE = (("box", "cone"), ("drilled cylinder",), ("torus", "vase"), ("part of a vase", "slice of a sphere"))
 # Seconds a damaged file may take, which is read in another process; whole ones take some hundredths.
-LONGEST = 180
+LONGEST = 300
 
 
 def truncated(rng, text):
