@@ -134,7 +134,7 @@ def test_damaged_files_are_read_or_refused(damage, whole, times, tmp_path):
     path = tmp_path / "damaged.step"
     outcomes = Counter()
     try:
-        for _ in range(8 * times):
+        for _ in range(5 * times):
             text = damage(rng, whole[rng.integers(len(whole))])
             path.write_bytes(text.encode("latin-1"))
             outcomes[reader.read(path)] += 1
