@@ -313,7 +313,8 @@ def add_given(table, pool, scene, tracked, listed, many, neglect, roots, work):
             if frame[11]:
                 write(roots, count, x, 0, 0, frame[0], frame[10], frame[3], frame[4], 0.0)
             if found != NOTHING:
-                count = count if are_one(table, pool, scene, roots, before, count, neglect) else before
+                same = frame[11] and are_one(table, pool, scene, roots, before, count, neglect)
+                count = count if same else before
             elif frame[11] and opposed(frame, scene[0], table, pool, scene[2][1], x):
                 # At a fold Newton's method may find nothing: there the contact still is.
                 count += 1

@@ -109,8 +109,6 @@ WAYS = 64
 FEW = 40
 # Bodies cross that are in each other by more than this.
 CROSSING = 1e-6
-# Where contacts are in each other by d, others may be by this times d.
-DEEPER = 2.0
 # Where nothing may move a pair is looked at after every step.
 LEAST_ALLOWANCE = 1e-12
 # Lists of patches that face each other are for motions up to so many first reaches.
@@ -194,10 +192,10 @@ def largest_part(table, pool, watch, memory, q):
 
 
 @kernel(inner=True)
-def near_enough(table, pool, scene, bulk, least, enough, depth, candidates, found, distances):
+def near_enough(table, pool, scene, bulk, least, enough, candidates, found, distances):
     """A distance within which so few of the pairs of patches are that each can be looked into; at most `enough`.
 
-    What is no farther than `depth`, or in the wrong order, is looked into in any case.
+    What is in the wrong order is looked into in any case.
     """
     for c in range(found):
         distances[c] = (
@@ -212,7 +210,7 @@ def near_enough(table, pool, scene, bulk, least, enough, depth, candidates, foun
         if count <= FEW:
             break
         enough *= 0.5
-    return max(enough, depth)
+    return enough
 
 
 @kernel(inline=True)
@@ -227,12 +225,9 @@ def around(table, pool, tree, e, lo, hi):
 
 @kernel(inner=True)
 def look_at_pair(
-    table, pool, watch, memory, p, q, tracked, stack, candidates, distances, roots, passed, work, thorough, depth
+    table, pool, watch, memory, p, q, tracked, stack, candidates, distances, roots, passed, work, thorough
 ):
-    """Find and list the roots of pair p; a `thorough` look tells whether the bodies cross elsewhere.
-
-    Bodies that are in each other by up to `depth`, or by what contacts say, have no contact that is not found.
-    """
+    """Find and list the roots of pair p; a `thorough` look tells whether the bodies cross elsewhere."""
     pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
     at = memory_places(table, watch)[0] + PAIR_MEMORY * p
     i = table[pair + PAIR_F]
@@ -261,10 +256,6 @@ def look_at_pair(
         pace += 2.0 * pool[root + RADIUS] * turned_by(memory, at, e)
         pace /= max(memory[CALLS] - memory[at + CALLED], 1.0)
         reach = min(max(MOVES * pace, pool[lengths + FIRST_REACH]), pool[lengths + LAST_REACH])
-    count = known_roots(table, pool, watch, memory, p, scene, tracked, roots, work)
-    for k in range(count):
-        depth = max(depth, min(DEEPER * (least - roots[k, GAP]), pool[lengths + LAST_REACH]))
-    reach = max(reach, depth)
     memory[at + CALLED] = memory[CALLS]
     center = add(matvec(turn, load(pool, root + CENTER)), shift)
     for k in range(4):
@@ -291,11 +282,11 @@ def look_at_pair(
         # Out of room: what is nearer is looked at more often.
         reach *= 0.5
     memory[at + REACH] = reach
+    count = known_roots(table, pool, watch, memory, p, scene, tracked, roots, work)
     flank = pool[table[pair + PAIR_MINIMUM] + 1]
     margin = pool[table[pair + PAIR_MINIMUM] + 2]
     bulk = magnitudes(turn)
-    enough = max(TAKE * reach, flank)
-    enough = near_enough(table, pool, scene, bulk, least, enough, depth, candidates, found, distances)
+    enough = near_enough(table, pool, scene, bulk, least, max(TAKE * reach, flank), candidates, found, distances)
     free = math.inf
     fertile = math.inf
     slides = 0
@@ -365,7 +356,7 @@ def look_at_pair(
         else:
             gap = roots[before, GAP]
             # The far sides of two bodies oppose each other, too.
-            alien = abs(gap) > reach + least or (gap < 0.0 and is_outside(table, pool, scene, roots, before, margin))
+            alien = gap > reach + least or (gap < 0.0 and is_outside(table, pool, scene, roots, before, margin))
             roots[before, ORIGIN] = USELESS if alien else NEW
     if smooth:
         seat_given(table, watch, memory, p, roots, count, tracked)
@@ -459,27 +450,7 @@ def look(table, pool, watch, memory, q, tracked, how):
             passed = np.empty((WAYS, PASSED))
             work = (np.empty((1, CONTACT_RECORD)), np.empty((1, TRACK)))
         thorough = how == EVERYTHING or math.isnan(memory[at + PAIR_MEMORY * p + TURN])
-        depth = 0.0
-        for _ in range(2):
-            look_at_pair(
-                table,
-                pool,
-                watch,
-                memory,
-                p,
-                q,
-                tracked,
-                stack,
-                candidates,
-                distances,
-                roots,
-                passed,
-                work,
-                thorough,
-                depth,
-            )
-            if memory[at + PAIR_MEMORY * p + CROSSED] != 1.0:
-                break
-            # In each other, and no contact says so: deep ones are looked for.
-            depth = pool[table[watch + LENGTHS] + LAST_REACH]
+        look_at_pair(
+            table, pool, watch, memory, p, q, tracked, stack, candidates, distances, roots, passed, work, thorough
+        )
     return np.int64(memory[EVENT_COUNT] - before)

@@ -312,7 +312,7 @@ def solve_program(table, pool, settings, state, history, tips):
         if watched and not changed:
             holds_now = off_rows(table, loose, one_sided, here, tick) <= TOUCHING
             how = CAREFUL if holds_now else AS_NEEDED
-            changed = look_again(table, pool, memory, here, how, free, loose[1], loose[4])
+            changed = look_again(table, pool, memory, here, how, free, loose[4])
         if changed:
             place_guards(table, memory, here, y, better_y, free, False)
         weigh_rows(rows, one_sided, here[3], y, mu, forces, active)
@@ -373,7 +373,7 @@ def solve_program(table, pool, settings, state, history, tips):
         # Where every last look finds other contacts, the limit ends it.
         if violation <= feasible and dual <= settings[STATIONARITY] and not (looks_last and iteration > limit):
             if looks_last:
-                changed = look_again(table, pool, memory, here, EVERYTHING, free, loose[1], loose[4])
+                changed = look_again(table, pool, memory, here, EVERYTHING, free, loose[4])
                 if changed:
                     iteration += 1
                     continue
@@ -526,7 +526,15 @@ def solve_program(table, pool, settings, state, history, tips):
                 # What the row adds to the descent is not in the merit before it binds.
                 slope -= (y[r] + residual[r] / mu) * times(bases, jacobian, r, step)
         if restoring:
-            if steepest <= 1e-9 * violation or longest < 1e-12:
+            ends = steepest <= 1e-9 * violation or longest < 1e-12
+            slows = iteration >= check_at and violation > 0.99 * check_violation
+            if (ends or slows) and watched and iteration < limit:
+                # A contact may have come to where a given one stands, of which no clearance asks anything.
+                changed = look_again(table, pool, memory, here, EVERYTHING, free, loose[4])
+                if changed:
+                    iteration += 1
+                    continue
+            if ends:
                 if kicks < KICKS and factorize_shifted(lagrangian, n, order, 1e-8, matrix) > SADDLE:
                     # A saddle of the violations: axes that are parallel and are to stand at right angles, say.
                     kicks += 1
@@ -540,10 +548,10 @@ def solve_program(table, pool, settings, state, history, tips):
                         continue
                 status = INFEASIBLE if violation > TOUCHING else STALLED
                 break
+            if slows:
+                status = STALLED
+                break
             if iteration >= check_at:
-                if violation > 0.99 * check_violation:
-                    status = STALLED
-                    break
                 check_at = iteration + PATIENCE
                 check_violation = violation
         longest *= cut
@@ -621,8 +629,8 @@ def solve_program(table, pool, settings, state, history, tips):
         # Contacts that no row tells of yet.
         look_around(table, pool, memory, here, EVERYTHING)
         place_guards(table, memory, here, y, better_y, free, False)
-        evaluate(table, pool, here[1], math.inf, loose, room, here)
-    crosses = tells and not is_clear(table, here[3])
+        lost = evaluate(table, pool, here[1], math.inf, loose, room, here)
+    crosses = tells and (lost >= 0 or not is_clear(table, here[3]))
     if holds and ((tick and not violation <= feasible) or crosses):
         # Back to the last pose that held; what is near there is looked for again.
         bring_back(held, rows, here, y)

@@ -19,8 +19,11 @@ from assembly.constraints.layout import (
     ROW_TABLE,
     SHELL_F,
     SURFACE_F,
+    SURFACE_G,
     WATCH,
 )
+from assembly.geometry.spline import surface_point
+from assembly.geometry.vec import dot, sub
 from assembly.proximity.solid_contact import FOLD, TRACK
 from assembly.proximity.watch import largest_part
 from assembly.proximity.watch_memory import (
@@ -107,7 +110,15 @@ def look_around(table, pool, memory, point, how):
 
 
 @kernel(inner=True)
-def look_again(table, pool, memory, point, how, free, lengths, scratch):
+def moved_along(table, pool, surface, tracked, was, r, i):
+    """How far a point of contact r on a surface is from where it was; its parameters are in columns i and i + 1."""
+    p = surface_point(table, pool, surface, tracked[r, i], tracked[r, i + 1])[0]
+    d = sub(p, surface_point(table, pool, surface, was[r, i], was[r, i + 1])[0])
+    return math.sqrt(dot(d, d))
+
+
+@kernel(inner=True)
+def look_again(table, pool, memory, point, how, free, scratch):
     """The watch's look at a point that is evaluated; whether rows changed.
 
     A look puts contacts on their extrema. Those whose coordinates are unknowns are on their way there: their rows have
@@ -127,15 +138,14 @@ def look_again(table, pool, memory, point, how, free, lengths, scratch):
         place = places + PLACE_MEMORY * (r - first)
         number = np.int64(memory[place + PLACE_NUMBER]) if memory[place] >= 0.0 else 0
         if free[r] >= 0 and number == table[table[ROW_TABLE] + ROW * r + GUARD_NUMBER]:
-            square = 0.0
-            for i in range(4):
-                d = (tracked[r, i] - scratch[r, i]) * lengths[r, i]
-                square += d * d
-            if square > neglect * neglect:
+            row = table[ROW_TABLE] + ROW * r
+            if moved_along(table, pool, table[row + SURFACE_F], tracked, scratch, r, 0) <= neglect and (
+                moved_along(table, pool, table[row + SURFACE_G], tracked, scratch, r, 2) <= neglect
+            ):
+                for i in range(TRACK):
+                    tracked[r, i] = scratch[r, i]
+            else:
                 changed = True
-                continue
-            for i in range(TRACK):
-                tracked[r, i] = scratch[r, i]
     return changed
 
 

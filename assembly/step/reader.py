@@ -36,6 +36,7 @@ PATIENCE = 240.0
 # Exit codes from which on Windows means a crash; elsewhere they are negative.
 ENDED = 0xC0000000
 # What is raised in this one is raised again in the process that asked. It ends without OCCT's taking anything down.
+# Arrays that come back as bytes beside the rest are read-only, as those of bodies are.
 _APART = """
 import os, pickle, sys
 from assembly.step.reader import bodies_of
@@ -44,8 +45,10 @@ try:
     found = bodies_of(path, unit, strict == "True", True)
 except Exception as error:
     found = error
+arrays = []
+rest = pickle.dumps(found, 5, buffer_callback=arrays.append)
 with open(answer, "wb") as file:
-    pickle.dump(found, file)
+    pickle.dump((rest, [bytes(array.raw()) for array in arrays]), file)
 os._exit(0)
 """
 
@@ -116,31 +119,32 @@ def _broken_entities(reader: Any) -> int:
 
 def _read_apart(path: str, unit: str, strict: bool, damage: str) -> tuple[list[Body], list[str]]:
     """`bodies_of` in another process, which OCCT may end, or not end."""
-    why = "OCCT cannot do without them"
     with TemporaryDirectory() as folder:
         answer = Path(folder) / "answer"
         try:
             ended = subprocess.run(
-                [sys.executable or "python", "-c", _APART, path, unit, str(strict), str(answer)],
+                [sys.executable or "python", "-P", "-c", _APART, path, unit, str(strict), str(answer)],
                 env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, sys.path))},
                 stdin=subprocess.DEVNULL,
                 capture_output=True,
                 check=False,
                 timeout=PATIENCE,
                 text=True,
+                errors="replace",
             )
-            if ended.returncode == 0:
-                found = pickle.loads(answer.read_bytes())
-                if isinstance(found, Exception):
-                    raise found
-                return found  # type: ignore[no-any-return]  # It is what the child found.
-            if 0 < ended.returncode < ENDED:
-                why = f"they cannot be read in another process: {ended.stderr.strip()[-200:]}"
         except subprocess.TimeoutExpired:
-            why = f"OCCT is not done with the others in {PATIENCE:g} seconds"
+            raise StepError(f"{damage}, and reading the others took more than {PATIENCE:g} seconds") from None
         except OSError as error:
-            why = f"they cannot be read in another process: {error}"
-    raise StepError(f"{damage}, and {why}")
+            raise StepError(f"{damage}, and no other process can be started to read it: {error}") from None
+        if 0 < ended.returncode < ENDED:
+            raise StepError(f"{damage}, and another process cannot read it: {ended.stderr.strip()[-200:]}")
+        if ended.returncode != 0:
+            raise StepError(f"{damage}, and OCCT cannot do without them")
+        rest, arrays = pickle.loads(answer.read_bytes())
+    found = pickle.loads(rest, buffers=arrays)
+    if isinstance(found, Exception):
+        raise found
+    return found  # type: ignore[no-any-return]  # It is what the child found.
 
 
 def _face_count(reader: Any) -> int:
@@ -261,10 +265,13 @@ def read_step(path: str | PathLike[str], *, unit: str = "mm", strict: bool = Tru
     file = Path(fspath(path))
     if not file.is_file():
         raise FileNotFoundError(f"path is {str(file)!r}; no such file")
+    damage = ""
     try:
         bodies, left = bodies_of(str(file), unit, bool(strict))
-    except _Damaged as damage:
-        bodies, left = _read_apart(str(file), unit, bool(strict), str(damage))
+    except _Damaged as reason:
+        damage = str(reason)
+    if damage:
+        bodies, left = _read_apart(str(file), unit, bool(strict), damage)
     for line in left:
         warnings.warn(line, StepWarning, stacklevel=2)
     return bodies
