@@ -129,6 +129,9 @@ def write(report: dict[str, Any], output: Path, only: str | None) -> Path:
     path = output / "all.json"
     kept = json.loads(path.read_text())["benchmarks"] if path.exists() else {}
     both = {**kept, **report["benchmarks"]}
+    if only and path.exists():
+        # The page's heading is that of the last whole run; a section says what differed when it was measured.
+        report = {**report, "machine": json.loads(path.read_text())["machine"]}
     whole = {**report, "benchmarks": {name: both[name] for name in BENCHMARKS if name in both}}
     path.write_text(json.dumps(whole, indent=1) + "\n")
     return path
@@ -150,7 +153,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options.output.mkdir(parents=True, exist_ok=True)
     for name in [options.only] if options.only else BENCHMARKS:
         result = run_apart(f"benchmarks.{name}", options.quick)
-        circumstances = {"date": f"{datetime.now(UTC):%Y-%m-%d}", "load": report["machine"]["load"]}
+        circumstances = {
+            "date": f"{datetime.now(UTC):%Y-%m-%d}",
+            "load": report["machine"]["load"],
+            "versions": report["machine"]["versions"],
+        }
         report["benchmarks"][name] = {**result, **circumstances}
         print("\n".join(["", name, table(result), *pages.lines(result)]), flush=True)
         # After each, for a whole run takes its time, and may be ended.

@@ -23,9 +23,10 @@ IDLE = 0.3
 HEADING = """\
 # Performance
 
-Written by `python -m benchmarks`; do not edit. Every section is from one run on one core of the machine below, times
-are medians, and peers were measured in the same run. "Reach" is the figure we set out to reach. A load above that of
-an idle machine means that other programs ran: times there are too long and unsteady."""
+Written by `python -m benchmarks`; do not edit. Every section is from one run on one core of the machine below, with
+these versions where it names no others. Times are medians, and peers were measured in the same run. "Reach" is the
+figure we set out to reach. A load above that of an idle machine means that other programs ran: times there are too long
+and unsteady."""
 
 
 def _cells(row: Mapping[str, Any]) -> list[str]:
@@ -50,12 +51,17 @@ def lines(result: Mapping[str, Any]) -> list[str]:
     return ["| " + " | ".join(cell.replace("|", r"\|") for cell in row) + " |" for row in table]
 
 
-def _circumstances(result: Mapping[str, Any], cores: int) -> str:
-    """When a section was measured, and on how busy a machine."""
+def _circumstances(result: Mapping[str, Any], machine: Mapping[str, Any]) -> str:
+    """When a section was measured, on how busy a machine, and with which versions that are not those of the heading."""
+    known = machine["versions"]
+    # The library itself may be run from its folder, where it has no version; and an absent peer has no figures.
+    found = {name: version for name, version in result.get("versions", {}).items() if name != "assembly"}
+    others = [f"{name} {version}" for name, version in found.items() if version not in ("absent", known.get(name))]
+    beside = f"; other versions: {', '.join(others)}" if others else ""
     load = result.get("load")
-    busy = "" if load is None else f", load {load:.1f} on {cores} cores when the run began"
+    busy = "" if load is None else f", load {load:.1f} on {machine['cores']} cores when the run began"
     provisional = "**Provisional:** " if load is None or load > IDLE else ""
-    return f"{provisional}measured {result.get('date', 'with an earlier version')}{busy}."
+    return f"{provisional}measured {result.get('date', 'with an earlier version')}{busy}{beside}."
 
 
 def page(report: Mapping[str, Any]) -> str:
@@ -70,7 +76,7 @@ def page(report: Mapping[str, Any]) -> str:
         parts.append(f"Not installed, and so absent from the tables: {absent}.")
     for name, result in report["benchmarks"].items():
         parts.append(f"## {name.capitalize()}")
-        parts.append(_circumstances(result, machine["cores"]))
+        parts.append(_circumstances(result, machine))
         if "about" in result:
             parts.append(result["about"])
         parts.append("\n".join(lines(result)))

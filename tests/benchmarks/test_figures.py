@@ -94,10 +94,26 @@ def test_a_busy_machine_is_said(load, said):
     assert ("load" in text.split("## Start")[1]) is (load is not None)
 
 
+def test_a_section_names_versions_that_are_not_those_of_the_heading():
+    versions = {"assembly": "absent", "numpy": "2.4.6", "coal": "3.0.3"}
+    machine = {"processor": "Abacus 3", "python": "3.11.1", "versions": versions, "cores": 2}
+    sections = {
+        "start": {"date": "2026-01-02", "load": 0.1, "versions": versions},
+        "pairs": {
+            "date": "2026-01-03",
+            "load": 0.1,
+            "versions": {"assembly": "0.1", "numpy": "2.5.0", "coal": "absent"},
+        },
+    }
+    text = report.page({"machine": machine, "benchmarks": sections})
+    assert text.count("other versions") == 1 and "; other versions: numpy 2.5.0." in text.split("## Pairs")[1]
+
+
 def test_a_section_measured_anew_takes_the_place_of_the_stored_one(tmp_path):
     first = {"quick": False, "machine": {}, "benchmarks": {"start": {"date": "then"}, "pairs": {"date": "then"}}}
     write(first, tmp_path, None)
-    path = write({**first, "benchmarks": {"start": {"date": "now"}}}, tmp_path, "start")
+    path = write({**first, "machine": {"load": 9.0}, "benchmarks": {"start": {"date": "now"}}}, tmp_path, "start")
+    assert json.loads(path.read_text())["machine"] == {}
     stored = json.loads(path.read_text())["benchmarks"]
     # In the order of the page.
     assert list(stored.items()) == [("pairs", {"date": "then"}), ("start", {"date": "now"})]

@@ -19,6 +19,7 @@ from assembly.solve.tangency import untouched
 from benchmarks.center_lines import torus_wire
 from benchmarks.running import example
 from benchmarks.scenes import MAJOR, MINOR
+from benchmarks.watching import Watch
 from benchmarks.wire_oracle import WireOracle
 
 IDENTITY = [1.0, 0.0, 0.0, 0.0]
@@ -180,10 +181,11 @@ def test_a_given_contact_stands_only_for_the_root_it_is_at(off, swapped):
         assert np.allclose(found[0, :4], root[:4], atol=1e-9)
 
 
-def test_contacts_of_rings_that_are_deep_in_each_other_are_listed():
+@pytest.mark.parametrize("reach", [0.05, 0.005])
+def test_contacts_of_rings_that_are_deep_in_each_other_are_listed(reach):
+    # By a first look, and by one whose reach is as short as that of later ones may be: a third of the depth, or less.
     rng = np.random.default_rng(3)
-    ring = asm.shapes.torus(MAJOR, MINOR)
-    bodies = [asm.Body("first", ring, fixed=True), asm.Body("second", ring)]
+    rings = Watch([asm.shapes.torus(MAJOR, MINOR)] * 2)
     oracle = WireOracle([torus_wire(MAJOR, MINOR)] * 2)
     listed = 0
     for _ in range(600):
@@ -192,9 +194,9 @@ def test_contacts_of_rings_that_are_deep_in_each_other_are_listed():
         extrema = oracle.extrema(q)
         deep = extrema.gap[(extrema.index == 0) & (extrema.gap < -1e-3) & (extrema.gap > -1.2 * MINOR)]
         if len(deep):
-            manager = asm.Manager(bodies)
-            manager.update(q)
-            found = np.array([contact.gap for contact in manager.contacts])
+            rings.forget()
+            rings.memory[watch_memory.MEMORY_HEADER + watch_memory.REACH] = reach
+            found = rings.look(q).gap
             for gap in deep:
                 # Newton's method on lengths of order one.
                 assert np.abs(found - gap).min() < 1e-12
