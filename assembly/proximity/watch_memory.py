@@ -141,7 +141,9 @@ def known_roots(table, pool, watch, memory, p, scene, tracked, roots, work):
     pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
     places = memory_places(table, watch)[1]
     neglect = pool[table[watch + LENGTHS] + NEGLECT]
-    count = add_given(table, pool, scene, tracked, table[pair + GIVEN], table[pair + GIVEN_COUNT], neglect, roots, work)
+    # A contact that is to close a gap would contradict a clearance that asks for one, where both stood for one root.
+    radius = neglect if pool[table[pair + PAIR_MINIMUM]] == 0.0 else math.inf
+    count = add_given(table, pool, scene, tracked, table[pair + GIVEN], table[pair + GIVEN_COUNT], radius, roots, work)
     for k in range(table[pair + LOW], table[pair + HIGH]):
         o = places + PLACE_MEMORY * k
         if memory[o] != p:
