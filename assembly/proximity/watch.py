@@ -356,7 +356,8 @@ def look_at_pair(
         else:
             gap = roots[before, GAP]
             # The far sides of two bodies oppose each other, too.
-            alien = gap > reach + least or (gap < 0.0 and is_outside(table, pool, scene, roots, before, margin))
+            alien = gap > reach + least or gap < -pool[lengths + LAST_REACH]
+            alien = alien or (gap < 0.0 and is_outside(table, pool, scene, roots, before, margin))
             roots[before, ORIGIN] = USELESS if alien else NEW
     if smooth:
         seat_given(table, watch, memory, p, roots, count, tracked)
