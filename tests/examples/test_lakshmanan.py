@@ -28,11 +28,13 @@ def run(tmp_path_factory):
     return result
 
 
+def power_of_speed(t, curve, power):
+    return float(np.linalg.norm(curve.evaluate(t, 1)[1])) ** power
+
+
 def test_table_1(run):
     for name, curve in run.module.table_1().items():
-        speed = lambda t, curve=curve: float(np.linalg.norm(curve.evaluate(t, 1)[1]))  # noqa: E731
-        length = quad(speed, 0.0, 1.0)[0]
-        square = quad(lambda t: speed(t) ** 2, 0.0, 1.0)[0]  # noqa: B023
+        length, square = (quad(power_of_speed, 0.0, 1.0, (curve, power))[0] for power in (1, 2))
         # Lemma 1 is the root of the mean square; rounding up is all that is added.
         assert run.arcs[name] == pytest.approx(np.sqrt(square), rel=1e-12)
         assert length < run.arcs[name] < 1.2 * length

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly.constraints.layout import FREE_COLUMN, WATCH
+from assembly.constraints.layout import FREE_COLUMN, ROWS, WATCH
 from assembly.geometry.spline import SURFACE_RECORD
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity import roots, watch, watch_memory
@@ -14,7 +14,8 @@ from assembly.proximity.extremal import SINGULAR, solve_pair
 from assembly.proximity.folds import fold_beyond
 from assembly.proximity.free_pair import VARIABLES, VECTORS, free_rows
 from assembly.proximity.pairs import _key, _packed, as_face, extremal_pair
-from assembly.proximity.solid_contact import PAIR_GAP, TRACK
+from assembly.proximity.solid_contact import CONTACT_RECORD, PAIR_GAP, TRACK
+from assembly.solve.guards import look_again, look_around, place_guards
 from assembly.solve.tangency import untouched
 from benchmarks.center_lines import torus_wire
 from benchmarks.running import example
@@ -205,6 +206,33 @@ def test_contacts_of_rings_that_are_deep_in_each_other_are_listed(reach, depth):
                 assert np.abs(found - gap).min() < 1e-12
                 listed += 1
     assert listed > (80 if depth > MINOR else 15)
+
+
+@pytest.mark.parametrize("off", [1e-9, 1e-3])
+def test_a_free_contact_of_a_clearance_goes_to_its_extremum_if_it_is_off_it(off):
+    ring = asm.shapes.torus(MAJOR, MINOR)
+    place = (1.4, 0.05, 0.1), (np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0)
+    scene = asm.Assembly([asm.Body("first", ring, fixed=True), asm.Body("second", ring, *place)])
+    scene.constrain(asm.Clearance(minimum=0.5))
+    packed = scene.packed()
+    table, memory = packed.table.copy(), packed.new_state()[packed.memory_at :]
+    q = np.array([body.q for body in scene.bodies])
+    q[:, :3] = (q[:, :3] - packed.reference) / packed.scale
+    rows = int(table[ROWS])
+    tracked, free = np.full((packed.tracked, TRACK), np.nan), np.full(rows, -1)
+    point = (q, tracked, np.zeros((rows, CONTACT_RECORD)), np.zeros(rows))
+    assert look_around(table, packed.pool, memory, point, watch.EVERYTHING)
+    place_guards(table, memory, point, np.zeros(rows), np.zeros(rows), free, True)
+    row = int(np.flatnonzero(~np.isnan(tracked[:, 0]))[0])
+    extremum = tracked[row].copy()
+    free[row] = 0
+    # A pair is looked at again where it moved; here by less than what Newton's method leaves.
+    q[1, 0] += 1e-15
+    tracked[row, :4] += off
+    moved = tracked[row].copy()
+    changed = look_again(table, packed.pool, memory, point, watch.EVERYTHING, free, np.empty_like(tracked))
+    assert changed == (off > 1e-6)
+    assert np.array_equal(tracked[row], moved) if off < 1e-6 else np.abs(tracked[row, :4] - extremum[:4]).max() < 1e-9
 
 
 def test_the_last_look_asks_of_every_pair_whether_it_crosses():
