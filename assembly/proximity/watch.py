@@ -114,7 +114,7 @@ LEAST_ALLOWANCE = 1e-12
 # Lists of patches that face each other are for motions up to so many first reaches.
 RINGS = 2.0
 # A reach is for so many moves as the last ones.
-MOVES = 12.0
+MOVES = 24.0
 
 
 @kernel(inline=True)
@@ -192,11 +192,12 @@ def largest_part(table, pool, watch, memory, q):
 
 
 @kernel(inner=True)
-def near_enough(table, pool, scene, bulk, least, enough, candidates, found, distances):
+def near_enough(table, pool, scene, bulk, least, enough, flank, candidates, found, distances):
     """A distance within which so few of the pairs of patches are that each can be looked into; at most `enough`.
 
-    What is in the wrong order is looked into in any case.
+    What is within `flank`, or in the wrong order, is looked into in any case: an allowance may be as long as that.
     """
+    enough = max(enough, flank)
     for c in range(found):
         distances[c] = (
             element_distance(table, pool, scene[3], scene[0], scene[1], bulk, candidates[c, 0], candidates[c, 1])
@@ -207,9 +208,9 @@ def near_enough(table, pool, scene, bulk, least, enough, candidates, found, dist
         for c in range(found):
             if -math.inf < distances[c] <= enough:
                 count += 1
-        if count <= FEW:
+        if count <= FEW or enough <= flank:
             break
-        enough *= 0.5
+        enough = max(0.5 * enough, flank)
     return enough
 
 
@@ -286,7 +287,7 @@ def look_at_pair(
     flank = pool[table[pair + PAIR_MINIMUM] + 1]
     margin = pool[table[pair + PAIR_MINIMUM] + 2]
     bulk = magnitudes(turn)
-    enough = near_enough(table, pool, scene, bulk, least, max(TAKE * reach, flank), candidates, found, distances)
+    enough = near_enough(table, pool, scene, bulk, least, TAKE * reach, flank, candidates, found, distances)
     free = math.inf
     fertile = math.inf
     slides = 0
@@ -301,13 +302,9 @@ def look_at_pair(
         if count == ROOTS:
             break
         bound = distances[c]
-        if bound > enough and bound > flank:
+        if bound > enough:
             # Whatever root is there is not near enough for a place.
             free = min(free, bound)
-            continue
-        if bound > enough:
-            fertile = flank
-            lo, hi = around(table, pool, scene[3][1], candidates[c, 1], lo, hi)
             continue
         codes, start, inside, folds = is_known(table, pool, scene, candidates[c, 0], candidates[c, 1], roots, count)
         folding = folding or folds

@@ -421,7 +421,7 @@ def solve_program(table, pool, settings, state, history, tips):
                 trial,
                 rows,
                 n,
-                (y, active, forces),
+                (active, forces),
                 mu,
                 softness,
                 share,

@@ -62,12 +62,15 @@ def foresee(table, shape, rows, residual, jacobian, y, mu, step, in_matrix, acti
 def toward_rows(shape, m, rows, residual, jacobian, mu, active, softness, enough, lagrangian, matrix, n, forces, out):
     """The shortest step after which rows hold to first order, into out; both matrices are overwritten.
 
-    Idle one-sided rows that it would break count as well, now and until it breaks no more. Where rows all but depend on
-    each other it is long: `softness` weighs its square against theirs. What it leaves of the first `m` by that, those
-    of the program, is to be a small part or at most `enough`: the softness falls until it is. Returns the softness.
+    One-sided rows that hold count where it would break them, and until it breaks no more: to bring them to zero is to
+    ask for more than they do, and where they all but depend on others, for a long step. Where those that count do so,
+    too, `softness` weighs its square against theirs. What it leaves of the first `m` by that, those of the program, is
+    to be a small part or at most `enough`: the softness falls until it is. Returns the softness.
     """
     bases, one_sided, order, _of_rows = shape
     broken = 0
+    for r in range(rows):
+        active[r] = 0.0 if one_sided[r] == 1 and residual[r] >= 0.0 else 1.0 / mu
     while True:
         for i in range(n):
             out[i] = 0.0

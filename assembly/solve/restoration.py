@@ -9,7 +9,7 @@ from assembly.constraints.layout import ROWS, WATCH
 from assembly.constraints.program import evaluate
 from assembly.proximity.extremal import BEND
 from assembly.solve.guards import is_too_far
-from assembly.solve.multipliers import toward_rows, weigh_rows
+from assembly.solve.multipliers import toward_rows
 from assembly.solve.rows import carry, move
 from assembly.solve.tangency import off_rows
 
@@ -38,12 +38,11 @@ def way_back(
 ):
     """A share of the least step that leaves little of the gaps, into the trial point.
 
-    `weights` are multipliers, which rows are active, and room for forces. Returns the softness that the step took, and
-    how far off the rows it leads: infinitely where bodies may not go so far, or a pair is lost.
+    `weights` is room for which rows count, and for forces. Returns the softness that the step took, and how far off the
+    rows it leads: infinitely where bodies may not go so far, or a pair is lost.
     """
-    y, active, forces = weights
+    active, forces = weights
     bases, one_sided, _order, _of_rows = shape
-    weigh_rows(rows, one_sided, here[3], y, mu, forces, active)
     softness = toward_rows(
         shape, table[ROWS], rows, here[3], here[4], mu, active, softness, enough, lagrangian, matrix, n, forces, step
     )

@@ -32,6 +32,22 @@ FOLD = (
     [-12.595296238, 3.463942266, -24.328661362, 0.407620658, 0.428730289, 0.073853356, 0.802858282],
 )
 
+# Rings before which so many patches lie that a look takes in fewer of them; the contact is none of these.
+CROWDED = (
+    ("torus", "torus", 0.0491253785, [
+        [-0.4081011206105496, -0.27450016466535265, -0.5626423656049672]
+        + [-0.08106598418437047, 0.2575905890504896, 0.9075526457720017, -0.3215953821078297],
+        [-0.474758158827904, -0.6053765075206227, -1.2807206482121916]
+        + [-0.6712744819384387, -0.1885489482677121, -0.3993333099131176, -0.5952921733058939],
+    ]),
+    ("wide torus", "torus", 0.0438119365, [
+        [-0.2674288856749793, 0.46417993246699396, -0.09472510324876687]
+        + [-0.5094093419742862, -0.009940766586675361, 0.2684023446195836, -0.8175350052882777],
+        [0.2374794230617538, 1.1125705870888798, -0.6939004356280962]
+        + [0.9099106849062067, 0.2906286412684434, -0.26792240551170865, 0.1257581925474283],
+    ]),
+)  # fmt: skip
+
 
 @pytest.fixture(scope="module")
 def clips():
@@ -48,6 +64,15 @@ def test_no_contact_is_missed_doubled_or_made_up(f, g):
     assert (len(errors.missed), len(errors.doubled), len(errors.strange)) == (0, 0, 0)
     # Motions that came near, and were compared.
     assert errors.poses > 20 * MOTIONS - 5 and errors.contacts > MOTIONS
+
+
+@pytest.mark.parametrize(("f", "g", "gap", "q"), CROWDED)
+def test_what_is_nearer_than_an_allowance_is_listed(f, g, gap, q):
+    wires, surfaces, _ = zip(SHAPES[f], SHAPES[g], strict=True)
+    listed = Watch(surfaces).look(np.array(q))
+    assert WireOracle(wires).minima(np.array(q), 0.1).gap == pytest.approx([gap], abs=1e-9)
+    # All nearer than this has to be listed, and no body may move by more before the next look.
+    assert listed.gap == pytest.approx([gap], abs=1e-9) or listed.take[0] <= gap
 
 
 @pytest.mark.parametrize("place", PARALLEL)

@@ -122,7 +122,7 @@ def test_the_way_back_onto_rows_breaks_no_idle_ones():
     places = np.array([np.full(6, 5), np.arange(6), np.full(6, 5)])
     order = (places, np.zeros((1, 2), np.int64), np.empty((1, 6)), np.empty(0, np.int64))
     shape = (bases, np.ones(rows, np.int64), order, (np.arange(rows), np.full(rows, rows - 1)))
-    residual, active, mu = np.array([-1e-3, 0.0]), np.array([1e6, 0.0]), 1e-6
+    residual, active, mu = np.array([-1e-3, 0.0]), np.empty(rows), 1e-6
     matrices, out = np.empty((2, 6, 6)), np.empty(6)
     forces = np.empty(rows)
     toward_rows(shape, 2, rows, residual, jacobian, mu, active, 1e-6, 0.0, matrices[0], matrices[1], 6, forces, out)
@@ -130,6 +130,25 @@ def test_the_way_back_onto_rows_breaks_no_idle_ones():
     np.testing.assert_allclose(jacobian[:, :6] @ out, [1e-3, 0.0], rtol=0, atol=1e-14)
     np.testing.assert_allclose(out, [1e-3, 1e-3, 0, 0, 0, 0], rtol=0, atol=1e-14)
     assert active[1] > 0.0
+
+
+@pytest.mark.parametrize("angle", [1e-3, 1e-6])
+def test_the_way_back_onto_rows_leaves_those_alone_that_hold(angle):
+    """Two contacts of the same wires, all but the same row: one is to close, the other one is open and may stay so."""
+    rows = 2
+    bases = np.full((rows, 3), -1, dtype=np.int64)
+    bases[:, 0] = 0
+    jacobian = np.zeros((rows, layout.EXTRA_COLUMN))
+    jacobian[0, 0], jacobian[1, :2] = 1.0, (np.cos(angle), np.sin(angle))
+    places = np.array([np.full(6, 5), np.arange(6), np.full(6, 5)])
+    order = (places, np.zeros((1, 2), np.int64), np.empty((1, 6)), np.empty(0, np.int64))
+    shape = (bases, np.array([0, 1]), order, (np.arange(rows), np.full(rows, rows - 1)))
+    residual, active, mu = np.array([-1e-10, 3e-10]), np.full(rows, 1e6), 1e-6
+    matrices, out, forces = np.empty((2, 6, 6)), np.empty(6), np.empty(rows)
+    toward_rows(shape, 2, rows, residual, jacobian, mu, active, 1.0, 0.0, matrices[0], matrices[1], 6, forces, out)
+    # A softness of one leaves a millionth of the gap. To close both is a step of 4e-10 over the angle.
+    np.testing.assert_allclose(out, [1e-10, 0, 0, 0, 0, 0], rtol=0, atol=1e-15)
+    assert active.tolist() == [1e6, 0.0]
 
 
 @pytest.mark.parametrize("angle", [1e-1, 1e-3, 1e-5])
