@@ -100,9 +100,11 @@ class Watch:
             for side, body in enumerate(pair):
                 local = self.surfaces[body].evaluate(*row[2 * side : 2 * side + 2])
                 points[k, side] = Rotation.from_quat(q[body, 3:], scalar_first=True).apply(local) + q[body, :3]
-        # A look that meets many patches takes what is as near as its allowance, which says what it left out.
-        take = (
-            np.minimum(watch_memory.TAKE * pairs[:, watch_memory.REACH], pairs[:, watch_memory.ALLOWANCE])
-            * packed.scale
-        )
+        # A look that meets many patches takes what is as near as its allowances, which say what it left out; that of a
+        # ball may be less for other reasons, and in a crowd no less than this is looked into.
+        at = int(packed.table[self._at + watch_memory.PAIR_TABLE]) + watch_memory.PAIR_MINIMUM
+        flank = packed.pool[packed.table[at :: watch_memory.PAIR_RECORD][: len(pairs)] + 1]
+        around = np.maximum(pairs[:, watch_memory.BALL_ALLOWANCE], watch.CROWDED_PART * flank)
+        take = np.minimum(watch_memory.TAKE * pairs[:, watch_memory.REACH], pairs[:, watch_memory.ALLOWANCE])
+        take = np.minimum(take, around) * packed.scale
         return Listed(bodies, points, tracked[:, PAIR_GAP] * packed.scale, take, looked)

@@ -105,8 +105,9 @@ SLIDES_A_LOOK = 6
 FLAT = 0.2
 # Ways of Newton's method that are remembered in a look.
 WAYS = 64
-# So many pairs of patches are looked into, if there are others that are farther apart.
-FEW = 40
+# So many pairs of patches are looked into, if there are others that are farther apart; in a crowd, all that are nearer
+# than this part of what a ball may go where contacts may be born. Less makes looks cheaper and steps shorter.
+FEW, CROWDED_PART = 40, 0.5
 # Bodies cross that are in each other by more than this.
 CROSSING = 1e-6
 # Where nothing may move a pair is looked at after every step.
@@ -192,12 +193,11 @@ def largest_part(table, pool, watch, memory, q):
 
 
 @kernel(inner=True)
-def near_enough(table, pool, scene, bulk, least, enough, flank, candidates, found, distances):
+def near_enough(table, pool, scene, bulk, least, enough, lowest, candidates, found, distances):
     """A distance within which so few of the pairs of patches are that each can be looked into; at most `enough`.
 
-    What is within `flank`, or in the wrong order, is looked into in any case: an allowance may be as long as that.
+    What is within `lowest`, or in the wrong order, is looked into in any case.
     """
-    enough = max(enough, flank)
     for c in range(found):
         distances[c] = (
             element_distance(table, pool, scene[3], scene[0], scene[1], bulk, candidates[c, 0], candidates[c, 1])
@@ -208,9 +208,9 @@ def near_enough(table, pool, scene, bulk, least, enough, flank, candidates, foun
         for c in range(found):
             if -math.inf < distances[c] <= enough:
                 count += 1
-        if count <= FEW or enough <= flank:
+        if count <= FEW or enough <= lowest:
             break
-        enough = max(0.5 * enough, flank)
+        enough = max(0.5 * enough, lowest)
     return enough
 
 
@@ -287,7 +287,8 @@ def look_at_pair(
     flank = pool[table[pair + PAIR_MINIMUM] + 1]
     margin = pool[table[pair + PAIR_MINIMUM] + 2]
     bulk = magnitudes(turn)
-    enough = near_enough(table, pool, scene, bulk, least, TAKE * reach, flank, candidates, found, distances)
+    enough = max(TAKE * reach, flank)
+    enough = near_enough(table, pool, scene, bulk, least, enough, CROWDED_PART * flank, candidates, found, distances)
     free = math.inf
     fertile = math.inf
     slides = 0
@@ -302,9 +303,14 @@ def look_at_pair(
         if count == ROOTS:
             break
         bound = distances[c]
-        if bound > enough:
+        if bound > flank and bound > enough:
             # Whatever root is there is not near enough for a place.
             free = min(free, bound)
+            continue
+        if bound > enough:
+            # Nor is one here, and what is around it may go as far.
+            fertile = min(fertile, bound)
+            lo, hi = around(table, pool, scene[3][1], candidates[c, 1], lo, hi)
             continue
         codes, start, inside, folds = is_known(table, pool, scene, candidates[c, 0], candidates[c, 1], roots, count)
         folding = folding or folds
