@@ -55,7 +55,8 @@ class Watch:
         self.surfaces = list(surfaces)
         self.bodies = [asm.Body(f"body {k + 1}", surface) for k, surface in enumerate(surfaces)]
         scene = asm.Assembly(self.bodies)
-        scene.constrain(asm.Clearance())
+        # Wires that move fast are looked at far ahead, and as many contacts are listed.
+        scene.constrain(asm.Clearance(places=16))
         self._packed = packed = scene.packed()
         self._at = int(packed.table[layout.WATCH])
         self.pairs = [(self.bodies.index(a), self.bodies.index(b)) for a, b in packed.guarded[0]]

@@ -232,7 +232,8 @@ def test_a_pin_in_a_plate_with_a_hole():
     scene.minimize(asm.PointDistance(pin.point(0.0, 0.0, 0.0), (2.0, 1.0, 0.0)))
     solution = scene.solve()
     assert solution.success
-    assert np.hypot(*solution.q[1, :2]) == pytest.approx(0.4, abs=HOLDS)
+    # A contact that pushes may be open by what counts as stationary, 1e-10 of the scene's size.
+    assert -HOLDS < 0.4 - np.hypot(*solution.q[1, :2]) < 1e-10 * scene.packed().scale
     assert solution.q[1, :3] == pytest.approx(0.4 / np.sqrt(5.0) * np.array([2.0, 1.0, 0.0]), abs=1e-6)
 
 
