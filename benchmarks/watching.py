@@ -69,6 +69,11 @@ class Watch:
         self.memory = self._packed._memory.copy()
         self.tracked = np.full((self._packed.tracked, TRACK), np.nan)
 
+    @property
+    def scale(self) -> float:
+        """The length that is one in the watch's memory."""
+        return self._packed.scale
+
     def _pairs(self) -> Array:
         return self.memory[self._pairs_at : self._places_at].reshape(-1, watch_memory.PAIR_MEMORY)
 

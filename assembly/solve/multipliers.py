@@ -11,8 +11,9 @@ from assembly.constraints.sparsity import clear_upper
 from assembly.solve.linear import factorize, factorize_shifted, solve_step, substitute
 from assembly.solve.rows import add_row, add_transposed, clear_row, times
 
-# So often a step back onto rows is computed again for rows that it breaks.
-BROKEN = 4
+# So often a step back onto rows is computed again for one-sided rows that would hold without it; for those that it
+# breaks it is as often as there are any. A row pulls that ends above this part of what it is off.
+RELEASES, PULLS = 4, 1e-12
 # What such a step is weighed with: one, and less where it would leave more than this part of the violations, because
 # the rows all but depend on each other.
 LEFT_OVER, SOFTER, SOFTEST = 0.1, 1e-3, 1e-9
@@ -62,15 +63,16 @@ def foresee(table, shape, rows, residual, jacobian, y, mu, step, in_matrix, acti
 def toward_rows(shape, m, rows, residual, jacobian, mu, active, softness, enough, lagrangian, matrix, n, forces, out):
     """The shortest step after which rows hold to first order, into out; both matrices are overwritten.
 
-    One-sided rows that hold count where it would break them, and until it breaks no more: to bring them to zero is to
-    ask for more than they do, and where they all but depend on others, for a long step. Where those that count do so,
-    too, `softness` weighs its square against theirs. What it leaves of the first `m` by that, those of the program, is
-    to be a small part or at most `enough`: the softness falls until it is. Returns the softness.
+    One-sided rows that hold count where it would break them by more than `enough`, and none does that it would pull
+    back: to bring such rows to zero is to ask for more than they do, and where they all but depend on others, for a
+    long step. Where those that count do so, too, `softness` weighs its square against theirs. What it leaves of the
+    first `m` by that, those of the program, is to be a small part or at most `enough`: the softness falls until it is.
+    Returns the softness.
     """
     bases, one_sided, order, _of_rows = shape
-    broken = 0
     for r in range(rows):
         active[r] = 0.0 if one_sided[r] == 1 and residual[r] >= 0.0 else 1.0 / mu
+    releases = 0
     while True:
         for i in range(n):
             out[i] = 0.0
@@ -84,21 +86,25 @@ def toward_rows(shape, m, rows, residual, jacobian, mu, active, softness, enough
             solve_step(matrix, n, order, out)
         worst = 0.0
         left = 0.0
-        found = 0
+        broken = False
+        pulled = False
         for r in range(rows):
             there = residual[r] + times(bases, jacobian, r, out)
-            if active[r] > 0.0:
-                if r < m:
-                    worst = max(worst, abs(residual[r]))
-                    left = max(left, abs(there))
-            elif one_sided[r] == 1 and there < 0.0 and broken < BROKEN:
-                active[r] = 1.0 / mu
-                found += 1
-        if found > 0:
-            broken += 1
-        elif left <= max(LEFT_OVER * worst, enough) or softness <= SOFTEST:
-            return softness
-        else:
+            if active[r] == 0.0:
+                if there < -enough:
+                    active[r] = 1.0 / mu
+                    broken = True
+            elif one_sided[r] == 1 and there > PULLS * abs(residual[r]) and releases < RELEASES:
+                active[r] = 0.0
+                pulled = True
+            elif r < m:
+                worst = max(worst, abs(residual[r]))
+                left = max(left, -there if one_sided[r] == 1 else abs(there))
+        if pulled:
+            releases += 1
+        elif not broken:
+            if left <= max(LEFT_OVER * worst, enough) or softness <= SOFTEST:
+                return softness
             softness = max(SOFTER * softness, SOFTEST)
 
 

@@ -132,23 +132,42 @@ def test_the_way_back_onto_rows_breaks_no_idle_ones():
     assert active[1] > 0.0
 
 
-@pytest.mark.parametrize("angle", [1e-3, 1e-6])
-def test_the_way_back_onto_rows_leaves_those_alone_that_hold(angle):
-    """Two contacts of the same wires, all but the same row: one is to close, the other one is open and may stay so."""
-    rows = 2
+def way_back(sides, residual, jacobian, softness=1.0, enough=0.0):
+    """The step back onto rows of one body's six unknowns, and which rows count."""
+    rows = len(sides)
     bases = np.full((rows, 3), -1, dtype=np.int64)
     bases[:, 0] = 0
-    jacobian = np.zeros((rows, layout.EXTRA_COLUMN))
-    jacobian[0, 0], jacobian[1, :2] = 1.0, (np.cos(angle), np.sin(angle))
     places = np.array([np.full(6, 5), np.arange(6), np.full(6, 5)])
     order = (places, np.zeros((1, 2), np.int64), np.empty((1, 6)), np.empty(0, np.int64))
-    shape = (bases, np.array([0, 1]), order, (np.arange(rows), np.full(rows, rows - 1)))
-    residual, active, mu = np.array([-1e-10, 3e-10]), np.full(rows, 1e6), 1e-6
-    matrices, out, forces = np.empty((2, 6, 6)), np.empty(6), np.empty(rows)
-    toward_rows(shape, 2, rows, residual, jacobian, mu, active, 1.0, 0.0, matrices[0], matrices[1], 6, forces, out)
-    # A softness of one leaves a millionth of the gap. To close both is a step of 4e-10 over the angle.
-    np.testing.assert_allclose(out, [1e-10, 0, 0, 0, 0, 0], rtol=0, atol=1e-15)
-    assert active.tolist() == [1e6, 0.0]
+    shape = (bases, np.array(sides), order, (np.arange(rows), np.full(rows, rows - 1)))
+    whole = np.zeros((rows, layout.EXTRA_COLUMN))
+    whole[:, :6] = jacobian
+    active, forces, matrices, out = np.empty(rows), np.empty(rows), np.empty((2, 6, 6)), np.empty(6)
+    back = (np.array(residual), whole, 1e-6, active, softness, enough)
+    toward_rows(shape, rows, rows, *back, matrices[0], matrices[1], 6, forces, out)
+    return out, active > 0.0
+
+
+@pytest.mark.parametrize("softness", [1.0, 1e-9])
+@pytest.mark.parametrize("angle", [1e-3, 1e-6])
+@pytest.mark.parametrize(("sides", "residual"), [((0, 1), (-1e-10, 3e-10)), ((1, 1), (-3e-10, -1e-10))])
+def test_the_way_back_onto_rows_pulls_none_back(sides, residual, angle, softness):
+    """Two contacts of the same wires, all but the same row: once one of them holds, the other one does."""
+    jacobian = np.zeros((2, 6))
+    jacobian[0, 0], jacobian[1, :2] = 1.0, (np.cos(angle), np.sin(angle))
+    out, counts = way_back(sides, residual, jacobian, softness)
+    # A softness of one leaves a millionth of the gap. To close both is a step of 2e-10 or 4e-10 over the angle.
+    np.testing.assert_allclose(out, [-residual[0], 0, 0, 0, 0, 0], rtol=0, atol=1e-15)
+    assert counts.tolist() == [True, False]
+
+
+def test_the_way_back_onto_rows_pushes_a_whole_line_on():
+    """Six bodies in a line touch, and the first has to go: every round finds one more that is in the way."""
+    jacobian = np.eye(6) - np.eye(6, k=-1)
+    out, counts = way_back([1] * 6, [-1e-6, 0, 0, 0, 0, 0], jacobian)
+    # A millionth is left in every row.
+    np.testing.assert_allclose(out, np.full(6, 1e-6), rtol=0, atol=3e-11)
+    assert counts.all()
 
 
 @pytest.mark.parametrize("angle", [1e-1, 1e-3, 1e-5])
