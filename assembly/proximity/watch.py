@@ -115,7 +115,7 @@ LEAST_ALLOWANCE = 1e-12
 # Lists of patches that face each other are for motions up to so many first reaches.
 RINGS = 2.0
 # A reach is for so many moves as the last ones.
-MOVES = 24.0
+MOVES = 12.0
 
 
 @kernel(inline=True)
