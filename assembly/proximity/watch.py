@@ -304,11 +304,11 @@ def look_at_pair(
             break
         bound = distances[c]
         if bound > flank and bound > enough:
-            # Whatever root is there is not near enough for a place.
+            # Whatever root is there is not near enough for a place, and bounds what the bodies may go;
             free = min(free, bound)
             continue
         if bound > enough:
-            # Nor is one here, and what is around it may go as far.
+            # in a crowd, what the ball around it may go.
             fertile = min(fertile, bound)
             lo, hi = around(table, pool, scene[3][1], candidates[c, 1], lo, hi)
             continue

@@ -99,7 +99,7 @@ def toward_rows(shape, m, rows, residual, jacobian, mu, active, softness, enough
                 pulled = True
             elif r < m:
                 worst = max(worst, abs(residual[r]))
-                left = max(left, -there if one_sided[r] == 1 else abs(there))
+                left = max(left, abs(there))
         if pulled:
             releases += 1
         elif not broken:

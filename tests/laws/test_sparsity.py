@@ -161,6 +161,16 @@ def test_the_way_back_onto_rows_pulls_none_back(sides, residual, angle, softness
     assert counts.tolist() == [True, False]
 
 
+@pytest.mark.parametrize(("enough", "breaks"), [(1e-9, False), (1e-11, True)])
+def test_the_way_back_onto_rows_breaks_others_by_no_more_than_enough(enough, breaks):
+    jacobian = np.zeros((2, 6))
+    jacobian[0, 0], jacobian[1, :2] = 1.0, (-1.0, 1.0)
+    out, counts = way_back((0, 1), (-1e-10, 0.0), jacobian, enough=enough)
+    # Alone, the first row breaks the second one by what it gains.
+    np.testing.assert_allclose(out[:2], [1e-10, 1e-10 if breaks else 0.0], rtol=0, atol=1e-15)
+    assert counts.tolist() == [True, breaks]
+
+
 def test_the_way_back_onto_rows_pushes_a_whole_line_on():
     """Six bodies in a line touch, and the first has to go: every round finds one more that is in the way."""
     jacobian = np.eye(6) - np.eye(6, k=-1)
