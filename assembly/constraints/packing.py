@@ -474,8 +474,8 @@ class Packed:
             for pair in pairs:
                 f, g = (_side_faces(body) for body in pair)
                 flank = max(FLANK * min(thin[f], thin[g]), LEAST_FLANK)
-                margin = max(FacetTree.of(f).offset, FacetTree.of(g).offset) / self.scale
-                _, minimum = self._add(pool=[clearance.minimum / self.scale, flank, margin])
+                offsets = [FacetTree.of(faces).offset / self.scale for faces in (f, g)]
+                _, minimum = self._add(pool=[clearance.minimum / self.scale, flank, *offsets])
                 if is_one_smooth(f) and is_one_smooth(g):
                     shape = [self._surface(surfaces, f[0]), self._surface(surfaces, g[0]), -1, -1]
                 else:

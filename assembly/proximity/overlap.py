@@ -1,7 +1,8 @@
 """Whether two bodies are in each other, whatever extrema there are, and which roots are of far sides: by facets.
 
-A patch whose middle is inside the other body says so by its foot there. A segment between two points is inside, or
-outside, by how many facets it cuts.
+A patch whose middle is inside the other body says so by its foot there, where nothing is between the two. A segment is
+inside a body or outside by how many facets it cuts. Of a body that is wholly inside another one every ray cuts an odd
+number; so do some rays from outside a tube with open ends, but not three of three points.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly.geometry.spline import surface_point
 from assembly.geometry.trim import trim_side
-from assembly.geometry.vec import add, cross, dot, matvec, matvec_t, sub
+from assembly.geometry.vec import add, cross, dot, matvec, matvec_t, scale, sub
 from assembly.proximity.bounding_tree import (
     CENTER,
     CHILD,
@@ -35,6 +36,8 @@ from assembly.proximity.switching import feature_at
 
 # Room for the descent of a segment.
 DEPTH = 256
+# How often Newton's steps to a foot begin again where they end.
+FEET = 4
 
 
 @kernel(inline=True)
@@ -57,20 +60,23 @@ def meets_box(pool, o, a, d):
 
 
 @kernel(inline=True)
-def cuts(a, d, p, q, r, end):
-    """Whether a segment from a along d cuts the triangle p q r (Möller and Trumbore), but for that part at its ends."""
+def cut_at(a, d, p, q, r, end):
+    """Where a segment from a along d cuts a triangle (Möller and Trumbore): whether it does, shares of q and of r.
+
+    What is nearer to an end than that part of the segment does not count.
+    """
     e = sub(q, p)
     f = sub(r, p)
     h = cross(d, f)
     det = dot(e, h)
     if abs(det) < 1e-300:
-        return False
+        return False, 0.0, 0.0
     s = sub(a, p)
     u = dot(s, h) / det
     w = cross(s, e)
     v = dot(d, w) / det
     t = dot(f, w) / det
-    return u >= 0.0 and v >= 0.0 and u + v <= 1.0 and end < t < 1.0 - end
+    return u >= 0.0 and v >= 0.0 and u + v <= 1.0 and end < t < 1.0 - end, u, v
 
 
 @kernel(inner=True)
@@ -88,34 +94,6 @@ def in_trim(table, pool, shell, code, u, v):
         return True
     trim = table[table[shell + FACE_TABLE] + FACE_RECORD * code + FACE_TRIM]
     return trim < 0 or trim_side(table, pool, trim, u, v) > 0
-
-
-@kernel(inner=True)
-def is_deep(table, pool, scene, e, d, margin):
-    """Whether the middle of a patch of f is farther than a margin inside g at a patch, or the other way round."""
-    turn, shift = scene[0], scene[1]
-    o = table[scene[3][0] + ELEMENT_POOL] + ELEMENT * e
-    p = table[scene[3][1] + ELEMENT_POOL] + ELEMENT * d
-    f = surface_of(table, scene[2][2], scene[2][0], np.int64(pool[o + ELEMENT_FEATURE]))
-    g = surface_of(table, scene[2][3], scene[2][1], np.int64(pool[p + ELEMENT_FEATURE]))
-    if f < 0 or g < 0:
-        return False
-    shell_f, shell_g = scene[2][2], scene[2][3]
-    code_f = np.int64(pool[o + ELEMENT_FEATURE])
-    code_g = np.int64(pool[p + ELEMENT_FEATURE])
-    if in_trim(table, pool, shell_f, code_f, pool[o], pool[o + 1]):
-        y = matvec_t(turn, sub(surface_point(table, pool, f, pool[o], pool[o + 1])[0], shift))
-        s, t, distance, _n = foot_of(table, pool, g, y, pool[p], pool[p + 1])
-        beside = is_within(table, pool, g, s, t, pool[p], pool[p + 1], BESIDE * pool[p + 2], BESIDE * pool[p + 3])
-        # A foot farther off may be on the far side.
-        if distance < -margin and beside and in_trim(table, pool, shell_g, code_g, s, t):
-            return True
-    if in_trim(table, pool, shell_g, code_g, pool[p], pool[p + 1]):
-        y = add(matvec(turn, surface_point(table, pool, g, pool[p], pool[p + 1])[0]), shift)
-        s, t, distance, _n = foot_of(table, pool, f, y, pool[o], pool[o + 1])
-        beside = is_within(table, pool, f, s, t, pool[o], pool[o + 1], BESIDE * pool[o + 2], BESIDE * pool[o + 3])
-        return distance < -margin and beside and in_trim(table, pool, shell_f, code_f, s, t)
-    return False
 
 
 @kernel(inner=True, allocates=True)
@@ -138,69 +116,180 @@ def facets_cut(table, pool, tree, surface, shell, a, d, end):
                 stack[used + 1] = child + 1
                 used += 2
             continue
-        r = surface_of(table, shell, surface, table[at + FEATURE])
+        code = table[at + FEATURE]
+        r = surface_of(table, shell, surface, code)
         if r < 0:
             continue
         e = table[tree + ELEMENT_POOL] + ELEMENT * (-1 - child)
-        p = surface_point(table, pool, r, pool[e] - pool[e + 2], pool[e + 1] - pool[e + 3])[0]
-        q = surface_point(table, pool, r, pool[e] + pool[e + 2], pool[e + 1] - pool[e + 3])[0]
-        s = surface_point(table, pool, r, pool[e] + pool[e + 2], pool[e + 1] + pool[e + 3])[0]
-        t = surface_point(table, pool, r, pool[e] - pool[e + 2], pool[e + 1] + pool[e + 3])[0]
-        count += int(cuts(a, d, p, q, s, end)) + int(cuts(a, d, p, s, t, end))
+        u = pool[e] - pool[e + 2]
+        v = pool[e + 1] - pool[e + 3]
+        wide = 2.0 * pool[e + 2]
+        high = 2.0 * pool[e + 3]
+        p = surface_point(table, pool, r, u, v)[0]
+        q = surface_point(table, pool, r, u + wide, v)[0]
+        s = surface_point(table, pool, r, u + wide, v + high)[0]
+        t = surface_point(table, pool, r, u, v + high)[0]
+        hit, x, y = cut_at(a, d, p, q, s, end)
+        if hit and in_trim(table, pool, shell, code, u + (x + y) * wide, v + y * high):
+            count += 1
+        hit, x, y = cut_at(a, d, p, s, t, end)
+        if hit and in_trim(table, pool, shell, code, u + x * wide, v + (x + y) * high):
+            count += 1
     return count
 
 
 @kernel(inner=True)
-def first_point(table, pool, tree, surface, shell):
-    """A point of a body's faces, in its axes, and whether there is one."""
-    for e in range(table[tree + ELEMENTS]):
-        o = table[tree + ELEMENT_POOL] + ELEMENT * e
-        r = surface_of(table, shell, surface, np.int64(pool[o + ELEMENT_FEATURE]))
-        if r >= 0:
-            return surface_point(table, pool, r, pool[o], pool[o + 1])[0], True
-    return (0.0, 0.0, 0.0), False
+def foot_at(table, pool, tree, surface, shell, e, y):
+    """The signed distance of a point from its foot at a body's element e, the normal there, and whether there is one.
+
+    A foot that Newton's method did not reach is none: off the foot of a point outside, the tangent plane of a bulge has
+    it inside. One farther off than BESIDE may be on the far side.
+    """
+    o = table[tree + ELEMENT_POOL] + ELEMENT * e
+    code = np.int64(pool[o + ELEMENT_FEATURE])
+    f = surface_of(table, shell, surface, code)
+    if f < 0:
+        return 0.0, y, False
+    s, t, distance, n, settled = foot_of(table, pool, f, y, pool[o], pool[o + 1])
+    for _ in range(FEET):
+        if settled:
+            break
+        s, t, distance, n, settled = foot_of(table, pool, f, y, s, t)
+    beside = is_within(table, pool, f, s, t, pool[o], pool[o + 1], BESIDE * pool[o + 2], BESIDE * pool[o + 3])
+    return distance, n, settled and beside and in_trim(table, pool, shell, code, s, t)
+
+
+@kernel(inner=True, allocates=True)
+def nearest_foot(table, pool, tree, surface, shell, y, reach):
+    """The signed distance of a point from its nearest foot on a body; minus the reach if none is nearer than that."""
+    stack = np.empty(DEPTH, np.int64)
+    stack[0] = 0
+    used = 1
+    nearest = -reach
+    while used > 0:
+        used -= 1
+        i = stack[used]
+        o = table[tree + NODE_POOL] + NODE * i
+        square = 0.0
+        for k in range(3):
+            off = max(abs(y[k] - pool[o + CENTER + k]) - pool[o + HALF + k], 0.0)
+            square += off * off
+        if square > nearest * nearest:
+            continue
+        child = table[table[tree + NODE_TABLE] + NODE_INTS * i + CHILD]
+        if child >= 0:
+            if used + 2 <= DEPTH:
+                stack[used] = child
+                stack[used + 1] = child + 1
+                used += 2
+            continue
+        distance, _n, some = foot_at(table, pool, tree, surface, shell, -1 - child, y)
+        if some and abs(distance) < abs(nearest):
+            nearest = distance
+    return nearest
 
 
 @kernel(inner=True)
-def crosses(table, pool, scene, stack, candidates, margin):
-    """Whether two bodies are in each other, whatever extrema there are; of smooth ones also whether one is wholly."""
-    turn, shift = scene[0], scene[1]
-    count = overlapping(table, pool, scene[3][0], scene[3][1], turn, shift, stack, candidates)
-    for c in range(count):
-        if is_deep(table, pool, scene, candidates[c, 0], candidates[c, 1], margin):
-            return True
-    if scene[2][0] < 0:
-        # Facets of trimmed faces say nothing of what is inside.
+def is_inside_at(table, pool, tree, surface, shell, e, y, margin, offset):
+    """Whether a point is farther than a margin inside a body, by its foot at element e.
+
+    Of a thin wall the foot may be on the far side. Then one on the near side is nearer, or, where that is past an edge,
+    a facet is between; these are up to an `offset` beside their surfaces.
+    """
+    distance, n, some = foot_at(table, pool, tree, surface, shell, e, y)
+    if not (some and distance < -margin):
         return False
-    # Some direction that no face is likely to lie along, and far enough.
-    far = 10.0 * (pool[table[scene[3][0] + NODE_POOL] + RADIUS] + pool[table[scene[3][1] + NODE_POOL] + RADIUS])
-    ray = (0.6012 * far, 0.3517 * far, 0.7174 * far)
-    a, some = first_point(table, pool, scene[3][0], scene[2][0], scene[2][2])
-    if (
-        some
-        and facets_cut(table, pool, scene[3][1], scene[2][1], scene[2][3], matvec_t(turn, sub(a, shift)), ray, 0.0) % 2
-        == 1
-    ):
+    if nearest_foot(table, pool, tree, surface, shell, y, -distance) >= -margin:
+        return False
+    if -distance <= 2.0 * offset:
         return True
-    b, some = first_point(table, pool, scene[3][1], scene[2][1], scene[2][3])
-    b = add(matvec(turn, b), shift)
-    return some and facets_cut(table, pool, scene[3][0], scene[2][0], scene[2][2], b, ray, 0.0) % 2 == 1
+    return facets_cut(table, pool, tree, surface, shell, y, scale(-distance, n), offset / -distance) == 0
 
 
 @kernel(inner=True)
-def is_outside(table, pool, scene, roots, k, margin):
+def is_deep(table, pool, scene, e, d, margin, offsets):
+    """Whether the middle of a patch of f is farther than a margin inside g at a patch, or the other way round."""
+    turn, shift = scene[0], scene[1]
+    tree_f, tree_g = scene[3]
+    f, g, shell_f, shell_g = scene[2]
+    a, some = middle(table, pool, tree_f, f, shell_f, e)
+    a = matvec_t(turn, sub(a, shift))
+    if some and is_inside_at(table, pool, tree_g, g, shell_g, d, a, margin, offsets[1]):
+        return True
+    b, some = middle(table, pool, tree_g, g, shell_g, d)
+    b = add(matvec(turn, b), shift)
+    return some and is_inside_at(table, pool, tree_f, f, shell_f, e, b, margin, offsets[0])
+
+
+@kernel(inner=True)
+def middle(table, pool, tree, surface, shell, e):
+    """The middle of a patch, in the axes of its body, and whether it is one of a face and within its boundary."""
+    o = table[tree + ELEMENT_POOL] + ELEMENT * e
+    code = np.int64(pool[o + ELEMENT_FEATURE])
+    f = surface_of(table, shell, surface, code)
+    if f < 0 or not in_trim(table, pool, shell, code, pool[o], pool[o + 1]):
+        return (0.0, 0.0, 0.0), False
+    return surface_point(table, pool, f, pool[o], pool[o + 1])[0], True
+
+
+@kernel(inner=True)
+def is_wholly_inside(table, pool, scene, side):
+    """Whether f (side 0) is wholly inside g, or g in f: by a ray from each of three points of it, each another way."""
+    turn, shift = scene[0], scene[1]
+    tree, other = scene[3][side], scene[3][1 - side]
+    surface, shell = scene[2][side], scene[2][2 + side]
+    # Some direction that no face is likely to lie along, and far enough.
+    far = 10.0 * (pool[table[tree + NODE_POOL] + RADIUS] + pool[table[other + NODE_POOL] + RADIUS])
+    elements = table[tree + ELEMENTS]
+    for k in range(3):
+        a = (0.0, 0.0, 0.0)
+        some = False
+        for e in range(elements):
+            # Elements of edges and of vertices are no faces.
+            a, some = middle(table, pool, tree, surface, shell, (e + elements * k // 3) % elements)
+            if some:
+                break
+        if not some:
+            return False
+        ray = (0.6012 * far, 0.3517 * far, 0.7174 * far)
+        if k == 1:
+            ray = scale(-1.0, ray)
+        elif k == 2:
+            ray = (0.5218 * far, -0.8125 * far, -0.2601 * far)
+        a = matvec_t(turn, sub(a, shift)) if side == 0 else add(matvec(turn, a), shift)
+        cut = facets_cut(table, pool, other, scene[2][1 - side], scene[2][3 - side], a, ray, 0.0)
+        if cut % 2 == 0:
+            return False
+    return True
+
+
+@kernel(inner=True)
+def crosses(table, pool, scene, stack, candidates, margin, offsets):
+    """Whether two bodies are in each other by more than a margin, or wholly, whatever extrema there are.
+
+    Facets of f and of g are up to `offsets` beside their surfaces.
+    """
+    count = overlapping(table, pool, scene[3][0], scene[3][1], scene[0], scene[1], stack, candidates)
+    for c in range(count):
+        if is_deep(table, pool, scene, candidates[c, 0], candidates[c, 1], margin, offsets):
+            return True
+    return is_wholly_inside(table, pool, scene, 0) or is_wholly_inside(table, pool, scene, 1)
+
+
+@kernel(inner=True)
+def is_outside(table, pool, scene, roots, k, offsets):
     """Whether root k, of a negative gap, is one of far sides: then a surface is between its points.
 
-    Facets are up to a `margin` beside their surfaces; gaps of no more are taken for true.
+    Facets of f and of g are up to `offsets` beside their surfaces; gaps of no more are taken for true.
     """
-    if -roots[k, GAP] <= 2.0 * margin:
-        return False
-    end = margin / -roots[k, GAP]
+    depth = -roots[k, GAP]
     turn, shift = scene[0], scene[1]
     a = (roots[k, POINT_F], roots[k, POINT_F + 1], roots[k, POINT_F + 2])
     b = (roots[k, POINT_G], roots[k, POINT_G + 1], roots[k, POINT_G + 2])
-    if facets_cut(table, pool, scene[3][0], scene[2][0], scene[2][2], a, sub(b, a), end) > 0:
+    end = offsets[0] / depth
+    if end < 0.5 and facets_cut(table, pool, scene[3][0], scene[2][0], scene[2][2], a, sub(b, a), end) > 0:
         return True
     a = matvec_t(turn, sub(a, shift))
     b = matvec_t(turn, sub(b, shift))
-    return facets_cut(table, pool, scene[3][1], scene[2][1], scene[2][3], a, sub(b, a), end) > 0
+    end = offsets[1] / depth
+    return end < 0.5 and facets_cut(table, pool, scene[3][1], scene[2][1], scene[2][3], a, sub(b, a), end) > 0

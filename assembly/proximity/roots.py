@@ -150,10 +150,12 @@ def surfaces_root(table, pool, scene, start, roots, k):
 def foot_of(table, pool, g, y, s, t):
     """The foot on surface g of a point y, by Newton's method from (s, t): parameters, signed distance, normal.
 
-    Positive outside. A step is never longer than what brings the tangent plane's foot.
+    Positive outside. A step is never longer than what brings the tangent plane's foot. And whether four of them did:
+    they may not be there yet, or where the distance has no minimum.
     """
     distance = 0.0
     n = (0.0, 0.0, 0.0)
+    settled = False
     for _ in range(4):
         p, su, sv, suu, suv, svv = surface_point(table, pool, g, s, t)
         d = sub(y, p)
@@ -172,15 +174,17 @@ def foot_of(table, pool, g, y, s, t):
         h12 = b - distance * dot(n, suv)
         h22 = c - distance * dot(n, svv)
         det = h11 * h22 - h12 * h12
-        if not (det > 0.1 * (a * c - b * b) and h11 > 0.0):
+        bent = det > 0.1 * (a * c - b * b) and h11 > 0.0
+        if not bent:
             h11, h12, h22 = a, b, c
             det = a * c - b * b
         s, t, _held = into_domain(
             table, pool, g, s + (h22 * first - h12 * second) / det, t + (h11 * second - h12 * first) / det
         )
         if first * first / a + second * second / c < 1e-16:
+            settled = bent
             break
-    return s, t, distance, n
+    return s, t, distance, n, settled
 
 
 @kernel(inner=True)
@@ -193,7 +197,7 @@ def slide_down(table, pool, f, g, turn, shift, start, stride, half):
     """
     u, v, s, t = start
     p, su, sv, _uu, _uv, _vv = surface_point(table, pool, f, u, v)
-    s, t, gap, n = foot_of(table, pool, g, matvec_t(turn, sub(p, shift)), s, t)
+    s, t, gap, n, _settled = foot_of(table, pool, g, matvec_t(turn, sub(p, shift)), s, t)
     slope = matvec(turn, n)
     normal = cross(su, sv)
     across = scale(1.0 / max(math.sqrt(dot(normal, normal)), 1e-300), normal)
@@ -214,7 +218,7 @@ def slide_down(table, pool, f, g, turn, shift, start, stride, half):
             table, pool, f, u + (c * first - b * second) / det, v + (a * second - b * first) / det
         )
         q, ru, rv, _uu, _uv, _vv = surface_point(table, pool, f, u_new, v_new)
-        s_new, t_new, gap_new, n = foot_of(table, pool, g, matvec_t(turn, sub(q, shift)), s, t)
+        s_new, t_new, gap_new, n, _settled = foot_of(table, pool, g, matvec_t(turn, sub(q, shift)), s, t)
         if gap_new > gap:
             length *= 0.25
             continue

@@ -285,7 +285,7 @@ def look_at_pair(
     memory[at + REACH] = reach
     count = known_roots(table, pool, watch, memory, p, scene, tracked, roots, work)
     flank = pool[table[pair + PAIR_MINIMUM] + 1]
-    margin = pool[table[pair + PAIR_MINIMUM] + 2]
+    offsets = (pool[table[pair + PAIR_MINIMUM] + 2], pool[table[pair + PAIR_MINIMUM] + 3])
     bulk = magnitudes(turn)
     enough = max(TAKE * reach, flank)
     enough = near_enough(table, pool, scene, bulk, least, enough, CROWDED_PART * flank, candidates, found, distances)
@@ -360,7 +360,7 @@ def look_at_pair(
             gap = roots[before, GAP]
             # The far sides of two bodies oppose each other, too.
             alien = gap > reach + least or gap < -pool[lengths + LAST_REACH]
-            alien = alien or (gap < 0.0 and is_outside(table, pool, scene, roots, before, margin))
+            alien = alien or (gap < 0.0 and is_outside(table, pool, scene, roots, before, offsets))
             roots[before, ORIGIN] = USELESS if alien else NEW
     if smooth:
         seat_given(table, watch, memory, p, roots, count, tracked)
@@ -385,7 +385,7 @@ def look_at_pair(
         for k in range(table[pair + LOW], table[pair + HIGH]):
             if memory[memory_places(table, watch)[1] + PLACE_MEMORY * k] == p:
                 deep = deep or tracked[table[watch + FIRST] + k, PAIR_GAP] < -CROSSING
-        crossed = not deep and crosses(table, pool, scene, stack, candidates, CROSSING)
+        crossed = not deep and crosses(table, pool, scene, stack, candidates, CROSSING, offsets)
         memory[at + CROSSED] = 1.0 if crossed else 0.0
     else:
         memory[at + CROSSED] = math.nan

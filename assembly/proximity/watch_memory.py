@@ -40,8 +40,8 @@ PAIRS, PLACES, PAIR_TABLE, FIRST, TRACK_SOLIDS, LENGTHS, LISTS, LIST_TABLE, WATC
 # the largest.
 NEGLECT, FIRST_REACH, LAST_REACH, LENGTH_COUNT = 0, 1, 2, 3
 # A pair: bodies, trees, surfaces or else (-1) shells, where its least gap is in the pool (behind it how far it may
-# go between looks where contacts may be born, and how far facets are from their surfaces), its places from and to, and
-# rows of given contacts between the two (row, 1 if the bodies are the other way round).
+# go between looks where contacts may be born, and how far facets of either are from their surfaces), its places from
+# and to, and rows of given contacts between the two (row, 1 if the bodies are the other way round).
 PAIR_F, PAIR_G, TREE_F, TREE_G, PAIR_SURFACE_F, PAIR_SURFACE_G, PAIR_SHELL_F, PAIR_SHELL_G = 0, 1, 2, 3, 4, 5, 6, 7
 PAIR_MINIMUM, LOW, HIGH, GIVEN, GIVEN_COUNT, PAIR_RECORD = 8, 9, 10, 11, 12, 13
 # Memory. Header: events, looks and contacts so far, the time of the caller, whether a near root ever found no place,

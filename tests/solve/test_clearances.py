@@ -156,8 +156,14 @@ def test_solves_in_threads_are_those_of_one():
         (BALL, asm.shapes.sphere(0.3), 0.05),
         (asm.shapes.box(1, 1, 1), asm.shapes.box(1, 1, 1), 0.7),
         (RING, RING, 1.0),
+        (asm.shapes.box(1, 1, 1), asm.shapes.box(0.2, 0.3, 0.1), 0.1),
+        (asm.shapes.box(1, 1, 1), asm.shapes.sphere(0.2), 0.1),
+        (BALL, asm.shapes.box(0.2, 0.3, 0.1), 0.1),
     ],
-    ids=["balls-1.8", "balls-1.0", "balls-0.3", "ball-in-ball", "boxes", "rings"],
+    ids=[
+        *("balls-1.8", "balls-1.0", "balls-0.3", "ball-in-ball", "boxes", "rings"),
+        *("box-in-box", "ball-in-box", "box-in-ball"),
+    ],
 )
 def test_bodies_deep_in_each_other_are_never_solved(a, b, x):
     bodies = [asm.Body("a", a, fixed=True), asm.Body("b", b, (x, 0, 0))]

@@ -1,0 +1,161 @@
+"""Whether bodies are in each other: told where they are, and only there, against center lines and closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import assembly as asm
+from assembly.constraints import layout
+from assembly.proximity import watch, watch_memory
+from assembly.proximity.solid_contact import PAIR_GAP, TRACK
+from benchmarks.center_lines import ball_wire, paper_clip_wire, torus_wire
+from benchmarks.wire_oracle import WireOracle
+
+WIRES = {
+    "clip": (asm.shapes.paper_clip(), paper_clip_wire()),
+    "ring": (asm.shapes.torus(5.0, 0.5), torus_wire(5.0, 0.5)),
+    "thick ring": (asm.shapes.torus(3.0, 1.5), torus_wire(3.0, 1.5)),
+    "ball": (asm.shapes.sphere(3.0), ball_wire(3.0)),
+}
+UPRIGHT = (1.0, 0.0, 0.0, 0.0)
+TURNED = (0.8, 0.36, 0.48, 0.0)
+
+
+def judge(f, g):
+    """What a look that asks for everything says of two bodies at poses (2, 7): no contact but they cross, deepest gap.
+
+    The deepest gap is NaN where no contact is listed.
+    """
+    scene = asm.Assembly([asm.Body("f", f), asm.Body("g", g)])
+    scene.constrain(asm.Clearance(places=32))
+    packed = scene.packed()
+
+    def at(q):
+        memory = packed._memory.copy()
+        tracked = np.full((packed.tracked, TRACK), np.nan)
+        q = np.array(q, dtype=float)
+        q[:, :3] = (q[:, :3] - packed.reference) / packed.scale
+        watch.look(packed.table, packed.pool, packed.table[layout.WATCH], memory, q, tracked, watch.EVERYTHING)
+        gaps = tracked[np.isfinite(tracked[:, PAIR_GAP]), PAIR_GAP]
+        crossed = memory[watch_memory.MEMORY_HEADER + watch_memory.CROSSED]
+        assert crossed in (0.0, 1.0)
+        return crossed == 1.0, packed.scale * gaps.min() if gaps.size else np.nan
+
+    return at
+
+
+def stopped(oracle, rng, gap):
+    """A random pose of the second wire from which it was moved away until it has a gap from the first one."""
+    turns = Rotation.random(2, random_state=int(rng.integers(1 << 30))).as_quat(scalar_first=True)
+    start, way = 2.0 * rng.normal(size=3), rng.normal(size=3)
+    way /= np.linalg.norm(way)
+
+    def moved(far):
+        return np.array([[0.0, 0.0, 0.0, *turns[0]], [*(start + far * way), *turns[1]]])
+
+    low, high = 0.0, 60.0
+    while high - low > 1e-5:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if oracle.gaps(moved(middle))[0] > gap else (middle, high)
+    return moved(high)
+
+
+@pytest.mark.parametrize(
+    ("f", "g"),
+    [("clip", "clip"), ("ring", "clip"), ("thick ring", "clip"), ("ball", "clip"), ("ball", "ring")],
+)
+def test_wires_cross_where_their_center_lines_say_so(f, g):
+    oracle = WireOracle([WIRES[f][1], WIRES[g][1]])
+    crossed = judge(WIRES[f][0], WIRES[g][0])
+    rng = np.random.default_rng(5)
+    for gap in (1e-3, 1e-2, 0.1, -1e-3, -0.1) * 6:
+        q = stopped(oracle, rng, gap)
+        true = oracle.gaps(q)[0]
+        told, deepest = crossed(q)
+        assert not (told and true > 0.0)
+        assert true > -1e-4 or told or deepest < 0.0
+
+
+def test_clips_that_touch_are_not_told_to_cross():
+    # Here a foot that Newton's method had not reached yet had a patch of one clip in another one.
+    q = np.array(
+        [
+            [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
+            [
+                -6.480574335054459,
+                4.258737211843085,
+                -22.668945325643914,
+                0.9038431043908197,
+                0.2810754438430033,
+                0.14443553334232795,
+                0.28844863359312656,
+            ],
+            [
+                5.735783795112681,
+                1.784657687220835,
+                -26.55188289106474,
+                0.6522427133881731,
+                -0.10842937807660974,
+                -0.19993123735944185,
+                0.7230836833519864,
+            ],
+        ]
+    )
+    crossed = judge(WIRES["clip"][0], WIRES["clip"][0])
+    assert abs(WireOracle([paper_clip_wire()] * 3).deepest(q)) < 1e-9
+    assert not any(crossed(q[[i, j]])[0] for i, j in ((0, 1), (0, 2), (1, 2)))
+
+
+@pytest.mark.parametrize("turn", [UPRIGHT, TURNED])
+@pytest.mark.parametrize("thickness", [0.3, 0.1, 0.03])
+@pytest.mark.parametrize("ball", [asm.shapes.sphere(1.0), asm.shapes.sphere(5.0)], ids=["small", "large"])
+def test_what_is_beside_a_thin_plate_is_not_in_it(thickness, ball, turn):
+    # Feet on the far side of the plate have it between them and what is beside the near one.
+    crossed = judge(asm.shapes.box(10.0, 8.0, thickness), ball)
+    radius = 5.0 if ball.control_points[..., :3].max() > 2.0 else 1.0
+    for gap in (1e-3, 0.02):
+        for x in (0.0, 1.3, 4.9):
+            pose = (x, 0.7, -0.5 * thickness - radius - gap, *turn)
+            assert not crossed([(0.0, 0.0, 0.0, *UPRIGHT), pose])[0]
+        # Half way into it; the gap of the one contact there says so, or the look.
+        told, deepest = crossed([(0.0, 0.0, 0.0, *UPRIGHT), (0.3, 0.7, -radius, *turn)])
+        assert told or deepest < -1e-3
+
+
+INNER = {
+    "box": asm.shapes.box(0.5, 0.4, 0.3),
+    "ball": asm.shapes.sphere(0.25),
+    "ring": asm.shapes.torus(0.3, 0.1),
+}
+
+
+# Of each a place in it and one that is not; the ring's is in its tube, and in its hole.
+OUTER = {
+    "box": (asm.shapes.box(4.0, 4.0, 4.0), (0.2, 0.1, 0.0), (7.0, 0.0, 0.0)),
+    "ball": (asm.shapes.sphere(2.0), (0.2, 0.1, 0.0), (0.0, 0.0, 3.0)),
+    "ring": (asm.shapes.torus(3.0, 1.0), (3.0, 0.1, 0.0), (0.0, 0.1, 0.0)),
+}
+
+
+@pytest.mark.parametrize("inner", list(INNER))
+@pytest.mark.parametrize("outer", list(OUTER))
+def test_a_body_wholly_inside_another_one_is_in_it(outer, inner):
+    shape, *places = OUTER[outer]
+    for turn in (UPRIGHT, TURNED):
+        for place, inside in zip(places, (True, False), strict=True):
+            q = np.array([(0.0, 0.0, 0.0, *UPRIGHT), (*place, *turn)])
+            assert judge(shape, INNER[inner])(q)[0] == inside
+            assert judge(INNER[inner], shape)(q[::-1])[0] == inside
+
+
+def test_rays_that_leave_a_tube_by_its_open_end_do_not_put_a_body_inside():
+    tube = asm.shapes.cylinder(1.0, 6.0)
+    crossed = judge(tube, asm.shapes.sphere(0.3))
+    rng = np.random.default_rng(8)
+    for _ in range(60):
+        # All around the ends, and never within.
+        place = rng.uniform((-3.0, -3.0, 3.4), (3.0, 3.0, 5.0))
+        place[2] *= rng.choice([-1.0, 1.0])
+        assert not crossed([(0.0, 0.0, 0.0, *UPRIGHT), (*place, *UPRIGHT)])[0]
