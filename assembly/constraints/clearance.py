@@ -48,6 +48,9 @@ class Clearance(Constraint):
         Fewer than two bodies, bodies without shape, a pair that is not of the bodies, numbers out of range.
     """
 
+    # Whether corners over faces are listed besides extrema, for steps to see.
+    corners = True
+
     def __init__(
         self,
         bodies: Iterable[Body] | None = None,

@@ -502,7 +502,8 @@ class Packed:
         lists = min(len(table), MOST_LISTS)
         list_table, _ = self._add([-1] * (LIST_INTS * lists))
         counts = [len(table), self.guards, pair_table, len(self.contacts), 0, lengths_at]
-        return self._add([*counts, lists, list_table])[0]
+        corners = int(any(clearance.corners for clearance in self.clearances))
+        return self._add([*counts, lists, list_table, corners])[0]
 
     def _trim(self, trim: TrimContact, rows: list[list[int]]) -> list[list[int]]:
         """The records of a trim's rows."""

@@ -64,7 +64,7 @@ from assembly.geometry.vec import dot, sub
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.extremal import CLOSE, CONVERGED, LEFT_PATCH, SINGULAR, solve_pair
 from assembly.proximity.free_pair import VARIABLES, free_hessian, free_rows
-from assembly.proximity.solid_contact import CONTACT_RECORD, FEATURE_F, FOLD, PAIR_GAP, PROPER, TRACK
+from assembly.proximity.solid_contact import CONTACT_RECORD, FEATURE_F, FOLD, HELD, PAIR_GAP, PROPER, TRACK
 from assembly.proximity.start import global_start
 from assembly.proximity.velocity import GAP, RATES, add_gap_terms, gradient_row, store_record
 
@@ -119,15 +119,12 @@ def search_row(table, pool, row, q, tracked, r):
 
 @kernel(inner=True)
 def track_row(table, pool, row, q, start, patience, records, tracked, r):
-    """The features of the solids of a row from start[r] on, into tracked[r] and record r. Whether they were found."""
+    """The features of the solids of a row from start[r] on, into tracked[r] and record r. A status."""
     shell_f = table[row + SHELL_F]
     shell_g = table[row + SHELL_G]
     i = table[row + BODY_F]
     j = table[row + BODY_G]
-    status = call_address(
-        table[TRACK_AT], (table, pool, shell_f, shell_g, i, j, q, start, patience, records, tracked, r)
-    )
-    return status == CONVERGED or status == SINGULAR
+    return call_address(table[TRACK_AT], (table, pool, shell_f, shell_g, i, j, q, start, patience, records, tracked, r))
 
 
 @kernel(inline=True)
@@ -147,14 +144,16 @@ def idle_row(r, gap, point):
 
 
 @kernel(inner=True)
-def lost_guard(table, pool, r, start, point):
-    """Row r of a clearance whose pair was lost: idle, if its gap would be open.
+def lost_guard(table, pool, r, start, point, past):
+    """Row r of a clearance whose pair was lost: idle, if its gap would be open, or it is a corner `past` its face.
 
     What the neighborhood holds now is for the next look to find.
     """
     row = table[ROW_TABLE] + ROW * r
     gap = start[r, PAIR_GAP] - pool[table[row + MINIMUM]]
-    if not gap > 0.0:
+    if past:
+        gap = max(gap, 0.0)
+    elif not gap > 0.0:
         return False
     idle_row(r, gap, point)
     # Nothing moves it: its pair is not known.
@@ -175,14 +174,17 @@ def solids_row(table, pool, r, start, patience, point):
     """
     q, tracked, records, residual, jacobian = point
     row = table[ROW_TABLE] + ROW * r
-    found = track_row(table, pool, row, q, start, patience, records, tracked, r)
+    status = track_row(table, pool, row, q, start, patience, records, tracked, r)
+    found = status == CONVERGED or status == SINGULAR
     if not found:
         if is_guard(table, r):
-            return lost_guard(table, pool, r, start, point)
+            past = start[r, HELD] == 1.0 and status == LEFT_PATCH
+            return lost_guard(table, pool, r, start, point, past)
         if table[row + ONE_SIDED] == 1 or patience == math.inf:
             found = search_row(table, pool, row, q, tracked, r)
             if found:
-                found = track_row(table, pool, row, q, tracked, math.inf, records, tracked, r)
+                status = track_row(table, pool, row, q, tracked, math.inf, records, tracked, r)
+                found = status == CONVERGED or status == SINGULAR
     if found:
         residual[r] = records[r, GAP] - pool[table[row + MINIMUM]]
         tracked[r, PAIR_GAP] = records[r, GAP]
@@ -217,7 +219,7 @@ def contact_row(table, pool, r, start, patience, loose, point):
             if table[row + ONE_SIDED] == 0:
                 return False
             if is_guard(table, r):
-                return lost_guard(table, pool, r, start, point)
+                return lost_guard(table, pool, r, start, point, False)
             # A one-sided contact is of the nearest pair, whichever that is now.
             held = status == LEFT_PATCH and distance > 0.0
             status, x = restart_contact(table, pool, row, q, records, r)

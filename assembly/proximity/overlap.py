@@ -233,6 +233,28 @@ def middle(table, pool, tree, surface, shell, e):
 
 
 @kernel(inner=True)
+def middle_of_part(table, pool, tree, surface, shell, k):
+    """The middle of a patch in the k-th of three parts of a body's patches, and whether there is one.
+
+    The parts are of different faces, if there are some: a point of a face that touches may be taken for inside.
+    """
+    first = table[tree + ELEMENT_POOL] + ELEMENT_FEATURE
+    elements = table[tree + ELEMENTS]
+    patches = 0
+    for e in range(elements):
+        patches += int(shell < 0 or pool[first + ELEMENT * e] < table[shell + FACES])
+    passed = 0
+    for e in range(elements):
+        if shell < 0 or pool[first + ELEMENT * e] < table[shell + FACES]:
+            if passed >= patches * k // 3:
+                a, some = middle(table, pool, tree, surface, shell, e)
+                if some:
+                    return a, True
+            passed += 1
+    return (0.0, 0.0, 0.0), False
+
+
+@kernel(inner=True)
 def is_wholly_inside(table, pool, scene, side):
     """Whether f (side 0) is wholly inside g, or g in f: by a ray from each of three points of it, each another way."""
     turn, shift = scene[0], scene[1]
@@ -240,15 +262,8 @@ def is_wholly_inside(table, pool, scene, side):
     surface, shell = scene[2][side], scene[2][2 + side]
     # Some direction that no face is likely to lie along, and far enough.
     far = 10.0 * (pool[table[tree + NODE_POOL] + RADIUS] + pool[table[other + NODE_POOL] + RADIUS])
-    elements = table[tree + ELEMENTS]
     for k in range(3):
-        a = (0.0, 0.0, 0.0)
-        some = False
-        for e in range(elements):
-            # Elements of edges and of vertices are no faces.
-            a, some = middle(table, pool, tree, surface, shell, (e + elements * k // 3) % elements)
-            if some:
-                break
+        a, some = middle_of_part(table, pool, tree, surface, shell, k)
         if not some:
             return False
         ray = (0.6012 * far, 0.3517 * far, 0.7174 * far)

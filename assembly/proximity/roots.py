@@ -51,16 +51,17 @@ from assembly.proximity.extremal import (
 )
 from assembly.proximity.folds import ALONE, BESIDE, fold_beyond, fold_of
 from assembly.proximity.shell import FACES
-from assembly.proximity.solid_contact import FEATURE_F, FEATURE_G, FOLD, PAIR_NORMAL, PROPER
+from assembly.proximity.solid_contact import FEATURE_F, FEATURE_G, FOLD, HELD, PAIR_NORMAL, PROPER
 from assembly.proximity.start import opposed
 from assembly.proximity.switching import feature_at
 from assembly.proximity.velocity import ARM_F
 from assembly.proximity.velocity import GAP as RECORD_GAP
 
 # A root: parameters, features, normal in the axes of f, gap, where it is from, its points in the axes of f, how far it
-# is from a fold (det H / |H|^2), and how far so beyond the knot lines beside it (NaN: not looked at).
-CODE_F, CODE_G, ROOT_NORMAL, GAP, ORIGIN, POINT_F, POINT_G, ROOT_FOLD, ROOT_BEYOND, ROOT = (
-    4, 5, 6, 9, 10, 11, 14, 17, 18, 19
+# is from a fold (det H / |H|^2), how far so beyond the knot lines beside it (NaN: not looked at), and whether it is no
+# root, but a corner (`corners.py`).
+CODE_F, CODE_G, ROOT_NORMAL, GAP, ORIGIN, POINT_F, POINT_G, ROOT_FOLD, ROOT_BEYOND, CORNER, ROOT = (
+    4, 5, 6, 9, 10, 11, 14, 17, 18, 19, 20
 )  # fmt: skip
 # Where it is from: of no use, new, from LISTED on the place it has, down from GIVEN_CONTACT which given contact it is.
 USELESS, NEW, LISTED, GIVEN_CONTACT = -2.0, -1.0, 0, -3.0
@@ -236,19 +237,21 @@ def slide_down(table, pool, f, g, turn, shift, start, stride, half):
 
 
 @kernel(inner=True)
-def solids_root(table, pool, scene, codes, start, n, roots, k, work):
-    """Switching and Newton on the features of two solids; fills root k."""
+def solids_root(table, pool, scene, codes, start, n, roots, k, work, corner):
+    """Switching and Newton on the features of two solids, or Newton alone for a corner; fills root k."""
     i, j, q, track_at = scene[4]
     records, tracked = work
     tracked[0, 0], tracked[0, 1], tracked[0, 2], tracked[0, 3] = start
     tracked[0, FEATURE_F] = float(codes[0])
     tracked[0, FEATURE_G] = float(codes[1])
+    tracked[0, HELD] = corner
     for l in range(3):
         tracked[0, PAIR_NORMAL + l] = n[l]
     status = call_address(
         track_at, (table, pool, scene[2][2], scene[2][3], i, j, q, tracked, math.inf, records, tracked, 0)
     )
-    if status != CONVERGED and status != SINGULAR:
+    if status != CONVERGED and (status != SINGULAR or corner == 1.0):
+        # An edge along another one, or along a face, is no corner: its ends are.
         return NOTHING
     turn = rotation(q, i)
     m = (tracked[0, PAIR_NORMAL], tracked[0, PAIR_NORMAL + 1], tracked[0, PAIR_NORMAL + 2])
@@ -258,6 +261,7 @@ def solids_root(table, pool, scene, codes, start, n, roots, k, work):
     write(
         roots, k, x, tracked[0, FEATURE_F], tracked[0, FEATURE_G], m, gap, sub(pg, scale(gap, m)), pg, records[0, FOLD]
     )
+    roots[k, CORNER] = corner
     return MINIMUM_FOUND if records[0, PROPER] == 1.0 else SADDLE
 
 
@@ -273,18 +277,19 @@ def write(roots, k, x, code_f, code_g, n, gap, pf, pg, fold):
     roots[k, POINT_G], roots[k, POINT_G + 1], roots[k, POINT_G + 2] = pg
     roots[k, ROOT_FOLD] = fold
     roots[k, ROOT_BEYOND] = math.nan
+    roots[k, CORNER] = 0.0
 
 
 @kernel(inner=True)
-def add_root(table, pool, scene, codes, start, n, neglect, roots, count, work):
-    """Look for a root from a start and add it, as USELESS, if it is none of the known ones.
+def add_root(table, pool, scene, codes, start, n, neglect, roots, count, work, corner):
+    """Look for a root from a start and add it, as USELESS, if it is none of the known ones; a corner where that is 1.
 
     Returns how many roots there are, and NOTHING, ALIKE, SADDLE or MINIMUM_FOUND.
     """
     if scene[2][0] >= 0:
         found = surfaces_root(table, pool, scene, start, roots, count)
     else:
-        found = solids_root(table, pool, scene, codes, start, n, roots, count, work)
+        found = solids_root(table, pool, scene, codes, start, n, roots, count, work, corner)
     if found == NOTHING:
         return count, found
     for k in range(count):
@@ -311,7 +316,7 @@ def add_given(table, pool, scene, tracked, listed, many, neglect, roots, work):
         if table[listed + 2 * c + 1] == 1:
             x = (x[2], x[3], x[0], x[1])
         before = count
-        count, found = add_root(table, pool, scene, (0, 0), x, (0.0, 0.0, 0.0), 0.0, roots, count, work)
+        count, found = add_root(table, pool, scene, (0, 0), x, (0.0, 0.0, 0.0), 0.0, roots, count, work, 0.0)
         if scene[2][0] >= 0 and (found == NOTHING or (count > before and count < roots.shape[0])):
             frame = pair_frame(table, pool, scene[2][0], scene[2][1], scene[0], scene[1], x)
             if frame[11]:

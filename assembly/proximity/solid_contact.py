@@ -1,7 +1,8 @@
 """A contact of two solids as a solve tracks it: the pair of features that is closest, its coordinates, its normal.
 
 Of every contact a solve keeps `TRACK` numbers: the coordinates of the pair (4), the two features, the normal in the
-axes of body f, which tells on which side of each other two edges are where they touch, and the gap.
+axes of body f, which tells on which side of each other two edges are where they touch, the gap, and whether the pair
+stays with these two features: a corner over a face, which need not be the closest one (`corners.py`).
 
 The kernels here are large, and few scenes need them: loops call them by address (`_kernel.call_address`).
 """
@@ -17,10 +18,10 @@ from assembly.proximity.extremal import CONVERGED, SINGULAR
 from assembly.proximity.feature_pair import feature_record
 from assembly.proximity.nearest import CROSSING
 from assembly.proximity.nearest_query import NORMAL, PAIR
-from assembly.proximity.switching import track_features
+from assembly.proximity.switching import hold_features, track_features
 from assembly.proximity.velocity import RECORD
 
-FEATURE_F, FEATURE_G, PAIR_NORMAL, PAIR_GAP, TRACK = 4, 5, 6, 9, 10
+FEATURE_F, FEATURE_G, PAIR_NORMAL, PAIR_GAP, HELD, TRACK = 4, 5, 6, 9, 10, 11
 # Behind a record: whether surfaces do not cross at the pair, and how far it is from a fold.
 PROPER, FOLD, CONTACT_RECORD = RECORD, RECORD + 1, RECORD + 2
 
@@ -37,21 +38,17 @@ def write_tracked(x, feature_f, feature_g, n, tracked, r):
 
 @kernel(inner=True)
 def track_row(table, pool, shell_f, shell_g, relative, shift, start, r, patience):
-    """`track_features` from the tracked values start[r]."""
-    return track_features(
-        table,
-        pool,
-        shell_f,
-        shell_g,
-        relative,
-        shift,
-        np.int64(start[r, FEATURE_F]),
-        np.int64(start[r, FEATURE_G]),
-        (start[r, 0], start[r, 1], start[r, 2], start[r, 3]),
-        (start[r, PAIR_NORMAL], start[r, PAIR_NORMAL + 1], start[r, PAIR_NORMAL + 2]),
-        1.0,
-        patience,
-    )
+    """`track_features` from the tracked values start[r], or `hold_features`."""
+    code_f = np.int64(start[r, FEATURE_F])
+    code_g = np.int64(start[r, FEATURE_G])
+    x = (start[r, 0], start[r, 1], start[r, 2], start[r, 3])
+    n = (start[r, PAIR_NORMAL], start[r, PAIR_NORMAL + 1], start[r, PAIR_NORMAL + 2])
+    if start[r, HELD] == 1.0:
+        status, x, frame = hold_features(
+            table, pool, shell_f, shell_g, relative, shift, code_f, code_g, x, n, 1.0, patience
+        )
+        return status, code_f, code_g, x, frame, 0
+    return track_features(table, pool, shell_f, shell_g, relative, shift, code_f, code_g, x, n, 1.0, patience)
 
 
 @kernel
@@ -70,6 +67,7 @@ def track_solids(table, pool, shell_f, shell_g, i, j, q, start, patience, record
         records[r, PROPER] = 1.0 if frame[14] else 0.0
         records[r, FOLD] = frame[15]
         write_tracked(x, feature_f, feature_g, frame[0], tracked, r)
+        tracked[r, HELD] = start[r, HELD]
     return status
 
 
@@ -98,4 +96,5 @@ def search_solids(table, pool, shell_f, shell_g, i, j, q, nearest_at, deepest_at
         if status != CROSSING:
             n = matvec_t(rotation(q, i), (out[NORMAL], out[NORMAL + 1], out[NORMAL + 2]))
     write_tracked((out[0], out[1], out[2], out[3]), codes[0], codes[1], n, tracked, r)
+    tracked[r, HELD] = 0.0
     return 1

@@ -29,8 +29,9 @@ from assembly.geometry.spline import (
 )
 from assembly.geometry.trim import trim_nearest, trim_side
 from assembly.geometry.vec import blend, cross, dot, matvec, matvec_t, neg, sub
-from assembly.proximity.extremal import LEFT_PATCH, NOT_CONVERGED, into_domain, own_frame
+from assembly.proximity.extremal import CONVERGED, LEFT_PATCH, NOT_CONVERGED, SINGULAR, into_domain, own_frame
 from assembly.proximity.feature_pair import solve_features
+from assembly.proximity.pair_tests import is_feasible
 from assembly.proximity.shell import (
     EDGE,
     EDGE_CURVE,
@@ -62,6 +63,8 @@ from assembly.proximity.tips import LEAN, from_tip, tip_near, unit
 
 # Switches in a row that no motion of a pair needs.
 ROUNDS = 64
+# How far a unit normal may lean over what is beside a feature that is held.
+TILT = 0.3
 # Cosine between the normals before and after below which the pair is another one.
 ACROSS = 0.3
 
@@ -183,7 +186,7 @@ def edge_end(table, pool, edge, end):
 
 @kernel(inner=True)
 def from_vertex(table, pool, shell, code, n):
-    """The edge along which the normal leans most at a vertex: code and (t, 0); or the vertex itself."""
+    """The edge along which the normal leans most at a vertex: code, (t, 0) and how much; or the vertex itself."""
     faces = table[shell + FACES]
     vertex = table[shell + VERTEX_TABLE] + VERTEX_RECORD * (code - faces - table[shell + EDGES])
     best = LEAN
@@ -201,8 +204,8 @@ def from_vertex(table, pool, shell, code, n):
             code = faces + table[at]
             found = (t, 0.0)
     if table[vertex + VERTEX_EDGES] == 0:
-        return from_tip(table, pool, shell, vertex, code, n)
-    return code, found
+        code, found = from_tip(table, pool, shell, vertex, code, n)
+    return code, found, best
 
 
 @kernel(inner=True)
@@ -269,7 +272,7 @@ def checked(table, pool, shell, code, a, b, held, n):
             return code, (a, b), False
         lean, face, found = from_edge(table, pool, shell, code, a, n)
         return (face, found, True) if lean > LEAN else (code, (a, b), False)
-    other, found = from_vertex(table, pool, shell, code, n)
+    other, found, _lean = from_vertex(table, pool, shell, code, n)
     return other, found, other != code
 
 
@@ -337,3 +340,41 @@ def track_features(table, pool, shell_f, shell_g, rotation, shift, code_f, code_
         if dot(normal, matvec_t(rotation, n)) > 0.0:
             status = NOT_CONVERGED
     return status, code_f, code_g, x, frame, switches
+
+
+@kernel(inner=True)
+def lean_of(table, pool, shell, code, t, n):
+    """By how much a normal leans over what is beside an edge or a vertex, at most; 0 for a face."""
+    kind = feature_kind(table, shell, code)
+    if kind == EDGE:
+        return from_edge(table, pool, shell, code, t, n)[0]
+    return from_vertex(table, pool, shell, code, n)[2] if kind == VERTEX else 0.0
+
+
+@kernel(inner=True)
+def hold_features(table, pool, shell_f, shell_g, rotation, shift, code_f, code_g, x, n, size, turn):
+    """Newton's method on two features that stay what they are: status, x, frame. Arguments as in `track_features`.
+
+    LEFT_PATCH where a point on a face is past its boundary, one of an edge past its end, or the normal leans by more
+    than TILT.
+    """
+    kind_f = feature_kind(table, shell_f, code_f)
+    kind_g = feature_kind(table, shell_g, code_g)
+    if kind_f == EDGE and kind_g == EDGE and dot(n, n) < 0.25:
+        n = between_edges(table, pool, shell_f, shell_g, rotation, code_f, code_g, x[0], x[2])
+    f = feature_at(table, shell_f, code_f)
+    g = feature_at(table, shell_g, code_g)
+    status, x, frame = solve_features(table, pool, kind_f, f, kind_g, g, rotation, shift, x, n, size, turn)
+    inside = True
+    if kind_f == FACE:
+        inside = is_feasible(table, pool, FACE, table[shell_f + FACE_TABLE] + FACE_RECORD * code_f, x[0], x[1])
+    elif kind_g == FACE:
+        inside = is_feasible(table, pool, FACE, table[shell_g + FACE_TABLE] + FACE_RECORD * code_g, x[2], x[3])
+    if not inside:
+        return LEFT_PATCH, x, frame
+    if status == CONVERGED or status == SINGULAR:
+        n = frame[0]
+        lean = lean_of(table, pool, shell_f, code_f, x[0], n)
+        lean = max(lean, lean_of(table, pool, shell_g, code_g, x[2], neg(matvec_t(rotation, n))))
+        status = status if lean <= TILT else LEFT_PATCH
+    return status, x, frame

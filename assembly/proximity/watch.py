@@ -18,12 +18,15 @@ from assembly._kernel import kernel
 from assembly.geometry.vec import add, dot, matvec, matvec_t, quaternion_matrix, quaternion_product, scale, sub
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.bounding_tree import CENTER, NODE_POOL, RADIUS, least_distance, magnitudes, pairs_within
+from assembly.proximity.corners import add_corners
 from assembly.proximity.near_root import BARREN, LEFT, PASSED, half_widths, stays
 from assembly.proximity.overlap import crosses, is_outside
 from assembly.proximity.patch_list import LIST_INTS, listed_pairs
 from assembly.proximity.roots import (
     ALIKE,
+    CORNER,
     GAP,
+    LISTED,
     MINIMUM_FOUND,
     NEW,
     NOTHING,
@@ -38,7 +41,7 @@ from assembly.proximity.roots import (
     is_known,
     slide_down,
 )
-from assembly.proximity.solid_contact import CONTACT_RECORD, PAIR_GAP, TRACK
+from assembly.proximity.solid_contact import CONTACT_RECORD, HELD, PAIR_GAP, TRACK
 from assembly.proximity.watch_memory import (
     ALLOWANCE,
     BALL,
@@ -47,6 +50,7 @@ from assembly.proximity.watch_memory import (
     BALL_RADIUS,
     CALLED,
     CALLS,
+    CORNERS,
     CROSSED,
     CROWDED,
     EVENT_COUNT,
@@ -331,7 +335,7 @@ def look_at_pair(
         if stayed or not folding:
             # Where nothing folds, it tells whether it goes to a root that is known.
             count, result = add_root(
-                table, pool, scene, codes, near, (0.0, 0.0, 0.0), pool[lengths + NEGLECT], roots, count, work
+                table, pool, scene, codes, near, (0.0, 0.0, 0.0), pool[lengths + NEGLECT], roots, count, work, 0.0
             )
         if count > before:
             folding = folding or not is_alone(roots, before)
@@ -345,7 +349,7 @@ def look_at_pair(
             start, stayed = slide_down(table, pool, scene[2][0], scene[2][1], turn, shift, start, stride, half)
             if stayed and count < ROOTS:
                 count, result = add_root(
-                    table, pool, scene, codes, start, (0.0, 0.0, 0.0), pool[lengths + NEGLECT], roots, count, work
+                    table, pool, scene, codes, start, (0.0, 0.0, 0.0), pool[lengths + NEGLECT], roots, count, work, 0.0
                 )
         if result == ALIKE and not folding:
             # On the slopes around a root that is known.
@@ -364,6 +368,14 @@ def look_at_pair(
             roots[before, ORIGIN] = USELESS if alien else NEW
     if smooth:
         seat_given(table, watch, memory, p, roots, count, tracked)
+    elif table[watch + CORNERS] == 1:
+        neglect = pool[lengths + NEGLECT]
+        span = (-pool[lengths + LAST_REACH], reach + least)
+        count = add_corners(table, pool, scene, span, offsets, neglect, stack, candidates, roots, count, work)
+        for k in range(count):
+            place = np.int64(roots[k, ORIGIN])
+            if place >= LISTED:
+                tracked[table[watch + FIRST] + place - LISTED, HELD] = roots[k, CORNER]
     rest, wanting = list_roots(table, pool, watch, memory, p, roots, count, tracked)
     listed = 0
     for k in range(table[pair + LOW], table[pair + HIGH]):

@@ -16,6 +16,7 @@ from assembly.proximity.roots import (
     ALIKE,
     CODE_F,
     CODE_G,
+    CORNER,
     GAP,
     GIVEN_CONTACT,
     LISTED,
@@ -29,12 +30,13 @@ from assembly.proximity.roots import (
     add_given,
     add_root,
 )
-from assembly.proximity.solid_contact import FEATURE_F, FEATURE_G, PAIR_GAP, PAIR_NORMAL
+from assembly.proximity.solid_contact import FEATURE_F, FEATURE_G, HELD, PAIR_GAP, PAIR_NORMAL
 
 # The record of a watch: counts; where pairs begin; the row of `tracked` that is the first place; address of
-# `track_solids`; where its lengths are in the pool; how many lists there are, where they begin.
-PAIRS, PLACES, PAIR_TABLE, FIRST, TRACK_SOLIDS, LENGTHS, LISTS, LIST_TABLE, WATCH_RECORD = (
-    0, 1, 2, 3, 4, 5, 6, 7, 8
+# `track_solids`; where its lengths are in the pool; how many lists there are, where they begin; whether corners are
+# listed (`corners.py`).
+PAIRS, PLACES, PAIR_TABLE, FIRST, TRACK_SOLIDS, LENGTHS, LISTS, LIST_TABLE, CORNERS, WATCH_RECORD = (
+    0, 1, 2, 3, 4, 5, 6, 7, 8, 9
 )  # fmt: skip
 # Its lengths: roots nearer to each other than the first, and along the surfaces, are one; the reach of a first look;
 # the largest.
@@ -130,6 +132,7 @@ def write_root(roots, i, tracked, r):
     for k in range(3):
         tracked[r, PAIR_NORMAL + k] = roots[i, ROOT_NORMAL + k]
     tracked[r, PAIR_GAP] = roots[i, GAP]
+    tracked[r, HELD] = roots[i, CORNER]
 
 
 @kernel(inner=True)
@@ -144,18 +147,22 @@ def known_roots(table, pool, watch, memory, p, scene, tracked, roots, work):
     # A contact that is to close a gap would contradict a clearance that asks for one, where both stood for one root.
     radius = neglect if pool[table[pair + PAIR_MINIMUM]] == 0.0 else math.inf
     count = add_given(table, pool, scene, tracked, table[pair + GIVEN], table[pair + GIVEN_COUNT], radius, roots, work)
-    for k in range(table[pair + LOW], table[pair + HIGH]):
+    first, last = table[pair + LOW], table[pair + HIGH]
+    # Roots first, then corners, which give way to them.
+    for step in range(2 * (last - first)):
+        k = first + step % (last - first)
         o = places + PLACE_MEMORY * k
-        if memory[o] != p:
-            continue
         r = table[watch + FIRST] + k
+        corner = 1.0 if tracked[r, HELD] == 1.0 else 0.0
+        if memory[o] != p or (corner == 1.0) != (step >= last - first):
+            continue
         lost = math.isnan(tracked[r, 0])
         before = count
         if not lost and count < ROOTS:
             start = (tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3])
             codes = (np.int64(tracked[r, FEATURE_F]), np.int64(tracked[r, FEATURE_G]))
             n = (tracked[r, PAIR_NORMAL], tracked[r, PAIR_NORMAL + 1], tracked[r, PAIR_NORMAL + 2])
-            count, found = add_root(table, pool, scene, codes, start, n, neglect, roots, count, work)
+            count, found = add_root(table, pool, scene, codes, start, n, neglect, roots, count, work, corner)
             lost = found != ALIKE and found != MINIMUM_FOUND
         if count > before and not lost:
             roots[before, ORIGIN] = LISTED + k

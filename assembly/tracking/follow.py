@@ -144,7 +144,8 @@ def correct(table, pool, row, r, q, guess, tracked, records):
     for i in range(TRACK):
         tracked[r, i] = guess[r, i]
     if table[row + SHELL_F] >= 0:
-        found = track_row(table, pool, row, q, guess, BEND, records, tracked, r)
+        status = track_row(table, pool, row, q, guess, BEND, records, tracked, r)
+        found = status == CONVERGED or status == SINGULAR
     else:
         start = (guess[r, 0], guess[r, 1], guess[r, 2], guess[r, 3])
         status, x, _distance = track_contact(table, pool, row, q, start, BEND, records, r)

@@ -61,7 +61,9 @@ class ListedContact:
 
 
 class _Everything(Clearance):
-    """A clearance of bodies any of which may be moved."""
+    """A clearance of bodies any of which may be moved, and extrema alone."""
+
+    corners = False
 
     def pairs(self, bodies: Sequence[Body]) -> list[tuple[Body, Body]]:
         """All pairs."""
