@@ -23,7 +23,10 @@ class Clearance(Constraint):
 
     Bodies that cross at the start are pushed apart where they are in each other by less than a twentieth of the scene's
     size and less than their radii of curvature. Deeper ones stay, and the solve ends STALLED, never SOLVED; a tracker
-    does not begin there. Not told is a solid with edges that is wholly inside another body.
+    does not begin there.
+
+    Of solids with edges corners are contacts too: vertices and points of edges over a face, and edges that cross, whose
+    normal misses their cones by less than 0.3 rad. Where faces come to lie on each other, several of them carry.
 
     Parameters
     ----------
@@ -40,7 +43,8 @@ class Clearance(Constraint):
         well, are one: the radius of the spheres of neglect (paper 001, section 5), in parts of the scene's size.
         Contacts farther apart are all kept, also across a wire thinner than the radius.
     places : int, optional
-        How many contacts may be near at a time; six a pair by default. A solve that needs more doubles it.
+        How many contacts may be near at a time; by default six for one pair and two more for each further one, at most
+        eight and four a body. A solve that needs more doubles it.
 
     Raises
     ------
