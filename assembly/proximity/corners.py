@@ -13,7 +13,6 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly.proximity.bounding_tree import ELEMENT, ELEMENT_FEATURE, ELEMENT_POOL, pairs_about
-from assembly.proximity.overlap import is_outside
 from assembly.proximity.roots import (
     CODE_F,
     CODE_G,
@@ -48,7 +47,7 @@ def hold_roots(table, pool, scene, roots, count, work):
         return
     for k in range(count):
         codes = (np.int64(roots[k, CODE_F]), np.int64(roots[k, CODE_G]))
-        if roots[k, CORNER] == 1.0 or not is_corner(table, scene, codes[0], codes[1]):
+        if roots[k, CORNER] == 1.0 or roots[k, GAP] < -SLACK or not is_corner(table, scene, codes[0], codes[1]):
             continue
         x = (roots[k, 0], roots[k, 1], roots[k, 2], roots[k, 3])
         n = (roots[k, ROOT_NORMAL], roots[k, ROOT_NORMAL + 1], roots[k, ROOT_NORMAL + 2])
@@ -57,17 +56,14 @@ def hold_roots(table, pool, scene, roots, count, work):
 
 
 @kernel(inner=True)
-def add_corners(table, pool, scene, span, offsets, neglect, stack, candidates, roots, count, work):
-    """Add corners with gaps in a span; how many roots there are then.
+def add_corners(table, pool, scene, reach, neglect, stack, candidates, roots, count, work):
+    """Add corners with gaps up to a reach; how many roots there are then.
 
-    Roots that are at a corner become one. A point below a face is inside, where none is between; of edges that crossed
-    already and are no root, one may be beside the other body.
-
-    Where `candidates` does not hold them all, the first ones are looked into.
+    What is below a face or has crossed an edge already, and is no root, may be beside the other body, or behind a
+    sheet: roots tell of it. Where all that are near have been looked into, roots that are at a corner become one.
     """
-    hold_roots(table, pool, scene, roots, count, work)
     tree_f, tree_g = scene[3]
-    found = pairs_about(table, pool, tree_f, tree_g, scene[0], scene[1], span[1], 0.0, TILT, stack, candidates)
+    found = pairs_about(table, pool, tree_f, tree_g, scene[0], scene[1], reach, 0.0, TILT, stack, candidates)
     for c in range(min(found, candidates.shape[0])):
         if count == roots.shape[0]:
             break
@@ -79,14 +75,11 @@ def add_corners(table, pool, scene, span, offsets, neglect, stack, candidates, r
         start = (pool[o], pool[o + 1], pool[p], pool[p + 1])
         before = count
         count, _result = add_root(table, pool, scene, codes, start, (0.0, 0.0, 0.0), neglect, roots, count, work, 1.0)
-        if count == before:
-            continue
-        gap = roots[before, GAP]
-        of_edges = feature_kind(table, scene[2][2], codes[0]) == feature_kind(table, scene[2][3], codes[1])
-        if not (-SLACK if of_edges else span[0]) <= gap <= span[1] or (
-            gap < -SLACK and is_outside(table, pool, scene, roots, before, offsets)
-        ):
-            count = before
-        else:
-            roots[before, ORIGIN] = NEW
+        if count > before:
+            if -SLACK <= roots[before, GAP] <= reach:
+                roots[before, ORIGIN] = NEW
+            else:
+                count = before
+    if 0 <= found <= candidates.shape[0]:
+        hold_roots(table, pool, scene, roots, count, work)
     return count

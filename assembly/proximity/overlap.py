@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from assembly._kernel import kernel
-from assembly.geometry.spline import surface_point
+from assembly.geometry.spline import SIGN, surface_point
 from assembly.geometry.trim import trim_side
 from assembly.geometry.vec import add, cross, dot, matvec, matvec_t, scale, sub
 from assembly.proximity.bounding_tree import (
@@ -61,22 +61,23 @@ def meets_box(pool, o, a, d):
 
 @kernel(inline=True)
 def cut_at(a, d, p, q, r, end):
-    """Where a segment from a along d cuts a triangle (Möller and Trumbore): whether it does, shares of q and of r.
+    """Where a segment from a along d cuts a triangle (Möller and Trumbore): whether it does, which part of the way.
 
-    What is nearer to an end than that part of the segment does not count.
+    And the shares of q and of r there, and whether it goes to the side to which the corners turn left. What is nearer
+    to an end than that part of the segment does not count.
     """
     e = sub(q, p)
     f = sub(r, p)
     h = cross(d, f)
     det = dot(e, h)
     if abs(det) < 1e-300:
-        return False, 0.0, 0.0
+        return False, 0.0, 0.0, 0.0, False
     s = sub(a, p)
     u = dot(s, h) / det
     w = cross(s, e)
     v = dot(d, w) / det
     t = dot(f, w) / det
-    return u >= 0.0 and v >= 0.0 and u + v <= 1.0 and end < t < 1.0 - end, u, v
+    return u >= 0.0 and v >= 0.0 and u + v <= 1.0 and end < t < 1.0 - end, t, u, v, det < 0.0
 
 
 @kernel(inner=True)
@@ -89,20 +90,25 @@ def surface_of(table, shell, surface, code):
 
 @kernel(inner=True)
 def in_trim(table, pool, shell, code, u, v):
-    """Whether parameters are within the boundary of a face; of a surface without one they always are."""
+    """Whether parameters are within the boundary of a face or on it; of a surface without one they always are."""
     if shell < 0:
         return True
     trim = table[table[shell + FACE_TABLE] + FACE_RECORD * code + FACE_TRIM]
-    return trim < 0 or trim_side(table, pool, trim, u, v) > 0
+    return trim < 0 or trim_side(table, pool, trim, u, v) >= 0
 
 
 @kernel(inner=True, allocates=True)
 def facets_cut(table, pool, tree, surface, shell, a, d, end):
-    """How many facets of a body's faces cut the segment from a to a + d, but for that part at its ends; body axes."""
+    """How many facets of a body's faces cut the segment from a to a + d, but for that part at its ends; body axes.
+
+    And whether the first of them leads out of the body.
+    """
     stack = np.empty(DEPTH, np.int64)
     stack[0] = 0
     used = 1
     count = 0
+    first = 2.0
+    leaves = False
     while used > 0:
         used -= 1
         i = stack[used]
@@ -129,13 +135,15 @@ def facets_cut(table, pool, tree, surface, shell, a, d, end):
         q = surface_point(table, pool, r, u + wide, v)[0]
         s = surface_point(table, pool, r, u + wide, v + high)[0]
         t = surface_point(table, pool, r, u, v + high)[0]
-        hit, x, y = cut_at(a, d, p, q, s, end)
-        if hit and in_trim(table, pool, shell, code, u + (x + y) * wide, v + y * high):
-            count += 1
-        hit, x, y = cut_at(a, d, p, s, t, end)
-        if hit and in_trim(table, pool, shell, code, u + x * wide, v + (x + y) * high):
-            count += 1
-    return count
+        for k in range(2):
+            hit, way, x, y, along = cut_at(a, d, p, q if k == 0 else s, s if k == 0 else t, end)
+            here = (u + (x + y if k == 0 else x) * wide, v + (y if k == 0 else x + y) * high)
+            if hit and in_trim(table, pool, shell, code, here[0], here[1]):
+                count += 1
+                if way < first:
+                    first = way
+                    leaves = along == (table[r + SIGN] > 0)
+    return count, leaves
 
 
 @kernel(inner=True)
@@ -203,7 +211,7 @@ def is_inside_at(table, pool, tree, surface, shell, e, y, margin, offset):
         return False
     if -distance <= 2.0 * offset:
         return True
-    return facets_cut(table, pool, tree, surface, shell, y, scale(-distance, n), offset / -distance) == 0
+    return facets_cut(table, pool, tree, surface, shell, y, scale(-distance, n), offset / -distance)[0] == 0
 
 
 @kernel(inner=True)
@@ -272,8 +280,9 @@ def is_wholly_inside(table, pool, scene, side):
         elif k == 2:
             ray = (0.5218 * far, -0.8125 * far, -0.2601 * far)
         a = matvec_t(turn, sub(a, shift)) if side == 0 else add(matvec(turn, a), shift)
-        cut = facets_cut(table, pool, other, scene[2][1 - side], scene[2][3 - side], a, ray, 0.0)
-        if cut % 2 == 0:
+        cut, leaves = facets_cut(table, pool, other, scene[2][1 - side], scene[2][3 - side], a, ray, 0.0)
+        # In a bore that is open at its ends a ray goes into the material.
+        if cut % 2 == 0 or not leaves:
             return False
     return True
 
@@ -302,9 +311,9 @@ def is_outside(table, pool, scene, roots, k, offsets):
     a = (roots[k, POINT_F], roots[k, POINT_F + 1], roots[k, POINT_F + 2])
     b = (roots[k, POINT_G], roots[k, POINT_G + 1], roots[k, POINT_G + 2])
     end = offsets[0] / depth
-    if end < 0.5 and facets_cut(table, pool, scene[3][0], scene[2][0], scene[2][2], a, sub(b, a), end) > 0:
+    if end < 0.5 and facets_cut(table, pool, scene[3][0], scene[2][0], scene[2][2], a, sub(b, a), end)[0] > 0:
         return True
     a = matvec_t(turn, sub(a, shift))
     b = matvec_t(turn, sub(b, shift))
     end = offsets[1] / depth
-    return end < 0.5 and facets_cut(table, pool, scene[3][1], scene[2][1], scene[2][3], a, sub(b, a), end) > 0
+    return end < 0.5 and facets_cut(table, pool, scene[3][1], scene[2][1], scene[2][3], a, sub(b, a), end)[0] > 0

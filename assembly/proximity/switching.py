@@ -370,8 +370,8 @@ def hold_features(table, pool, shell_f, shell_g, rotation, shift, code_f, code_g
         inside = is_feasible(table, pool, FACE, table[shell_f + FACE_TABLE] + FACE_RECORD * code_f, x[0], x[1])
     elif kind_g == FACE:
         inside = is_feasible(table, pool, FACE, table[shell_g + FACE_TABLE] + FACE_RECORD * code_g, x[2], x[3])
-    if not inside:
-        return LEFT_PATCH, x, frame
+    if status == CONVERGED and not inside:
+        status = LEFT_PATCH
     if status == CONVERGED or status == SINGULAR:
         n = frame[0]
         lean = lean_of(table, pool, shell_f, code_f, x[0], n)

@@ -41,7 +41,9 @@ def crossings(solution: Solution) -> tuple[tuple[str, str], ...]:
     ]
     contacts = [item for item in scene.constraints if isinstance(item, Contact)]
     try:
-        packed = pack(scene.bodies, [*contacts, Clearance(name="crossings", exclude=joined)], ())
+        watched = Clearance(name="crossings", exclude=joined)
+        watched.corners = False
+        packed = pack(scene.bodies, [*contacts, watched], ())
     except InputError:
         # The name is taken by a contact, or bodies are not of one scene: nothing to look at.
         return ()

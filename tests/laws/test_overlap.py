@@ -118,7 +118,8 @@ def test_what_is_beside_a_thin_plate_is_not_in_it(thickness, ball, turn):
     for gap in (1e-3, 0.02):
         for x in (0.0, 1.3, 4.9):
             pose = (x, 0.7, -0.5 * thickness - radius - gap, *turn)
-            assert not crossed([(0.0, 0.0, 0.0, *UPRIGHT), pose])[0]
+            told, deepest = crossed([(0.0, 0.0, 0.0, *UPRIGHT), pose])
+            assert not told and not deepest < 0.0
         # Half way into it; the gap of the one contact there says so, or the look.
         told, deepest = crossed([(0.0, 0.0, 0.0, *UPRIGHT), (0.3, 0.7, -radius, *turn)])
         assert told or deepest < -1e-3
@@ -146,8 +147,9 @@ def test_a_body_wholly_inside_another_one_is_in_it(outer, inner):
     for turn in (UPRIGHT, TURNED):
         for place, inside in zip(places, (True, False), strict=True):
             q = np.array([(0.0, 0.0, 0.0, *UPRIGHT), (*place, *turn)])
-            assert judge(shape, INNER[inner])(q)[0] == inside
-            assert judge(INNER[inner], shape)(q[::-1])[0] == inside
+            for told, deepest in (judge(shape, INNER[inner])(q), judge(INNER[inner], shape)(q[::-1])):
+                assert told == inside
+                assert inside or not deepest < 0.0
 
 
 def test_rays_that_leave_a_tube_by_its_open_end_do_not_put_a_body_inside():
@@ -159,3 +161,26 @@ def test_rays_that_leave_a_tube_by_its_open_end_do_not_put_a_body_inside():
         place = rng.uniform((-3.0, -3.0, 3.4), (3.0, 3.0, 5.0))
         place[2] *= rng.choice([-1.0, 1.0])
         assert not crossed([(0.0, 0.0, 0.0, *UPRIGHT), (*place, *UPRIGHT)])[0]
+
+
+@pytest.mark.parametrize("x", [0.0, 0.5, 3.0])
+def test_plates_with_flush_sides_are_not_in_each_other(x):
+    # Segments between far sides run along the sides, through the borders of faces.
+    plate = asm.shapes.box(3.0, 3.0, 0.03)
+    told, deepest = judge(plate, plate)([(0.0, 0.0, 0.0, *UPRIGHT), (x, 0.0, 0.04, *UPRIGHT)])
+    assert not told and deepest == pytest.approx(0.01, abs=1e-9)
+
+
+def test_what_is_behind_a_sheet_is_not_in_it():
+    sheet = asm.Face(asm.shapes.plane(10.0, 10.0))
+    tilted = Rotation.from_rotvec([0.1, 0.17, 0.3]).as_quat(scalar_first=True)
+    told, deepest = judge(sheet, asm.shapes.box(1.0, 1.0, 0.1))([(0.0, 0.0, 0.0, *UPRIGHT), (0.1, 0.2, -0.3, *tilted)])
+    assert not told and not deepest < 0.0
+
+
+@pytest.mark.parametrize("inner", list(INNER))
+def test_what_is_in_a_bore_is_not_in_its_wall(inner):
+    bore = asm.Face(asm.shapes.cylinder(1.0, 6.0), reversed=True)
+    for turn in (UPRIGHT, TURNED):
+        told, deepest = judge(bore, INNER[inner])([(0.0, 0.0, 0.0, *UPRIGHT), (0.2, 0.1, 0.4, *turn)])
+        assert not told and not deepest < 0.0
