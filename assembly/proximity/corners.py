@@ -13,6 +13,7 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly.proximity.bounding_tree import ELEMENT, ELEMENT_FEATURE, ELEMENT_POOL, pairs_about
+from assembly.proximity.overlap import is_outside
 from assembly.proximity.roots import (
     CODE_F,
     CODE_G,
@@ -56,14 +57,15 @@ def hold_roots(table, pool, scene, roots, count, work):
 
 
 @kernel(inner=True)
-def add_corners(table, pool, scene, reach, neglect, stack, candidates, roots, count, work):
-    """Add corners with gaps up to a reach; how many roots there are then.
+def add_corners(table, pool, scene, span, offsets, neglect, stack, candidates, roots, count, work):
+    """Add corners with gaps in a span; how many roots there are then.
 
-    What is below a face or has crossed an edge already, and is no root, may be beside the other body, or behind a
-    sheet: roots tell of it. Where all that are near have been looked into, roots that are at a corner become one.
+    A point just below a face is inside, where none is between; deeper ones may be behind a sheet, and edges that have
+    crossed already beside the other body: roots tell of them. Where all that are near have been looked into, roots
+    that are at a corner become one.
     """
     tree_f, tree_g = scene[3]
-    found = pairs_about(table, pool, tree_f, tree_g, scene[0], scene[1], reach, 0.0, TILT, stack, candidates)
+    found = pairs_about(table, pool, tree_f, tree_g, scene[0], scene[1], span[1], 0.0, TILT, stack, candidates)
     for c in range(min(found, candidates.shape[0])):
         if count == roots.shape[0]:
             break
@@ -76,7 +78,10 @@ def add_corners(table, pool, scene, reach, neglect, stack, candidates, roots, co
         before = count
         count, _result = add_root(table, pool, scene, codes, start, (0.0, 0.0, 0.0), neglect, roots, count, work, 1.0)
         if count > before:
-            if -SLACK <= roots[before, GAP] <= reach:
+            gap = roots[before, GAP]
+            of_edges = feature_kind(table, scene[2][2], codes[0]) == feature_kind(table, scene[2][3], codes[1])
+            stays = (-SLACK if of_edges else span[0]) <= gap <= span[1]
+            if stays and not (gap < -SLACK and is_outside(table, pool, scene, roots, before, offsets)):
                 roots[before, ORIGIN] = NEW
             else:
                 count = before

@@ -370,7 +370,8 @@ def look_at_pair(
         seat_given(table, watch, memory, p, roots, count, tracked)
     elif table[watch + CORNERS] == 1:
         neglect = pool[lengths + NEGLECT]
-        count = add_corners(table, pool, scene, reach + least, neglect, stack, candidates, roots, count, work)
+        span = (-pool[lengths + FIRST_REACH], reach + least)
+        count = add_corners(table, pool, scene, span, offsets, neglect, stack, candidates, roots, count, work)
         for k in range(count):
             place = np.int64(roots[k, ORIGIN])
             if place >= LISTED:
