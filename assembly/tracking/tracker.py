@@ -13,13 +13,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly._kernel import clock_address
 from assembly.assembly import Assembly
-from assembly.constraints.layout import CLOCK_AT
+from assembly.constraints.layout import CLOCK_AT, WATCH
 from assembly.constraints.objectives import FrameDistance, PointDistance
 from assembly.errors import InputError, integer, number, positive
 from assembly.kinematics.body import Body, Frame, Point
 from assembly.kinematics.pose import Pose, axes_quaternion, rotation_matrix
 from assembly.proximity.events import Event, events_of
+from assembly.proximity.solid_contact import HELD, TRACK
 from assembly.proximity.watch_memory import (
+    CORNERS,
     EVENT_COUNT,
 )
 from assembly.solve.augmented_lagrangian import (
@@ -273,6 +275,10 @@ class Tracker:
         self._size = first._state.size
         recalled = recall_size(packed.count, packed.pair_rows)
         self._state = np.concatenate([first._state, np.zeros(recalled)])
+        if packed.guards:
+            # A tick has no last look: rows follow extrema, from edges onto faces as well, which corners do not.
+            packed.table[packed.table[WATCH] + CORNERS] = 0
+            self._state[packed.contacts_at : packed.angles_at].reshape(-1, TRACK)[:, HELD] = 0.0
         self._settings[RECALL] = self._size
         self._pose = self._state[: self._size]
         # Numbers are read from a view in half the time it takes to read them from the array.
