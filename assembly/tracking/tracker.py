@@ -19,7 +19,8 @@ from assembly.errors import InputError, integer, number, positive
 from assembly.kinematics.body import Body, Frame, Point
 from assembly.kinematics.pose import Pose, axes_quaternion, rotation_matrix
 from assembly.proximity.events import Event, events_of
-from assembly.proximity.solid_contact import HELD, TRACK
+from assembly.proximity.solid_contact import HELD as STAYS
+from assembly.proximity.solid_contact import TRACK
 from assembly.proximity.watch_memory import (
     CORNERS,
     EVENT_COUNT,
@@ -278,7 +279,7 @@ class Tracker:
         if packed.guards:
             # A tick has no last look: rows follow extrema, from edges onto faces as well, which corners do not.
             packed.table[packed.table[WATCH] + CORNERS] = 0
-            self._state[packed.contacts_at : packed.angles_at].reshape(-1, TRACK)[:, HELD] = 0.0
+            self._state[packed.contacts_at : packed.angles_at].reshape(-1, TRACK)[:, STAYS] = 0.0
         self._settings[RECALL] = self._size
         self._pose = self._state[: self._size]
         # Numbers are read from a view in half the time it takes to read them from the array.
