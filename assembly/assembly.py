@@ -21,16 +21,16 @@ from assembly.kinematics.body import Body, Frame, Point
 from assembly.kinematics.pose import pose_rows
 from assembly.proximity.pairs import inside
 from assembly.proximity.solid_contact import TRACK
-from assembly.solve.augmented_lagrangian import (
+from assembly.solve.augmented_lagrangian import solve_program
+from assembly.solve.options import Options
+from assembly.solve.settings import (
     CONTACT_LOST,
     FREE_TRIMS,
     GATHER,
     HISTORY,
     ITERATIONS,
     SCATTER,
-    solve_program,
 )
-from assembly.solve.options import Options
 from assembly.solve.solution import Scene, Solution, Status
 
 if TYPE_CHECKING:

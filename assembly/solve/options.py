@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.errors import InputError, integer, number
-from assembly.solve.augmented_lagrangian import (
+from assembly.solve.settings import (
     FEASIBILITY,
     ITERATIONS,
     LAST_LOOK,

@@ -30,12 +30,12 @@ from assembly.errors import InputError
 from assembly.geometry.surface import NurbsSurface
 from assembly.kinematics.body import Body, BodyFace
 from assembly.proximity.solid_contact import FEATURE_F, TRACK
-from assembly.solve.augmented_lagrangian import COUNT, CULPRIT, DUAL, IMPROPER, OBJECTIVE, VIOLATION
 from assembly.solve.check import audit, is_extremal, twist_gradients
 from assembly.solve.measure import Near
 from assembly.solve.reference_rows import Poses, Rows
 from assembly.solve.reference_surfaces import Pair, Patch
 from assembly.solve.reference_terms import Terms
+from assembly.solve.settings import COUNT, CULPRIT, DUAL, IMPROPER, OBJECTIVE, VIOLATION
 from assembly.solve.solution import Iteration, Solution, Status
 
 if TYPE_CHECKING:

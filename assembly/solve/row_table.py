@@ -50,10 +50,10 @@ from assembly.constraints.program import evaluate
 from assembly.constraints.terms import objective
 from assembly.proximity.free_pair import VARIABLES, VECTORS
 from assembly.proximity.solid_contact import CONTACT_RECORD, TRACK
-from assembly.solve.augmented_lagrangian import FREE_BELOW
 from assembly.solve.contacts import free_folds, start_contacts
 from assembly.solve.rows import arrange, shape_of
 from assembly.solve.search import goal
+from assembly.solve.settings import FREE_BELOW
 
 
 @kernel(inner=True)

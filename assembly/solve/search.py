@@ -72,37 +72,16 @@ def goal(table, pool, shape, rows, loose, room, tips, point, order, gradient, he
 
 
 @kernel(inner=True)
-def search(
-    table,
-    pool,
-    shape,
-    loose,
-    room,
-    tips,
-    here,
-    trial,
-    lines,
-    rows,
-    y,
-    base,
-    value,
-    restoring,
-    mu,
-    slope,
-    longest,
-    matrix,
-    active,
-    forces,
-    gradient,
-    lagrangian,
-):
+def search(program, tips, here, trial, rows, y, base, value, restoring, mu, slope, longest, weights, system):
     """Try alpha times the step, alpha from 1 down, until the augmented Lagrangian falls enough.
 
     The trial point is left in `trial`. Returns whether one was accepted, alpha, and the contact lost by the last trial
     or -1. `base` is the objective's part of the merit here, `longest` the largest component of the step.
     """
+    table, pool, shape, loose, room = program
+    active, forces, _foreseen = weights
+    gradient, (descent, step, straight), lagrangian, matrix = system
     bases, one_sided, order, _of_rows = shape
-    descent, step, straight = lines
     n = descent.size
     residual = here[3]
     here_merit = merit(residual, one_sided, rows, y, mu) + base

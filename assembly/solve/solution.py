@@ -20,8 +20,8 @@ from assembly.kinematics.body import Body
 from assembly.kinematics.pose import Pose
 from assembly.proximity.pairs import ContactPair
 from assembly.proximity.solid_contact import TRACK
-from assembly.solve.augmented_lagrangian import COUNT, CULPRIT, DUAL, IMPROPER, OBJECTIVE, VIOLATION
 from assembly.solve.measure import measure, standing
+from assembly.solve.settings import COUNT, CULPRIT, DUAL, IMPROPER, OBJECTIVE, VIOLATION
 
 if TYPE_CHECKING:
     from assembly.kinematics.body import BodyFace

@@ -19,10 +19,11 @@ from assembly.constraints.expression import Expression
 from assembly.constraints.packing import Packed, pack
 from assembly.constraints.trim_contact import TrimContact
 from assembly.proximity.solid_contact import TRACK
-from assembly.solve.augmented_lagrangian import HISTORY, solve_program
+from assembly.solve.augmented_lagrangian import solve_program
 from assembly.solve.jacobian import Rows
 from assembly.solve.options import Options
 from assembly.solve.rank import HELD
+from assembly.solve.settings import HISTORY
 from assembly.solve.solution import Scene, Solution, Status
 
 __all__ = ["Problem", "Snapshot"]

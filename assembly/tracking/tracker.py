@@ -25,7 +25,10 @@ from assembly.proximity.watch_memory import (
     CORNERS,
     EVENT_COUNT,
 )
-from assembly.solve.augmented_lagrangian import (
+from assembly.solve.augmented_lagrangian import solve_program
+from assembly.solve.options import Options
+from assembly.solve.recall import recall_size
+from assembly.solve.settings import (
     BUDGET,
     CONTACT_LOST,
     COUNT,
@@ -45,10 +48,7 @@ from assembly.solve.augmented_lagrangian import (
     STATIONARITY,
     TICK,
     VIOLATION,
-    solve_program,
 )
-from assembly.solve.options import Options
-from assembly.solve.recall import recall_size
 from assembly.solve.solution import Scene, Solution, Status
 from assembly.tracking.log import TrackLog
 

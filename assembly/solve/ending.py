@@ -1,0 +1,91 @@
+"""How a solve ends: what crosses is told, the last pose that held brought back, the pose judged as it is returned."""
+
+from __future__ import annotations
+
+import math
+
+from assembly._kernel import kernel
+from assembly.constraints.layout import ROWS, SCALE, WATCH
+from assembly.constraints.program import add_row_terms, evaluate
+from assembly.proximity.watch import EVERYTHING
+from assembly.solve.guards import clear_guards, go_back, look_around, place_guards
+from assembly.solve.linear import factorize_shifted
+from assembly.solve.multipliers import weigh_rows
+from assembly.solve.recall import leave
+from assembly.solve.report import bring_back, is_clear, judge, write_pose, write_rows
+from assembly.solve.room import results_of
+from assembly.solve.search import goal
+from assembly.solve.settings import (
+    CONTACT_LOST,
+    CURVED,
+    HELD,
+    IMPROPER,
+    PENALTY_FLOOR,
+    RECALL,
+    SECOND_ORDER,
+    SOLVED,
+    STALLED,
+    TICK,
+)
+
+
+@kernel(inner=True)
+def tells_crossing(table, pool, loose, room, here, y, better_y):
+    """Look at everything where a solve failed; whether bodies are in each other, of which no row told yet."""
+    memory, free = loose[5], loose[0]
+    look_around(table, pool, memory, here, EVERYTHING)
+    place_guards(table, memory, here, y, better_y, free, False)
+    lost = evaluate(table, pool, here[1], math.inf, loose, room, here)
+    return lost >= 0 or not is_clear(table, here[3])
+
+
+@kernel(inner=True)
+def return_to(table, pool, held, numbers, loose, rows, here, y, better_y, tick):
+    """Back to the last pose that held; what is near there is looked for again."""
+    memory, free = loose[5], loose[0]
+    bring_back(held, rows, here, y)
+    if table[WATCH] >= 0:
+        go_back(table, memory, numbers)
+        if not tick:
+            look_around(table, pool, memory, here, EVERYTHING)
+        place_guards(table, memory, here, y, better_y, free, False)
+
+
+@kernel(inner=True)
+def finish(program, settings, state, tips, here, trial, by_row, at_end, held, numbers, system):
+    """Write the end into the state; returns the status and the violation of the pose as it is returned.
+
+    `at_end`: the status, the violation, what of it is none, how many rows there are, whether `held` has a pose.
+    """
+    table, pool, shape, loose, room = program
+    gradient, _lines, lagrangian, matrix = system
+    y, better_y, active, forces = by_row[2], by_row[3], by_row[4], by_row[5]
+    status, violation, feasible, rows, holds = at_end
+    results = results_of(table, state)
+    tick = settings[TICK] == 1.0
+    watched = table[WATCH] >= 0
+    tells = watched and not tick and status != SOLVED and status != CONTACT_LOST
+    crosses = tells and tells_crossing(table, pool, loose, room, here, y, better_y)
+    if holds and ((tick and not violation <= feasible) or crosses):
+        return_to(table, pool, held, numbers, loose, rows, here, y, better_y, tick)
+        results[HELD] = 1.0
+    write_pose(table, pool, here[0], state)
+    if status != CONTACT_LOST and not (tick and results[HELD] == 0.0):
+        # A tick that went well ends at a pose that was just evaluated.
+        good, violation = judge(table, pool, state, loose, room, shape, rows, here, trial, 1.25 * feasible, tick)
+        if status == SOLVED and not good:
+            status = STALLED
+    results[IMPROPER] = write_rows(table, here, y, loose, tick, pool[SCALE], state)
+    if settings[SECOND_ORDER] == 1.0 and results[HELD] == 0.0 and status != CONTACT_LOST:
+        goal(table, pool, shape, rows, loose, room, tips, here, 1, gradient, lagrangian)
+        weigh_rows(rows, shape[1], here[3], y, settings[PENALTY_FLOOR], forces, active)
+        add_row_terms(table, pool, loose, room, shape, here, y, active, lagrangian)
+        least = factorize_shifted(lagrangian, gradient.size, shape[2], 0.0, matrix)
+        results[CURVED] = 1.0 if least == 0.0 else -1.0
+    if settings[RECALL] > 0.0:
+        # With clearances what a tick ends with depends on rounding where wires wedge: there, rows are evaluated afresh.
+        good = status == SOLVED if watched else status != CONTACT_LOST
+        leave(table, state, int(settings[RECALL]), here, good and results[HELD] == 0.0 and rows == table[ROWS])
+    if watched:
+        clear_guards(table)
+    return status, violation

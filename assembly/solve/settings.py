@@ -1,0 +1,20 @@
+"""What the loop is told and what it tells: its settings, its results, its outcomes."""
+
+from __future__ import annotations
+
+# Outcomes; `solution.Status` gives each a sentence. RUNNING is none of them.
+SOLVED, INFEASIBLE, STALLED, ITERATION_LIMIT, CONTACT_LOST, OUT_OF_TIME, RUNNING = 0, 1, 2, 3, 4, 5, 6
+# Settings, in scaled lengths.
+FEASIBILITY, STATIONARITY, ITERATIONS, PENALTY, PENALTY_FLOOR, RADIUS, GATHER, FREE_TRIMS = 0, 1, 2, 3, 4, 5, 6, 7
+# Whether all that moved is looked at once more before a pose counts as solved. Of a tick: whether it is one, which ends
+# at a pose that holds after so many iterations, and at the last one that held where it ends otherwise; how long it may
+# take (0: as long as it takes); whether its end is tested for a minimum; where in the state the rows are that the last
+# one left (0: nowhere).
+LAST_LOOK, TICK, BUDGET, SECOND_ORDER, RECALL, SETTINGS = 8, 9, 10, 11, 12, 13
+# Results at the end of the state.
+STATUS, COUNT, OBJECTIVE, VIOLATION, DUAL, CULPRIT, IMPROPER, SCATTER = 0, 1, 2, 3, 4, 5, 6, 7
+# Of a tick: whether it ended at a pose that held before; whether its end is a minimum (0: not tested, 1, or -1: no).
+HELD, CURVED = 8, 9
+HISTORY = 7  # figures an iteration: objective, feasibility, stationarity, mu, regularization, step length, radius
+# A pair this near to a fold (det H over |H|^2) gets its coordinates as unknowns.
+FREE_BELOW = 0.02

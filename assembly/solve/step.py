@@ -1,0 +1,126 @@
+"""The step from a point: the system that gives it, rows foreseen to bind, how much of it may be taken."""
+
+from __future__ import annotations
+
+import math
+
+from assembly._kernel import kernel
+from assembly.constraints.layout import MOVING, WATCH
+from assembly.constraints.program import add_row_terms, evaluate
+from assembly.solve.guards import allowed_share
+from assembly.solve.linear import factorize_shifted
+from assembly.solve.multipliers import curve_rows, foresee, weigh_rows
+from assembly.solve.rows import add_transposed, carry, move, times
+from assembly.solve.search import damped_step
+
+# A step is computed so many times more for one-sided rows that it would break.
+FORESEEN = 4
+# Where violations are stationary, this much curvature downward makes a saddle of it; a small move leads off it, in a
+# direction that nothing but a scene made for it has as a symmetry.
+SADDLE, KICK = 1e-5, 1e-3
+
+
+@kernel(inner=True)
+def aim(program, here, rows, y, mu, shift, radius, dual, restoring, is_fresh, weights, system):
+    """The step of the augmented Lagrangian at a point, into the system's lines; by the last factor unless `is_fresh`.
+
+    `weights` gets which rows count, what they push with, and which do because the step would break them. Returns the
+    shift of the matrix and that of the factor the step is by, negative where there is none; the step's largest
+    component and turn.
+    """
+    table, pool, shape, loose, room = program
+    active, forces, foreseen = weights
+    gradient, lines, lagrangian, matrix = system
+    bases, one_sided, order, _of_rows = shape
+    descent, step, straight = lines
+    n = descent.size
+    residual, jacobian = here[3], here[4]
+    weigh_rows(rows, one_sided, residual, y, mu, forces, active)
+    for i in range(n):
+        descent[i] = -gradient[i]
+    add_transposed(bases, jacobian, rows, forces, descent)
+    for r in range(rows):
+        foreseen[r] = 0.0
+    if is_fresh:
+        curve_rows(rows, residual, y, active, restoring, forces)
+        add_row_terms(table, pool, loose, room, shape, here, forces, active, lagrangian)
+        # What the inertia needs falls with the distance to the solution.
+        shift = factorize_shifted(lagrangian, n, order, max(min(0.25 * shift, dual), 1e-8), matrix)
+        if shift < 0.0:
+            return shift, shift, 0.0, 0.0
+    used, longest, turn = damped_step(table, lagrangian, n, order, shift, radius, matrix, descent, step, straight)
+    for _ in range(FORESEEN):
+        if used < 0.0 or restoring:
+            break
+        changed = foresee(
+            table, shape, rows, residual, jacobian, y, mu, step, is_fresh, active, foreseen, descent, lagrangian
+        )
+        if changed == 0:
+            break
+        if not is_fresh:
+            is_fresh = True
+            curve_rows(rows, residual, y, active, restoring, forces)
+            add_row_terms(table, pool, loose, room, shape, here, forces, active, lagrangian)
+        shift = factorize_shifted(lagrangian, n, order, max(shift, 1e-8), matrix)
+        used = shift
+        if shift >= 0.0:
+            used, longest, turn = damped_step(
+                table, lagrangian, n, order, shift, radius, matrix, descent, step, straight
+            )
+    return shift, used, longest, turn
+
+
+@kernel(inner=True)
+def cut_step(program, here, trial, rows, y, mu, radius, longest, turn, foreseen, lines):
+    """Shorten the step to the radius, a radian, and as far as bodies may go between looks.
+
+    Returns the share that is left, the merit's slope along it, and the largest component of the descent.
+    """
+    table, pool, shape, loose, _room = program
+    descent, step, straight = lines
+    cut = min(1.0, radius / longest) if longest > 0.0 else 1.0
+    cut = min(cut, 1.0 / turn) if turn > 0.0 else cut
+    if table[WATCH] >= 0:
+        cut = allowed_share(table, pool, loose[5], here, trial, step, cut)
+    slope = 0.0
+    steepest = 0.0
+    for i in range(descent.size):
+        step[i] *= cut
+        straight[i] = step[i]
+        slope -= descent[i] * step[i]
+        steepest = max(steepest, abs(descent[i]))
+    for r in range(rows):
+        if foreseen[r] == 1.0:
+            # What the row adds to the descent is not in the merit before it binds.
+            slope -= (y[r] + here[3][r] / mu) * times(shape[0], here[4], r, step)
+    return cut, slope, steepest
+
+
+@kernel(inner=True)
+def propose(shape, here, rows, y, mu, active, straight, alpha, better_y):
+    """The multipliers of first order after a share alpha of the straight step."""
+    bases, one_sided, _order, _of_rows = shape
+    for r in range(rows):
+        better_y[r] = 0.0
+        if active[r] > 0.0:
+            better_y[r] = y[r] + alpha * (times(bases, here[4], r, straight) + here[3][r]) / mu
+            if one_sided[r] == 1:
+                better_y[r] = min(better_y[r], 0.0)
+
+
+@kernel(inner=True)
+def leave_saddle(program, here, trial, number, system):
+    """A small move off a saddle of the violations, into the trial point; whether it is one.
+
+    Of axes that are parallel and are to stand at right angles, say. `number` is how many moves there have been.
+    """
+    table, pool, shape, loose, room = program
+    _gradient, (_descent, step, _straight), lagrangian, matrix = system
+    n = step.size
+    if not factorize_shifted(lagrangian, n, shape[2], 1e-8, matrix) > SADDLE:
+        return False
+    for i in range(n):
+        step[i] = KICK * math.sin(number + 1 + i) if i < 6 * table[MOVING] else 0.0
+    move(table, here[0], step, 1.0, trial[0])
+    carry(table, pool, shape[0], loose, here, step, 1.0)
+    return evaluate(table, pool, loose[4], math.inf, loose, room, trial) < 0
