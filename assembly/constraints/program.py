@@ -178,7 +178,7 @@ def solids_row(table, pool, r, start, patience, point):
     found = status == CONVERGED or status == SINGULAR
     if not found:
         if is_guard(table, r):
-            past = start[r, HELD] == 1.0 and status == LEFT_PATCH
+            past = start[r, HELD] > 0.0 and status == LEFT_PATCH
             return lost_guard(table, pool, r, start, point, past)
         if table[row + ONE_SIDED] == 1 or patience == math.inf:
             found = search_row(table, pool, row, q, tracked, r)

@@ -4,7 +4,8 @@ Of two solids only extrema of the distance are contacts. Where a face is nearly 
 at one corner, and jumps to the next one as the bodies turn: a step knows of the one alone, and the next one is in the
 way. But every vertex and every point of an edge that has its foot on a face must stay outside of it, as long as it is
 near, whichever is the lowest. Those whose cones miss the normal by little are listed beside the extrema, each a contact
-of the two features that it is of.
+of the two features that it is of. Of a curved edge that is a point here and there which stays where it is on the edge:
+the extremum of a rim that lies almost flat runs around it as the bodies turn by next to nothing.
 """
 
 from __future__ import annotations
@@ -12,7 +13,9 @@ from __future__ import annotations
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly.geometry.vec import cross, dot
 from assembly.proximity.bounding_tree import ELEMENT, ELEMENT_FEATURE, ELEMENT_POOL, pairs_about
+from assembly.proximity.edge_frame import edge_jet
 from assembly.proximity.overlap import is_outside
 from assembly.proximity.roots import (
     CODE_F,
@@ -27,10 +30,14 @@ from assembly.proximity.roots import (
     solids_root,
 )
 from assembly.proximity.shell import EDGE, FACE
-from assembly.proximity.switching import TILT, feature_kind
+from assembly.proximity.switching import FEATURES, POINT, TILT, feature_at, feature_kind
+from assembly.proximity.tips import unit
 
 # Rounding of gaps.
 SLACK = 1e-9
+# Cosine of the angle by which an edge turns from one of its points that are held to the next; an edge is straight whose
+# parts turn by less than this.
+NEXT, STRAIGHT = 0.75, 0.02
 
 
 @kernel(inner=True)
@@ -48,12 +55,48 @@ def hold_roots(table, pool, scene, roots, count, work):
         return
     for k in range(count):
         codes = (np.int64(roots[k, CODE_F]), np.int64(roots[k, CODE_G]))
-        if roots[k, CORNER] == 1.0 or roots[k, GAP] < -SLACK or not is_corner(table, scene, codes[0], codes[1]):
+        if roots[k, CORNER] > 0.0 or roots[k, GAP] < -SLACK or not is_corner(table, scene, codes[0], codes[1]):
             continue
         x = (roots[k, 0], roots[k, 1], roots[k, 2], roots[k, 3])
         n = (roots[k, ROOT_NORMAL], roots[k, ROOT_NORMAL + 1], roots[k, ROOT_NORMAL + 2])
-        found = solids_root(table, pool, scene, codes, x, n, roots, count, work, 1.0)
-        roots[k, CORNER] = 0.0 if found == NOTHING else 1.0
+        found = solids_root(table, pool, scene, codes, x, n, roots, count, work, FEATURES)
+        roots[k, CORNER] = 0.0 if found == NOTHING else FEATURES
+
+
+@kernel(inner=True)
+def is_next(table, pool, scene, codes, side, start, width, roots, count):
+    """Whether the middle of a part of an edge, at `start`, is to be held over the face that the other feature is.
+
+    So it is where the edge is bent, and has turned far from all of its points that are known over that face.
+    """
+    edge = feature_at(table, scene[2][2 + side], codes[side])
+    _p, along, bent = edge_jet(table, pool, edge, start[2 * side])
+    side_of = cross(along, bent)
+    if width * width * dot(side_of, side_of) < STRAIGHT * STRAIGHT * dot(along, along) * dot(along, along):
+        return False
+    along = unit(along)
+    for k in range(count):
+        if roots[k, CODE_F] == codes[0] and roots[k, CODE_G] == codes[1]:
+            _p, other, _bent = edge_jet(table, pool, edge, roots[k, 2 * side])
+            if dot(along, unit(other)) > NEXT:
+                return False
+    return True
+
+
+@kernel(inner=True)
+def add_corner(table, pool, scene, codes, start, span, offsets, neglect, roots, count, work, holds):
+    """Add the corner that holds on to two features, or to a point of an edge; how many roots there are then."""
+    before = count
+    count, _result = add_root(table, pool, scene, codes, start, (0.0, 0.0, 0.0), neglect, roots, count, work, holds)
+    if count == before:
+        return count
+    gap = roots[before, GAP]
+    of_edges = feature_kind(table, scene[2][2], codes[0]) == feature_kind(table, scene[2][3], codes[1])
+    stays = (-SLACK if of_edges else span[0]) <= gap <= span[1]
+    if not stays or (gap < -SLACK and is_outside(table, pool, scene, roots, before, offsets)):
+        return before
+    roots[before, ORIGIN] = NEW
+    return count
 
 
 @kernel(inner=True)
@@ -75,16 +118,14 @@ def add_corners(table, pool, scene, span, offsets, neglect, stack, candidates, r
         if not is_corner(table, scene, codes[0], codes[1]):
             continue
         start = (pool[o], pool[o + 1], pool[p], pool[p + 1])
-        before = count
-        count, _result = add_root(table, pool, scene, codes, start, (0.0, 0.0, 0.0), neglect, roots, count, work, 1.0)
-        if count > before:
-            gap = roots[before, GAP]
-            of_edges = feature_kind(table, scene[2][2], codes[0]) == feature_kind(table, scene[2][3], codes[1])
-            stays = (-SLACK if of_edges else span[0]) <= gap <= span[1]
-            if stays and not (gap < -SLACK and is_outside(table, pool, scene, roots, before, offsets)):
-                roots[before, ORIGIN] = NEW
-            else:
-                count = before
+        count = add_corner(table, pool, scene, codes, start, span, offsets, neglect, roots, count, work, FEATURES)
+        side = 0 if feature_kind(table, scene[2][2], codes[0]) == EDGE else 1
+        other = feature_kind(table, scene[2][3 - side], codes[1 - side])
+        is_rim = other == FACE and feature_kind(table, scene[2][2 + side], codes[side]) == EDGE
+        width = pool[(o if side == 0 else p) + 2]
+        if is_rim and count < roots.shape[0]:
+            if is_next(table, pool, scene, codes, side, start, width, roots, count):
+                count = add_corner(table, pool, scene, codes, start, span, offsets, neglect, roots, count, work, POINT)
     if 0 <= found <= candidates.shape[0]:
         hold_roots(table, pool, scene, roots, count, work)
     return count

@@ -46,7 +46,7 @@ from assembly.proximity.extremal import (
     curvature_bound,
     own_frame,
 )
-from assembly.proximity.shell import EDGE, VERTEX
+from assembly.proximity.shell import EDGE
 
 # A curve is steep where the part of its tangent along a face is below this (squared, of its length squared).
 STEEP = 1e-12
@@ -56,7 +56,7 @@ LEVEL = 1e-9
 
 @kernel(inner=True)
 def solve_on_face(table, pool, face, kind, other, rotation, shift, x, size, turn, limit):
-    """Newton from x = (u, v, t) for a face and an edge or a vertex, in the axes of the face.
+    """Newton from x = (u, v, t) for a face and an edge, a vertex or a point of an edge, in the axes of the face.
 
     With limit 0 everything is evaluated at x. Returns status, (u, v, t), and
 
@@ -78,7 +78,7 @@ def solve_on_face(table, pool, face, kind, other, rotation, shift, x, size, turn
         k12 = beta * a[1]
         k22 = 1.0 + beta * a[2]
         bound = max(curvature_bound(a), 1.0 / size)
-        point = kind == VERTEX
+        point = kind != EDGE
         steep = False
         c0 = 1.0
         c1 = 0.0

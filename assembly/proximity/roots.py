@@ -58,8 +58,8 @@ from assembly.proximity.velocity import ARM_F
 from assembly.proximity.velocity import GAP as RECORD_GAP
 
 # A root: parameters, features, normal in the axes of f, gap, where it is from, its points in the axes of f, how far it
-# is from a fold (det H / |H|^2), how far so beyond the knot lines beside it (NaN: not looked at), and whether it is no
-# root, but a corner (`corners.py`).
+# is from a fold (det H / |H|^2), how far so beyond the knot lines beside it (NaN: not looked at), and what it holds on
+# to if it is no root, but a corner (`corners.py`).
 CODE_F, CODE_G, ROOT_NORMAL, GAP, ORIGIN, POINT_F, POINT_G, ROOT_FOLD, ROOT_BEYOND, CORNER, ROOT = (
     4, 5, 6, 9, 10, 11, 14, 17, 18, 19, 20
 )  # fmt: skip
@@ -250,7 +250,7 @@ def solids_root(table, pool, scene, codes, start, n, roots, k, work, corner):
     status = call_address(
         track_at, (table, pool, scene[2][2], scene[2][3], i, j, q, tracked, math.inf, records, tracked, 0)
     )
-    if status != CONVERGED and (status != SINGULAR or corner == 1.0):
+    if status != CONVERGED and (status != SINGULAR or corner > 0.0):
         # An edge along another one, or along a face, is no corner: its ends are.
         return NOTHING
     turn = rotation(q, i)
@@ -282,7 +282,8 @@ def write(roots, k, x, code_f, code_g, n, gap, pf, pg, fold):
 
 @kernel(inner=True)
 def add_root(table, pool, scene, codes, start, n, neglect, roots, count, work, corner):
-    """Look for a root from a start and add it, as USELESS, if it is none of the known ones; a corner where that is 1.
+    """Look for a root from a start and add it, as USELESS, if it is none of the known ones; a corner where it holds on
+    to something.
 
     Returns how many roots there are, and NOTHING, ALIKE, SADDLE or MINIMUM_FOUND.
     """

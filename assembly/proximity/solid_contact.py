@@ -1,8 +1,8 @@
 """A contact of two solids as a solve tracks it: the pair of features that is closest, its coordinates, its normal.
 
 Of every contact a solve keeps `TRACK` numbers: the coordinates of the pair (4), the two features, the normal in the
-axes of body f, which tells on which side of each other two edges are where they touch, the gap, and whether the pair
-stays with these two features: a corner over a face, which need not be the closest one (`corners.py`).
+axes of body f, which tells on which side of each other two edges are where they touch, the gap, and what the pair holds
+on to: a corner over a face, which need not be the closest one (`corners.py`), stays with its features.
 
 The kernels here are large, and few scenes need them: loops call them by address (`_kernel.call_address`).
 """
@@ -43,9 +43,9 @@ def track_row(table, pool, shell_f, shell_g, relative, shift, start, r, patience
     code_g = np.int64(start[r, FEATURE_G])
     x = (start[r, 0], start[r, 1], start[r, 2], start[r, 3])
     n = (start[r, PAIR_NORMAL], start[r, PAIR_NORMAL + 1], start[r, PAIR_NORMAL + 2])
-    if start[r, HELD] == 1.0:
+    if start[r, HELD] > 0.0:
         status, x, frame = hold_features(
-            table, pool, shell_f, shell_g, relative, shift, code_f, code_g, x, n, 1.0, patience
+            table, pool, shell_f, shell_g, relative, shift, code_f, code_g, x, n, 1.0, patience, start[r, HELD]
         )
         return status, code_f, code_g, x, frame, 0
     return track_features(table, pool, shell_f, shell_g, relative, shift, code_f, code_g, x, n, 1.0, patience)

@@ -40,6 +40,7 @@ from assembly.proximity.shell import (
     EDGE_FACE_A,
     EDGE_FACE_B,
     EDGE_MAP,
+    EDGE_POINT,
     EDGE_RECORD,
     EDGE_START,
     EDGE_SURFACE,
@@ -65,6 +66,8 @@ from assembly.proximity.tips import LEAN, from_tip, tip_near, unit
 ROUNDS = 64
 # How far a unit normal may lean over what is beside a feature that is held.
 TILT = 0.3
+# What a pair holds on to: nothing, its features, or a point of an edge as well.
+NOTHING, FEATURES, POINT = 0.0, 1.0, 2.0
 # Cosine between the normals before and after below which the pair is another one.
 ACROSS = 0.3
 
@@ -343,23 +346,34 @@ def track_features(table, pool, shell_f, shell_g, rotation, shift, code_f, code_
 
 
 @kernel(inner=True)
-def lean_of(table, pool, shell, code, t, n):
-    """By how much a normal leans over what is beside an edge or a vertex, at most; 0 for a face."""
-    kind = feature_kind(table, shell, code)
-    if kind == EDGE:
-        return from_edge(table, pool, shell, code, t, n)[0]
+def lean_of(table, pool, shell, kind, code, t, n):
+    """By how much a normal leans over what is beside an edge, a point of one, or a vertex, at most; 0 for a face."""
+    if kind == EDGE or kind == EDGE_POINT:
+        lean = from_edge(table, pool, shell, code, t, n)[0]
+        if kind == EDGE:
+            return lean
+        edge = feature_at(table, shell, code)
+        along = on_surface(table, pool, table[edge + EDGE_SURFACE], table[edge + EDGE_CURVE], t)[3]
+        return max(lean, abs(dot(n, unit(along))))
     return from_vertex(table, pool, shell, code, n)[2] if kind == VERTEX else 0.0
 
 
+@kernel(inline=True)
+def held_kind(table, shell, code, held):
+    """The kind of a feature, EDGE_POINT of an edge where a point of it is held."""
+    kind = feature_kind(table, shell, code)
+    return EDGE_POINT if held == POINT and kind == EDGE else kind
+
+
 @kernel(inner=True)
-def hold_features(table, pool, shell_f, shell_g, rotation, shift, code_f, code_g, x, n, size, turn):
+def hold_features(table, pool, shell_f, shell_g, rotation, shift, code_f, code_g, x, n, size, turn, held):
     """Newton's method on two features that stay what they are: status, x, frame. Arguments as in `track_features`.
 
-    LEFT_PATCH where a point on a face is past its boundary, one of an edge past its end, or the normal leans by more
-    than TILT.
+    Where `held` is POINT, a point of an edge stays where it is on it, too. LEFT_PATCH where a point on a face is past
+    its boundary, one of an edge past its end, or the normal leans by more than TILT.
     """
-    kind_f = feature_kind(table, shell_f, code_f)
-    kind_g = feature_kind(table, shell_g, code_g)
+    kind_f = held_kind(table, shell_f, code_f, held)
+    kind_g = held_kind(table, shell_g, code_g, held)
     if kind_f == EDGE and kind_g == EDGE and dot(n, n) < 0.25:
         n = between_edges(table, pool, shell_f, shell_g, rotation, code_f, code_g, x[0], x[2])
     f = feature_at(table, shell_f, code_f)
@@ -374,7 +388,7 @@ def hold_features(table, pool, shell_f, shell_g, rotation, shift, code_f, code_g
         status = LEFT_PATCH
     if status == CONVERGED or status == SINGULAR:
         n = frame[0]
-        lean = lean_of(table, pool, shell_f, code_f, x[0], n)
-        lean = max(lean, lean_of(table, pool, shell_g, code_g, x[2], neg(matvec_t(rotation, n))))
+        lean = lean_of(table, pool, shell_f, kind_f, code_f, x[0], n)
+        lean = max(lean, lean_of(table, pool, shell_g, kind_g, code_g, x[2], neg(matvec_t(rotation, n))))
         status = status if lean <= TILT else LEFT_PATCH
     return status, x, frame

@@ -381,10 +381,10 @@ def look_at_pair(
     for k in range(table[pair + LOW], table[pair + HIGH]):
         if memory[memory_places(table, watch)[1] + PLACE_MEMORY * k] == p:
             listed += 1
-    # What is born at a fold is about as far away as that.
+    # What is born at a fold is about as far away as that; corners stay what they are.
     low = math.inf
     for k in range(count):
-        if not is_alone(roots, k) and abs(roots[k, GAP] - least) <= reach:
+        if roots[k, CORNER] == 0.0 and not is_alone(roots, k) and abs(roots[k, GAP] - least) <= reach:
             low = min(low, max(roots[k, GAP] - least, 0.0))
     urgent = fertile < math.inf and low <= FLAT * pool[lengths + FIRST_REACH]
     if fertile < math.inf and not urgent:

@@ -153,8 +153,8 @@ def known_roots(table, pool, watch, memory, p, scene, tracked, roots, work):
         k = first + step % (last - first)
         o = places + PLACE_MEMORY * k
         r = table[watch + FIRST] + k
-        corner = 1.0 if tracked[r, HELD] == 1.0 else 0.0
-        if memory[o] != p or (corner == 1.0) != (step >= last - first):
+        corner = tracked[r, HELD] if tracked[r, HELD] > 0.0 else 0.0
+        if memory[o] != p or (corner > 0.0) != (step >= last - first):
             continue
         lost = math.isnan(tracked[r, 0])
         before = count

@@ -20,7 +20,17 @@ from assembly.geometry.spline import (
 )
 from assembly.proximity.extremal import CONVERGED, LEFT_PATCH, NOT_CONVERGED, SINGULAR
 from assembly.proximity.feature_query import PAIR, feature_derivatives, find_features
-from assembly.proximity.shell import EDGE, EDGE_CURVE, EDGE_END, EDGE_RECORD, EDGE_START, EDGE_SURFACE, FACE, VERTEX
+from assembly.proximity.shell import (
+    EDGE,
+    EDGE_CURVE,
+    EDGE_END,
+    EDGE_POINT,
+    EDGE_RECORD,
+    EDGE_START,
+    EDGE_SURFACE,
+    FACE,
+    VERTEX,
+)
 from tests.laws.scenes import dome, inside, quadratic, quaternion_of, random_quaternion
 from tests.laws.witness import rotated
 
@@ -29,7 +39,7 @@ STATUS = {CONVERGED: "CONVERGED", SINGULAR: "SINGULAR", LEFT_PATCH: "LEFT_PATCH"
 
 @dataclass(frozen=True, eq=False)
 class Feature:
-    """A face; an edge on a surface, or in space; a vertex."""
+    """A face; an edge on a surface, or in space; a point of one that stays where it is; a vertex."""
 
     kind: int
     face: Face | None = None
@@ -38,9 +48,11 @@ class Feature:
     endless: bool = False
 
     def jet(self, x):
-        """Point, first derivatives in body axes."""
+        """Point, first derivatives in body axes by what may move."""
         if self.kind == VERTEX:
             return (self.point,)
+        if self.kind == EDGE_POINT:
+            return Feature(EDGE, self.face, self.curve).jet(x)[:1]
         if self.kind == FACE:
             return self.face.surface.evaluate(x[0], x[1], 1)
         if self.face is None:
@@ -150,16 +162,16 @@ def random_feature(rng, kind, in_space=None):
     """A feature and coordinates (2,) on it."""
     if kind == VERTEX:
         return Feature(VERTEX, point=rng.normal(size=3)), (0.0, 0.0)
-    if kind == EDGE and (rng.random() < 0.5 if in_space is None else in_space):
+    if kind in (EDGE, EDGE_POINT) and (rng.random() < 0.5 if in_space is None else in_space):
         curve, t = space_curve(rng)
-        return Feature(EDGE, curve=curve), (t, 0.0)
+        return Feature(kind, curve=curve), (t, 0.0)
     surface = dome(rng) if rng.random() < 0.5 else quadratic(rng)
     face = Face(surface, reversed=bool(rng.integers(2)))
     at = inside(rng, surface)
     if kind == FACE:
         return Feature(FACE, face=face), tuple(at)
     curve, t = plane_curve(rng, surface, at)
-    return Feature(EDGE, face=face, curve=curve), (t, 0.0)
+    return Feature(kind, face=face, curve=curve), (t, 0.0)
 
 
 def axes(n, spin):
