@@ -9,7 +9,7 @@ from assembly.errors import InputError
 from assembly.geometry.face import Face
 from assembly.kinematics.body import Body, BodyFace
 
-__all__ = ["Contact"]
+__all__ = ["Contact", "side_faces"]
 
 
 class Contact(Constraint):
@@ -61,7 +61,7 @@ class Contact(Constraint):
         self._unilateral = bool(unilateral)
         if edges is not None and not isinstance(edges, (bool, np.bool_)):
             raise InputError(f"edges is {edges!r}; expected True, False or None")
-        sides = [(side.face,) if isinstance(side, BodyFace) else tuple(f.face for f in side.faces) for side in (a, b)]
+        sides = [side_faces(side) for side in (a, b)]
         several = any(len(faces) > 1 for faces in sides)
         if several and edges is not None and not edges:
             raise InputError("edges is False for a body with several faces; expected a contact of two single faces")
@@ -99,6 +99,11 @@ class Contact(Constraint):
 
     def __repr__(self) -> str:
         return f"Contact({self.a!r}, {self.b!r}, name={self.name!r}{', unilateral=True' if self.unilateral else ''})"
+
+
+def side_faces(side: Body | BodyFace) -> tuple[Face, ...]:
+    """The faces that take part on a side of a contact."""
+    return (side.face,) if isinstance(side, BodyFace) else tuple(part.face for part in side.faces)
 
 
 def _has_loops(face: Face) -> bool:

@@ -18,32 +18,12 @@ from assembly.proximity.edge_cells import edge_cells, outside_cells
 from assembly.proximity.pairs import OFFSETS
 from assembly.proximity.start import CELL_SIZE
 from assembly.proximity.topology import Topology
+from assembly.proximity.writer import Writer
 
 __all__ = ["pack_shell"]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
-
-
-class _Writer:
-    """Arrays that grow at the end of a table and of a pool which are there already."""
-
-    def __init__(self, table_at: int, pool_at: int) -> None:
-        self.table_at, self.pool_at = table_at, pool_at
-        self._table: list[Table] = []
-        self._pool: list[Array] = []
-
-    def add(self, table: Sequence[int] | Table = (), pool: Sequence[float] | Array = ()) -> tuple[int, int]:
-        """Append; returns where the parts begin."""
-        at = self.table_at, self.pool_at
-        self._table.append(np.asarray(table, dtype=np.int64).ravel())
-        self._pool.append(np.asarray(pool, dtype=np.float64).ravel())
-        self.table_at += self._table[-1].size
-        self.pool_at += self._pool[-1].size
-        return at
-
-    def arrays(self) -> tuple[Table, Array]:
-        return np.concatenate(self._table), np.concatenate(self._pool)
 
 
 def pack_shell(topology: Topology, scale: float, table_at: int = 0, pool_at: int = 0) -> tuple[Table, Array, int]:
@@ -66,7 +46,7 @@ def pack_shell(topology: Topology, scale: float, table_at: int = 0, pool_at: int
     """
     scale = positive("scale", scale)
     parts = _parts(topology)
-    writer = _Writer(table_at, pool_at)
+    writer = Writer(table_at, pool_at)
     header = np.zeros(shell.SHELL, dtype=np.int64)
     offset, _ = writer.add(header)
     faces, places = [], []
@@ -106,13 +86,11 @@ def pack_shell(topology: Topology, scale: float, table_at: int = 0, pool_at: int
     header[shell.FACE_TABLE], _ = writer.add([field for row in faces for field in row])
     header[shell.EDGE_TABLE], _ = writer.add([field for row in edge_rows for field in row])
     header[shell.VERTEX_TABLE], _ = writer.add([field for row in vertex_rows for field in row])
-    table, pool = writer.arrays()
-    table[: shell.SHELL] = header
-    return table, pool, offset
+    return *writer.arrays(), offset
 
 
 def _face(
-    writer: _Writer, face: Face, flags: Array, edges: Sequence[int | None], factor: float
+    writer: Writer, face: Face, flags: Array, edges: Sequence[int | None], factor: float
 ) -> tuple[list[int], int]:
     """Pack a face: its record, and where the records of its boundary curves begin."""
     record, pool = face.packed()

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from assembly.constraints.contact import side_faces
 from assembly.constraints.layout import DEEPEST_AT, NEAREST_AT, ROW, ROW_TABLE, SHELL_F, SHELL_G
 from assembly.kinematics.body import Body, BodyFace
 from assembly.proximity.features import closest_features, features_of
@@ -111,5 +112,4 @@ def _crossing(solution: Solution, k: int, places: list[int]) -> ContactPair:
 
 def _feature_name(side: Body | BodyFace, number: int) -> str:
     """What a feature of a side is called."""
-    faces = (side.face,) if isinstance(side, BodyFace) else tuple(part.face for part in side.faces)
-    return features_of(faces)[number].name
+    return features_of(side_faces(side))[number].name

@@ -1,6 +1,6 @@
 """Scattered bodies put together one after the other, so that the loop starts near where joints hold.
 
-Bodies are taken in an order (`packing.py`) in which each has joints with bodies that stand already. Each is moved by
+Bodies are taken in an order (`numbering.py`) in which each has joints with bodies that stand already. Each is moved by
 Levenberg and Marquardt's method until the rows it shares with those are as small as they get: exactly zero where the
 joints make a tree. Rows that close a loop are left to the loop of the solve.
 """

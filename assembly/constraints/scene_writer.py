@@ -1,0 +1,162 @@
+"""The table and the pool of a scene (`layout.py`) while they are written, and what several parts of it share."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.constraints import layout
+from assembly.constraints.constraint import Constraint, Coordinate, FramePair
+from assembly.constraints.dexterity import Dexterity
+from assembly.constraints.expression import Expression
+from assembly.constraints.objectives import FrameDistance, Objective, PointDistance
+from assembly.constraints.primitives import AZIMUTH, TURN
+from assembly.geometry import tape
+from assembly.geometry.face import Face
+from assembly.geometry.spline import SURFACE_RECORD
+from assembly.kinematics.body import Body
+from assembly.proximity.pairs import OFFSETS
+from assembly.proximity.shell_packing import pack_shell
+from assembly.proximity.solid import solid_of
+from assembly.proximity.writer import Writer
+
+__all__ = ["SceneWriter", "scene_size"]
+
+Array = NDArray[np.float64]
+Table = NDArray[np.int64]
+
+
+class SceneWriter(Writer):
+    """Parts of a scene, one behind the other; shells, frames and angles are there once, whoever asks for them.
+
+    Parameters
+    ----------
+    bodies : sequence of Body
+    scale : float
+        Lengths are divided by it.
+    pair_rows : int
+        Rows of contacts, behind whose tracked values those of angles are.
+
+    Attributes
+    ----------
+    header : array
+        Of the table; filled until the end.
+    places : dict
+        The number of a body, by its id.
+    shells : dict
+        Where the shell of a solid is, by its faces.
+    frames : dict
+        The number of a pair of frames, and the pair, by its id.
+    angles : list of Coordinate
+        In the order of their tracked values.
+    """
+
+    def __init__(self, bodies: Sequence[Body], scale: float, pair_rows: int) -> None:
+        super().__init__()
+        self.scale = scale
+        self.header = np.zeros(layout.HEADER, dtype=np.int64)
+        self.places = {id(body): k for k, body in enumerate(bodies)}
+        self.shells: dict[tuple[Face, ...], int] = {}
+        self.frames: dict[int, tuple[int, FramePair]] = {}
+        self.angles: list[Coordinate] = []
+        self._pair_rows = pair_rows
+        self._angle_places: dict[int, int] = {}
+        self._tape_room = [0, 0, 0]
+
+    def places_of(self, bodies: Iterable[Body]) -> list[int]:
+        """The numbers of bodies."""
+        return [self.places[id(body)] for body in bodies]
+
+    def surface(self, known: dict[tuple[int, bool], int], face: Face) -> int:
+        """Offset of the record of a face; one that is known is written no more."""
+        key = (id(face.surface), face.reversed)
+        if key not in known:
+            record, pool = Face(face.surface.transformed(scale=1.0 / self.scale), reversed=face.reversed).packed()
+            record = record.copy()
+            record[list(OFFSETS)] += self.pool_at
+            assert record.size == SURFACE_RECORD
+            known[key], _ = self.add(record, pool)
+        return known[key]
+
+    def shell(self, faces: tuple[Face, ...]) -> int:
+        """Offset of the shell of a solid."""
+        if faces not in self.shells:
+            table, pool, shell = pack_shell(solid_of(faces), self.scale, self.table_at, self.pool_at)
+            self.add(table, pool)
+            self.shells[faces] = shell
+        return self.shells[faces]
+
+    def coordinate(self, coordinate: Coordinate) -> tuple[list[int], list[int]]:
+        """The fields of a coordinate in a row, and its bodies."""
+        frames = coordinate.frames
+        number, _ = self.frames.setdefault(id(frames), (len(self.frames), frames))
+        angle = -1
+        if coordinate.kind in (TURN, AZIMUTH):
+            place = self._angle_places.setdefault(id(coordinate), len(self.angles))
+            if place == len(self.angles):
+                self.angles.append(coordinate)
+            angle = self._pair_rows + place
+        bodies = self.places_of(frame.body for frame in (frames.frame_a, frames.frame_b))
+        return [coordinate.kind, coordinate.component, number, angle], bodies
+
+    def tape(self, expression: Expression, row: int) -> list[int]:
+        """The record of an expression whose instructions are written now; `row` is its first one, -1 of a term."""
+        offsets = []
+        room = self._tape_room
+        for instructions in expression.tapes:
+            table = instructions.table.copy()
+            table[tape.CONSTANTS] += self.pool_at
+            offsets.append(self.add(table, instructions.constants)[0])
+            room[2] = max(room[2], int(table[tape.WORK]))
+        bodies, count = len(expression.bodies), expression.count
+        room[0] = max(room[0], 7 * bodies + count)
+        room[1] = max(room[1], count + 6 * bodies * count, 36 * bodies**2)
+        listed, at = self.add(self.places_of(expression.bodies), [expression.scale])
+        return [*offsets, count, bodies, listed, row, at, 0]
+
+    def add_shared(self) -> None:
+        """Write what rows and terms asked for: frames, and the room that tapes take."""
+        fields: list[int] = []
+        for _, pair in self.frames.values():
+            pool = [
+                np.concatenate([frame.origin / self.scale, frame.axes.T.ravel()])
+                for frame in (pair.frame_a, pair.frame_b)
+            ]
+            _, at = self.add(pool=np.concatenate(pool))
+            fields += [*self.places_of((pair.frame_a.body, pair.frame_b.body)), at]
+        header = self.header
+        header[layout.JOINT_TABLE], _ = self.add(fields)
+        header[layout.JOINTS] = len(self.frames)
+        header[layout.TRACKED] = self._pair_rows + len(self.angles)
+        header[layout.TAPE_ROOM], _ = self.add(self._tape_room)
+
+
+def scene_size(
+    bodies: Sequence[Body], constraints: Sequence[Constraint], objectives: Sequence[tuple[float, Objective]]
+) -> float:
+    """The largest body, by its shape or by the frames and points on it; of points alone, their spread."""
+    marks: dict[int, list[Array]] = {id(body): [] for body in bodies}
+    for item in constraints:
+        for equation in getattr(item, "equations", ()):
+            for _, coordinate in equation.terms:
+                for frame in (coordinate.frames.frame_a, coordinate.frames.frame_b):
+                    marks[id(frame.body)].append(frame.origin)
+    for _, term in objectives:
+        if isinstance(term, PointDistance):
+            marks[id(term.point.body)].append(term.point.coordinates)
+        elif isinstance(term, FrameDistance):
+            marks[id(term.frame.body)].append(term.frame.origin)
+        elif isinstance(term, Dexterity):
+            marks[id(term.tip_task.tip.body)].append(term.tip_task.origin)
+    sizes = [max(body.size, _spread(marks[id(body)])) for body in bodies]
+    size = max(sizes)
+    if not size > 0.0:
+        size = _spread([body.pose.apply(mark) for body in bodies for mark in (np.zeros(3), *marks[id(body)])])
+    return size if size > 0.0 else 1.0
+
+
+def _spread(points: Sequence[Array]) -> float:
+    """Diagonal of the box around points."""
+    return float(np.linalg.norm(np.ptp(points, axis=0))) if points else 0.0

@@ -1,0 +1,139 @@
+"""What clearances watch (`proximity/watch.py`): which pairs of bodies, and how many contacts may be near at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from assembly.constraints.clearance import Clearance
+from assembly.constraints.contact import Contact, side_faces
+from assembly.constraints.scene_writer import SceneWriter
+from assembly.errors import InputError
+from assembly.geometry.face import Face
+from assembly.kinematics.body import Body
+from assembly.proximity import watch_memory
+from assembly.proximity.facet_tree import FacetTree
+from assembly.proximity.patch_list import LIST_INTS
+from assembly.proximity.solid import is_one_smooth
+from assembly.proximity.tree_packing import pack_tree
+
+__all__ = ["LAST_REACH", "guarded_pairs", "pack_watch", "place_count"]
+
+Pair = tuple[Body, Body]
+# Of a watch, in parts of the scene's size: how far its looks reach at least, and at most.
+FIRST_REACH, LAST_REACH = 0.005, 0.05
+# How far bodies may go between looks where contacts may be born, in parts of the smallest radius of curvature of the
+# two; in parts of the scene's size, it is no less than this.
+FLANK, LEAST_FLANK = 0.5, 1e-4
+# Lists of facing patches are kept for so many pairs of bodies at a time.
+MOST_LISTS = 64
+
+
+def guarded_pairs(clearances: Sequence[Clearance], bodies: Sequence[Body]) -> list[list[Pair]]:
+    """The pairs that each clearance keeps apart; no pair may be that of two."""
+    owner: dict[frozenset[int], str] = {}
+    result = []
+    for clearance in clearances:
+        pairs = clearance.pairs(bodies)
+        for a, b in pairs:
+            other = owner.setdefault(frozenset((id(a), id(b))), clearance.name)
+            if other != clearance.name:
+                raise InputError(
+                    f"clearance {clearance.name!r} is of bodies {a.name!r} and {b.name!r}, of which clearance "
+                    f"{other!r} is, too; expected each pair once, say exclude=..."
+                )
+        result.append(pairs)
+    return result
+
+
+def place_count(clearance: Clearance, pairs: Sequence[Pair]) -> int:
+    """How many contacts may be near at a time."""
+    if not pairs:
+        return 0
+    bodies = len({id(body) for pair in pairs for body in pair})
+    return clearance.places or min(4 + 2 * len(pairs), 8 + 4 * bodies)
+
+
+def pack_watch(
+    writer: SceneWriter,
+    clearances: Sequence[Clearance],
+    guarded: Sequence[Sequence[Pair]],
+    places: Sequence[int],
+    contacts: Sequence[Contact],
+) -> int:
+    """Pack the watch of clearances, of which each has pairs and places; where its record begins.
+
+    `contacts` are the given ones, in the order of their rows; the first place is behind them.
+    """
+    pairs = _PairPacking(writer, [pair for own in guarded for pair in own], contacts)
+    first = 0
+    for clearance, own, count in zip(clearances, guarded, places, strict=True):
+        for pair in own:
+            pairs.add(pair, clearance.minimum, [first, first + count])
+        first += count
+    count, pair_table = pairs.write()
+    lengths = np.zeros(watch_memory.LENGTH_COUNT)
+    lengths[watch_memory.NEGLECT] = min(clearance.neglect for clearance in clearances)
+    lengths[watch_memory.FIRST_REACH], lengths[watch_memory.LAST_REACH] = FIRST_REACH, LAST_REACH
+    _, lengths_at = writer.add(pool=lengths)
+    lists = min(count, MOST_LISTS)
+    list_table, _ = writer.add([-1] * (LIST_INTS * lists))
+    record = np.zeros(watch_memory.WATCH_RECORD, dtype=np.int64)
+    record[watch_memory.PAIRS], record[watch_memory.PLACES] = count, first
+    record[watch_memory.PAIR_TABLE], record[watch_memory.FIRST] = pair_table, len(contacts)
+    record[watch_memory.LENGTHS] = lengths_at
+    record[watch_memory.LISTS], record[watch_memory.LIST_TABLE] = lists, list_table
+    record[watch_memory.CORNERS] = any(clearance.corners for clearance in clearances)
+    return writer.add(record)[0]
+
+
+class _PairPacking:
+    """The pairs of a watch while they are packed; the trees of all their bodies come first."""
+
+    def __init__(self, writer: SceneWriter, pairs: Sequence[Pair], contacts: Sequence[Contact]) -> None:
+        self._writer = writer
+        self._contacts = contacts
+        self._records: list[list[int]] = []
+        self._given: list[int] = []
+        self._surfaces: dict[tuple[int, bool], int] = {}
+        # Where the tree of faces is, its smallest radius and how far its facets are off; bodies of a shape share it.
+        self._trees: dict[tuple[Face, ...], tuple[int, float, float]] = {}
+        for faces in dict.fromkeys(side_faces(body) for pair in pairs for body in pair):
+            tree = FacetTree.of(faces)
+            table, pool, at = pack_tree(tree, writer.scale, writer.table_at, writer.pool_at)
+            writer.add(table, pool)
+            self._trees[faces] = at, tree.least_radius / writer.scale, tree.offset / writer.scale
+
+    def add(self, pair: Pair, least: float, places: Sequence[int]) -> None:
+        """Pack a pair with its least gap and where its places begin and end."""
+        writer = self._writer
+        f, g = (side_faces(body) for body in pair)
+        (tree_f, radius_f, offset_f), (tree_g, radius_g, offset_g) = self._trees[f], self._trees[g]
+        flank = max(FLANK * min(radius_f, radius_g), LEAST_FLANK)
+        _, minimum = writer.add(pool=[least / writer.scale, flank, offset_f, offset_g])
+        given: list[int] = []
+        if is_one_smooth(f) and is_one_smooth(g):
+            shape = [writer.surface(self._surfaces, f[0]), writer.surface(self._surfaces, g[0]), -1, -1]
+            given = self._contacts_of(pair)
+        else:
+            shape = [-1, -1, writer.shell(f), writer.shell(g)]
+        fields = [*writer.places_of(pair), tree_f, tree_g, *shape, minimum, *places]
+        self._records.append([*fields, len(self._given), len(given) // 2])
+        self._given += given
+
+    def _contacts_of(self, pair: Pair) -> list[int]:
+        """The rows of given contacts between two bodies, each with whether they are the other way round there."""
+        return [
+            field
+            for k, contact in enumerate(self._contacts)
+            if {id(body) for body in contact.bodies} == {id(body) for body in pair}
+            for field in (k, int(contact.body_a is pair[1]))
+        ]
+
+    def write(self) -> tuple[int, int]:
+        """How many pairs there are, and where their records begin."""
+        given_at, _ = self._writer.add(self._given)
+        table = np.array(self._records, dtype=np.int64).reshape(-1, watch_memory.PAIR_RECORD)
+        table[:, watch_memory.GIVEN] += given_at
+        return len(table), self._writer.add(table)[0]

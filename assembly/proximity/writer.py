@@ -1,0 +1,46 @@
+"""What kernels read is written into two arrays: a table of integers and a pool of doubles."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Writer"]
+
+Array = NDArray[np.float64]
+Table = NDArray[np.int64]
+
+
+class Writer:
+    """A table and a pool that grow at their ends.
+
+    Parameters
+    ----------
+    table_at, pool_at : int
+        Where they will stand in larger ones: offsets in records are absolute.
+
+    Attributes
+    ----------
+    table_at, pool_at : int
+        Where the next parts will begin.
+    """
+
+    def __init__(self, table_at: int = 0, pool_at: int = 0) -> None:
+        self.table_at, self.pool_at = table_at, pool_at
+        self._table: list[Table] = []
+        self._pool: list[Array] = []
+
+    def add(self, table: Sequence[int] | Table = (), pool: Sequence[float] | Array = ()) -> tuple[int, int]:
+        """Append; returns where the parts begin. Until `arrays`, an array that was given may still be filled."""
+        at = self.table_at, self.pool_at
+        self._table.append(np.asarray(table, dtype=np.int64).ravel())
+        self._pool.append(np.asarray(pool, dtype=np.float64).ravel())
+        self.table_at += self._table[-1].size
+        self.pool_at += self._pool[-1].size
+        return at
+
+    def arrays(self) -> tuple[Table, Array]:
+        """All that was added."""
+        return np.concatenate(self._table), np.concatenate(self._pool)
