@@ -50,7 +50,7 @@ from assembly.constraints.layout import (
 from assembly.constraints.program import add_gram
 from assembly.geometry.pieces import TRIM_CURVES
 from assembly.geometry.spline import curve_point, surface_point
-from assembly.geometry.trim import trim_nearest
+from assembly.geometry.trim_nearest import trim_nearest
 from assembly.geometry.vec import add, cross, dot, matvec, matvec_t, scale, sub
 from assembly.kinematics.motion import position, relative_pose, rotation
 from assembly.proximity.extremal import CONVERGED, SINGULAR
