@@ -64,7 +64,7 @@ from assembly.geometry.vec import dot, sub
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.extremal import CLOSE, CONVERGED, LEFT_PATCH, SINGULAR, solve_pair
 from assembly.proximity.free_pair import VARIABLES, free_hessian, free_rows
-from assembly.proximity.solid_contact import CONTACT_RECORD, FEATURE_F, FOLD, HELD, PAIR_GAP, PROPER, TRACK
+from assembly.proximity.solid_contact import CONTACT_RECORD, FEATURE_F, FOLD, PAIR_GAP, PROPER, STAYS, TRACK
 from assembly.proximity.start import global_start
 from assembly.proximity.velocity import GAP, RATES, add_gap_terms, gradient_row, store_record
 
@@ -178,7 +178,7 @@ def solids_row(table, pool, r, start, patience, point):
     found = status == CONVERGED or status == SINGULAR
     if not found:
         if is_guard(table, r):
-            past = start[r, HELD] == 1.0 and status == LEFT_PATCH
+            past = start[r, STAYS] == 1.0 and status == LEFT_PATCH
             return lost_guard(table, pool, r, start, point, past)
         if table[row + ONE_SIDED] == 1 or patience == math.inf:
             found = search_row(table, pool, row, q, tracked, r)

@@ -51,7 +51,7 @@ from assembly.proximity.extremal import (
 )
 from assembly.proximity.folds import ALONE, BESIDE, fold_beyond, fold_of
 from assembly.proximity.shell import FACES
-from assembly.proximity.solid_contact import FEATURE_F, FEATURE_G, FOLD, HELD, PAIR_NORMAL, PROPER
+from assembly.proximity.solid_contact import FEATURE_F, FEATURE_G, FOLD, PAIR_NORMAL, PROPER, STAYS
 from assembly.proximity.start import opposed
 from assembly.proximity.switching import feature_at
 from assembly.proximity.velocity import ARM_F
@@ -244,7 +244,7 @@ def solids_root(table, pool, scene, codes, start, n, roots, k, work, corner):
     tracked[0, 0], tracked[0, 1], tracked[0, 2], tracked[0, 3] = start
     tracked[0, FEATURE_F] = float(codes[0])
     tracked[0, FEATURE_G] = float(codes[1])
-    tracked[0, HELD] = corner
+    tracked[0, STAYS] = corner
     for l in range(3):
         tracked[0, PAIR_NORMAL + l] = n[l]
     status = call_address(

@@ -41,7 +41,7 @@ from assembly.proximity.roots import (
     is_known,
     slide_down,
 )
-from assembly.proximity.solid_contact import CONTACT_RECORD, HELD, PAIR_GAP, TRACK
+from assembly.proximity.solid_contact import CONTACT_RECORD, PAIR_GAP, STAYS, TRACK
 from assembly.proximity.watch_memory import (
     ALLOWANCE,
     BALL,
@@ -375,7 +375,7 @@ def look_at_pair(
         for k in range(count):
             place = np.int64(roots[k, ORIGIN])
             if place >= LISTED:
-                tracked[table[watch + FIRST] + place - LISTED, HELD] = roots[k, CORNER]
+                tracked[table[watch + FIRST] + place - LISTED, STAYS] = roots[k, CORNER]
     rest, wanting = list_roots(table, pool, watch, memory, p, roots, count, tracked)
     listed = 0
     for k in range(table[pair + LOW], table[pair + HIGH]):

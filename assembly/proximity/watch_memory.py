@@ -30,7 +30,7 @@ from assembly.proximity.roots import (
     add_given,
     add_root,
 )
-from assembly.proximity.solid_contact import FEATURE_F, FEATURE_G, HELD, PAIR_GAP, PAIR_NORMAL
+from assembly.proximity.solid_contact import FEATURE_F, FEATURE_G, PAIR_GAP, PAIR_NORMAL, STAYS
 
 # The record of a watch: counts; where pairs begin; the row of `tracked` that is the first place; address of
 # `track_solids`; where its lengths are in the pool; how many lists there are, where they begin; whether corners are
@@ -132,7 +132,7 @@ def write_root(roots, i, tracked, r):
     for k in range(3):
         tracked[r, PAIR_NORMAL + k] = roots[i, ROOT_NORMAL + k]
     tracked[r, PAIR_GAP] = roots[i, GAP]
-    tracked[r, HELD] = roots[i, CORNER]
+    tracked[r, STAYS] = roots[i, CORNER]
 
 
 @kernel(inner=True)
@@ -153,7 +153,7 @@ def known_roots(table, pool, watch, memory, p, scene, tracked, roots, work):
         k = first + step % (last - first)
         o = places + PLACE_MEMORY * k
         r = table[watch + FIRST] + k
-        corner = 1.0 if tracked[r, HELD] == 1.0 else 0.0
+        corner = 1.0 if tracked[r, STAYS] == 1.0 else 0.0
         if memory[o] != p or (corner == 1.0) != (step >= last - first):
             continue
         lost = math.isnan(tracked[r, 0])

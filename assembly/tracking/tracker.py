@@ -19,8 +19,7 @@ from assembly.errors import InputError, integer, number, positive
 from assembly.kinematics.body import Body, Frame, Point
 from assembly.kinematics.pose import Pose, axes_quaternion, rotation_matrix
 from assembly.proximity.events import Event, events_of
-from assembly.proximity.solid_contact import HELD as STAYS
-from assembly.proximity.solid_contact import TRACK
+from assembly.proximity.solid_contact import STAYS, TRACK
 from assembly.proximity.watch_memory import (
     CORNERS,
     EVENT_COUNT,
