@@ -45,7 +45,8 @@ from assembly.constraints.layout import (
     VECTOR_TRIMS,
     WATCH,
 )
-from assembly.constraints.program import add_row_terms, evaluate
+from assembly.constraints.program import evaluate
+from assembly.constraints.row_terms import add_row_terms
 from assembly.constraints.sparsity import clear_upper
 from assembly.constraints.terms import objective, recenter
 from assembly.proximity.free_pair import VARIABLES, VECTORS
