@@ -94,6 +94,17 @@ def note(table, watch, memory, kind, reason, p, number, gap):
 
 
 @kernel(inner=True)
+def any_listed(table, watch, memory, p):
+    """Whether pair p has a listed contact."""
+    pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
+    places = memory_places(table, watch)[1]
+    for k in range(table[pair + LOW], table[pair + HIGH]):
+        if memory[places + PLACE_MEMORY * k] == p:
+            return True
+    return False
+
+
+@kernel(inner=True)
 def any_lost(table, watch, memory, p, tracked):
     """Whether a listed contact of pair p has lost its root."""
     pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
