@@ -66,10 +66,10 @@ if TYPE_CHECKING:
     from assembly.step import write_step as write_step
     from assembly.tracking.log import TrackLog as TrackLog
     from assembly.tracking.manager import Manager as Manager
+    from assembly.tracking.tick import Step as Step
+    from assembly.tracking.tick import TrackStatus as TrackStatus
     from assembly.tracking.trace import Trace as Trace
-    from assembly.tracking.tracker import Step as Step
     from assembly.tracking.tracker import Tracker as Tracker
-    from assembly.tracking.tracker import TrackStatus as TrackStatus
 else:
     __getattr__, __dir__, __all__ = lazy_names(
         __name__,
@@ -111,10 +111,10 @@ else:
             "Solution": "assembly.solve.solution",
             "Spherical": "assembly.constraints.joints",
             "Status": "assembly.solve.solution",
-            "Step": "assembly.tracking.tracker",
+            "Step": "assembly.tracking.tick",
             "Trace": "assembly.tracking.trace",
             "TrackLog": "assembly.tracking.log",
-            "TrackStatus": "assembly.tracking.tracker",
+            "TrackStatus": "assembly.tracking.tick",
             "Tracker": "assembly.tracking.tracker",
             "TrimContact": "assembly.constraints.trim_contact",
             "Universal": "assembly.constraints.joints",

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import assembly as asm
-from assembly.tracking.tracker import TrackStatus
+from assembly.tracking.tick import TrackStatus
 from benchmarks.facets import walk
 from benchmarks.figures import figure
 from benchmarks.hands import NEAR, TAUT, WIRE, linked_rings, paper_clips, ring_chain

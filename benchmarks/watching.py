@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 import assembly as asm
 from assembly.constraints import layout
 from assembly.proximity import watch, watch_memory
+from assembly.proximity.facing import CROWDED_PART
 from assembly.proximity.solid_contact import PAIR_GAP, TRACK
 
 __all__ = ["Listed", "Watch"]
@@ -110,7 +111,7 @@ class Watch:
         # ball may be less for other reasons, and in a crowd no less than this is looked into.
         at = int(packed.table[self._at + watch_memory.PAIR_TABLE]) + watch_memory.PAIR_MINIMUM
         flank = packed.pool[packed.table[at :: watch_memory.PAIR_RECORD][: len(pairs)] + 1]
-        around = np.maximum(pairs[:, watch_memory.BALL_ALLOWANCE], watch.CROWDED_PART * flank)
+        around = np.maximum(pairs[:, watch_memory.BALL_ALLOWANCE], CROWDED_PART * flank)
         take = np.minimum(watch_memory.TAKE * pairs[:, watch_memory.REACH], pairs[:, watch_memory.ALLOWANCE])
         take = np.minimum(take, around) * packed.scale
         return Listed(bodies, points, tracked[:, PAIR_GAP] * packed.scale, take, looked)

@@ -47,10 +47,10 @@ from assembly.constraints.layout import (
     TRIM_SIDE,
     TRIMS,
 )
-from assembly.constraints.program import add_gram
+from assembly.constraints.row_terms import add_gram
 from assembly.geometry.pieces import TRIM_CURVES
 from assembly.geometry.spline import curve_point, surface_point
-from assembly.geometry.trim import trim_nearest
+from assembly.geometry.trim_nearest import trim_nearest
 from assembly.geometry.vec import add, cross, dot, matvec, matvec_t, scale, sub
 from assembly.kinematics.motion import position, relative_pose, rotation
 from assembly.proximity.extremal import CONVERGED, SINGULAR

@@ -18,7 +18,8 @@ from assembly.geometry.measures import area_and_volume
 from assembly.geometry.space_nearest import nearest_in_space
 from assembly.geometry.spline import SIGN
 from assembly.geometry.surface import NurbsSurface
-from assembly.geometry.trim import locate_points, nearest_points
+from assembly.geometry.trim import locate_points
+from assembly.geometry.trim_nearest import nearest_points
 
 __all__ = ["BoundaryPoint", "Face"]
 

@@ -20,7 +20,8 @@ from assembly.errors import InputError, positive
 from assembly.geometry.border import Border, border, cross, on_surface, pole_sides
 from assembly.geometry.delaunay import inside, triangulated
 from assembly.geometry.face import Face
-from assembly.geometry.steps import Axis, axes, unit
+from assembly.geometry.facet_gaps import Apart, measured
+from assembly.geometry.steps import Axis, axes
 from assembly.geometry.unroll import Sheet, crossed, unrolled
 
 __all__ = ["Facets", "facets"]
@@ -34,11 +35,6 @@ _MOST_POINTS = 4_000_000
 _NEAR = 0.4
 # Oblique axes: of the two diagonals of a cell one is the shorter, and the triangulation has no choice.
 _OBLIQUE_AXES = np.array([[1.0, 0.0], [0.15, 1.0]])
-# In parts of an edge: how far off its middle the surface may be at its middle parameters, along the surface.
-_OBLIQUE = 0.3
-# How much farther than the angle asked for a surface may turn along an edge, and what part of the tolerance is so
-# little that it does not matter how far it turns.
-_ARCHED, _UNSEEN = 1.5, 0.01
 # Normals of a corner between two sides of a crease are taken this far inside each triangle, in parts of it.
 _INWARD = 1e-6
 
@@ -98,62 +94,6 @@ def facets(face: Face, tolerance: float, *, angle: float = 0.25 * pi) -> Facets:
 
 def _too_many(tolerance: float) -> InputError:
     return InputError(f"tolerance is {tolerance:g}; expected one that needs less than {_MOST_POINTS} points")
-
-
-class _Apart(NamedTuple):
-    """Edges (k, 2) that are to be divided and triangles that are to get a point inside."""
-
-    edges: Indices
-    triangles: Indices
-
-
-def _measured(
-    face: Face, parameters: Array, points: Array, triangles: Indices, tolerance: float, angle: float
-) -> _Apart:
-    """Where the surface is farther than a tolerance from triangles, or turns too far along them.
-
-    The point of the surface at the middle parameters of an edge or a triangle is apart from its middle along the
-    surface and across: across counts, and along as soon as the first is no more told apart from the second. At the
-    last edges whatever is not along the edge counts.
-    """
-    n = len(points)
-    pairs = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
-    keys, first, number = np.unique(pairs @ np.array([n, 1]), return_index=True, return_inverse=True)
-    edges = np.column_stack(np.divmod(keys, n))
-    number = number.reshape(-1, 3)
-    corners = points[triangles]
-    at = np.concatenate([parameters[edges].mean(axis=1), parameters[triangles].mean(axis=1)])
-    middle = np.concatenate([points[edges].mean(axis=1), corners.mean(axis=1)])
-    there, su, sv = on_surface(face.surface, at, 1)
-    normal = unit(cross(su, sv))
-    apart = there - middle
-    across = np.abs((apart * normal).sum(axis=1))
-    along = np.linalg.norm(apart, axis=1)
-    ways = points[edges[:, 1]] - points[edges[:, 0]]
-    length = np.linalg.norm(ways, axis=1)
-    # Where facets end, none goes on across the foot of the normal. At a seam one does, from corners of the same place.
-    _, place = np.unique(points, axis=0, return_inverse=True)
-    _, same, uses = np.unique(
-        np.sort(place.reshape(-1)[pairs], axis=1) @ np.array([n, 1]), return_inverse=True, return_counts=True
-    )
-    last = np.flatnonzero(uses[same.reshape(-1)[first]] == 1)
-    way = unit(ways[last])
-    across[last] = np.linalg.norm(apart[last] - (apart[last] * way).sum(axis=1, keepdims=True) * way, axis=1)
-    size = np.concatenate([length, length[number].max(axis=1)])
-    # An arc that turns by an angle rises by an eighth of it, times its chord.
-    arched = np.maximum(_ARCHED / 8.0 * angle * size, _UNSEEN * tolerance)
-    bad = (across > np.minimum(tolerance, arched)) | (along > np.maximum(_OBLIQUE * size, tolerance))
-    wrong, hollow = bad[: len(edges)] & (length > 0.0), bad[len(edges) :]
-    # Facets that look inward, other than by the width of a hair.
-    flat = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    longest = length[number].max(axis=1)
-    turned = (flat * normal[len(edges) :]).sum(axis=1) < -tolerance * longest
-    rank = np.where(wrong[number], length[number], 0.0)
-    chosen = np.where(wrong[number].any(axis=1), rank.argmax(axis=1), -1)
-    chosen = np.where((chosen < 0) & turned, length[number].argmax(axis=1), chosen)
-    rows = np.flatnonzero(chosen >= 0)
-    divided = np.unique(number[rows, chosen[rows]])
-    return _Apart(edges[divided], np.flatnonzero(hollow & (chosen < 0)))
 
 
 class _Line:
@@ -352,7 +292,7 @@ class _Trimmed:
             corners = points[triangles]
             sides = np.abs(corners - np.roll(corners, 1, axis=1)).max(axis=2)
             triangles = triangles[(sides > 0.0).all(axis=1)]
-            apart = _measured(self.face, found.parameters, points, triangles, self.tolerance, self.angle)
+            apart = measured(self.face, found.parameters, points, triangles, self.tolerance, self.angle)
             if not len(apart.edges) and not len(apart.triangles):
                 break
             self._divide(found, apart.edges, edges, owner)
@@ -418,7 +358,7 @@ def _untrimmed(face: Face, tolerance: float, angle: float) -> Facets:
         corners = vertices[triangles]
         sides = np.abs(corners - np.roll(corners, 1, axis=1)).max(axis=2)
         triangles = triangles[(sides > 0.0).all(axis=1)]
-        apart = _measured(face, parameters.reshape(-1, 2), vertices, triangles, tolerance, angle)
+        apart = measured(face, parameters.reshape(-1, 2), vertices, triangles, tolerance, angle)
         if not len(apart.edges) and not len(apart.triangles):
             break
         u, v = _halved(u, v, apart, triangles)
@@ -426,7 +366,7 @@ def _untrimmed(face: Face, tolerance: float, angle: float) -> Facets:
     return _finished(face, parameters.reshape(-1, 2), vertices, triangles, creased)
 
 
-def _halved(u: Array, v: Array, apart: _Apart, triangles: Indices) -> tuple[Array, Array]:
+def _halved(u: Array, v: Array, apart: Apart, triangles: Indices) -> tuple[Array, Array]:
     """Lines with new ones in the middles of cells that have edges, or triangles, to divide."""
     new: list[list[Array]] = [[], []]
     pairs = [apart.edges, triangles[apart.triangles][:, [0, 1]], triangles[apart.triangles][:, [0, 2]]]

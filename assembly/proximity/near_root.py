@@ -1,4 +1,4 @@
-"""Whether an extremal pair may be near where Newton's method starts: it goes on only as long as it stays there.
+"""Whether a pair of patches has a root that is known, or one to which Newton's method stays near where it starts.
 
 The patches of two bodies that face each other are tiles of where they may touch. What is in a tile is found from its
 middle in a few steps; a sequence that leaves it, and those beside it, is on its way to what other tiles have.
@@ -6,11 +6,16 @@ middle in a few steps; a sequence that leaves it, and those beside it, is on its
 
 from __future__ import annotations
 
+import math
+
+import numpy as np
+
 from assembly._kernel import kernel
-from assembly.proximity.bounding_tree import ELEMENT, ELEMENT_POOL
+from assembly.geometry.spline import BREAKS_U, BREAKS_V, CLOSED_U, CLOSED_V, SPANS_U, SPANS_V
+from assembly.proximity.bounding_tree import ELEMENT, ELEMENT_FEATURE, ELEMENT_POOL
 from assembly.proximity.extremal import bent_at_most, move_pair, pair_frame, pair_matrix, pair_step
-from assembly.proximity.folds import BESIDE
-from assembly.proximity.roots import is_within
+from assembly.proximity.folds import ALONE, BESIDE, fold_beyond
+from assembly.proximity.roots import CODE_F, CODE_G, ROOT_BEYOND, ROOT_FOLD, is_alone
 
 # Steps; and below so many radians, that a step turns a normal, it is as good as there.
 STEPS, CLOSE = 6, 0.02
@@ -30,12 +35,56 @@ def half_widths(table, pool, trees, pair):
 
 
 @kernel(inline=True)
+def is_within(table, pool, surface, x, y, u, v, half_u, half_v):
+    """Whether parameters (x, y) are in a box around (u, v)."""
+    du = abs(x - u)
+    dv = abs(y - v)
+    if surface >= 0:
+        if table[surface + CLOSED_U] == 1:
+            period = pool[table[surface + BREAKS_U] + table[surface + SPANS_U]] - pool[table[surface + BREAKS_U]]
+            du = min(du, period - du)
+        if table[surface + CLOSED_V] == 1:
+            period = pool[table[surface + BREAKS_V] + table[surface + SPANS_V]] - pool[table[surface + BREAKS_V]]
+            dv = min(dv, period - dv)
+    return du <= half_u and dv <= half_v
+
+
+@kernel(inline=True)
 def is_beside(table, pool, surfaces, x, y, half, part):
     """Whether parameters x are within a part of half widths from y, on both surfaces."""
     f, g = surfaces[0], surfaces[1]
     return is_within(table, pool, f, x[0], x[1], y[0], y[1], part * half[0], part * half[1]) and is_within(
         table, pool, g, x[2], x[3], y[2], y[3], part * half[2], part * half[3]
     )
+
+
+@kernel(inner=True)
+def is_known(table, pool, scene, e, d, roots, count):
+    """The features of elements e and d, the parameters of their middles, whether a known root is all there is.
+
+    And whether one is there that is near a fold, on this side of a knot line or beyond: a second root may be beside it.
+    """
+    o = table[scene[3][0] + ELEMENT_POOL] + ELEMENT * e
+    p = table[scene[3][1] + ELEMENT_POOL] + ELEMENT * d
+    codes = (np.int64(pool[o + ELEMENT_FEATURE]), np.int64(pool[p + ELEMENT_FEATURE]))
+    start = (pool[o], pool[o + 1], pool[p], pool[p + 1])
+    half = half_widths(table, pool, scene[3], (e, d))
+    folds = False
+    for k in range(count):
+        if roots[k, CODE_F] != codes[0] or roots[k, CODE_G] != codes[1]:
+            continue
+        if not roots[k, ROOT_FOLD] > ALONE:
+            continue
+        x = (roots[k, 0], roots[k, 1], roots[k, 2], roots[k, 3])
+        if not is_beside(table, pool, scene[2], x, start, half, BESIDE):
+            continue
+        if scene[2][0] >= 0 and math.isnan(roots[k, ROOT_BEYOND]):
+            # Beyond a knot line curvatures may be others.
+            roots[k, ROOT_BEYOND] = fold_beyond(table, pool, scene, x, half)
+        if is_alone(roots, k):
+            return codes, start, True, False
+        folds = True
+    return codes, start, False, folds
 
 
 @kernel(inner=True)

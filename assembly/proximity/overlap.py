@@ -29,8 +29,10 @@ from assembly.proximity.bounding_tree import (
     RADIUS,
     overlapping,
 )
+from assembly.proximity.feet import foot_of
 from assembly.proximity.folds import BESIDE
-from assembly.proximity.roots import GAP, POINT_F, POINT_G, foot_of, is_within
+from assembly.proximity.near_root import is_within
+from assembly.proximity.roots import GAP, POINT_F, POINT_G
 from assembly.proximity.shell import FACE_RECORD, FACE_TABLE, FACE_TRIM, FACES
 from assembly.proximity.switching import feature_at
 
@@ -97,6 +99,16 @@ def in_trim(table, pool, shell, code, u, v):
     return trim < 0 or trim_side(table, pool, trim, u, v) >= 0
 
 
+@kernel(inline=True)
+def with_children(stack, used, child):
+    """How many nodes are on a stack, after a node's children were put there, for which there is room."""
+    if used + 2 > DEPTH:
+        return used
+    stack[used] = child
+    stack[used + 1] = child + 1
+    return used + 2
+
+
 @kernel(inner=True, allocates=True)
 def facets_cut(table, pool, tree, surface, shell, a, d, end):
     """How many facets of a body's faces cut the segment from a to a + d, but for that part at its ends; body axes.
@@ -117,10 +129,7 @@ def facets_cut(table, pool, tree, surface, shell, a, d, end):
         at = table[tree + NODE_TABLE] + NODE_INTS * i
         child = table[at + CHILD]
         if child >= 0:
-            if used + 2 <= DEPTH:
-                stack[used] = child
-                stack[used + 1] = child + 1
-                used += 2
+            used = with_children(stack, used, child)
             continue
         code = table[at + FEATURE]
         r = surface_of(table, shell, surface, code)
@@ -186,10 +195,7 @@ def nearest_foot(table, pool, tree, surface, shell, y, reach):
             continue
         child = table[table[tree + NODE_TABLE] + NODE_INTS * i + CHILD]
         if child >= 0:
-            if used + 2 <= DEPTH:
-                stack[used] = child
-                stack[used + 1] = child + 1
-                used += 2
+            used = with_children(stack, used, child)
             continue
         distance, _n, some = foot_at(table, pool, tree, surface, shell, -1 - child, y)
         if some and abs(distance) < abs(nearest):

@@ -21,7 +21,8 @@ from assembly.geometry.spline import (
     SPANS_U,
     SPANS_V,
 )
-from assembly.geometry.trim import trim_nearest, trim_side
+from assembly.geometry.trim import trim_side
+from assembly.geometry.trim_nearest import trim_nearest
 from assembly.geometry.vec import cross, dot, sub
 from assembly.proximity.box_model import (
     BEND,

@@ -12,46 +12,14 @@ import math
 import numpy as np
 
 from assembly._kernel import call_address, kernel
-from assembly.geometry.spline import (
-    BREAKS_U,
-    BREAKS_V,
-    CLOSED_U,
-    CLOSED_V,
-    SIGN,
-    SPANS_U,
-    SPANS_V,
-    surface_point,
-)
-from assembly.geometry.vec import add, cross, dot, matvec, matvec_t, scale, sub
+from assembly.geometry.spline import BREAKS_U, BREAKS_V, CLOSED_U, CLOSED_V, SPANS_U, SPANS_V, surface_point
+from assembly.geometry.vec import add, dot, matvec, matvec_t, scale, sub
 from assembly.kinematics.motion import rotation
-from assembly.proximity.bounding_tree import (
-    AXIS,
-    CENTER,
-    COS,
-    ELEMENT,
-    ELEMENT_FEATURE,
-    ELEMENT_NODE,
-    ELEMENT_POOL,
-    NODE,
-    NODE_POOL,
-    RADIUS,
-    SIN,
-    box_distance,
-    seen_from,
-    three,
-)
 from assembly.proximity.controller import descend_pair
-from assembly.proximity.extremal import (
-    CONVERGED,
-    NOT_CONVERGED,
-    SINGULAR,
-    into_domain,
-    pair_frame,
-    solve_pair,
-)
-from assembly.proximity.folds import ALONE, BESIDE, fold_beyond, fold_of
+from assembly.proximity.extremal import CONVERGED, NOT_CONVERGED, SINGULAR, pair_frame, solve_pair
+from assembly.proximity.folds import ALONE, fold_of
 from assembly.proximity.shell import FACES
-from assembly.proximity.solid_contact import FEATURE_F, FEATURE_G, FOLD, HELD, PAIR_NORMAL, PROPER
+from assembly.proximity.solid_contact import FEATURE_F, FEATURE_G, FOLD, PAIR_NORMAL, PROPER, STAYS
 from assembly.proximity.start import opposed
 from assembly.proximity.switching import feature_at
 from assembly.proximity.velocity import ARM_F
@@ -69,9 +37,8 @@ USELESS, NEW, LISTED, GIVEN_CONTACT = -2.0, -1.0, 0, -3.0
 NOTHING, ALIKE, SADDLE, MINIMUM_FOUND = 0, 1, 2, 3
 # Roots of no use are the same within this radius, in parts of the scene's size.
 SAME = 1e-6
-# Steps of the controller where Newton's method fails, and down the slope of a gap.
+# Steps of the controller where Newton's method fails.
 DESCENTS = 40
-SLIDES = 24
 
 
 @kernel(inline=True)
@@ -148,95 +115,6 @@ def surfaces_root(table, pool, scene, start, roots, k):
 
 
 @kernel(inner=True)
-def foot_of(table, pool, g, y, s, t):
-    """The foot on surface g of a point y, by Newton's method from (s, t): parameters, signed distance, normal.
-
-    Positive outside. A step is never longer than what brings the tangent plane's foot. And whether four of them did:
-    they may not be there yet, or where the distance has no minimum.
-    """
-    distance = 0.0
-    n = (0.0, 0.0, 0.0)
-    settled = False
-    for _ in range(4):
-        p, su, sv, suu, suv, svv = surface_point(table, pool, g, s, t)
-        d = sub(y, p)
-        n = cross(su, sv)
-        length = math.sqrt(dot(n, n))
-        if not length > 0.0:
-            break
-        n = scale(float(table[g + SIGN]) / length, n)
-        distance = dot(n, d)
-        a = dot(su, su)
-        b = dot(su, sv)
-        c = dot(sv, sv)
-        first = dot(d, su)
-        second = dot(d, sv)
-        h11 = a - distance * dot(n, suu)
-        h12 = b - distance * dot(n, suv)
-        h22 = c - distance * dot(n, svv)
-        det = h11 * h22 - h12 * h12
-        bent = det > 0.1 * (a * c - b * b) and h11 > 0.0
-        if not bent:
-            h11, h12, h22 = a, b, c
-            det = a * c - b * b
-        s, t, _held = into_domain(
-            table, pool, g, s + (h22 * first - h12 * second) / det, t + (h11 * second - h12 * first) / det
-        )
-        if first * first / a + second * second / c < 1e-16:
-            settled = bent
-            break
-    return s, t, distance, n, settled
-
-
-@kernel(inner=True)
-def slide_down(table, pool, f, g, turn, shift, start, stride, half):
-    """Parameters at which the gap is smaller than at the start: down its slope on f, the foot on g following.
-
-    And whether they are beside the start, within BESIDE times half widths on f; it goes no farther. Newton's method
-    goes to saddles of the gap as well; this does not. The first step is `stride` times the sine of the angle between
-    the normals; then steps are those of Barzilai and Borwein, halved where the gap grows.
-    """
-    u, v, s, t = start
-    p, su, sv, _uu, _uv, _vv = surface_point(table, pool, f, u, v)
-    s, t, gap, n, _settled = foot_of(table, pool, g, matvec_t(turn, sub(p, shift)), s, t)
-    slope = matvec(turn, n)
-    normal = cross(su, sv)
-    across = scale(1.0 / max(math.sqrt(dot(normal, normal)), 1e-300), normal)
-    slope = sub(slope, scale(dot(slope, across), across))
-    length = stride
-    for _ in range(SLIDES):
-        if dot(slope, slope) < 1e-12:
-            break
-        a = dot(su, su)
-        b = dot(su, sv)
-        c = dot(sv, sv)
-        det = a * c - b * b
-        if not det > 0.0:
-            break
-        first = -length * dot(slope, su)
-        second = -length * dot(slope, sv)
-        u_new, v_new, _held = into_domain(
-            table, pool, f, u + (c * first - b * second) / det, v + (a * second - b * first) / det
-        )
-        q, ru, rv, _uu, _uv, _vv = surface_point(table, pool, f, u_new, v_new)
-        s_new, t_new, gap_new, n, _settled = foot_of(table, pool, g, matvec_t(turn, sub(q, shift)), s, t)
-        if gap_new > gap:
-            length *= 0.25
-            continue
-        normal = cross(ru, rv)
-        across = scale(1.0 / max(math.sqrt(dot(normal, normal)), 1e-300), normal)
-        there = matvec(turn, n)
-        there = sub(there, scale(dot(there, across), across))
-        moved = sub(q, p)
-        bent = dot(moved, sub(there, slope))
-        length = min(dot(moved, moved) / bent, 4.0 * length) if bent > 0.0 else 2.0 * length
-        u, v, s, t, gap, p, su, sv, slope = u_new, v_new, s_new, t_new, gap_new, q, ru, rv, there
-        if not is_within(table, pool, f, u, v, start[0], start[1], BESIDE * half[0], BESIDE * half[1]):
-            return (u, v, s, t), False
-    return (u, v, s, t), True
-
-
-@kernel(inner=True)
 def solids_root(table, pool, scene, codes, start, n, roots, k, work, corner):
     """Switching and Newton on the features of two solids, or Newton alone for a corner; fills root k."""
     i, j, q, track_at = scene[4]
@@ -244,7 +122,7 @@ def solids_root(table, pool, scene, codes, start, n, roots, k, work, corner):
     tracked[0, 0], tracked[0, 1], tracked[0, 2], tracked[0, 3] = start
     tracked[0, FEATURE_F] = float(codes[0])
     tracked[0, FEATURE_G] = float(codes[1])
-    tracked[0, HELD] = corner
+    tracked[0, STAYS] = corner
     for l in range(3):
         tracked[0, PAIR_NORMAL + l] = n[l]
     status = call_address(
@@ -334,89 +212,6 @@ def add_given(table, pool, scene, tracked, listed, many, neglect, roots, work):
 
 
 @kernel(inline=True)
-def element_ball(table, pool, tree, e):
-    """Center and radius of a ball around an element, in the axes of its body."""
-    o = table[tree + NODE_POOL] + NODE * np.int64(pool[table[tree + ELEMENT_POOL] + ELEMENT * e + ELEMENT_NODE])
-    return three(pool, o + CENTER), pool[o + RADIUS]
-
-
-@kernel(inner=True)
-def element_distance(table, pool, trees, turn, shift, bulk, e, d):
-    """About the least distance of two elements: that of their boxes, or across the planes of their middle normals.
-
-    A patch leaves its plane by no more than its radius times the sine of the angle by which its normals turn. Where the
-    planes are in the wrong order by more than that, the bodies are in each other, or these are far sides: -inf.
-    """
-    o = table[trees[0] + NODE_POOL] + NODE * np.int64(pool[table[trees[0] + ELEMENT_POOL] + ELEMENT * e + ELEMENT_NODE])
-    p = table[trees[1] + NODE_POOL] + NODE * np.int64(pool[table[trees[1] + ELEMENT_POOL] + ELEMENT * d + ELEMENT_NODE])
-    seen = seen_from(pool, p, turn, bulk, shift)
-    square = box_distance(pool, o, p, seen, turn, bulk)
-    apart = sub(seen[0], three(pool, o + CENTER))
-    if pool[o + COS] <= 0.0 or pool[p + COS] <= 0.0:
-        return math.sqrt(square)
-    n = sub(three(pool, o + AXIS), seen[2])
-    length = math.sqrt(dot(n, n))
-    if length < 1.0:
-        return math.sqrt(square)
-    n = scale(1.0 / length, n)
-    off_f = sub(n, three(pool, o + AXIS))
-    off_g = add(n, seen[2])
-    thick = pool[o + RADIUS] * (pool[o + SIN] + math.sqrt(dot(off_f, off_f)))
-    thick += pool[p + RADIUS] * (pool[p + SIN] + math.sqrt(dot(off_g, off_g)))
-    along = dot(n, apart)
-    return max(math.sqrt(square), along - thick) if along >= -thick else -math.inf
-
-
-@kernel(inline=True)
-def is_within(table, pool, surface, x, y, u, v, half_u, half_v):
-    """Whether parameters (x, y) are in a box around (u, v)."""
-    du = abs(x - u)
-    dv = abs(y - v)
-    if surface >= 0:
-        if table[surface + CLOSED_U] == 1:
-            period = pool[table[surface + BREAKS_U] + table[surface + SPANS_U]] - pool[table[surface + BREAKS_U]]
-            du = min(du, period - du)
-        if table[surface + CLOSED_V] == 1:
-            period = pool[table[surface + BREAKS_V] + table[surface + SPANS_V]] - pool[table[surface + BREAKS_V]]
-            dv = min(dv, period - dv)
-    return du <= half_u and dv <= half_v
-
-
-@kernel(inline=True)
 def is_alone(roots, k):
     """Whether root k is far from a fold, beyond knot lines too as far as it is known."""
     return roots[k, ROOT_FOLD] > ALONE and not roots[k, ROOT_BEYOND] <= ALONE
-
-
-@kernel(inner=True)
-def is_known(table, pool, scene, e, d, roots, count):
-    """The features of elements e and d, the parameters of their middles, whether a known root is all there is.
-
-    And whether one is there that is near a fold, on this side of a knot line or beyond: a second root may be beside it.
-    """
-    o = table[scene[3][0] + ELEMENT_POOL] + ELEMENT * e
-    p = table[scene[3][1] + ELEMENT_POOL] + ELEMENT * d
-    codes = (np.int64(pool[o + ELEMENT_FEATURE]), np.int64(pool[p + ELEMENT_FEATURE]))
-    start = (pool[o], pool[o + 1], pool[p], pool[p + 1])
-    half = (pool[o + 2], pool[o + 3], pool[p + 2], pool[p + 3])
-    f = scene[2][0]
-    g = scene[2][1]
-    folds = False
-    for k in range(count):
-        if roots[k, CODE_F] != codes[0] or roots[k, CODE_G] != codes[1]:
-            continue
-        if not roots[k, ROOT_FOLD] > ALONE:
-            continue
-        x = (roots[k, 0], roots[k, 1], roots[k, 2], roots[k, 3])
-        if not (
-            is_within(table, pool, f, x[0], x[1], start[0], start[1], BESIDE * half[0], BESIDE * half[1])
-            and is_within(table, pool, g, x[2], x[3], start[2], start[3], BESIDE * half[2], BESIDE * half[3])
-        ):
-            continue
-        if f >= 0 and math.isnan(roots[k, ROOT_BEYOND]):
-            # Beyond a knot line curvatures may be others.
-            roots[k, ROOT_BEYOND] = fold_beyond(table, pool, scene, x, half)
-        if is_alone(roots, k):
-            return codes, start, True, False
-        folds = True
-    return codes, start, False, folds

@@ -1,8 +1,8 @@
 """A contact of two solids as a solve tracks it: the pair of features that is closest, its coordinates, its normal.
 
 Of every contact a solve keeps `TRACK` numbers: the coordinates of the pair (4), the two features, the normal in the
-axes of body f, which tells on which side of each other two edges are where they touch, the gap, and what the pair holds
-on to: a corner over a face, which need not be the closest one (`corners.py`), stays with its features.
+axes of body f, which tells on which side of each other two edges are where they touch, the gap, and what the pair
+stays with: a corner over a face, which need not be the closest one (`corners.py`), has its features for good.
 
 The kernels here are large, and few scenes need them: loops call them by address (`_kernel.call_address`).
 """
@@ -21,7 +21,7 @@ from assembly.proximity.nearest_query import NORMAL, PAIR
 from assembly.proximity.switching import hold_features, track_features
 from assembly.proximity.velocity import RECORD
 
-FEATURE_F, FEATURE_G, PAIR_NORMAL, PAIR_GAP, HELD, TRACK = 4, 5, 6, 9, 10, 11
+FEATURE_F, FEATURE_G, PAIR_NORMAL, PAIR_GAP, STAYS, TRACK = 4, 5, 6, 9, 10, 11
 # Behind a record: whether surfaces do not cross at the pair, and how far it is from a fold.
 PROPER, FOLD, CONTACT_RECORD = RECORD, RECORD + 1, RECORD + 2
 
@@ -43,9 +43,9 @@ def track_row(table, pool, shell_f, shell_g, relative, shift, start, r, patience
     code_g = np.int64(start[r, FEATURE_G])
     x = (start[r, 0], start[r, 1], start[r, 2], start[r, 3])
     n = (start[r, PAIR_NORMAL], start[r, PAIR_NORMAL + 1], start[r, PAIR_NORMAL + 2])
-    if start[r, HELD] > 0.0:
+    if start[r, STAYS] > 0.0:
         status, x, frame = hold_features(
-            table, pool, shell_f, shell_g, relative, shift, code_f, code_g, x, n, 1.0, patience, start[r, HELD]
+            table, pool, shell_f, shell_g, relative, shift, code_f, code_g, x, n, 1.0, patience, start[r, STAYS]
         )
         return status, code_f, code_g, x, frame, 0
     return track_features(table, pool, shell_f, shell_g, relative, shift, code_f, code_g, x, n, 1.0, patience)
@@ -67,7 +67,7 @@ def track_solids(table, pool, shell_f, shell_g, i, j, q, start, patience, record
         records[r, PROPER] = 1.0 if frame[14] else 0.0
         records[r, FOLD] = frame[15]
         write_tracked(x, feature_f, feature_g, frame[0], tracked, r)
-        tracked[r, HELD] = start[r, HELD]
+        tracked[r, STAYS] = start[r, STAYS]
     return status
 
 
@@ -96,5 +96,5 @@ def search_solids(table, pool, shell_f, shell_g, i, j, q, nearest_at, deepest_at
         if status != CROSSING:
             n = matvec_t(rotation(q, i), (out[NORMAL], out[NORMAL + 1], out[NORMAL + 2]))
     write_tracked((out[0], out[1], out[2], out[3]), codes[0], codes[1], n, tracked, r)
-    tracked[r, HELD] = 0.0
+    tracked[r, STAYS] = 0.0
     return 1

@@ -27,7 +27,8 @@ from assembly.geometry.spline import (
     surface_point,
     xyz,
 )
-from assembly.geometry.trim import trim_nearest, trim_side
+from assembly.geometry.trim import trim_side
+from assembly.geometry.trim_nearest import trim_nearest
 from assembly.geometry.vec import blend, cross, dot, matvec, matvec_t, neg, sub
 from assembly.proximity.extremal import CONVERGED, LEFT_PATCH, NOT_CONVERGED, SINGULAR, into_domain, own_frame
 from assembly.proximity.feature_pair import solve_features

@@ -14,7 +14,7 @@ import math
 from assembly._kernel import kernel
 from assembly.geometry.pieces import TRIM_CURVES, TRIM_FIRST
 from assembly.geometry.spline import CURVE_RECORD, curve_point
-from assembly.geometry.trim import trim_nearest
+from assembly.geometry.trim_nearest import trim_nearest
 
 # Cosine between n and the tangent at the foot above which the foot is a corner.
 CORNER = 1e-6

@@ -30,7 +30,7 @@ from assembly.proximity.roots import (
     add_given,
     add_root,
 )
-from assembly.proximity.solid_contact import FEATURE_F, FEATURE_G, HELD, PAIR_GAP, PAIR_NORMAL
+from assembly.proximity.solid_contact import FEATURE_F, FEATURE_G, PAIR_GAP, PAIR_NORMAL, STAYS
 
 # The record of a watch: counts; where pairs begin; the row of `tracked` that is the first place; address of
 # `track_solids`; where its lengths are in the pool; how many lists there are, where they begin; whether corners are
@@ -94,6 +94,17 @@ def note(table, watch, memory, kind, reason, p, number, gap):
 
 
 @kernel(inner=True)
+def any_listed(table, watch, memory, p):
+    """Whether pair p has a listed contact."""
+    pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
+    places = memory_places(table, watch)[1]
+    for k in range(table[pair + LOW], table[pair + HIGH]):
+        if memory[places + PLACE_MEMORY * k] == p:
+            return True
+    return False
+
+
+@kernel(inner=True)
 def any_lost(table, watch, memory, p, tracked):
     """Whether a listed contact of pair p has lost its root."""
     pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
@@ -132,7 +143,7 @@ def write_root(roots, i, tracked, r):
     for k in range(3):
         tracked[r, PAIR_NORMAL + k] = roots[i, ROOT_NORMAL + k]
     tracked[r, PAIR_GAP] = roots[i, GAP]
-    tracked[r, HELD] = roots[i, CORNER]
+    tracked[r, STAYS] = roots[i, CORNER]
 
 
 @kernel(inner=True)
@@ -153,7 +164,7 @@ def known_roots(table, pool, watch, memory, p, scene, tracked, roots, work):
         k = first + step % (last - first)
         o = places + PLACE_MEMORY * k
         r = table[watch + FIRST] + k
-        corner = tracked[r, HELD] if tracked[r, HELD] > 0.0 else 0.0
+        corner = tracked[r, STAYS] if tracked[r, STAYS] > 0.0 else 0.0
         if memory[o] != p or (corner > 0.0) != (step >= last - first):
             continue
         lost = math.isnan(tracked[r, 0])

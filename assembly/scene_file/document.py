@@ -11,8 +11,9 @@ from assembly.assembly import Assembly
 from assembly.constraints.constraint import Constraint
 from assembly.errors import InputError
 from assembly.scene_file.fields import at, bad, each, members, whole, written
-from assembly.scene_file.kinds import BODY, CONSTRAINTS, FACE, OBJECTIVES, SURFACE, refers_to_others
+from assembly.scene_file.kinds import BODY, CONSTRAINTS, FACE, OBJECTIVES, SURFACE
 from assembly.scene_file.records import Listed, Parts
+from assembly.scene_file.references import refers_to_others
 
 __all__ = ["load", "save"]
 

@@ -10,12 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.constraints.clearance import Clearance
-from assembly.constraints.constraint import Freedom
 from assembly.constraints.contact import Contact
 from assembly.constraints.couplings import Gear, RackPinion
 from assembly.constraints.dexterity import Dexterity
 from assembly.constraints.expression import Expression
-from assembly.constraints.joint import Joint
 from assembly.constraints.joints import (
     Cylindrical,
     Fixed,
@@ -36,101 +34,24 @@ from assembly.geometry.curve import NurbsCurve
 from assembly.geometry.face import Face
 from assembly.geometry.loop import Loop
 from assembly.geometry.surface import NurbsSurface
-from assembly.kinematics.body import Body, BodyFace, Frame, Point
+from assembly.kinematics.body import Body, Frame, Point
 from assembly.kinematics.pose import Pose
-from assembly.scene_file.fields import at, bad, each, flag, members, number, or_null, table, text, vector, whole
+from assembly.scene_file.fields import bad, each, flag, number, or_null, table, text, vector, whole
 from assembly.scene_file.records import Field, Listed, OneOf, OrNull, Parts, Plain, Record
+from assembly.scene_file.references import BODY_NAME, CONTACT_NAME, FREEDOM, SIDE, Index
 
-__all__ = ["BODY", "CONSTRAINTS", "FACE", "OBJECTIVES", "SURFACE", "refers_to_others"]
+__all__ = ["BODY", "CONSTRAINTS", "FACE", "OBJECTIVES", "SURFACE"]
 
 # Axes of a frame are unit vectors at right angles to this; nine digits of a decimal do.
 RIGHT_ANGLES = 1e-9
 
 
-class _Index:
-    """The index in a table of the file, so that a surface or a face that many things share is there once."""
-
-    def __init__(self, table: str) -> None:
-        self._table = table
-
-    def write(self, path: str, value: Any, parts: Parts) -> int:
-        return parts.index(getattr(parts, self._table), value)
-
-    def read(self, path: str, value: Any, parts: Parts) -> Any:
-        table: list[Any] = getattr(parts, self._table)
-        index = whole(path, value)
-        if not 0 <= index < len(table):
-            raise bad(path, index, f"an index of one of {len(table)} {self._table}")
-        return table[index]
-
-
-class _BodyFace(_Index):
+class _BodyFace(Index):
     """The index of a face; files of version 1 have the face itself."""
 
     def read(self, path: str, value: Any, parts: Parts) -> Face:
         face: Face = FACE.read(path, value, parts) if parts.version == 1 else super().read(path, value, parts)
         return face
-
-
-class _BodyName:
-    """A body of the scene by its name."""
-
-    def write(self, path: str, value: Body, parts: Parts) -> str:
-        return value.name
-
-    def read(self, path: str, value: Any, parts: Parts) -> Body:
-        name = text(path, value)
-        with at(path):
-            return parts.scene.body(name)
-
-
-class _Side:
-    """A face of a body, or the body."""
-
-    def write(self, path: str, value: Body | BodyFace, parts: Parts) -> dict[str, Any]:
-        if isinstance(value, Body):
-            return {"body": value.name, "face": None}
-        return {"body": value.body.name, "face": value.name}
-
-    def read(self, path: str, value: Any, parts: Parts) -> Body | BodyFace:
-        body_name, face_name = members(path, value, ("body", "face"))
-        body = BODY_NAME.read(f"{path}.body", body_name, parts)
-        label = or_null(text)(f"{path}.face", face_name)
-        if label is None:
-            return body
-        with at(f"{path}.face"):
-            return body.face(label)
-
-
-class _Freedom:
-    """A freedom of a joint of the same file."""
-
-    def write(self, path: str, value: Freedom, parts: Parts) -> dict[str, Any]:
-        joint = value.joint
-        if parts.constraints.get(joint.name) is not joint:
-            raise InputError(
-                f"{path} is freedom {value.name!r} of joint {joint.name!r}, which is not in the assembly; "
-                "expected a joint that scene.constrain was given, for files refer to joints by name"
-            )
-        return {"joint": joint.name, "freedom": value.name}
-
-    def read(self, path: str, value: Any, parts: Parts) -> Freedom:
-        joint_name, freedom_name = members(path, value, ("joint", "freedom"))
-        joint: Joint = _of_the_file(Joint, "joint", f"{path}.joint", joint_name, parts)
-        label = text(f"{path}.freedom", freedom_name)
-        with at(f"{path}.freedom"):
-            return joint.freedom(label)
-
-
-class _ContactName:
-    """A contact of the same file by its name."""
-
-    def write(self, path: str, value: Contact, parts: Parts) -> str:
-        return value.name
-
-    def read(self, path: str, value: Any, parts: Parts) -> Contact:
-        contact: Contact = _of_the_file(Contact, "contact", path, value, parts)
-        return contact
 
 
 class _TrimLoop:
@@ -152,17 +73,6 @@ class _TrimLoop:
         if isinstance(value, bool) or not isinstance(value, int):
             raise bad(path, value, '"outer", the index of a hole, or an object with the fields tolerance, curves')
         return value
-
-
-def _of_the_file(kind: type, word: str, path: str, value: Any, parts: Parts) -> Any:
-    """A constraint of a kind by its name."""
-    name = text(path, value)
-    found = parts.constraints.get(name)
-    if not isinstance(found, kind):
-        names = [repr(known) for known, item in parts.constraints.items() if isinstance(item, kind)]
-        known = ", ".join(names) or f"none, the file has no {word}s"
-        raise bad(path, name, f"a {word} of the file: {known}")
-    return found
 
 
 def _trim(contact: Contact, side: str, loop: Loop | str | int, **others: Any) -> TrimContact:
@@ -228,11 +138,7 @@ def _point_distance(body: Body, point: list[float], target: list[float], weight:
 NUMBER = Plain(number)
 NUMBERS = Plain(table(1), _to_list)
 VECTOR = Plain(vector, _to_list)
-SURFACE_INDEX = _Index("surfaces")
-BODY_NAME = _BodyName()
-SIDE = _Side()
-FREEDOM = _Freedom()
-CONTACT_NAME = _ContactName()
+SURFACE_INDEX = Index("surfaces")
 DRIVEN = Plain(or_null(number))
 LIMITS = Plain(or_null(_read_limits), lambda limits: None if limits is None else list(limits))
 FRAME = Record(
@@ -411,8 +317,3 @@ OBJECTIVES = OneOf(
         "expression": EXPRESSION,
     }
 )
-
-
-def refers_to_others(record: Record) -> bool:
-    """Whether a thing can only be made when joints and contacts are there."""
-    return any(item.form is FREEDOM or item.form is CONTACT_NAME for item in record.fields)

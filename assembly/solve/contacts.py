@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
+from assembly.constraints.contact_rows import search_row
 from assembly.constraints.layout import (
     BODY_F,
     BODY_G,
@@ -20,7 +21,6 @@ from assembly.constraints.layout import (
     TRIM_PAIR,
     TRIMS,
 )
-from assembly.constraints.program import search_row
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.extremal import CONVERGED, SINGULAR, pair_frame
 from assembly.proximity.free_pair import coordinate_lengths

@@ -32,7 +32,8 @@ from assembly.constraints.layout import (
     TERMS,
 )
 from assembly.constraints.primitives import add_coordinate_hessian, coordinate
-from assembly.constraints.program import add_row_terms, evaluate
+from assembly.constraints.program import evaluate
+from assembly.constraints.row_terms import add_row_terms
 from assembly.constraints.terms import DEXTERITY, TERM, TERM_BODY, TERM_KIND, TERM_PARAMETERS, TERM_TAPE, load
 from assembly.geometry.vec import add, cross, matvec, scale
 from assembly.kinematics.motion import rotation

@@ -6,7 +6,8 @@ import math
 
 from assembly._kernel import kernel
 from assembly.constraints.layout import ROWS, SCALE, WATCH
-from assembly.constraints.program import add_row_terms, evaluate
+from assembly.constraints.program import evaluate
+from assembly.constraints.row_terms import add_row_terms
 from assembly.proximity.watch import EVERYTHING
 from assembly.solve.guards import clear_guards, go_back, look_around, place_guards
 from assembly.solve.linear import factorize_shifted

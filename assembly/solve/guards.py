@@ -24,8 +24,8 @@ from assembly.constraints.layout import (
 )
 from assembly.geometry.spline import surface_point
 from assembly.geometry.vec import dot, sub
+from assembly.proximity.allowances import largest_part
 from assembly.proximity.solid_contact import FOLD, TRACK
-from assembly.proximity.watch import largest_part
 from assembly.proximity.watch_memory import (
     LENGTHS,
     NEGLECT,

@@ -6,7 +6,7 @@ import math
 
 from assembly._kernel import kernel
 from assembly.constraints.layout import CONTACTS, TRIMS
-from assembly.constraints.program import add_square
+from assembly.constraints.row_terms import add_square
 from assembly.constraints.sparsity import clear_upper
 from assembly.solve.linear import factorize, factorize_shifted, solve_step, substitute
 from assembly.solve.rows import add_row, add_transposed, clear_row, times

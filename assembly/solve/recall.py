@@ -6,6 +6,7 @@ whether there is something | poses, as in the state | of every contact: number, 
 from __future__ import annotations
 
 from assembly._kernel import kernel
+from assembly.constraints.contact_rows import idle_row
 from assembly.constraints.layout import (
     BODIES,
     BODY_F,
@@ -18,7 +19,6 @@ from assembly.constraints.layout import (
     ROWS,
     TRACKED,
 )
-from assembly.constraints.program import idle_row
 from assembly.proximity.solid_contact import CONTACT_RECORD
 
 # Of a contact: its number, its residual, then its record and its gradient.

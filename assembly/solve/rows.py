@@ -52,7 +52,7 @@ from assembly.constraints.sparsity import close_envelope, place_folds
 from assembly.constraints.terms import TAPE_TERM, TERM, TERM_KIND, TERM_TABLE, TERM_TAPE
 from assembly.kinematics.motion import retract
 from assembly.proximity.extremal import into_domain
-from assembly.proximity.solid_contact import FEATURE_F, HELD, PAIR_GAP, PAIR_NORMAL
+from assembly.proximity.solid_contact import FEATURE_F, PAIR_GAP, PAIR_NORMAL, STAYS
 from assembly.proximity.velocity import RATES, ZED
 
 
@@ -347,7 +347,7 @@ def keep_inside(table, pool, row, tracked, k, out):
     if table[row + SHELL_F] >= 0:
         for i in range(FEATURE_F, PAIR_NORMAL + 3):
             out[k, i] = tracked[k, i]
-        out[k, HELD] = tracked[k, HELD]
+        out[k, STAYS] = tracked[k, STAYS]
         # What becomes of edges is up to switching.
         return
     for side in range(2):

@@ -7,8 +7,9 @@ shortened.
 from __future__ import annotations
 
 from assembly._kernel import kernel
+from assembly.constraints.contact_rows import is_guard
 from assembly.constraints.layout import CONTACTS, MOVING, WATCH
-from assembly.constraints.program import evaluate, is_guard
+from assembly.constraints.program import evaluate
 from assembly.constraints.terms import objective
 from assembly.proximity.extremal import BEND
 from assembly.solve.dexterity import add_dexterities

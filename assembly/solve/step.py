@@ -6,7 +6,8 @@ import math
 
 from assembly._kernel import kernel
 from assembly.constraints.layout import MOVING, WATCH
-from assembly.constraints.program import add_row_terms, evaluate
+from assembly.constraints.program import evaluate
+from assembly.constraints.row_terms import add_row_terms
 from assembly.solve.guards import allowed_share
 from assembly.solve.linear import factorize_shifted
 from assembly.solve.multipliers import curve_rows, foresee, weigh_rows

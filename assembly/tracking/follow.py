@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
+from assembly.constraints.contact_rows import track_contact, track_row
 from assembly.constraints.layout import (
     BODIES,
     BODY_F,
@@ -29,7 +30,6 @@ from assembly.constraints.layout import (
     SURFACE_F,
     WATCH,
 )
-from assembly.constraints.program import track_contact, track_row
 from assembly.geometry.spline import BREAKS_U, BREAKS_V, CLOSED_U, CLOSED_V, SPANS_U, SPANS_V
 from assembly.geometry.vec import quaternion_product
 from assembly.proximity.extremal import BEND, CONVERGED, SINGULAR, into_domain

@@ -14,7 +14,8 @@ from assembly.geometry.curve import NurbsCurve
 from assembly.geometry.face import BoundaryPoint, Face
 from assembly.geometry.spline import CURVE_RECORD
 from assembly.geometry.surface import NurbsSurface
-from assembly.geometry.trim import locate_points, nearest_points
+from assembly.geometry.trim import locate_points
+from assembly.geometry.trim_nearest import nearest_points
 from tests.geometry.loops import circle, polygon, polyline, random_face, segment
 
 PLANE = shapes.plane(10.0, 10.0)

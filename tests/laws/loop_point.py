@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from assembly.constraints import layout, program
+from assembly.constraints import layout, program, row_terms
 from assembly.constraints.blocks import BLOCKS, COLUMN, COUNT, FIRST, PLACE, is_blocked
 from assembly.proximity.free_pair import VARIABLES, VECTORS
 from assembly.proximity.solid_contact import CONTACT_RECORD, TRACK
@@ -110,7 +110,7 @@ class LoopPoint:
     def row_terms(self, y, weights=None):
         """Second derivative of y . rows + J^T diag(weights) J, (n, n)."""
         hessian = self.room_for_hessian()
-        program.add_row_terms(
+        row_terms.add_row_terms(
             self.table,
             self.pool,
             self.loose,

@@ -10,7 +10,7 @@ from assembly.geometry.curve import NurbsCurve
 from assembly.geometry.derivative_bounds import derivative_bounds
 from assembly.geometry.face import Face
 from assembly.geometry.surface import NurbsSurface
-from assembly.geometry.trim import nearest_points
+from assembly.geometry.trim_nearest import nearest_points
 from tests.geometry.loops import blob, dense, polygon_winding, random_face, segment
 
 PLANE = shapes.plane(10.0, 10.0)

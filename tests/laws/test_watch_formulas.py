@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from assembly.proximity.watch import turned_by
+from assembly.proximity.allowances import turned_by
 from assembly.proximity.watch_memory import (
     PAIR_MEMORY,
     PLACE,

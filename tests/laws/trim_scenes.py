@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import assembly as asm
-from assembly.constraints import layout, program
+from assembly.constraints import layout, program, row_terms
 from assembly.geometry.curve import NurbsCurve
 from assembly.geometry.face import Face
 from assembly.proximity.free_pair import coordinate_lengths
@@ -172,5 +172,7 @@ class FreePoint:
     def row_terms(self, y, weights):
         """Second derivative of y . rows + J^T diag(weights) J, (n, n)."""
         hessian = np.zeros((self.n, self.n))
-        program.add_row_terms(self.table, self.pool, self.loose, self.room, self.shape, self.point, y, weights, hessian)
+        row_terms.add_row_terms(
+            self.table, self.pool, self.loose, self.room, self.shape, self.point, y, weights, hessian
+        )
         return np.triu(hessian) + np.triu(hessian, 1).T

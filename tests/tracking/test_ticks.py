@@ -7,7 +7,7 @@ import pytest
 
 import assembly as asm
 from assembly.proximity.events import EventKind, EventReason
-from assembly.tracking.tracker import TrackStatus
+from assembly.tracking.tick import TrackStatus
 from benchmarks.hands import paper_clips
 from benchmarks.running import example
 from benchmarks.tracking import hand_of

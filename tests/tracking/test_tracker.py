@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import assembly as asm
-from assembly.tracking.tracker import TrackStatus
+from assembly.tracking.tick import TrackStatus
 from benchmarks.hands import paper_clips
 
 BALL = asm.shapes.sphere(1.0)

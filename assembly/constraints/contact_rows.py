@@ -1,0 +1,234 @@
+"""Rows of contacts: the pair of each is carried to the poses, its gap is the row. `layout.py` says what stands where.
+
+A contact of two surfaces is a pair of points with a common normal, one of solids the closest features of both
+(`proximity/solid_contact.py`). Rows of a clearance are contacts as well, of what its watch has listed.
+"""
+
+from __future__ import annotations
+
+import math
+
+from assembly._kernel import call_address, kernel
+from assembly.constraints.layout import (
+    BODY_F,
+    BODY_G,
+    DEEPEST_AT,
+    FIRST_GUARD,
+    FREE_COLUMN,
+    GUARDS,
+    MINIMUM,
+    NEAREST_AT,
+    ONE_SIDED,
+    ROW,
+    ROW_TABLE,
+    ROWS,
+    SEARCH_AT,
+    SHELL_F,
+    SHELL_G,
+    SURFACE_F,
+    SURFACE_G,
+    TRACK_AT,
+)
+from assembly.geometry.vec import dot, sub
+from assembly.kinematics.motion import relative_pose, rotation
+from assembly.proximity.extremal import CLOSE, CONVERGED, LEFT_PATCH, SINGULAR, solve_pair
+from assembly.proximity.free_pair import free_rows
+from assembly.proximity.solid_contact import CONTACT_RECORD, FEATURE_F, FOLD, PAIR_GAP, PROPER, STAYS, TRACK
+from assembly.proximity.start import global_start
+from assembly.proximity.velocity import GAP, RATES, gradient_row, store_record
+
+
+@kernel(inner=True)
+def track_contact(table, pool, row, q, start, patience, records, k):
+    """Newton on the pair of one row; fills its record. Returns status, parameters, the points' signed distance."""
+    i = table[row + BODY_F]
+    j = table[row + BODY_G]
+    turn = rotation(q, i)
+    relative, shift = relative_pose(q, i, turn, j, rotation(q, j))
+    status, x, _count, frame, curvature = solve_pair(
+        table, pool, table[row + SURFACE_F], table[row + SURFACE_G], relative, shift, start, 1.0, patience, CLOSE
+    )
+    apart = sub(frame[4], frame[3])
+    distance = math.sqrt(dot(apart, apart))
+    if status == CONVERGED or status == SINGULAR:
+        store_record(turn, shift, frame, curvature, records, k)
+        # Relative curvature -H (I + beta A)^-1: indefinite means the surfaces cross beside the point.
+        h = curvature[1]
+        det = h[0] * h[3] - h[1] * h[2]
+        norm2 = h[0] * h[0] + h[1] * h[1] + h[2] * h[2] + h[3] * h[3]
+        records[k, PROPER] = 1.0 if det > -1e-9 * norm2 and h[0] + h[3] <= 0.0 else 0.0
+        records[k, FOLD] = det / norm2 if norm2 > 1e-18 else 0.0
+    return status, x, distance if frame[10] > 0.0 else -distance
+
+
+@kernel(inner=True)
+def restart_contact(table, pool, row, q, records, k):
+    """As `track_contact`, from a global start."""
+    i = table[row + BODY_F]
+    j = table[row + BODY_G]
+    relative, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
+    status, x, _gap = global_start(table, pool, table[row + SURFACE_F], table[row + SURFACE_G], relative, shift, 1.0)
+    if status == CONVERGED or status == SINGULAR:
+        status, x, _distance = track_contact(table, pool, row, q, x, math.inf, records, k)
+    return status, x
+
+
+@kernel(inner=True)
+def search_row(table, pool, row, q, tracked, r):
+    """The closest features of the solids of a row wherever they are, into tracked[r]. Whether there are any."""
+    shell_f = table[row + SHELL_F]
+    shell_g = table[row + SHELL_G]
+    i = table[row + BODY_F]
+    j = table[row + BODY_G]
+    nearest = table[NEAREST_AT]
+    deepest = table[DEEPEST_AT]
+    found = call_address(table[SEARCH_AT], (table, pool, shell_f, shell_g, i, j, q, nearest, deepest, tracked, r))
+    return found == 1
+
+
+@kernel(inner=True)
+def track_row(table, pool, row, q, start, patience, records, tracked, r):
+    """The features of the solids of a row from start[r] on, into tracked[r] and record r. A status."""
+    shell_f = table[row + SHELL_F]
+    shell_g = table[row + SHELL_G]
+    i = table[row + BODY_F]
+    j = table[row + BODY_G]
+    return call_address(table[TRACK_AT], (table, pool, shell_f, shell_g, i, j, q, start, patience, records, tracked, r))
+
+
+@kernel(inline=True)
+def is_guard(table, r):
+    """Whether row r is a clearance's."""
+    return table[FIRST_GUARD] <= r < table[FIRST_GUARD] + table[GUARDS]
+
+
+@kernel(inline=True)
+def idle_row(r, gap, point):
+    """A row that is open by `gap`."""
+    records = point[2]
+    records[r, GAP] = gap
+    records[r, PROPER] = 1.0
+    records[r, FOLD] = 1.0
+    point[3][r] = gap
+
+
+@kernel(inner=True)
+def lost_guard(table, pool, r, start, point, past):
+    """Row r of a clearance whose pair was lost: idle, if its gap would be open, or it is a corner `past` its face.
+
+    What the neighborhood holds now is for the next look to find.
+    """
+    row = table[ROW_TABLE] + ROW * r
+    gap = start[r, PAIR_GAP] - pool[table[row + MINIMUM]]
+    if past:
+        gap = max(gap, 0.0)
+    elif not gap > 0.0:
+        return False
+    idle_row(r, gap, point)
+    # Nothing moves it: its pair is not known.
+    for i in range(RATES, CONTACT_RECORD - 2):
+        point[2][r, i] = 0.0
+    for i in range(FREE_COLUMN):
+        point[4][r, i] = 0.0
+    point[1][r, 0] = math.nan
+    return True
+
+
+@kernel(inner=True)
+def solids_row(table, pool, r, start, patience, point):
+    """Row r, of a contact of solids. Returns whether its pair was found.
+
+    Where the pair that is tracked is lost, the closest one there is takes over, if the row is one-sided or a step may
+    end anywhere: the loop shortens steps as long as it can. A clearance has a watch for that.
+    """
+    q, tracked, records, residual, jacobian = point
+    row = table[ROW_TABLE] + ROW * r
+    status = track_row(table, pool, row, q, start, patience, records, tracked, r)
+    found = status == CONVERGED or status == SINGULAR
+    if not found:
+        if is_guard(table, r):
+            past = start[r, STAYS] > 0.0 and status == LEFT_PATCH
+            return lost_guard(table, pool, r, start, point, past)
+        if table[row + ONE_SIDED] == 1 or patience == math.inf:
+            found = search_row(table, pool, row, q, tracked, r)
+            if found:
+                status = track_row(table, pool, row, q, tracked, math.inf, records, tracked, r)
+                found = status == CONVERGED or status == SINGULAR
+    if found:
+        residual[r] = records[r, GAP] - pool[table[row + MINIMUM]]
+        tracked[r, PAIR_GAP] = records[r, GAP]
+        gradient_row(records, r, jacobian, r)
+    return found
+
+
+@kernel(inner=True)
+def free_contact(table, pool, r, x, loose, point):
+    """Row r, of a contact whose coordinates x are unknowns, and its four rows of tangency."""
+    q, _tracked, _records, residual, jacobian = point
+    free, lengths = loose[0], loose[1]
+    row = table[ROW_TABLE] + ROW * r
+    free_rows(
+        table,
+        pool,
+        table[row + SURFACE_F],
+        table[row + SURFACE_G],
+        table[row + BODY_F],
+        table[row + BODY_G],
+        q,
+        x,
+        (lengths[r, 0], lengths[r, 1], lengths[r, 2], lengths[r, 3]),
+        loose[2],
+        residual,
+        jacobian,
+        r,
+        table[ROWS] + 4 * free[r],
+    )
+    residual[r] -= pool[table[row + MINIMUM]]
+
+
+@kernel(inner=True)
+def contact_row(table, pool, r, start, patience, loose, point):
+    """Row r, of contact r. Returns whether its pair was found.
+
+    A tracked contact is carried from `start` to its extremal pair, by steps that turn no normal by more than
+    `patience`. A free one (free[r] >= 0, its place among the free ones) is evaluated at `start` itself, and its four
+    rows of tangency follow the rows of the program. A one-sided row that loses its pair takes the
+    nearest one there is.
+    """
+    q, tracked, records, residual, jacobian = point
+    row = table[ROW_TABLE] + ROW * r
+    if table[row + BODY_F] < 0:
+        idle_row(r, 1.0, point)
+        return True
+    if table[row + SHELL_F] >= 0:
+        return solids_row(table, pool, r, start, patience, point)
+    for i in range(FEATURE_F, TRACK):
+        tracked[r, i] = start[r, i]
+    x = (start[r, 0], start[r, 1], start[r, 2], start[r, 3])
+    if loose[0][r] < 0:
+        status, x, distance = track_contact(table, pool, row, q, x, patience, records, r)
+        if status != CONVERGED and status != SINGULAR:
+            if table[row + ONE_SIDED] == 0:
+                return False
+            if is_guard(table, r):
+                return lost_guard(table, pool, r, start, point, False)
+            # A one-sided contact is of the nearest pair, whichever that is now.
+            held = status == LEFT_PATCH and distance > 0.0
+            status, x = restart_contact(table, pool, row, q, records, r)
+            if status != CONVERGED and status != SINGULAR:
+                if not held:
+                    return False
+                for i in range(CONTACT_RECORD):
+                    records[r, i] = 0.0
+                records[r, GAP] = distance
+                records[r, PROPER] = 1.0
+                records[r, FOLD] = 1.0
+            elif not records[r, GAP] > 0.0:
+                return False
+        residual[r] = records[r, GAP] - pool[table[row + MINIMUM]]
+        gradient_row(records, r, jacobian, r)
+    else:
+        free_contact(table, pool, r, x, loose, point)
+    tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3] = x
+    tracked[r, PAIR_GAP] = residual[r] + pool[table[row + MINIMUM]]
+    return True

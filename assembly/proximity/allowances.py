@@ -1,0 +1,144 @@
+"""How far a pair of bodies may go until it is looked at again, and which part of that it has gone.
+
+What a look does not list is farther than the pair's allowance: until a point of g has moved by that much, seen from f,
+it cannot touch. Where a motion may bring forth a contact, a ball around these patches of g has an allowance of its own.
+"""
+
+from __future__ import annotations
+
+import math
+
+from assembly._kernel import kernel
+from assembly.geometry.vec import add, dot, matvec, matvec_t, quaternion_matrix, quaternion_product, sub
+from assembly.kinematics.motion import rotation
+from assembly.proximity.bounding_tree import CENTER, NODE_POOL, RADIUS, three
+from assembly.proximity.watch_memory import (
+    ALLOWANCE,
+    BALL,
+    BALL_ALLOWANCE,
+    BALL_PLACE,
+    BALL_RADIUS,
+    CALLED,
+    CALLS,
+    FIRST_REACH,
+    LAST_REACH,
+    LENGTHS,
+    PAIR_F,
+    PAIR_G,
+    PAIR_MEMORY,
+    PAIR_RECORD,
+    PAIR_TABLE,
+    PAIRS,
+    PART,
+    PLACE,
+    REACH,
+    TREE_G,
+    TURN,
+    memory_places,
+)
+
+# Where nothing may move a pair is looked at after every step.
+LEAST_ALLOWANCE = 1e-12
+# A reach is for so many moves as the last ones.
+MOVES = 12.0
+
+
+@kernel(inline=True)
+def quaternion_from(q, i, j):
+    """The turn of body j seen from body i."""
+    return quaternion_product((q[i, 3], -q[i, 4], -q[i, 5], -q[i, 6]), (q[j, 3], q[j, 4], q[j, 5], q[j, 6]))
+
+
+@kernel(inline=True)
+def turned_by(memory, o, e):
+    """|e - e'|, 2 sin(a / 4) of the angle a by which a pair turned since its last look, in the memory at o."""
+    square = 0.0
+    other = 0.0
+    for k in range(4):
+        square += (e[k] - memory[o + TURN + k]) * (e[k] - memory[o + TURN + k])
+        other += (e[k] + memory[o + TURN + k]) * (e[k] + memory[o + TURN + k])
+    return math.sqrt(min(square, other))
+
+
+@kernel(inline=True)
+def moved_from(pool_or_memory, at, memory, was, turn, shift):
+    """How far a point of g, its place on g and where it was in arrays, is from where it was, seen from f."""
+    there = add(matvec(turn, three(pool_or_memory, at)), shift)
+    d = sub(there, three(memory, was))
+    return math.sqrt(dot(d, d))
+
+
+@kernel(inner=True)
+def reach_now(table, pool, watch, memory, p, e, turn, shift):
+    """Keep where the bodies of pair p stand at this look. Returns its reach: for MOVES moves as since the last one."""
+    at = memory_places(table, watch)[0] + PAIR_MEMORY * p
+    lengths = table[watch + LENGTHS]
+    reach = memory[at + REACH]
+    root = table[table[table[watch + PAIR_TABLE] + PAIR_RECORD * p + TREE_G] + NODE_POOL]
+    if not math.isnan(memory[at + TURN]):
+        pace = moved_from(pool, root + CENTER, memory, at + PLACE, turn, shift)
+        pace += 2.0 * pool[root + RADIUS] * turned_by(memory, at, e)
+        pace /= max(memory[CALLS] - memory[at + CALLED], 1.0)
+        reach = min(max(MOVES * pace, pool[lengths + FIRST_REACH]), pool[lengths + LAST_REACH])
+    memory[at + CALLED] = memory[CALLS]
+    center = add(matvec(turn, three(pool, root + CENTER)), shift)
+    for k in range(4):
+        memory[at + TURN + k] = e[k]
+    for k in range(3):
+        memory[at + PLACE + k] = center[k]
+    return reach
+
+
+@kernel(inner=True)
+def allow_ball(memory, at, ball, allowance):
+    """Keep a ball on g and how far what is in it may go, in the memory of its pair; infinite: there is no ball."""
+    memory[at + BALL_ALLOWANCE] = allowance
+    if allowance < math.inf:
+        center, place, memory[at + BALL_RADIUS] = ball
+        for k in range(3):
+            memory[at + BALL + k] = center[k]
+            memory[at + BALL_PLACE + k] = place[k]
+
+
+@kernel(inner=True)
+def part_used(table, pool, watch, memory, p, q):
+    """Which part of its allowances pair p has used at poses q; infinite before its first look.
+
+    A ball's points went no farther than its middle and 2 r |e - e'|: a turn by an angle a about an axis moves a point
+    at a distance r from it by 2 r sin(a / 2), and |e - e'| is 2 sin(a / 4).
+    """
+    o = memory_places(table, watch)[0] + PAIR_MEMORY * p
+    if math.isnan(memory[o + TURN]):
+        return math.inf
+    pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
+    i = table[pair + PAIR_F]
+    j = table[pair + PAIR_G]
+    e = quaternion_from(q, i, j)
+    turn = quaternion_matrix(e[0], e[1], e[2], e[3])
+    shift = matvec_t(rotation(q, i), (q[j, 0] - q[i, 0], q[j, 1] - q[i, 1], q[j, 2] - q[i, 2]))
+    root = table[table[pair + TREE_G] + NODE_POOL]
+    angle = turned_by(memory, o, e)
+    moved = moved_from(pool, root + CENTER, memory, o + PLACE, turn, shift) + 2.0 * pool[root + RADIUS] * angle
+    if not moved > 0.0:
+        return 0.0
+    part = moved / memory[o + ALLOWANCE]
+    if memory[o + BALL_ALLOWANCE] < memory[o + ALLOWANCE]:
+        moved = (
+            moved_from(memory, o + BALL, memory, o + BALL_PLACE, turn, shift) + 2.0 * memory[o + BALL_RADIUS] * angle
+        )
+        part = max(part, moved / memory[o + BALL_ALLOWANCE])
+    return part
+
+
+@kernel(inner=True)
+def largest_part(table, pool, watch, memory, q):
+    """The pair that used the largest part of its allowances at poses q, and that part."""
+    best = -1
+    largest = -1.0
+    for p in range(table[watch + PAIRS]):
+        part = part_used(table, pool, watch, memory, p, q)
+        memory[memory_places(table, watch)[0] + PAIR_MEMORY * p + PART] = part
+        if part > largest:
+            best = p
+            largest = part
+    return best, largest

@@ -1,0 +1,126 @@
+"""What a tick did: how it ended, and where the bodies, the forces and the contacts are then."""
+
+from __future__ import annotations
+
+from enum import Enum
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.proximity.events import Event
+from assembly.solve.settings import COUNT, CURVED, DUAL, HISTORY, OBJECTIVE, VIOLATION
+from assembly.solve.solution import Solution, Status
+
+if TYPE_CHECKING:
+    from assembly.tracking.tracker import Tracker
+
+__all__ = ["Step", "TrackStatus"]
+
+Array = NDArray[np.float64]
+
+
+class TrackStatus(Enum):
+    """How a tick ended; the value says it in a sentence."""
+
+    FOLLOWED = "the constraints hold and the pose is as near to the hand as they allow"
+    APPROACHING = "the constraints hold; the next tick goes on toward the hand"
+    LATE = "the time was spent; the constraints hold at the pose returned"
+    HELD = "no further pose was found that holds; the last one that does is returned"
+    BAD_TARGET = "the target is no finite point or pose; nothing moved"
+    VIOLATED = "the constraints hold at no pose that was found; the violation says by how much"
+
+
+class Step:
+    """What a tick did. Tables are computed when they are read.
+
+    Attributes
+    ----------
+    q : (n, 7)
+        A row a body: x y z qw qx qy qz.
+    feasibility : float
+        Largest violation of a constraint at `q`, in the user's units.
+    status : TrackStatus
+    force, wrench : (3,), (6,)
+        What the assembly exerts on the hand: force, then torque about the followed point, world axes; stiffness times
+        what the hand is ahead.
+    is_minimum : bool or None
+        Whether the second derivative along what the constraints leave free is positive definite; None if not asked.
+    iterations : int
+    seconds : float
+        From the call of `step` to its end.
+    events : tuple of Event
+        Contacts of clearances that came, went, were handed off or merged in this tick.
+    solution : Solution
+        The same pose with all that a solution tells: contacts, multipliers, wrenches of every constraint.
+    """
+
+    def __init__(
+        self,
+        tracker: Tracker,
+        state: Array,
+        status: TrackStatus,
+        target: Array,
+        events: tuple[Event, ...],
+        seconds: float,
+    ) -> None:
+        self._tracker = tracker
+        self._state = state
+        self._target = target
+        self.status = status
+        self.events = events
+        self.seconds = seconds
+
+    @cached_property
+    def q(self) -> Array:
+        """Configuration, (n, 7)."""
+        return self._state[: self._tracker._packed.contacts_at].reshape(-1, 7).copy()
+
+    def _result(self, place: int) -> float:
+        return float(self._state[self._tracker._packed.results_at + place])
+
+    @property
+    def feasibility(self) -> float:
+        """Largest violation of a constraint, in the user's units."""
+        return self._result(VIOLATION)
+
+    @property
+    def stationarity(self) -> float:
+        """Largest component of the Lagrangian's gradient, scaled."""
+        return self._result(DUAL)
+
+    @property
+    def objective(self) -> float:
+        """The objective, the energy of the hand's spring among it."""
+        return self._result(OBJECTIVE) * self._tracker._packed.unit
+
+    @property
+    def iterations(self) -> int:
+        """Steps of the loop."""
+        return int(self._result(COUNT))
+
+    @property
+    def is_minimum(self) -> bool | None:
+        """Whether the reduced Hessian is positive definite; None where it was not asked for."""
+        return {0.0: None, 1.0: True}.get(self._result(CURVED), False)
+
+    @cached_property
+    def wrench(self) -> Array:
+        """Force and torque on the hand, (6,)."""
+        return self._tracker._wrench(self.q, self._target)
+
+    @property
+    def force(self) -> Array:
+        """Force on the hand, (3,)."""
+        return self.wrench[:3]
+
+    @cached_property
+    def solution(self) -> Solution:
+        """The pose as a solution."""
+        tracker = self._tracker
+        status = Status.SOLVED if self.status is TrackStatus.FOLLOWED else Status.ITERATION_LIMIT
+        return Solution(tracker._scene, tracker._packed, self._state, status, self.seconds, np.empty((0, HISTORY)))
+
+    def __repr__(self) -> str:
+        return f"Step({self.status.name}, feasibility={self.feasibility:.1e}, {1e6 * self.seconds:.0f} us)"
