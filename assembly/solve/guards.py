@@ -24,7 +24,7 @@ from assembly.constraints.layout import (
 )
 from assembly.geometry.spline import surface_point
 from assembly.geometry.vec import dot, sub
-from assembly.proximity.allowances import largest_part
+from assembly.proximity.allowances import largest_part, part_used
 from assembly.proximity.solid_contact import FOLD, TRACK
 from assembly.proximity.watch_memory import (
     LENGTHS,
@@ -38,6 +38,7 @@ from assembly.proximity.watch_memory import (
     PAIR_SURFACE_F,
     PAIR_TABLE,
     PAIRS,
+    PART,
     PLACE_MEMORY,
     PLACE_NUMBER,
     TURN,
@@ -179,8 +180,16 @@ def allowed_share(table, pool, memory, here, trial, step, share):
     _pair, end = largest_part(table, pool, table[WATCH], memory, trial[0])
     if end <= 1.0:
         return share
-    _pair, begin = largest_part(table, pool, table[WATCH], memory, here[0])
-    return share * max(0.95 - begin, 0.05) / (end - begin)
+    watch = table[WATCH]
+    at = memory_places(table, watch)[0]
+    allowed = 1.0
+    for p in range(table[watch + PAIRS]):
+        # Of every pair by itself: one that is nearly spent, but hardly moves, is not in the way.
+        end = memory[at + PAIR_MEMORY * p + PART]
+        if end > 1.0:
+            begin = part_used(table, pool, watch, memory, p, here[0])
+            allowed = min(allowed, max(0.95 - begin, 0.05) / (end - begin))
+    return share * allowed
 
 
 @kernel(inner=True)
