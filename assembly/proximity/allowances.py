@@ -20,12 +20,14 @@ from assembly.proximity.watch_memory import (
     BALL_RADIUS,
     CALLED,
     CALLS,
+    CUT_SHORT,
     FIRST_REACH,
     LAST_REACH,
     LENGTHS,
     PAIR_F,
     PAIR_G,
     PAIR_MEMORY,
+    PAIR_MINIMUM,
     PAIR_RECORD,
     PAIR_TABLE,
     PAIRS,
@@ -74,12 +76,16 @@ def reach_now(table, pool, watch, memory, p, e, turn, shift):
     at = memory_places(table, watch)[0] + PAIR_MEMORY * p
     lengths = table[watch + LENGTHS]
     reach = memory[at + REACH]
-    root = table[table[table[watch + PAIR_TABLE] + PAIR_RECORD * p + TREE_G] + NODE_POOL]
+    pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
+    root = table[table[pair + TREE_G] + NODE_POOL]
     if not math.isnan(memory[at + TURN]):
         pace = moved_from(pool, root + CENTER, memory, at + PLACE, turn, shift)
         pace += 2.0 * pool[root + RADIUS] * turned_by(memory, at, e)
         pace /= max(memory[CALLS] - memory[at + CALLED], 1.0)
-        reach = min(max(MOVES * pace, pool[lengths + FIRST_REACH]), pool[lengths + LAST_REACH])
+        # After a step that was cut, as far as it was to go; but it goes no farther where contacts may be born.
+        asked = max(MOVES * pace, min(memory[at + CUT_SHORT], pool[table[pair + PAIR_MINIMUM] + 1]))
+        reach = min(max(asked, pool[lengths + FIRST_REACH]), pool[lengths + LAST_REACH])
+    memory[at + CUT_SHORT] = 0.0
     memory[at + CALLED] = memory[CALLS]
     center = add(matvec(turn, three(pool, root + CENTER)), shift)
     for k in range(4):

@@ -27,6 +27,8 @@ from assembly.geometry.vec import dot, sub
 from assembly.proximity.allowances import largest_part, part_used
 from assembly.proximity.solid_contact import FOLD, TRACK
 from assembly.proximity.watch_memory import (
+    ALLOWANCE,
+    CUT_SHORT,
     LENGTHS,
     NEGLECT,
     PAIR_F,
@@ -186,6 +188,7 @@ def allowed_share(table, pool, memory, here, trial, step, share):
     for p in range(table[watch + PAIRS]):
         # Of every pair by itself: one that is nearly spent, but hardly moves, is not in the way.
         end = memory[at + PAIR_MEMORY * p + PART]
+        memory[at + PAIR_MEMORY * p + CUT_SHORT] = end * memory[at + PAIR_MEMORY * p + ALLOWANCE]
         if end > 1.0:
             begin = part_used(table, pool, watch, memory, p, here[0])
             allowed = min(allowed, max(0.95 - begin, 0.05) / (end - begin))
