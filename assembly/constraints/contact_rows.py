@@ -33,7 +33,7 @@ from assembly.geometry.vec import dot, sub
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.extremal import CLOSE, CONVERGED, LEFT_PATCH, SINGULAR, solve_pair
 from assembly.proximity.free_pair import free_rows
-from assembly.proximity.solid_contact import CONTACT_RECORD, FEATURE_F, FOLD, PAIR_GAP, PROPER, STAYS, TRACK
+from assembly.proximity.solid_contact import CONTACT_RECORD, FOLD, PAIR_GAP, PROPER, STAYS, TRACK
 from assembly.proximity.start import global_start
 from assembly.proximity.velocity import GAP, RATES, gradient_row, store_record
 
@@ -100,6 +100,13 @@ def track_row(table, pool, row, q, start, patience, records, tracked, r):
 def is_guard(table, r):
     """Whether row r is a clearance's."""
     return table[FIRST_GUARD] <= r < table[FIRST_GUARD] + table[GUARDS]
+
+
+@kernel(inline=True)
+def copy_tracked(start, r, tracked):
+    """All that is tracked of a row, also what its kind has no use for: nothing is to depend on what was in memory."""
+    for i in range(TRACK):
+        tracked[r, i] = start[r, i]
 
 
 @kernel(inline=True)
@@ -197,13 +204,12 @@ def contact_row(table, pool, r, start, patience, loose, point):
     """
     q, tracked, records, residual, jacobian = point
     row = table[ROW_TABLE] + ROW * r
+    copy_tracked(start, r, tracked)
     if table[row + BODY_F] < 0:
         idle_row(r, 1.0, point)
         return True
     if table[row + SHELL_F] >= 0:
         return solids_row(table, pool, r, start, patience, point)
-    for i in range(FEATURE_F, TRACK):
-        tracked[r, i] = start[r, i]
     x = (start[r, 0], start[r, 1], start[r, 2], start[r, 3])
     if loose[0][r] < 0:
         status, x, distance = track_contact(table, pool, row, q, x, patience, records, r)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import call_address, kernel
-from assembly.constraints.contact_rows import contact_row
+from assembly.constraints.contact_rows import contact_row, copy_tracked
 from assembly.constraints.layout import (
     CONTACTS,
     COORDINATE,
@@ -136,7 +136,7 @@ def evaluate(table, pool, start, patience, loose, room, point):
         call_address(table[TRIM_ROWS_AT], (table, pool, loose[0], loose[1], q, tracked, records, residual, jacobian))
     for k in range(pairs, table[TRACKED]):
         # Of an angle that no row has, only an input of a dexterity, this is all that is known.
-        tracked[k, 0] = start[k, 0]
+        copy_tracked(start, k, tracked)
     for k in range(table[JOINTS]):
         joint = table[JOINT_TABLE] + JOINT_RECORD * k
         place_frames(pool, table[joint + 2], q, table[joint], table[joint + 1], records, pairs + k)

@@ -10,6 +10,7 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly.constraints.blocks import choose_storage
+from assembly.constraints.contact_rows import copy_tracked
 from assembly.constraints.layout import (
     ANGLE,
     BLOCK_LENGTH,
@@ -52,7 +53,7 @@ from assembly.constraints.sparsity import close_envelope, place_folds
 from assembly.constraints.terms import TAPE_TERM, TERM, TERM_KIND, TERM_TABLE, TERM_TAPE
 from assembly.kinematics.motion import retract
 from assembly.proximity.extremal import into_domain
-from assembly.proximity.solid_contact import FEATURE_F, PAIR_GAP, PAIR_NORMAL, STAYS
+from assembly.proximity.solid_contact import PAIR_GAP
 from assembly.proximity.velocity import RATES, ZED
 
 
@@ -313,8 +314,8 @@ def carry(table, pool, bases, loose, here, d, alpha):
     _q, tracked, records, _residual, jacobian = here
     lengths = loose[1]
     out = loose[4]
-    for k in range(table[CONTACTS], table[TRACKED]):
-        out[k, 0] = tracked[k, 0]
+    for k in range(table[TRACKED]):
+        copy_tracked(tracked, k, out)
     for k in range(table[CONTACTS]):
         row = table[ROW_TABLE] + ROW * k
         if table[row + BODY_F] < 0:
@@ -322,12 +323,11 @@ def carry(table, pool, bases, loose, here, d, alpha):
         f = bases[k, 0]
         g = bases[k, 1]
         u = bases[k, 2]
-        out[k, PAIR_GAP] = tracked[k, PAIR_GAP] + alpha * times(bases, jacobian, k, d)
-        for i in range(4):
-            out[k, i] = tracked[k, i]
-            if u >= 0:
+        out[k, PAIR_GAP] += alpha * times(bases, jacobian, k, d)
+        if u >= 0:
+            for i in range(4):
                 out[k, i] += alpha * d[u + i] / lengths[k, i]
-        if u < 0:
+        else:
             for j in range(4):
                 s = 0.0
                 for i in range(6):
@@ -338,17 +338,13 @@ def carry(table, pool, bases, loose, here, d, alpha):
                 s *= alpha
                 for i in range(4):
                     out[k, i] += records[k, RATES + 4 * i + j] * s
-        keep_inside(table, pool, row, tracked, k, out)
+        keep_inside(table, pool, row, k, out)
 
 
 @kernel(inner=True)
-def keep_inside(table, pool, row, tracked, k, out):
-    """A prediction may run over the end of a patch; Newton starts inside."""
+def keep_inside(table, pool, row, k, out):
+    """A prediction may run over the end of a patch; Newton starts inside. What becomes of edges is up to switching."""
     if table[row + SHELL_F] >= 0:
-        for i in range(FEATURE_F, PAIR_NORMAL + 3):
-            out[k, i] = tracked[k, i]
-        out[k, STAYS] = tracked[k, STAYS]
-        # What becomes of edges is up to switching.
         return
     for side in range(2):
         i = 2 * side
