@@ -282,7 +282,7 @@ class Packed:
         records = np.empty((1, JOINT_FRAMES))
 
         def evaluate(coordinate: Coordinate, near: float) -> float:
-            number = self._frames[id(coordinate.frames)][0]
+            number = self._frames[coordinate.frames]
             i, j, at = self.table[self.table[layout.JOINT_TABLE] + layout.JOINT_RECORD * number :][:3]
             place_frames(self.pool, at, scaled, i, j, records, 0)
             value = float(coordinate_value(coordinate.kind, coordinate.component, records, 0, near)[0])

@@ -44,11 +44,11 @@ class SceneWriter(Writer):
     header : array
         Of the table; filled until the end.
     places : dict
-        The number of a body, by its id.
+        The number of a body.
     shells : dict
         Where the shell of a solid is, by its faces.
     frames : dict
-        The number of a pair of frames, and the pair, by its id.
+        The number of a pair of frames.
     angles : list of Coordinate
         In the order of their tracked values.
     """
@@ -57,17 +57,17 @@ class SceneWriter(Writer):
         super().__init__()
         self.scale = scale
         self.header = np.zeros(layout.HEADER, dtype=np.int64)
-        self.places = {id(body): k for k, body in enumerate(bodies)}
+        self.places = {body: k for k, body in enumerate(bodies)}
         self.shells: dict[tuple[Face, ...], int] = {}
-        self.frames: dict[int, tuple[int, FramePair]] = {}
+        self.frames: dict[FramePair, int] = {}
         self.angles: list[Coordinate] = []
         self._pair_rows = pair_rows
-        self._angle_places: dict[int, int] = {}
+        self._angle_places: dict[Coordinate, int] = {}
         self._tape_room = [0, 0, 0]
 
     def places_of(self, bodies: Iterable[Body]) -> list[int]:
         """The numbers of bodies."""
-        return [self.places[id(body)] for body in bodies]
+        return [self.places[body] for body in bodies]
 
     def surface(self, known: dict[tuple[int, bool], int], face: Face) -> int:
         """Offset of the record of a face; one that is known is written no more."""
@@ -91,10 +91,10 @@ class SceneWriter(Writer):
     def coordinate(self, coordinate: Coordinate) -> tuple[list[int], list[int]]:
         """The fields of a coordinate in a row, and its bodies."""
         frames = coordinate.frames
-        number, _ = self.frames.setdefault(id(frames), (len(self.frames), frames))
+        number = self.frames.setdefault(frames, len(self.frames))
         angle = -1
         if coordinate.kind in (TURN, AZIMUTH):
-            place = self._angle_places.setdefault(id(coordinate), len(self.angles))
+            place = self._angle_places.setdefault(coordinate, len(self.angles))
             if place == len(self.angles):
                 self.angles.append(coordinate)
             angle = self._pair_rows + place
@@ -119,7 +119,7 @@ class SceneWriter(Writer):
     def add_shared(self) -> None:
         """Write what rows and terms asked for: frames, and the room that tapes take."""
         fields: list[int] = []
-        for _, pair in self.frames.values():
+        for pair in self.frames:
             pool = [
                 np.concatenate([frame.origin / self.scale, frame.axes.T.ravel()])
                 for frame in (pair.frame_a, pair.frame_b)

@@ -76,14 +76,14 @@ class TermPacking:
         """A point of a body drawn to a place."""
         _, at = self._writer.add(pool=[weight, *(mark / self._writer.scale), 0.0, 0.0, 0.0])
         self.targets.append((term, at + 4))
-        self._records.append([terms.POINT_DISTANCE, self._writer.places[id(body)], at])
+        self._records.append([terms.POINT_DISTANCE, self._writer.places[body], at])
 
     def _add_turn(self, weight: float, term: FrameDistance) -> None:
         """A body turned to a quaternion: a posture whose place has no weight."""
         lever = term.length / self._writer.scale
         _, at = self._writer.add(pool=[0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, weight * lever**2])
         self.turns.append((term, at + terms.POSTURE_QUATERNION))
-        self._records.append([terms.POSTURE, self._writer.places[id(term.frame.body)], at])
+        self._records.append([terms.POSTURE, self._writer.places[term.frame.body], at])
 
     def _add_posture(self, weight: float, term: Posture) -> None:
         bodies, scale = self._bodies, self._writer.scale
@@ -109,7 +109,7 @@ class TermPacking:
         direction = np.zeros(6) if term.direction is None else np.resize(term.direction, 6)
         turn = task.length if task.task == "pose" else 1.0
         _, at = writer.add(pool=[weight, *(task.origin / writer.scale), writer.scale, turn, *direction, *factors])
-        self._records.append([terms.DEXTERITY, writer.places[id(task.tip.body)], at, writer.add(fields)[0]])
+        self._records.append([terms.DEXTERITY, writer.places[task.tip.body], at, writer.add(fields)[0]])
         writer.header[layout.DEXTERITIES] += 1
 
     def write(self) -> None:

@@ -32,12 +32,12 @@ class Turns:
     """
 
     def __init__(self, angles: Sequence[Coordinate], equations: Sequence[tuple[Equation, int]]) -> None:
-        self._places = {id(angle): k for k, angle in enumerate(angles)}
+        self._places = {angle: k for k, angle in enumerate(angles)}
         self._drives: list[int | None] = [None] * len(angles)
         self._limits: list[list[Equation]] = [[] for _ in angles]
         self._couplings = [equation for equation, _ in equations if len(equation.terms) > 1]
         for equation, at in equations:
-            k = self._places.get(id(equation.terms[0][1]))
+            k = self._places.get(equation.terms[0][1])
             if k is None or len(equation.terms) > 1:
                 continue
             if equation.one_sided:
@@ -45,21 +45,21 @@ class Turns:
             else:
                 self._drives[k] = at
         self._driven = [(k, drive) for k, drive in enumerate(self._drives) if drive is not None]
-        coupled = {id(coordinate) for equation in self._couplings for _, coordinate in equation.terms}
-        self._coupled = [id(angle) in coupled for angle in angles]
+        coupled = {coordinate for equation in self._couplings for _, coordinate in equation.terms}
+        self._coupled = [angle in coupled for angle in angles]
         # Driven coordinates, slides too, and all that couplings move with them.
         self._targets = {
-            id(equation.terms[0][1]): equation
+            equation.terms[0][1]: equation
             for equation, _ in equations
             if len(equation.terms) == 1 and not equation.one_sided and equation.source is not None
         }
         led = set(self._targets)
         for _ in self._couplings:
             for equation in self._couplings:
-                sides = {id(coordinate) for _, coordinate in equation.terms}
+                sides = {coordinate for _, coordinate in equation.terms}
                 if sides & led:
                     led |= sides
-        self._led = [id(angle) in led for angle in angles]
+        self._led = [angle in led for angle in angles]
 
     @property
     def coupled(self) -> bool:
@@ -98,10 +98,10 @@ class Turns:
     def _follow(self, equation: Equation, near: Array, known: list[bool], evaluate: Evaluate) -> bool:
         """Find the turn of one side of a coupling from the other; whether there was one to find."""
         for (factor, this), (other_factor, other) in (equation.terms, equation.terms[::-1]):
-            k = self._places.get(id(this))
-            j = self._places.get(id(other))
+            k = self._places.get(this)
+            j = self._places.get(other)
             if k is not None and not known[k] and (j is None or known[j]):
-                target = self._targets.get(id(other))
+                target = self._targets.get(other)
                 if target is not None:
                     value = target.current()
                 else:

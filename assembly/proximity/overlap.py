@@ -1,8 +1,9 @@
 """Whether two bodies are in each other, whatever extrema there are, and which roots are of far sides: by facets.
 
-A patch whose middle is inside the other body says so by its foot there, where nothing is between the two. A segment is
-inside a body or outside by how many facets it cuts. Of a body that is wholly inside another one every ray cuts an odd
-number; so do some rays from outside a tube with open ends, but not three of three points.
+A patch whose middle is inside the other body says so by its foot there, where nothing is between the two; a part of an
+edge that goes through a face does (`piercing.py`). A segment is inside a body or outside by how many facets it cuts. Of
+a body that is wholly inside another one every ray cuts an odd number; so do some rays from outside a tube with open
+ends, but not three of three points.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly.geometry.spline import SIGN, surface_point
 from assembly.geometry.trim import trim_side
-from assembly.geometry.vec import add, cross, dot, matvec, matvec_t, scale, sub
+from assembly.geometry.vec import add, matvec, matvec_t, scale, sub
 from assembly.proximity.bounding_tree import (
     CENTER,
     CHILD,
@@ -32,6 +33,7 @@ from assembly.proximity.bounding_tree import (
 from assembly.proximity.feet import foot_of
 from assembly.proximity.folds import BESIDE
 from assembly.proximity.near_root import is_within
+from assembly.proximity.piercing import cut_at, pierces
 from assembly.proximity.roots import GAP, POINT_F, POINT_G
 from assembly.proximity.shell import FACE_RECORD, FACE_TABLE, FACE_TRIM, FACES
 from assembly.proximity.switching import feature_at
@@ -59,27 +61,6 @@ def meets_box(pool, o, a, d):
             lo = max(lo, min(s, t))
             hi = min(hi, max(s, t))
     return lo <= hi
-
-
-@kernel(inline=True)
-def cut_at(a, d, p, q, r, end):
-    """Where a segment from a along d cuts a triangle (Möller and Trumbore): whether it does, which part of the way.
-
-    And the shares of q and of r there, and whether it goes to the side to which the corners turn left. What is nearer
-    to an end than that part of the segment does not count.
-    """
-    e = sub(q, p)
-    f = sub(r, p)
-    h = cross(d, f)
-    det = dot(e, h)
-    if abs(det) < 1e-300:
-        return False, 0.0, 0.0, 0.0, False
-    s = sub(a, p)
-    u = dot(s, h) / det
-    w = cross(s, e)
-    v = dot(d, w) / det
-    t = dot(f, w) / det
-    return u >= 0.0 and v >= 0.0 and u + v <= 1.0 and end < t < 1.0 - end, t, u, v, det < 0.0
 
 
 @kernel(inner=True)
@@ -302,6 +283,8 @@ def crosses(table, pool, scene, stack, candidates, margin, offsets):
     count = overlapping(table, pool, scene[3][0], scene[3][1], scene[0], scene[1], stack, candidates)
     for c in range(count):
         if is_deep(table, pool, scene, candidates[c, 0], candidates[c, 1], margin, offsets):
+            return True
+        if scene[2][0] < 0 and pierces(table, pool, scene, (candidates[c, 0], candidates[c, 1]), margin, offsets):
             return True
     return is_wholly_inside(table, pool, scene, 0) or is_wholly_inside(table, pool, scene, 1)
 

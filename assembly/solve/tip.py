@@ -200,7 +200,7 @@ def _with_term(packed: Packed, objective: Dexterity) -> tuple[NDArray[np.int64],
     fields = [MEASURES.index(objective.measure), TASKS.index(task.task), len(task.inputs)]
     for k, freedom in enumerate(task.inputs):
         pair = freedom.coordinate.frames
-        bodies = [places[id(frame.body)] for frame in (pair.frame_a, pair.frame_b)]
+        bodies = [places[frame.body] for frame in (pair.frame_a, pair.frame_b)]
         frames += [*bodies, pool.size + 24 * k]
         numbers += [part for frame in (pair.frame_a, pair.frame_b) for part in (frame.origin / scale, frame.axes.T)]
         # Which turn an angle is on is no matter here.
@@ -216,7 +216,7 @@ def _with_term(packed: Packed, objective: Dexterity) -> tuple[NDArray[np.int64],
     extended[layout.JOINTS] = joints + len(task.inputs)
     term = extended.size - terms.TERM
     extended[term + terms.TERM_KIND] = terms.DEXTERITY
-    extended[term + terms.TERM_BODY] = places[id(task.tip.body)]
+    extended[term + terms.TERM_BODY] = places[task.tip.body]
     extended[term + terms.TERM_PARAMETERS] = pool.size + 24 * len(task.inputs)
     extended[term + terms.TERM_TAPE] = term - len(fields)
     return extended, np.concatenate([pool, *(part.ravel() for part in numbers), parameters]), term

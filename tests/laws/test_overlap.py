@@ -12,6 +12,7 @@ from assembly.proximity import watch, watch_memory
 from assembly.proximity.solid_contact import PAIR_GAP, TRACK
 from benchmarks.center_lines import ball_wire, paper_clip_wire, torus_wire
 from benchmarks.wire_oracle import WireOracle
+from tests.solve.test_flat_contacts import BOX, PLATE, apart
 
 WIRES = {
     "clip": (asm.shapes.paper_clip(), paper_clip_wire()),
@@ -60,6 +61,30 @@ def stopped(oracle, rng, gap):
         middle = 0.5 * (low + high)
         low, high = (low, middle) if oracle.gaps(moved(middle))[0] > gap else (middle, high)
     return moved(high)
+
+
+@pytest.mark.parametrize("sides", [(PLATE, PLATE), (BOX, PLATE), (BOX, BOX)], ids=["plates", "on a plate", "boxes"])
+def test_boxes_cross_where_no_axis_separates_them(sides):
+    crossed = judge(asm.shapes.box(*sides[0]), asm.shapes.box(*sides[1]))
+    rng = np.random.default_rng(11)
+    for _ in range(40):
+        turn = Rotation.random(random_state=int(rng.integers(1 << 30))).as_quat(scalar_first=True)
+        start, way = 0.7 * rng.normal(size=3), rng.normal(size=3)
+        way /= np.linalg.norm(way)
+
+        def moved(far, turn=turn, start=start, way=way):
+            return np.array([[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], [*(start + far * way), *turn]])
+
+        low, high = 0.0, 10.0
+        while high - low > 1e-13:
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if apart(moved(middle), sides) > 0.0 else (middle, high)
+        # Touching, a hair apart, and from where they only just cross to wherever they began.
+        for far in (high, high + 1e-9, high + 1e-3):
+            assert not crossed(moved(far))[0]
+        for far in (high - 1e-3, high - 0.05, 0.5 * high, 0.0):
+            told, deepest = crossed(moved(far))
+            assert apart(moved(far), sides) > -1e-4 or told or deepest < 0.0
 
 
 @pytest.mark.parametrize(
