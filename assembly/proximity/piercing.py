@@ -1,8 +1,9 @@
-"""Edges of one body that go through faces of the other: where thin plates cross no middle of a patch is in the other.
+"""Edges of one body that go through flat faces of the other: where plates cross no middle of a patch is in the other.
 
-A part of an edge is its chord here, a patch two facets; both are off by what they bend. A chord counts as going through
-a facet where its ends are farther from the facet's plane than that, on either side, and where it cuts the facet farther
-than that inside of the face's boundary: bodies that touch along edges do not cross.
+A part of an edge is its chord here, off by what it bends. The edge goes through the plane of a patch where the ends of
+the chord are farther from it than that, on either side; and through the face, where all points of the plane that are as
+near to the chord are inside of the face's boundary: bodies that touch along edges do not cross. Facets of a bent face
+stand out of it where it is hollow, so that a peg in a bore may cut them: of such faces nothing is told here.
 """
 
 from __future__ import annotations
@@ -15,13 +16,15 @@ from assembly._kernel import kernel
 from assembly.geometry.spline import surface_point
 from assembly.geometry.trim import trim_side
 from assembly.geometry.vec import add, cross, dot, matvec, matvec_t, scale, sub
-from assembly.proximity.bounding_tree import ELEMENT, ELEMENT_FEATURE, ELEMENT_POOL
+from assembly.proximity.bounding_tree import COS, ELEMENT, ELEMENT_FEATURE, ELEMENT_POOL, SIN, node_of
 from assembly.proximity.edge_frame import edge_jet, edge_limits
 from assembly.proximity.shell import EDGE, FACE, FACE_RECORD, FACE_TABLE, FACE_TRIM
 from assembly.proximity.switching import feature_at, feature_kind
 
 # A part of an edge is looked at with so much of its neighbors, in half widths: what goes through where two meet counts.
 WIDER = 1.5
+# Sine of the angle by which normals of a flat patch turn, at most.
+FLAT = 1e-9
 
 
 @kernel(inline=True)
@@ -73,7 +76,10 @@ def is_well_inside(table, pool, trim, u, v, du, dv):
 
 @kernel(inner=True)
 def goes_through(table, pool, tree, shell, e, a, b, margin):
-    """Whether a chord goes through the face of a body at a patch, by more than a margin; body axes."""
+    """Whether what is within a margin of a chord goes through the face of a body at a flat patch; body axes."""
+    node = node_of(table, pool, tree, e)
+    if pool[node + COS] <= 0.0 or pool[node + SIN] > FLAT:
+        return False
     o = table[tree + ELEMENT_POOL] + ELEMENT * e
     code = np.int64(pool[o + ELEMENT_FEATURE])
     face = table[shell + FACE_TABLE] + FACE_RECORD * code
@@ -95,8 +101,10 @@ def goes_through(table, pool, tree, shell, e, a, b, margin):
             continue
         if table[face + FACE_TRIM] < 0:
             return True
-        du = margin * wide / max(math.sqrt(dot(sub(s, t), sub(s, t))), margin)
-        dv = margin * high / max(math.sqrt(dot(sub(s, q), sub(s, q))), margin)
+        # A chord that leans over the plane is near to more of it.
+        beside = margin * math.sqrt(dot(n, n) * dot(sub(b, a), sub(b, a))) / abs(dot(n, sub(b, a)))
+        du = beside * wide / max(math.sqrt(dot(sub(s, t), sub(s, t))), 1e-300)
+        dv = beside * high / max(math.sqrt(dot(sub(s, q), sub(s, q))), 1e-300)
         here_u = u + (x + y if k == 0 else x) * wide
         here_v = v + (y if k == 0 else x + y) * high
         if is_well_inside(table, pool, table[face + FACE_TRIM], here_u, here_v, du, dv):

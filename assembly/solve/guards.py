@@ -189,8 +189,8 @@ def allowed_share(table, pool, memory, here, trial, step, share):
         # Of every pair by itself: one that is nearly spent, but hardly moves, is not in the way.
         end = memory[at + PAIR_MEMORY * p + PART]
         memory[at + PAIR_MEMORY * p + CUT_SHORT] = end * memory[at + PAIR_MEMORY * p + ALLOWANCE]
-        if end > 1.0:
-            begin = part_used(table, pool, watch, memory, p, here[0])
+        begin = part_used(table, pool, watch, memory, p, here[0]) if end > 1.0 else end
+        if end > begin:
             allowed = min(allowed, max(0.95 - begin, 0.05) / (end - begin))
     return share * allowed
 

@@ -1,4 +1,7 @@
-"""What the loop is told and what it tells: its settings, its results, its outcomes."""
+"""What the loop is told and what it tells: its settings, its results, its outcomes.
+
+`_kernel.py` stamps its cache with this file: kernels hold these constants.
+"""
 
 from __future__ import annotations
 

@@ -87,6 +87,36 @@ def test_boxes_cross_where_no_axis_separates_them(sides):
             assert apart(moved(far), sides) > -1e-4 or told or deepest < 0.0
 
 
+@pytest.mark.parametrize(("angle", "tilt"), [(0.0, 0.05), (0.1, 0.05), (0.1, 0.1), (0.1, 0.2)])
+def test_a_peg_that_leans_in_a_bore_does_not_cross_it(angle, tilt):
+    # Its edges cut facets of the bore, which stand out into it by four thousandths, and enter at the flat faces' holes.
+    side, length = 0.8 * np.sqrt(2.0), 6.0
+    crossed = judge(asm.shapes.plate(4.0, 4.0, 1.0, [(0.0, 0.0, 1.0)]), asm.shapes.box(side, side, length))
+    turn = (
+        Rotation.from_rotvec([0, 0, angle])
+        * Rotation.from_rotvec([0, tilt, 0])
+        * Rotation.from_rotvec([0, 0, np.pi / 4])
+    )
+    along = np.linspace(-0.5 * length, 0.5 * length, 6001)
+
+    def room(far):
+        least = np.inf
+        for x, y in ((0.5, 0.5), (0.5, -0.5), (-0.5, 0.5), (-0.5, -0.5)):
+            points = turn.apply(np.stack([np.full_like(along, x * side), np.full_like(along, y * side), along], axis=1))
+            points += far * np.array([np.cos(angle), np.sin(angle), 0.0])
+            points = points[np.abs(points[:, 2]) <= 0.5]
+            least = min(least, (1.0 - np.hypot(points[:, 0], points[:, 1])).min())
+        return least
+
+    low, high = 0.0, 1.0
+    while high - low > 1e-9:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if room(middle) > 1e-3 else (low, middle)
+    place = low * np.array([np.cos(angle), np.sin(angle), 0.0])
+    q = np.array([[0.0, 0.0, 0.0, *UPRIGHT], [*place, *turn.as_quat(scalar_first=True)]])
+    assert room(low) > 0.9e-3 and not crossed(q)[0]
+
+
 @pytest.mark.parametrize(
     ("f", "g"),
     [("clip", "clip"), ("ring", "clip"), ("thick ring", "clip"), ("ball", "clip"), ("ball", "ring")],
