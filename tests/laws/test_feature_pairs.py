@@ -226,6 +226,11 @@ class Case:
                 out[2 * side + k] = np.linalg.norm(tangent)
         return out
 
+    @property
+    def moves(self):
+        """Whether each parameter is solved for: a vertex has none, a point of an edge keeps its own."""
+        return np.repeat([self.f.kind != EDGE_POINT, self.g.kind != EDGE_POINT], 2) & (self.x != 0.0)
+
 
 def random_cases(kind_f, kind_g, count):
     """Pairs of two kinds at all gaps they can have, away from singular ones."""
@@ -254,8 +259,7 @@ def cases(request):
 def test_pairs_are_found_from_nearby(cases):
     rng = np.random.default_rng(8)
     for case in cases:
-        moves = np.repeat([case.f.kind != EDGE_POINT, case.g.kind != EDGE_POINT], 2) & (case.x != 0.0)
-        start = case.x + 1e-3 / case.speed * rng.uniform(-1.0, 1.0, 4) * moves
+        start = case.x + 1e-3 / case.speed * rng.uniform(-1.0, 1.0, 4) * case.moves
         status, out = case.packed.solve(case.q, start, case.n)
         assert status == "CONVERGED"
         # Rounding of lengths near ten, times rates below ten.
