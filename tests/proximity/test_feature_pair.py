@@ -14,8 +14,8 @@ from assembly.proximity import extremal_pair, gap_hessian
 from assembly.proximity.feature_query import FOLD, GAP, ISOLATED, NORMAL, PAIR, POINT_F, PROPER
 from assembly.proximity.shell import EDGE, FACE, VERTEX
 from tests.laws.feature_scenes import Feature, Packed, random_feature
-from tests.laws.test_feature_pairs import KINDS
 from tests.laws.scenes import quaternion_of, random_quaternion
+from tests.laws.test_feature_pairs import KINDS
 from tests.laws.witness import rotated
 
 HOME = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
