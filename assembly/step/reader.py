@@ -23,6 +23,7 @@ from assembly.kinematics.pose import Pose, axes_quaternion
 from assembly.step.faces import read_face
 from assembly.step.occt import occt, parts, quiet, settings
 from assembly.step.profiles import Unreadable
+from assembly.step.syntax import first_fault, is_step
 from assembly.step.tree import Color, Part, free_labels, leaves
 
 __all__ = ["UNITS", "StepError", "StepWarning", "read_step"]
@@ -62,7 +63,7 @@ class StepWarning(UserWarning):
 
 
 class _Damaged(StepError):
-    """A file with entities that OCCT could not load."""
+    """A file whose text is damaged, or with entities that OCCT could not load."""
 
 
 @dataclass
@@ -86,10 +87,17 @@ def checked_unit(unit: str) -> float:
 def document_of(path: str, damaged: bool = False) -> tuple[Any, int]:
     """The file as a document of OCCT, in millimeters, and the number of its faces.
 
-    Entities that OCCT cannot load may end the process when it makes shapes of them, or some later time: a file that has
-    such ones is refused unless it may be `damaged`.
+    Entities that OCCT cannot load may end the process when it makes shapes of them, or some later time, and text that
+    is no STEP file's may hold up its parser for good: a file that has such is refused unless it may be `damaged`.
     """
     o = occt()
+    if not damaged:
+        text = Path(path).read_bytes()
+        if not is_step(text):
+            raise StepError(f"path is {path!r}; expected a STEP file, which begins with ISO-10303-21")
+        line = first_fault(text)
+        if line is not None:
+            raise _Damaged(f"path is {path!r}; its text is damaged in line {line}")
     # Settings exist once there is a reader.
     reader = o.STEPCAFControl_Reader()
     auto = o.XCAFDoc_ShapeTool.AutoNaming_s()
@@ -133,13 +141,13 @@ def _read_apart(path: str, unit: str, strict: bool, damage: str) -> tuple[list[B
                 errors="replace",
             )
         except subprocess.TimeoutExpired:
-            raise StepError(f"{damage}, and reading the others took more than {PATIENCE:g} seconds") from None
+            raise StepError(f"{damage}, and reading the rest took more than {PATIENCE:g} seconds") from None
         except OSError as error:
             raise StepError(f"{damage}, and no other process can be started to read it: {error}") from None
         if 0 < ended.returncode < ENDED:
             raise StepError(f"{damage}, and another process cannot read it: {ended.stderr.strip()[-200:]}")
         if ended.returncode != 0:
-            raise StepError(f"{damage}, and OCCT cannot do without them")
+            raise StepError(f"{damage}, and OCCT cannot read the rest")
         rest, arrays = pickle.loads(answer.read_bytes())
     found = pickle.loads(rest, buffers=arrays)
     if isinstance(found, Exception):

@@ -289,9 +289,9 @@ def arrays_of(thing, seen=None):
 @pytest.mark.parametrize(
     ("child", "why"),
     [
-        ("import os; os.abort()", "OCCT cannot do without them"),
+        ("import os; os.abort()", "OCCT cannot read the rest"),
         ("raise SystemExit('no such module')", "another process cannot read it: no such module"),
-        ("import time; time.sleep(60.0)", "reading the others took more than 1 seconds"),
+        ("import time; time.sleep(60.0)", "reading the rest took more than 1 seconds"),
     ],
 )
 def test_damaged_files_that_end_the_process_are_refused(damaged, monkeypatch, child, why):
