@@ -15,7 +15,8 @@ from assembly.geometry.spline import BREAKS_U, BREAKS_V, CLOSED_U, CLOSED_V, SPA
 from assembly.proximity.bounding_tree import ELEMENT, ELEMENT_FEATURE, ELEMENT_POOL
 from assembly.proximity.extremal import bent_at_most, move_pair, pair_frame, pair_matrix, pair_step
 from assembly.proximity.folds import ALONE, BESIDE, fold_beyond
-from assembly.proximity.roots import CODE_F, CODE_G, ROOT_BEYOND, ROOT_FOLD, is_alone
+from assembly.proximity.roots import CODE_F, CODE_G, CORNER, ROOT_BEYOND, ROOT_FOLD, is_alone
+from assembly.proximity.switching import POINT
 
 # Steps; and below so many radians, that a step turns a normal, it is as good as there.
 STEPS, CLOSE = 6, 0.02
@@ -73,7 +74,8 @@ def is_known(table, pool, scene, e, d, roots, count):
     for k in range(count):
         if roots[k, CODE_F] != codes[0] or roots[k, CODE_G] != codes[1]:
             continue
-        if not roots[k, ROOT_FOLD] > ALONE:
+        if not roots[k, ROOT_FOLD] > ALONE or roots[k, CORNER] == POINT:
+            # A point that stays where it is on an edge is no root: where the edge is nearest may be beside it.
             continue
         x = (roots[k, 0], roots[k, 1], roots[k, 2], roots[k, 3])
         if not is_beside(table, pool, scene[2], x, start, half, BESIDE):

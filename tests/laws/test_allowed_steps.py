@@ -1,0 +1,160 @@
+"""How much of a step looks allow, and which roots stand for what is around them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import assembly as asm
+from assembly.constraints.layout import MOVING, WATCH
+from assembly.proximity import watch
+from assembly.proximity.allowances import part_used
+from assembly.proximity.bounding_tree import ELEMENT, ELEMENT_FEATURE, ELEMENT_POOL
+from assembly.proximity.near_root import is_known
+from assembly.proximity.roots import CORNER, ROOT, ROOT_BEYOND, ROOT_FOLD
+from assembly.proximity.shell import EDGE, FACE
+from assembly.proximity.solid_contact import TRACK
+from assembly.proximity.switching import FEATURES, NOTHING, POINT, feature_kind
+from assembly.proximity.watch_memory import (
+    ALLOWANCE,
+    CUT_SHORT,
+    PAIR_F,
+    PAIR_G,
+    PAIR_MEMORY,
+    PAIR_RECORD,
+    PAIR_SHELL_F,
+    PAIR_SHELL_G,
+    PAIR_SURFACE_F,
+    PAIR_SURFACE_G,
+    PAIR_TABLE,
+    PAIRS,
+    TREE_F,
+    TREE_G,
+    memory_places,
+)
+from assembly.solve.guards import allowed_share
+from assembly.solve.rows import move
+
+RINGS = 4
+
+
+class Looked:
+    """A chain of rings, looked at where they stand."""
+
+    def __init__(self, rng):
+        rings = []
+        for k in range(RINGS):
+            turn = Rotation.random(rng=rng).as_quat(scalar_first=True)
+            rings.append(asm.Body(f"ring {k}", asm.shapes.torus(5.0, 0.5), (7.0 * k, 0.0, 0.0), turn))
+        scene = asm.Assembly(rings)
+        scene.constrain(asm.Clearance())
+        self.packed = packed = scene.packed()
+        self.table, self.pool, self.watch = packed.table, packed.pool, packed.table[WATCH]
+        self.memory = packed._memory.copy()
+        self.q = scene.q.copy()
+        self.q[:, :3] = (self.q[:, :3] - packed.reference) / packed.scale
+        tracked = np.full((packed.tracked, TRACK), np.nan)
+        watch.look(self.table, self.pool, self.watch, self.memory, self.q, tracked, watch.EVERYTHING)
+        self.pairs = range(int(self.table[self.watch + PAIRS]))
+
+    def parts(self, q):
+        """Which parts of their allowances pairs have used."""
+        return np.array([part_used(self.table, self.pool, self.watch, self.memory, p, q) for p in self.pairs])
+
+    def moved(self, q, step, share):
+        out = q.copy()
+        move(self.table, q, step, share, out)
+        return out
+
+    def allowed(self, q, step, share):
+        trial = q.copy()
+        return allowed_share(self.table, self.pool, self.memory, (q,), (trial,), step, share)
+
+    def column(self, k):
+        at = memory_places(self.table, self.watch)[0]
+        return self.memory[at:][: PAIR_MEMORY * len(self.pairs)].reshape(len(self.pairs), -1)[:, k]
+
+
+def test_steps_end_within_what_looks_allow():
+    rng = np.random.default_rng(8)
+    cuts = 0
+    for _ in range(10):
+        looked = Looked(rng)
+        n = 6 * int(looked.table[MOVING])
+        for size in (1e-4, 1e-2, 0.03, 0.1):
+            before = looked.moved(looked.q, 1e-4 * rng.normal(size=n), 1.0)
+            step = size * rng.normal(size=n)
+            begin, end = looked.parts(before), looked.parts(looked.moved(before, step, 1.0))
+            if begin.max() > 0.9:
+                continue
+            share = looked.allowed(before, step, 1.0)
+            cut = end.max() > 1.0
+            assert share == 1.0 if not cut else 0.0 < share < 1.0
+            # Norms of what moves are below their chords; of turns by a tenth of a radian hardly above.
+            assert looked.parts(looked.moved(before, step, share)).max() <= (0.96 if cut else 1.0)
+            if cut:
+                cuts += 1
+                # What is asked of the next looks: as far as each pair was to go.
+                np.testing.assert_allclose(looked.column(CUT_SHORT), end * looked.column(ALLOWANCE), rtol=1e-12)
+    assert cuts > 10
+
+
+def test_a_pair_that_is_nearly_spent_and_hardly_moves_is_not_in_the_way():
+    looked = Looked(np.random.default_rng(9))
+    at = looked.table[looked.watch + PAIR_TABLE] + PAIR_RECORD * np.array(looked.pairs)
+    bodies = looked.table[np.add.outer(at, [PAIR_F, PAIR_G])]
+    allowances = looked.column(ALLOWANCE).copy()
+    # Of the pair with the least allowance nearly all is used by one body; others of that body have more.
+    spent = int(np.argmin(allowances))
+    apart = next(p for p in looked.pairs if not set(bodies[p]) & set(bodies[spent]))
+    q, step = looked.q.copy(), np.zeros(6 * int(looked.table[MOVING]))
+    q[bodies[spent, 1], 2] += 0.99 * allowances[spent]
+    assert looked.parts(q).max() == pytest.approx(0.99, abs=1e-9)
+    # Another pair is to go five times as far as it may.
+    step[6 * bodies[apart, 1] + 2] = 5.0 * allowances[apart]
+    step[6 * bodies[spent, 1] + 2] = 1e-4 * allowances[spent]
+    begin, end = looked.parts(q), looked.parts(looked.moved(q, step, 1.0))
+    assert begin[spent] > 0.98 and 0.98 < end[spent] < 1.0
+    # As if each pair were alone; together the spent one would leave them a twentieth.
+    asked = [(0.95 - b) / (e - b) for b, e in zip(begin, end, strict=True) if e > 1.0]
+    assert looked.allowed(q, step, 1.0) == pytest.approx(min(asked), rel=1e-9)
+    assert min(asked) > 1.5 * 0.05 / (end.max() - begin.max())
+    # One that goes on is allowed a twentieth.
+    step[:] = 0.0
+    step[6 * bodies[spent, 1] + 2] = allowances[spent]
+    assert looked.allowed(q, step, 1.0) == pytest.approx(0.05, rel=1e-9)
+
+
+def test_a_point_that_stays_on_an_edge_is_no_root():
+    can = asm.Body("can", asm.shapes.solid_cylinder(0.4, 1.0), (0.0, 0.0, 0.55))
+    scene = asm.Assembly([asm.Body("plate", asm.shapes.box(4.0, 4.0, 0.1), fixed=True), can])
+    scene.constrain(asm.Clearance())
+    packed = scene.packed()
+    table, pool = packed.table, packed.pool
+    pair = table[table[WATCH] + PAIR_TABLE]
+    trees = (table[pair + TREE_F], table[pair + TREE_G])
+    shells = (table[pair + PAIR_SHELL_F], table[pair + PAIR_SHELL_G])
+    there = (table[pair + PAIR_SURFACE_F], table[pair + PAIR_SURFACE_G], *shells)
+    looked_into = (None, None, there, trees, None)
+    elements = [
+        [(k, *pool[table[tree + ELEMENT_POOL] + ELEMENT * k :][:ELEMENT]) for k in range(table[tree + 3])]
+        for tree in trees
+    ]
+    seen = 0
+    for e in elements[0]:
+        for d in elements[1]:
+            kinds = (
+                feature_kind(table, shells[0], int(e[1 + ELEMENT_FEATURE])),
+                feature_kind(table, shells[1], int(d[1 + ELEMENT_FEATURE])),
+            )
+            if kinds != (FACE, EDGE):
+                continue
+            roots = np.zeros((1, ROOT))
+            roots[0, :6] = [*e[1:3], *d[1:3], e[1 + ELEMENT_FEATURE], d[1 + ELEMENT_FEATURE]]
+            roots[0, ROOT_FOLD], roots[0, ROOT_BEYOND] = 1.0, np.nan
+            for corner, known in ((NOTHING, True), (FEATURES, True), (POINT, False)):
+                roots[0, CORNER] = corner
+                assert is_known(table, pool, looked_into, e[0], d[0], roots, 1)[2] == known
+            seen += 1
+    assert seen > 4
