@@ -63,6 +63,61 @@ def stopped(oracle, rng, gap):
     return moved(high)
 
 
+def from_box(half, p):
+    """The distance of a point outside a box of half widths from it."""
+    return np.linalg.norm(np.maximum(np.abs(p) - half, 0.0))
+
+
+def from_cylinder(half, p):
+    """The distance of a point outside a cylinder about z from it: of half widths (radius, radius, half height)."""
+    return np.hypot(max(np.hypot(p[0], p[1]) - half[0], 0.0), max(abs(p[2]) - half[2], 0.0))
+
+
+SOLIDS = {
+    "box": (asm.shapes.box(1.0, 0.8, 0.6), (0.5, 0.4, 0.3), from_box),
+    "plate": (asm.shapes.box(*PLATE), 0.5 * np.array(PLATE), from_box),
+    "cylinder": (asm.shapes.solid_cylinder(0.4, 1.0), (0.4, 0.4, 0.5), from_cylinder),
+    "disc": (asm.shapes.solid_cylinder(1.0, 0.05), (1.0, 1.0, 0.025), from_cylinder),
+}
+
+
+def dented(rng, half, distance, depth):
+    """A random turn, and where a ball of radius 0.5 is that a solid cuts into by a depth."""
+    turn = Rotation.random(random_state=int(rng.integers(1 << 30)))
+    on = np.array(half) * rng.uniform(-1.0, 1.0, 3)
+    way = rng.normal(size=3)
+    low, high = 0.0, 10.0
+    while high - low > 1e-14:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if distance(half, on + middle * way) < 0.5 - depth else (low, middle)
+    return np.array([[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], [*(on + high * way), *turn.as_quat(scalar_first=True)]])
+
+
+@pytest.mark.parametrize("name", SOLIDS)
+def test_balls_into_which_corners_and_edges_cut_are_told_of_to_any_depth(name):
+    shape, half, distance = SOLIDS[name]
+    judged, rng = judge(shape, asm.shapes.sphere(0.5)), np.random.default_rng(13)
+    for _ in range(60):
+        depth = 10.0 ** rng.uniform(-8.0, -2.0)
+        crossed, gap = judged(dented(rng, half, distance, depth))
+        # Rounding of lengths of order one; how deep the deepest contact is says all.
+        assert gap == pytest.approx(-depth, abs=1e-12)
+        assert not crossed or depth > 1e-6
+
+
+@pytest.mark.parametrize("name", SOLIDS)
+def test_bodies_that_begin_in_each_other_are_pushed_apart(name):
+    shape, half, distance = SOLIDS[name]
+    rng = np.random.default_rng(14)
+    for _ in range(40):
+        q = dented(rng, half, distance, 10.0 ** rng.uniform(-5.0, -2.0))
+        scene = asm.Assembly([asm.Body("f", shape, fixed=True), asm.Body("g", asm.shapes.sphere(0.5))])
+        scene.constrain(asm.Clearance())
+        solution = scene.solve(q)
+        assert solution.success
+        assert distance(half, solution.q[1, :3]) > 0.5 - 1e-10
+
+
 @pytest.mark.parametrize("sides", [(PLATE, PLATE), (BOX, PLATE), (BOX, BOX)], ids=["plates", "on a plate", "boxes"])
 def test_boxes_cross_where_no_axis_separates_them(sides):
     crossed = judge(asm.shapes.box(*sides[0]), asm.shapes.box(*sides[1]))
