@@ -58,31 +58,44 @@ def element_ball(table, pool, tree, e):
     return three(pool, o + CENTER), pool[o + RADIUS]
 
 
+@kernel(inline=True)
+def along_normal(pool, o, p, axis_g, apart, n):
+    """How far a patch g is from a patch f along a unit normal n from f to g: their middles, and how thick they are.
+
+    A patch leaves its plane by no more than its radius times the sine of the angle by which its normals turn.
+    """
+    off_f = sub(n, three(pool, o + AXIS))
+    off_g = add(n, axis_g)
+    thick = pool[o + RADIUS] * (pool[o + SIN] + math.sqrt(dot(off_f, off_f)))
+    thick += pool[p + RADIUS] * (pool[p + SIN] + math.sqrt(dot(off_g, off_g)))
+    return dot(n, apart), thick
+
+
 @kernel(inner=True)
 def element_distance(table, pool, trees, turn, shift, bulk, e, d):
-    """About the least distance of two elements: that of their boxes, or across the planes of their middle normals.
+    """About the least distance of two elements: that of their boxes, or along a normal of theirs.
 
-    A patch leaves its plane by no more than its radius times the sine of the angle by which its normals turn. Where the
-    planes are in the wrong order by more than that, the bodies are in each other, or these are far sides: -inf.
+    Where they are in the wrong order along one by more than they are thick, the bodies are in each other, or these are
+    far sides: -inf. The normals are those of their middles, and the mean: a large flat patch is thin along its own.
     """
     o = table[trees[0] + NODE_POOL] + NODE * np.int64(pool[table[trees[0] + ELEMENT_POOL] + ELEMENT * e + ELEMENT_NODE])
     p = table[trees[1] + NODE_POOL] + NODE * np.int64(pool[table[trees[1] + ELEMENT_POOL] + ELEMENT * d + ELEMENT_NODE])
     seen = seen_from(pool, p, turn, bulk, shift)
-    square = box_distance(pool, o, p, seen, turn, bulk)
-    apart = sub(seen[0], three(pool, o + CENTER))
+    distance = math.sqrt(box_distance(pool, o, p, seen, turn, bulk))
     if pool[o + COS] <= 0.0 or pool[p + COS] <= 0.0:
-        return math.sqrt(square)
-    n = sub(three(pool, o + AXIS), seen[2])
-    length = math.sqrt(dot(n, n))
+        return distance
+    apart = sub(seen[0], three(pool, o + CENTER))
+    axis = three(pool, o + AXIS)
+    mean = sub(axis, seen[2])
+    length = math.sqrt(dot(mean, mean))
     if length < 1.0:
-        return math.sqrt(square)
-    n = scale(1.0 / length, n)
-    off_f = sub(n, three(pool, o + AXIS))
-    off_g = add(n, seen[2])
-    thick = pool[o + RADIUS] * (pool[o + SIN] + math.sqrt(dot(off_f, off_f)))
-    thick += pool[p + RADIUS] * (pool[p + SIN] + math.sqrt(dot(off_g, off_g)))
-    along = dot(n, apart)
-    return max(math.sqrt(square), along - thick) if along >= -thick else -math.inf
+        return distance
+    for n in (scale(1.0 / length, mean), axis, scale(-1.0, seen[2])):
+        along, thick = along_normal(pool, o, p, seen[2], apart, n)
+        if along < -thick:
+            return -math.inf
+        distance = max(distance, along - thick)
+    return distance
 
 
 @kernel(inner=True)

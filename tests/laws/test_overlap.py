@@ -105,6 +105,20 @@ def test_balls_into_which_corners_and_edges_cut_are_told_of_to_any_depth(name):
         assert not crossed or depth > 1e-6
 
 
+def test_a_ring_that_lies_in_a_plate_is_told_of_where_it_is_deepest():
+    # Patches of the ring are below the large flat face, and far from it by their boxes the more the deeper they are.
+    judged, rng = judge(asm.shapes.box(4.0, 4.0, 0.1), asm.shapes.torus(0.7, 0.1)), np.random.default_rng(15)
+    for _ in range(30):
+        depth, tilt = 10.0 ** rng.uniform(-4.0, -1.4), 10.0 ** rng.uniform(-2.5, -1.0)
+        axis = Rotation.from_rotvec([0.0, 0.0, rng.uniform(0.0, 6.0)]).apply([tilt, 0.0, 0.0])
+        turn = Rotation.from_rotvec(axis) * Rotation.from_rotvec([0.0, 0.0, rng.uniform(0.0, 6.0)])
+        height = 0.05 + 0.1 + 0.7 * np.sin(tilt) - depth
+        place = [*rng.uniform(-0.5, 0.5, 2), height, *turn.as_quat(scalar_first=True)]
+        _crossed, gap = judged(np.array([[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], place]))
+        # Rounding of lengths of order one, over that of the tilt.
+        assert gap == pytest.approx(-depth, abs=1e-12)
+
+
 @pytest.mark.parametrize("name", SOLIDS)
 def test_bodies_that_begin_in_each_other_are_pushed_apart(name):
     shape, half, distance = SOLIDS[name]
