@@ -98,6 +98,7 @@ def document_of(path: str, damaged: bool = False) -> tuple[Any, int]:
         line = first_fault(text)
         if line is not None:
             raise _Damaged(f"path is {path!r}; its text is damaged in line {line}")
+        del text
     # Settings exist once there is a reader.
     reader = o.STEPCAFControl_Reader()
     auto = o.XCAFDoc_ShapeTool.AutoNaming_s()
