@@ -13,7 +13,7 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly.geometry.spline import SIGN, surface_point
 from assembly.geometry.trim import trim_side
-from assembly.geometry.vec import add, matvec, matvec_t, scale, sub
+from assembly.geometry.vec import add, cross, matvec, matvec_t, scale, sub
 from assembly.proximity.bounding_tree import (
     CENTER,
     CHILD,
@@ -37,11 +37,18 @@ from assembly.proximity.piercing import cut_at, pierces
 from assembly.proximity.roots import GAP, POINT_F, POINT_G
 from assembly.proximity.shell import FACE_RECORD, FACE_TABLE, FACE_TRIM, FACES
 from assembly.proximity.switching import feature_at
+from assembly.proximity.tips import unit
 
 # Room for the descent of a segment.
 DEPTH = 256
 # How often Newton's steps to a foot begin again where they end.
 FEET = 4
+# A segment that passes a facet by less than this part of its sides cuts it, where being cut by two is no harm: one
+# through a common side may miss both.
+BETWEEN = 1e-9
+# What is wholly inside is asked of points this far below a surface, and twice as far as the other's facets are off:
+# bodies at one place are in each other.
+BELOW = 1e-6
 
 
 @kernel(inline=True)
@@ -91,10 +98,10 @@ def with_children(stack, used, child):
 
 
 @kernel(inner=True, allocates=True)
-def facets_cut(table, pool, tree, surface, shell, a, d, end):
+def facets_cut(table, pool, tree, surface, shell, a, d, end, beside):
     """How many facets of a body's faces cut the segment from a to a + d, but for that part at its ends; body axes.
 
-    And whether the first of them leads out of the body.
+    Or are beside it, by that part of their sides. And whether the first of them leads out of the body.
     """
     stack = np.empty(DEPTH, np.int64)
     stack[0] = 0
@@ -126,7 +133,7 @@ def facets_cut(table, pool, tree, surface, shell, a, d, end):
         s = surface_point(table, pool, r, u + wide, v + high)[0]
         t = surface_point(table, pool, r, u, v + high)[0]
         for k in range(2):
-            hit, way, x, y, along = cut_at(a, d, p, q if k == 0 else s, s if k == 0 else t, end)
+            hit, way, x, y, along = cut_at(a, d, p, q if k == 0 else s, s if k == 0 else t, end, beside)
             here = (u + (x + y if k == 0 else x) * wide, v + (y if k == 0 else x + y) * high)
             if hit and in_trim(table, pool, shell, code, here[0], here[1]):
                 count += 1
@@ -198,7 +205,7 @@ def is_inside_at(table, pool, tree, surface, shell, e, y, margin, offset):
         return False
     if -distance <= 2.0 * offset:
         return True
-    return facets_cut(table, pool, tree, surface, shell, y, scale(-distance, n), offset / -distance)[0] == 0
+    return facets_cut(table, pool, tree, surface, shell, y, scale(-distance, n), offset / -distance, 0.0)[0] == 0
 
 
 @kernel(inner=True)
@@ -228,8 +235,8 @@ def middle(table, pool, tree, surface, shell, e):
 
 
 @kernel(inner=True)
-def middle_of_part(table, pool, tree, surface, shell, k):
-    """The middle of a patch in the k-th of three parts of a body's patches, and whether there is one.
+def below_part(table, pool, tree, surface, shell, k, below):
+    """A point `below` the middle of a patch in the k-th of three parts of a body's patches, and whether there is one.
 
     The parts are of different faces, if there are some: a point of a face that touches may be taken for inside.
     """
@@ -244,21 +251,24 @@ def middle_of_part(table, pool, tree, surface, shell, k):
             if passed >= patches * k // 3:
                 a, some = middle(table, pool, tree, surface, shell, e)
                 if some:
-                    return a, True
+                    o = table[tree + ELEMENT_POOL] + ELEMENT * e
+                    f = surface_of(table, shell, surface, np.int64(pool[o + ELEMENT_FEATURE]))
+                    _p, su, sv, _uu, _uv, _vv = surface_point(table, pool, f, pool[o], pool[o + 1])
+                    return sub(a, scale(float(table[f + SIGN]) * below, unit(cross(su, sv)))), True
             passed += 1
     return (0.0, 0.0, 0.0), False
 
 
 @kernel(inner=True)
-def is_wholly_inside(table, pool, scene, side):
-    """Whether f (side 0) is wholly inside g, or g in f: by a ray from each of three points of it, each another way."""
+def is_wholly_inside(table, pool, scene, side, below):
+    """Whether f (side 0) is wholly inside g, or g in f: by rays, each another way, from three points `below` it."""
     turn, shift = scene[0], scene[1]
     tree, other = scene[3][side], scene[3][1 - side]
     surface, shell = scene[2][side], scene[2][2 + side]
     # Some direction that no face is likely to lie along, and far enough.
     far = 10.0 * (pool[table[tree + NODE_POOL] + RADIUS] + pool[table[other + NODE_POOL] + RADIUS])
     for k in range(3):
-        a, some = middle_of_part(table, pool, tree, surface, shell, k)
+        a, some = below_part(table, pool, tree, surface, shell, k, below)
         if not some:
             return False
         ray = (0.6012 * far, 0.3517 * far, 0.7174 * far)
@@ -267,7 +277,7 @@ def is_wholly_inside(table, pool, scene, side):
         elif k == 2:
             ray = (0.5218 * far, -0.8125 * far, -0.2601 * far)
         a = matvec_t(turn, sub(a, shift)) if side == 0 else add(matvec(turn, a), shift)
-        cut, leaves = facets_cut(table, pool, other, scene[2][1 - side], scene[2][3 - side], a, ray, 0.0)
+        cut, leaves = facets_cut(table, pool, other, scene[2][1 - side], scene[2][3 - side], a, ray, 0.0, 0.0)
         # In a bore that is open at its ends a ray goes into the material.
         if cut % 2 == 0 or not leaves:
             return False
@@ -286,7 +296,9 @@ def crosses(table, pool, scene, stack, candidates, margin, offsets):
             return True
         if scene[2][0] < 0 and pierces(table, pool, scene, (candidates[c, 0], candidates[c, 1]), margin, offsets):
             return True
-    return is_wholly_inside(table, pool, scene, 0) or is_wholly_inside(table, pool, scene, 1)
+    return is_wholly_inside(table, pool, scene, 0, BELOW + 2.0 * offsets[1]) or is_wholly_inside(
+        table, pool, scene, 1, BELOW + 2.0 * offsets[0]
+    )
 
 
 @kernel(inner=True)
@@ -300,9 +312,11 @@ def is_outside(table, pool, scene, roots, k, offsets):
     a = (roots[k, POINT_F], roots[k, POINT_F + 1], roots[k, POINT_F + 2])
     b = (roots[k, POINT_G], roots[k, POINT_G + 1], roots[k, POINT_G + 2])
     end = offsets[0] / depth
-    if end < 0.5 and facets_cut(table, pool, scene[3][0], scene[2][0], scene[2][2], a, sub(b, a), end)[0] > 0:
+    if end < 0.5 and facets_cut(table, pool, scene[3][0], scene[2][0], scene[2][2], a, sub(b, a), end, BETWEEN)[0] > 0:
         return True
     a = matvec_t(turn, sub(a, shift))
     b = matvec_t(turn, sub(b, shift))
     end = offsets[1] / depth
-    return end < 0.5 and facets_cut(table, pool, scene[3][1], scene[2][1], scene[2][3], a, sub(b, a), end)[0] > 0
+    return (
+        end < 0.5 and facets_cut(table, pool, scene[3][1], scene[2][1], scene[2][3], a, sub(b, a), end, BETWEEN)[0] > 0
+    )

@@ -28,11 +28,12 @@ FLAT = 1e-9
 
 
 @kernel(inline=True)
-def cut_at(a, d, p, q, r, end):
+def cut_at(a, d, p, q, r, end, beside):
     """Where a segment from a along d cuts a triangle (Möller and Trumbore): whether it does, which part of the way.
 
     And the shares of q and of r there, and whether it goes to the side to which the corners turn left. What is nearer
-    to an end than that part of the segment does not count.
+    to an end than that part of the segment does not count; what passes `beside` the triangle by so small a part of its
+    sides does.
     """
     e = sub(q, p)
     f = sub(r, p)
@@ -45,7 +46,7 @@ def cut_at(a, d, p, q, r, end):
     w = cross(s, e)
     v = dot(d, w) / det
     t = dot(f, w) / det
-    return u >= 0.0 and v >= 0.0 and u + v <= 1.0 and end < t < 1.0 - end, t, u, v, det < 0.0
+    return min(u, v, 1.0 - u - v) >= -beside and end < t < 1.0 - end, t, u, v, det < 0.0
 
 
 @kernel(inner=True)
@@ -94,7 +95,7 @@ def goes_through(table, pool, tree, shell, e, a, b, margin):
     t = surface_point(table, pool, r, u, v + high)[0]
     for k in range(2):
         second, third = (q, s) if k == 0 else (s, t)
-        hit, _way, x, y, _along = cut_at(a, sub(b, a), p, second, third, 0.0)
+        hit, _way, x, y, _along = cut_at(a, sub(b, a), p, second, third, 0.0, 0.0)
         n = cross(sub(second, p), sub(third, p))
         away = margin * math.sqrt(dot(n, n))
         if not hit or min(abs(dot(n, sub(a, p))), abs(dot(n, sub(b, p)))) <= away:

@@ -308,3 +308,37 @@ def test_what_is_in_a_bore_is_not_in_its_wall(inner):
     for turn in (UPRIGHT, TURNED):
         told, deepest = judge(bore, INNER[inner])([(0.0, 0.0, 0.0, *UPRIGHT), (0.2, 0.1, 0.4, *turn)])
         assert not told and not deepest < 0.0
+
+
+def placed(rng, off):
+    """One random pose, and the same one moved in its own axes."""
+    turn, at = Rotation.random(random_state=int(rng.integers(1 << 30))), rng.normal(size=3)
+    e = turn.as_quat(scalar_first=True)
+    return np.array([[*at, *e], [*(at + turn.apply(off)), *e]])
+
+
+@pytest.mark.parametrize("error", [1e-8, 1e-7])
+def test_seams_that_faces_leave_open_hide_no_contact(error):
+    rng = np.random.default_rng(16)
+    sides = [asm.shapes.box(*np.multiply([1.0, 0.8, 0.6], 1.0 + error * rng.uniform(-1, 1, 3))) for _ in range(6)]
+    judged = judge(tuple(box[k] for k, box in enumerate(sides)), asm.shapes.sphere(0.5))
+    for _ in range(60):
+        depth = 10.0 ** rng.uniform(-4.5, -2.0)
+        crossed, gap = judged(dented(rng, (0.5, 0.4, 0.3), from_box, depth))
+        # As far off as the faces are.
+        assert crossed or gap == pytest.approx(-depth, abs=2.0 * error)
+
+
+@pytest.mark.parametrize("shape", [asm.shapes.box(1.0, 1.0, 1.0), asm.shapes.solid_cylinder(0.4, 1.0)])
+def test_bodies_at_one_place_are_in_each_other(shape):
+    judged, rng = judge(shape, shape), np.random.default_rng(17)
+    assert all(judged(placed(rng, np.zeros(3)))[0] for _ in range(20))
+
+
+@pytest.mark.parametrize("side", [1.0, 0.5, 0.01])
+def test_far_sides_of_parts_that_are_aligned_are_none(side):
+    # The segments between them pass through diagonals and sides of facets.
+    judged, rng = judge(asm.shapes.box(1.0, 1.0, 0.01), asm.shapes.box(side, side, 0.01)), np.random.default_rng(18)
+    for _ in range(30):
+        crossed, gap = judged(placed(rng, np.array([0.0, 0.0, 0.02])))
+        assert not crossed and not gap < 0.0
