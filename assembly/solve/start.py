@@ -125,7 +125,7 @@ def put_together(program, here, by_row):
     return evaluate(table, pool, here[1], math.inf, loose, room, here)
 
 
-@kernel(inner=True)
+@kernel(inner=True, allocates=True)
 def set_out(program, settings, state, here, by_row, n):
     """Find contacts, evaluate rows, gather what is scattered where the settings ask for it.
 
