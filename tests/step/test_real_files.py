@@ -11,6 +11,7 @@ import pytest
 import assembly as asm
 from assembly.step.occt import occt, quiet
 from assembly.step.reader import _shapes, document_of
+from assembly.step.syntax import first_fault, is_step
 from assembly.step.tree import Part, free_labels, leaves
 from tests.step.models import O, areas, faces, off, volumes
 
@@ -48,6 +49,16 @@ def test_every_face_is_read(file):
     assert len({id(side.face) for body in bodies for side in body.faces}) == unique
     assert len({body.name for body in bodies}) == count
     assert all(body.color is not None for body in bodies)
+
+
+def test_the_text_has_the_form_of_a_step_file(file):
+    # What has not is read by another process, which takes seconds.
+    text = file[0].read_bytes()
+    assert is_step(text) and first_fault(text) is None
+    # A parenthesis too many is found wherever it is.
+    for at in np.random.default_rng(0).integers(2000, len(text), 5):
+        at = text.index(b",#", int(at))
+        assert first_fault(text[:at] + b")" + text[at:]) is not None
 
 
 def test_areas_and_volumes_are_occt_s(file):

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import os
-from pathlib import Path
-
-import numpy as np
 import pytest
 
 from assembly.step.syntax import first_fault, is_step
@@ -67,23 +63,7 @@ def test_files_that_end_early_or_are_none():
     assert not is_step(b"solid cube") and not is_step(b"") and not is_step(b"ISO-10303-28;")
 
 
-def test_it_is_over_soon():
-    """Texts that look like statements for long: nothing is tried twice."""
+def test_texts_that_look_like_statements_for_long():
     for piece in (b"(", b"(1,", b"'", b"/*", b"A", b"#1=A(" + b"1,", b"()", b"\n"):
         assert first_fault(HEAD + 100_000 * piece) == (100_006 if piece == b"\n" else 6)
     assert first_fault(HEAD + b"#1=A" + 100_000 * b"(" + 100_000 * b")" + b";" + TAIL) is None
-
-
-@pytest.mark.skipif("ASSEMBLY_CAD_DATA" not in os.environ, reason="ASSEMBLY_CAD_DATA names no directory of STEP files")
-def test_files_of_other_programs_pass():
-    paths = [path for path in Path(os.environ["ASSEMBLY_CAD_DATA"]).iterdir() if path.suffix.startswith(".st")]
-    rng = np.random.default_rng(0)
-    for path in paths:
-        text = path.read_bytes()
-        assert is_step(text) and first_fault(text) is None
-        # One character too many between tokens is found where it is.
-        for _ in range(5):
-            at = int(rng.integers(2000, len(text)))
-            at = text.index(b",#", at)
-            assert first_fault(text[:at] + b")" + text[at:]) is not None
-    assert paths
