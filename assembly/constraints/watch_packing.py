@@ -26,10 +26,9 @@ FIRST_REACH, LAST_REACH = 0.005, 0.05
 # How far bodies may go between looks where contacts may be born, in parts of the smallest radius of curvature of the
 # two; in parts of the scene's size, it is no less than this.
 FLANK, LEAST_FLANK = 0.5, 1e-4
-# Newton's method leaves roots beside their surfaces by less than this part of the scene's size, and faces leave edges
-# that they share by less than so many times what tells points of a body apart: by so much more facets are taken to be
-# off, those of flat faces too.
-BESIDE, SEAMS = 1e-9, 3.0
+# Faces leave edges that they share, and Newton's method leaves roots beside their surfaces, by less than so many times
+# what tells points of a body apart: by so much more facets of a body with edges are taken to be off, flat ones too.
+SEAMS = 3.0
 # Lists of facing patches are kept for so many pairs of bodies at a time.
 MOST_LISTS = 64
 
@@ -108,8 +107,7 @@ class _PairPacking:
             table, pool, at = pack_tree(tree, writer.scale, writer.table_at, writer.pool_at)
             writer.add(table, pool)
             seams = SEAMS * tree.topology.tolerance if tree.topology.edges else 0.0
-            off = (tree.offset + seams) / writer.scale + BESIDE
-            self._trees[faces] = at, tree.least_radius / writer.scale, off
+            self._trees[faces] = at, tree.least_radius / writer.scale, (tree.offset + seams) / writer.scale
 
     def add(self, pair: Pair, least: float, places: Sequence[int]) -> None:
         """Pack a pair with its least gap and where its places begin and end."""
