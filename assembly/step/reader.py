@@ -23,7 +23,7 @@ from assembly.kinematics.pose import Pose, axes_quaternion
 from assembly.step.faces import read_face
 from assembly.step.occt import occt, parts, quiet, settings
 from assembly.step.profiles import Unreadable
-from assembly.step.syntax import first_fault, is_step
+from assembly.step.syntax import first_fault, is_step, mended
 from assembly.step.tree import Color, Part, free_labels, leaves
 
 __all__ = ["UNITS", "StepError", "StepWarning", "read_step"]
@@ -63,7 +63,11 @@ class StepWarning(UserWarning):
 
 
 class _Damaged(StepError):
-    """A file whose text is damaged, or with entities that OCCT could not load."""
+    """A file with entities that OCCT could not load."""
+
+
+class _Malformed(_Damaged):
+    """A file whose text is damaged."""
 
 
 @dataclass
@@ -88,24 +92,33 @@ def document_of(path: str, damaged: bool = False) -> tuple[Any, int]:
     """The file as a document of OCCT, in millimeters, and the number of its faces.
 
     Entities that OCCT cannot load may end the process when it makes shapes of them, or some later time, and text that
-    is no STEP file's may hold up its parser for good: a file that has such is refused unless it may be `damaged`.
+    is no STEP file's may hold up its parser for good: a file that has such is refused unless it may be `damaged`. Then
+    OCCT is given what is whole of its text.
     """
-    o = occt()
+    text = Path(path).read_bytes()
+    if not is_step(text):
+        raise StepError(f"path is {path!r}; expected a STEP file, which begins with ISO-10303-21")
+    line = first_fault(text)
+    if line is None:
+        return _loaded(path, path, damaged)
     if not damaged:
-        text = Path(path).read_bytes()
-        if not is_step(text):
-            raise StepError(f"path is {path!r}; expected a STEP file, which begins with ISO-10303-21")
-        line = first_fault(text)
-        if line is not None:
-            raise _Damaged(f"path is {path!r}; its text is damaged in line {line}")
-        del text
+        raise _Malformed(f"path is {path!r}; its text is damaged in line {line}")
+    with TemporaryDirectory() as folder:
+        whole = Path(folder) / "whole.step"
+        whole.write_bytes(mended(text))
+        return _loaded(path, str(whole), damaged)
+
+
+def _loaded(path: str, file: str, damaged: bool) -> tuple[Any, int]:
+    """`document_of` a file that has the form of one, and is, or is made of, the one at the path."""
+    o = occt()
     # Settings exist once there is a reader.
     reader = o.STEPCAFControl_Reader()
     auto = o.XCAFDoc_ShapeTool.AutoNaming_s()
     try:
         o.XCAFDoc_ShapeTool.SetAutoNaming_s(False)
         with settings({"read.stepcaf.subshapes.name": 1, "read.step.product.mode": 1}):
-            if reader.ReadFile(path) != o.IFSelect_RetDone:
+            if reader.ReadFile(file) != o.IFSelect_RetDone:
                 raise StepError(f"path is {path!r}; expected a STEP file, and OCCT cannot parse it")
             if not damaged and (broken := _broken_entities(reader)):
                 raise _Damaged(f"path is {path!r}; {broken} of its entities are damaged")
@@ -247,7 +260,8 @@ def read_step(path: str | PathLike[str], *, unit: str = "mm", strict: bool = Tru
     unit : {"mm", "um", "cm", "m", "in", "ft"}
         Lengths are converted to it, whatever the file's own unit.
     strict : bool
-        Raise where a face cannot be read. Otherwise it is left out, and a warning for each body says which and why.
+        Raise where a face cannot be read, or the text is damaged. Otherwise faces are left out, statements too, and
+        warnings say which and why.
 
     Returns
     -------
@@ -257,7 +271,8 @@ def read_step(path: str | PathLike[str], *, unit: str = "mm", strict: bool = Tru
     Raises
     ------
     StepError
-        Not a STEP file, nothing in it, or faces that cannot be read, named with the reasons.
+        Not a STEP file, nothing in it, a text that is damaged in a line, or faces that cannot be read, named with the
+        reasons.
     FileNotFoundError
         No such file.
     ImportError
@@ -266,7 +281,7 @@ def read_step(path: str | PathLike[str], *, unit: str = "mm", strict: bool = Tru
     Warns
     -----
     StepWarning
-        Faces that are left out, or were approximated by more than 1e-7 mm (offset surfaces).
+        Faces that are left out, or were approximated by more than 1e-7 mm (offset surfaces); damage to the file.
     """
     checked_unit(unit)
     if not isinstance(strict, (bool, np.bool_)):
@@ -279,8 +294,11 @@ def read_step(path: str | PathLike[str], *, unit: str = "mm", strict: bool = Tru
         bodies, left = bodies_of(str(file), unit, bool(strict))
     except _Damaged as reason:
         damage = str(reason)
+        if strict and isinstance(reason, _Malformed):
+            raise StepError(f"{damage}; pass strict=False for what is whole of it") from None
     if damage:
         bodies, left = _read_apart(str(file), unit, bool(strict), damage)
+        left.append(f"{damage}, and what OCCT makes of the rest was read")
     for line in left:
         warnings.warn(line, StepWarning, stacklevel=2)
     return bodies
