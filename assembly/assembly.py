@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from operator import is_
 from os import PathLike
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -18,7 +19,7 @@ from assembly.constraints.packing import Packed, lone_surfaces, pack, structure_
 from assembly.constraints.trim_contact import TrimContact
 from assembly.errors import InputError, vector
 from assembly.kinematics.body import Body, Frame, Point
-from assembly.kinematics.pose import pose_rows
+from assembly.kinematics.pose import Pose, pose_rows
 from assembly.proximity.pairs import inside
 from assembly.proximity.solid_contact import TRACK
 from assembly.solve.augmented_lagrangian import solve_program
@@ -75,6 +76,7 @@ class Assembly:
         self._packed: Packed | None = None
         self._crowding = 1  # how many times as many places as clearances ask for
         self._scene: Scene | None = None
+        self._stood: tuple[list[Pose], Array] = [], np.empty((0, 7))
         for body in bodies:
             self.add(body)
 
@@ -166,7 +168,13 @@ class Assembly:
     @property
     def q(self) -> Array:
         """Where the bodies stand, (n, 7)."""
-        return np.array([body.pose.row for body in self._bodies]).reshape(-1, 7)
+        poses = [body.pose for body in self._bodies]
+        before, q = self._stood
+        # Poses do not change, bodies get others: those of the last call are compared in a fraction of the time.
+        if len(before) != len(poses) or not all(map(is_, before, poses)):
+            q = np.array([pose.row for pose in poses]).reshape(-1, 7)
+            self._stood = poses, q
+        return q.copy()
 
     def packed(self) -> Packed:
         """The scene as the compiled loop reads it; made at first use."""

@@ -33,7 +33,7 @@ from assembly.proximity.bounding_tree import (
 from assembly.proximity.feet import foot_of
 from assembly.proximity.folds import BESIDE
 from assembly.proximity.near_root import is_within
-from assembly.proximity.piercing import cut_at, pierces
+from assembly.proximity.piercing import cut_at, patch_corners, pierces
 from assembly.proximity.roots import GAP, POINT_F, POINT_G
 from assembly.proximity.shell import FACE_RECORD, FACE_TABLE, FACE_TRIM, FACES
 from assembly.proximity.switching import feature_at
@@ -124,14 +124,7 @@ def facets_cut(table, pool, tree, surface, shell, a, d, end, beside):
         if r < 0:
             continue
         e = table[tree + ELEMENT_POOL] + ELEMENT * (-1 - child)
-        u = pool[e] - pool[e + 2]
-        v = pool[e + 1] - pool[e + 3]
-        wide = 2.0 * pool[e + 2]
-        high = 2.0 * pool[e + 3]
-        p = surface_point(table, pool, r, u, v)[0]
-        q = surface_point(table, pool, r, u + wide, v)[0]
-        s = surface_point(table, pool, r, u + wide, v + high)[0]
-        t = surface_point(table, pool, r, u, v + high)[0]
+        (u, v, wide, high), (p, q, s, t) = patch_corners(table, pool, r, e)
         for k in range(2):
             hit, way, x, y, along = cut_at(a, d, p, q if k == 0 else s, s if k == 0 else t, end, beside)
             here = (u + (x + y if k == 0 else x) * wide, v + (y if k == 0 else x + y) * high)

@@ -75,6 +75,20 @@ def is_well_inside(table, pool, trim, u, v, du, dv):
     )
 
 
+@kernel(inline=True)
+def patch_corners(table, pool, surface, e):
+    """The first (u, v) of the patch at e and its widths, and its corners, counterclockwise in (u, v) from there."""
+    u = pool[e] - pool[e + 2]
+    v = pool[e + 1] - pool[e + 3]
+    wide = 2.0 * pool[e + 2]
+    high = 2.0 * pool[e + 3]
+    p = surface_point(table, pool, surface, u, v)[0]
+    q = surface_point(table, pool, surface, u + wide, v)[0]
+    s = surface_point(table, pool, surface, u + wide, v + high)[0]
+    t = surface_point(table, pool, surface, u, v + high)[0]
+    return (u, v, wide, high), (p, q, s, t)
+
+
 @kernel(inner=True)
 def goes_through(table, pool, tree, shell, e, a, b, margin):
     """Whether what is within a margin of a chord goes through the face of a body at a flat patch; body axes."""
@@ -85,14 +99,7 @@ def goes_through(table, pool, tree, shell, e, a, b, margin):
     code = np.int64(pool[o + ELEMENT_FEATURE])
     face = table[shell + FACE_TABLE] + FACE_RECORD * code
     r = feature_at(table, shell, code)
-    u = pool[o] - pool[o + 2]
-    v = pool[o + 1] - pool[o + 3]
-    wide = 2.0 * pool[o + 2]
-    high = 2.0 * pool[o + 3]
-    p = surface_point(table, pool, r, u, v)[0]
-    q = surface_point(table, pool, r, u + wide, v)[0]
-    s = surface_point(table, pool, r, u + wide, v + high)[0]
-    t = surface_point(table, pool, r, u, v + high)[0]
+    (u, v, wide, high), (p, q, s, t) = patch_corners(table, pool, r, o)
     for k in range(2):
         second, third = (q, s) if k == 0 else (s, t)
         hit, _way, x, y, _along = cut_at(a, sub(b, a), p, second, third, 0.0, 0.0)

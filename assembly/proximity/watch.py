@@ -73,10 +73,13 @@ from assembly.proximity.watch_memory import (
     seat_given,
 )
 
-# Looks: at pairs that used up their allowance, at urgent ones too, at all that moved.
-AS_NEEDED, EVERYTHING, CAREFUL = 0, 1, 2
-# The pair that used most of its allowance is looked at again when that is this part of it; others can wait longer.
+# Looks: at pairs that used up their allowance, at all that moved, at urgent ones too, earlier at one pair at a time.
+AS_NEEDED, EVERYTHING, CAREFUL, IN_TURNS = 0, 1, 2, 3
+# A pair is looked at again when so much of its allowance is used; in turns, the one that used most of it at the first.
 USED, SPENT = 0.5, 0.85
+# What moved by less than this part of its allowance is where it was: a root that is born beside another one by such a
+# move is no deeper than the power 1.5 of it.
+STILL = 1e-8
 # Room: pairs of patches of a look.
 CANDIDATES, STACK = 8192, 1024
 # Folds nearer than this part of a first reach are looked at after every move.
@@ -210,7 +213,7 @@ def any_crossed(table, watch, memory):
 
 @kernel
 def look(table, pool, watch, memory, q, tracked, how):
-    """Look at the pairs of bodies that need it, at urgent ones as well, or at all that moved; list what is near.
+    """Look at the pairs of bodies that need it, or at all that moved, and list what is near.
 
     Returns how many events that made. `tracked` has a row for every place (`solid_contact.py`), at the roots of the
     poses q or close by.
@@ -231,8 +234,8 @@ def look(table, pool, watch, memory, q, tracked, how):
         if how == EVERYTHING:
             due = part > 0.0 or math.isnan(memory[at + PAIR_MEMORY * p + CROSSED])
         else:
-            due = part > SPENT or (p == next_pair and part > USED)
-            due = due or (how == CAREFUL and part > 0.0 and memory[at + PAIR_MEMORY * p + URGENT] == 1.0)
+            due = part > SPENT or (how == IN_TURNS and p == next_pair and part > USED)
+            due = due or (how == CAREFUL and part > STILL and memory[at + PAIR_MEMORY * p + URGENT] == 1.0)
         if not due and not any_lost(table, watch, memory, p, tracked):
             continue
         if not ready:

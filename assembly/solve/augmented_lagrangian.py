@@ -179,7 +179,7 @@ def solve_program(table, pool, settings, state, history, tips):
     changed = watched and settings[GATHER] == 1.0 and results[SCATTER] == 1.0
     while status == RUNNING:
         if watched and not changed:
-            holds_now = off_rows(table, loose, one_sided, here, tick) <= TOUCHING
+            holds_now = off_rows(table, loose, one_sided, here, tick) <= (feasible if tick else TOUCHING)
             how = CAREFUL if holds_now else AS_NEEDED
             changed = look_again(table, pool, memory, here, how, free, loose[4])
         if changed:

@@ -59,7 +59,7 @@ def crossings(solution: Solution) -> tuple[tuple[str, str], ...]:
         pairs[watch_memory.REACH : watch_memory.PAIR_MEMORY * len(packed.guarded[0]) : watch_memory.PAIR_MEMORY] = depth
         tracked = np.full((packed.pair_rows, TRACK), np.nan)
         tracked[: len(contacts)] = solution._parameters[: len(contacts)]
-        watch.look(packed.table, packed.pool, packed.table[layout.WATCH], memory, q, tracked, 1)
+        watch.look(packed.table, packed.pool, packed.table[layout.WATCH], memory, q, tracked, watch.EVERYTHING)
         each = memory[watch_memory.MEMORY_HEADER :][: watch_memory.PAIR_MEMORY * len(packed.guarded[0])].reshape(
             -1, watch_memory.PAIR_MEMORY
         )

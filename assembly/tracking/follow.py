@@ -35,6 +35,7 @@ from assembly.geometry.vec import quaternion_product
 from assembly.proximity.extremal import BEND, CONVERGED, SINGULAR, into_domain
 from assembly.proximity.solid_contact import FOLD, PAIR_GAP, PROPER, TRACK
 from assembly.proximity.velocity import ARM_F, GAP, RATES, ZED
+from assembly.proximity.watch import IN_TURNS
 from assembly.proximity.watch_memory import (
     ALLOWANCE,
     EVENT_COUNT,
@@ -216,7 +217,7 @@ def follow(table, pool, q, poses, tracked, records, room, free, memory):
         elif table[row + SHELL_F] < 0 and is_astray(table, pool, row, r, before, guess, tracked):
             look_at_all_of(table, memory, k)
         doubt_twins(table, pool, memory, k, records)
-    look_around(table, pool, memory, (poses, tracked), 0)
+    look_around(table, pool, memory, (poses, tracked), IN_TURNS)
     for k in range(table[GUARDS]):
         before[first + k, 0] = float(table[table[ROW_TABLE] + ROW * (first + k) + GUARD_NUMBER])
     place_guards(table, memory, (poses, tracked, records, rows[0]), rows[0], rows[1], free, False)
