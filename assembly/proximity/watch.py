@@ -164,7 +164,7 @@ def look_at_pair(
     reach = reach_now(table, pool, watch, memory, p, e, turn, shift)
     found, reach = facing_pairs(table, pool, watch, memory, p, scene, e, reach, stack, candidates)
     memory[at + REACH] = reach
-    count = known_roots(table, pool, watch, memory, p, scene, tracked, roots, work)
+    count = known_roots(table, pool, watch, memory, p, scene, offsets, tracked, roots, work)
     enough = near_enough(table, pool, scene, least, reach, flank, candidates, found, distances)
     span = (-pool[lengths + LAST_REACH], reach + least)
     neglect = pool[lengths + NEGLECT]

@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly.proximity.overlap import is_outside
 from assembly.proximity.roots import (
     ALIKE,
     CODE_F,
@@ -148,10 +149,10 @@ def write_root(roots, i, tracked, r):
 
 
 @kernel(inner=True)
-def known_roots(table, pool, watch, memory, p, scene, tracked, roots, work):
+def known_roots(table, pool, watch, memory, p, scene, offsets, tracked, roots, work):
     """The roots that contacts of pair p have now: given ones, then listed ones. Returns how many roots there are.
 
-    A listed contact that lost its root, or came to that of another one, gives up its place.
+    A listed contact that lost its root, or came to that of another one or to the far sides, gives up its place.
     """
     pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
     places = memory_places(table, watch)[1]
@@ -176,6 +177,8 @@ def known_roots(table, pool, watch, memory, p, scene, tracked, roots, work):
             n = (tracked[r, PAIR_NORMAL], tracked[r, PAIR_NORMAL + 1], tracked[r, PAIR_NORMAL + 2])
             count, found = add_root(table, pool, scene, codes, start, n, neglect, roots, count, work, corner)
             lost = found != ALIKE and found != MINIMUM_FOUND
+            if count > before and corner == 0.0 and roots[before, GAP] < 0.0:
+                lost = lost or is_outside(table, pool, scene, roots, before, offsets)
         if count > before and not lost:
             roots[before, ORIGIN] = LISTED + k
             write_root(roots, before, tracked, r)

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 import assembly as asm
 from assembly.proximity import watch_memory
 from benchmarks.center_lines import paper_clip_wire
-from benchmarks.motions import FLAT, PAIRS, SAME, SHAPES, Errors, compared, wander
+from benchmarks.motions import FLAT, PAIRS, SAME, SHAPES, Errors, compared, random_motion, wander
 from benchmarks.watching import Watch
 from benchmarks.wire_oracle import WireOracle
 from tests.laws.ellipsoid_witness import minima
@@ -77,6 +77,14 @@ def test_what_is_nearer_than_an_allowance_is_listed(f, g, gap, q):
     reach = rings.memory[watch_memory.MEMORY_HEADER + watch_memory.REACH]
     assert watch_memory.TAKE * reach * rings.scale > gap
     assert listed.gap == pytest.approx([gap], abs=1e-9) or listed.take[0] <= gap
+
+
+def test_a_contact_never_goes_to_the_far_sides():
+    # In its eighth pose Newton's method goes from where the contact was to the far sides of the two wires.
+    rng = np.random.default_rng([5, PAIRS.index(("wide torus", "torus")), 103])
+    watch = Watch([SHAPES[name][1] for name in ("wide torus", "torus")])
+    listed = [watch.look(q).gap for q in random_motion(rng, "wide torus", "torus", 40)]
+    assert sum(map(len, listed)) >= 7 and min(gap.min(initial=0.0) for gap in listed) >= 0.0
 
 
 @pytest.mark.parametrize("place", PARALLEL)
