@@ -73,8 +73,9 @@ from assembly.proximity.watch_memory import (
     seat_given,
 )
 
-# Looks: at pairs that used up their allowance, at all that moved, at urgent ones too, earlier at one pair at a time.
-AS_NEEDED, EVERYTHING, CAREFUL, IN_TURNS = 0, 1, 2, 3
+# Looks: at pairs that used up their allowance, or at all that moved. The first may be careful, at urgent pairs too, and
+# in turns, earlier at one pair at a time, or both.
+AS_NEEDED, EVERYTHING, CAREFUL, IN_TURNS = 0, 1, 2, 4
 # A pair is looked at again when so much of its allowance is used; in turns, the one that used most of it at the first.
 USED, SPENT = 0.5, 0.85
 # What moved by less than this part of its allowance is where it was: a root that is born beside another one by such a
@@ -234,8 +235,8 @@ def look(table, pool, watch, memory, q, tracked, how):
         if how == EVERYTHING:
             due = part > 0.0 or math.isnan(memory[at + PAIR_MEMORY * p + CROSSED])
         else:
-            due = part > SPENT or (how == IN_TURNS and p == next_pair and part > USED)
-            due = due or (how == CAREFUL and part > STILL and memory[at + PAIR_MEMORY * p + URGENT] == 1.0)
+            due = part > SPENT or (how & IN_TURNS != 0 and p == next_pair and part > USED)
+            due = due or (how & CAREFUL != 0 and part > STILL and memory[at + PAIR_MEMORY * p + URGENT] == 1.0)
         if not due and not any_lost(table, watch, memory, p, tracked):
             continue
         if not ready:

@@ -39,7 +39,7 @@ from assembly.constraints.program import evaluate
 from assembly.constraints.sparsity import clear_upper
 from assembly.constraints.terms import objective
 from assembly.proximity.solid_contact import FOLD
-from assembly.proximity.watch import AS_NEEDED, CAREFUL, EVERYTHING, any_crossed
+from assembly.proximity.watch import AS_NEEDED, CAREFUL, EVERYTHING, IN_TURNS, any_crossed
 from assembly.solve.contacts import free_folds, is_of_surfaces
 from assembly.solve.ending import finish
 from assembly.solve.guards import look_again, numbers_of, place_guards
@@ -180,7 +180,7 @@ def solve_program(table, pool, settings, state, history, tips):
     while status == RUNNING:
         if watched and not changed:
             holds_now = off_rows(table, loose, one_sided, here, tick) <= (feasible if tick else TOUCHING)
-            how = CAREFUL if holds_now else AS_NEEDED
+            how = (CAREFUL if holds_now else AS_NEEDED) | (AS_NEEDED if tick else IN_TURNS)
             changed = look_again(table, pool, memory, here, how, free, loose[4])
         if changed:
             place_guards(table, memory, here, y, better_y, free, False)
