@@ -90,7 +90,8 @@ class Watch:
         scaled = q.copy()
         scaled[:, :3] = (q[:, :3] - packed.reference) / packed.scale
         calls = memory[watch_memory.CALLS] + 1.0
-        watch.look(packed.table, packed.pool, self._at, memory, scaled, self.tracked, int(everything))
+        how = watch.EVERYTHING if everything else watch.IN_TURNS
+        watch.look(packed.table, packed.pool, self._at, memory, scaled, self.tracked, how)
         if memory[watch_memory.CROWDED]:
             raise RuntimeError("contacts are near for which there is no place")
         pairs = self._pairs()

@@ -78,8 +78,7 @@ from assembly.proximity.watch_memory import (
 AS_NEEDED, EVERYTHING, CAREFUL, IN_TURNS = 0, 1, 2, 4
 # A pair is looked at again when so much of its allowance is used; in turns, the one that used most of it at the first.
 USED, SPENT = 0.5, 0.85
-# What moved by less than this part of its allowance is where it was: a root that is born beside another one by such a
-# move is no deeper than the power 1.5 of it.
+# What moved by less than this part of its allowance, 5e-10 of the scene's size, is where it was for an urgent look.
 STILL = 1e-8
 # Room: pairs of patches of a look.
 CANDIDATES, STACK = 8192, 1024

@@ -43,7 +43,7 @@ import os, pickle, sys
 from assembly.step.reader import bodies_of
 path, unit, strict, answer = sys.argv[1:]
 try:
-    found = bodies_of(path, unit, strict == "True", True)
+    found = bodies_of(path, unit, strict == "True", os.path.dirname(answer))
 except Exception as error:
     found = error
 arrays = []
@@ -63,7 +63,7 @@ class StepWarning(UserWarning):
 
 
 class _Damaged(StepError):
-    """A file with entities that OCCT could not load."""
+    """A file with entities that OCCT could not load, or with references that lead nowhere."""
 
 
 class _Malformed(_Damaged):
@@ -88,25 +88,27 @@ def checked_unit(unit: str) -> float:
     return UNITS[unit]
 
 
-def document_of(path: str, damaged: bool = False) -> tuple[Any, int]:
+def document_of(path: str, folder: str | None = None) -> tuple[Any, int]:
     """The file as a document of OCCT, in millimeters, and the number of its faces.
 
     Entities that OCCT cannot load may end the process when it makes shapes of them, or some later time, and text that
-    is no STEP file's may hold up its parser for good: a file that has such is refused unless it may be `damaged`. Then
-    OCCT is given what is whole of its text.
+    is no STEP file's may hold up its parser for good: a file that has such is refused, unless there is a folder. Then
+    OCCT is given what is whole of the text, from there.
     """
     text = Path(path).read_bytes()
     if not is_step(text):
         raise StepError(f"path is {path!r}; expected a STEP file, which begins with ISO-10303-21")
-    line = first_fault(text)
-    if line is None:
-        return _loaded(path, path, damaged)
-    if not damaged:
-        raise _Malformed(f"path is {path!r}; its text is damaged in line {line}")
-    with TemporaryDirectory() as folder:
-        whole = Path(folder) / "whole.step"
-        whole.write_bytes(mended(text))
-        return _loaded(path, str(whole), damaged)
+    fault = first_fault(text)
+    if fault is not None and folder is None:
+        if fault.is_lost:
+            raise _Damaged(f"path is {path!r}; a reference in line {fault.line} leads nowhere")
+        raise _Malformed(f"path is {path!r}; its text is damaged in line {fault.line}")
+    file = path
+    if fault is not None:
+        file = os.path.join(str(folder), "whole.step")
+        Path(file).write_bytes(mended(text))
+    del text
+    return _loaded(path, file, folder is not None)
 
 
 def _loaded(path: str, file: str, damaged: bool) -> tuple[Any, int]:
@@ -304,13 +306,13 @@ def read_step(path: str | PathLike[str], *, unit: str = "mm", strict: bool = Tru
     return bodies
 
 
-def bodies_of(path: str, unit: str, strict: bool, damaged: bool = False) -> tuple[list[Body], list[str]]:
-    """The bodies of a file, and what there is to warn of."""
+def bodies_of(path: str, unit: str, strict: bool, folder: str | None = None) -> tuple[list[Body], list[str]]:
+    """The bodies of a file, also of one that is damaged if there is a folder, and what there is to warn of."""
     scale = 1.0 / checked_unit(unit)
     file = Path(path)
     o = occt()
     with quiet():
-        document, count = document_of(path, damaged)
+        document, count = document_of(path, folder)
         root = o.XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
         bodies: list[Body] = []
         missing: list[str] = []
@@ -341,12 +343,15 @@ def bodies_of(path: str, unit: str, strict: bool, damaged: bool = False) -> tupl
                         body = Body(name, shape.faces, pose.position, pose.quaternion)
                         body.color = leaf.color or shape.color
                         bodies.append(body)
-    if missing and strict:
-        raise StepError(f"path is {str(file)!r}; {_listed('not read', missing)}; pass strict=False to go without")
+    lost = [f"{count - built} of {count} faces, of which OCCT makes nothing"] if built < count else []
+    # Those of a file that is not damaged are of no shape.
+    if strict and (missing or (lost and folder is not None)):
+        raise StepError(
+            f"path is {str(file)!r}; {_listed('not read', missing + lost)}; pass strict=False to go without"
+        )
     if not bodies:
         raise StepError(f"path is {str(file)!r}; it has no faces")
-    if built < count:
-        missing.append(f"{count - built} of {count} faces, of which OCCT makes nothing")
+    missing += lost
     lines = (("not read", missing), ("approximated", inexact))
     return bodies, [f"{file.name}: {_listed(what, told)}" for what, told in lines if told]
 

@@ -235,29 +235,58 @@ def test_a_free_contact_of_a_clearance_goes_to_its_extremum_if_it_is_off_it(off)
     assert np.array_equal(tracked[row], moved) if off < 1e-6 else np.abs(tracked[row, :4] - extremum[:4]).max() < 1e-9
 
 
-def test_the_last_look_asks_of_every_pair_whether_it_crosses():
-    chain = example("paper_clips").paper_clips()
-    chain.constrain(asm.Clearance())
-    packed = chain.packed()
-    state = packed.new_state()
-    memory = state[packed.memory_at :]
-    q = np.array([body.q for body in chain.bodies])
-    q[:, :3] = (q[:, :3] - packed.reference) / packed.scale
-    tracked = np.full((packed.tracked, TRACK), np.nan)
-    pairs = int(packed.table[packed.table[WATCH] + watch_memory.PAIRS])
+class Clips:
+    """Three clips under watch."""
 
-    def looked(how):
-        before = memory[watch_memory.LOOKS]
-        watch.look(packed.table, packed.pool, packed.table[WATCH], memory, q, tracked, how)
-        return memory[watch_memory.LOOKS] - before
+    def __init__(self):
+        chain = example("paper_clips").paper_clips()
+        chain.constrain(asm.Clearance())
+        self.packed = packed = chain.packed()
+        self.memory = packed.new_state()[packed.memory_at :]
+        self.q = np.array([body.q for body in chain.bodies])
+        self.q[:, :3] = (self.q[:, :3] - packed.reference) / packed.scale
+        self.tracked = np.full((packed.tracked, TRACK), np.nan)
+        self.count = int(packed.table[packed.table[WATCH] + watch_memory.PAIRS])
+
+    @property
+    def pairs(self):
+        """What is known of each pair."""
+        known = self.memory[watch_memory.MEMORY_HEADER :][: self.count * watch_memory.PAIR_MEMORY]
+        return known.reshape(self.count, -1)
+
+    def looked(self, how):
+        """How many pairs a look looks at."""
+        before = self.memory[watch_memory.LOOKS]
+        packed = self.packed
+        watch.look(packed.table, packed.pool, packed.table[WATCH], self.memory, self.q, self.tracked, how)
+        return self.memory[watch_memory.LOOKS] - before
+
+
+def test_the_last_look_asks_of_every_pair_whether_it_crosses():
+    clips = Clips()
 
     def unasked():
-        pair = memory[watch_memory.MEMORY_HEADER :][: pairs * watch_memory.PAIR_MEMORY]
-        return np.isnan(pair.reshape(pairs, -1)[:, watch_memory.CROSSED])
+        return np.isnan(clips.pairs[:, watch_memory.CROSSED])
 
     # A first look asks; one that a motion calls for does not; the last one asks where nothing moved since, and once.
-    assert looked(watch.AS_NEEDED) == pairs and not unasked().any()
-    q[1:, 0] += 0.05 * np.arange(1, len(q))
-    assert looked(watch.AS_NEEDED) > 0.0 and unasked().any()
-    assert looked(watch.EVERYTHING) == pairs and not unasked().any()
-    assert looked(watch.EVERYTHING) == 0.0
+    assert clips.looked(watch.AS_NEEDED) == clips.count and not unasked().any()
+    clips.q[1:, 0] += 0.05 * np.arange(1, len(clips.q))
+    assert clips.looked(watch.AS_NEEDED) > 0.0 and unasked().any()
+    assert clips.looked(watch.EVERYTHING) == clips.count and not unasked().any()
+    assert clips.looked(watch.EVERYTHING) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("part", "as_needed", "in_turns", "careful"),
+    [(0.9, 2, 2, 2), (0.8, 0, 1, 2), (0.4, 0, 0, 2), (1e-7, 0, 0, 2), (1e-9, 0, 0, 0)],
+)
+def test_pairs_are_looked_at_that_need_it(part, as_needed, in_turns, careful):
+    # The middle clip goes a part of what its pairs allow; both of them are urgent.
+    for how, count in ((watch.AS_NEEDED, as_needed), (watch.IN_TURNS, in_turns), (watch.CAREFUL, careful)):
+        clips = Clips()
+        assert clips.looked(how) == clips.count == 3
+        clips.pairs[:, watch_memory.ALLOWANCE] = 1e-3
+        clips.pairs[:, watch_memory.BALL_ALLOWANCE] = np.inf
+        clips.pairs[:, watch_memory.URGENT] = 1.0
+        clips.q[1, 2] += 1e-3 * part
+        assert clips.looked(how) == count

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import tempfile
 from math import pi
 
 import numpy as np
@@ -256,7 +257,7 @@ def damaged(tmp_path):
 def test_damaged_files_are_read_in_another_process(damaged):
     with pytest.warns(StepWarning) as warned:
         (body,) = asm.read_step(damaged, unit="cm", strict=False)
-    (here,), lines = reader.bodies_of(str(damaged), "cm", False, True)
+    (here,), lines = reader.bodies_of(str(damaged), "cm", False, str(damaged.parent))
     said = f"path is {str(damaged)!r}; 1 of its entities are damaged, and what OCCT makes of the rest was read"
     assert [str(line.message) for line in warned] == [*lines, said] and lines
     assert [side.name for side in body.faces] == [side.name for side in here.faces]
@@ -288,26 +289,39 @@ def arrays_of(thing, seen=None):
 
 
 @pytest.mark.parametrize(
-    ("pattern", "other"),
+    ("pattern", "other", "why"),
     [
         # OCCT's parser did not return from the first, in one of some ten trials, and ended the process at the second.
-        (r"#(\d+)( = PLANE)", r"#15\2"),
-        (r"#(\d+)( = ORIENTED_EDGE\('',\*,\*,)#\d+", r"#\1\2#\1"),
-        (r"( = PLANE\('',#\d+\));", r"\1"),
+        (r"#(\d+)( = PLANE)", r"#15\2", r"text is damaged in line \d+; pass strict=False"),
+        (r"#(\d+)( = ORIENTED_EDGE\('',\*,\*,)#\d+", r"#\1\2#\1", "'face 1': two edges that should meet"),
+        (r"( = PLANE\('',)#\d+", r"\1#999", "1 of 6 faces, of which OCCT makes nothing"),
+        (r"( = PLANE\('',#\d+\));", r"\1", r"text is damaged in line \d+; pass strict=False"),
     ],
-    ids=["another's number", "itself", "not ended"],
+    ids=["another's number", "itself", "nowhere", "not ended"],
 )
-def test_of_damaged_text_what_is_whole_is_read(tmp_path, pattern, other):
+def test_of_damaged_text_what_is_whole_is_read(tmp_path, pattern, other, why):
     file = File()
     file.part(box(), "box")
     path = file.write(tmp_path / "box.step")
     path.write_text(re.sub(pattern, other, path.read_text(), count=1))
-    with pytest.raises(StepError, match=r"text is damaged in line \d+; pass strict=False"):
+    with pytest.raises(StepError, match=why):
         asm.read_step(path)
     with pytest.warns(StepWarning) as warned:
         (body,) = asm.read_step(path, strict=False)
-    assert "text is damaged in line" in str(warned[-1].message)
+    assert re.search(r"(damaged in|reference in) line \d+.*, and what OCCT makes of the rest", str(warned[-1].message))
     assert body.name == "box" and len(body.faces) == 5
+
+
+def test_nothing_is_left_of_a_process_that_ended(damaged, monkeypatch, tmp_path):
+    damaged.write_text(damaged.read_text().replace("ENDSEC;\nEND-ISO", "#1 = (\nENDSEC;\nEND-ISO"))
+    monkeypatch.setenv("TMPDIR", str(tmp_path / "apart"))
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    (tmp_path / "apart").mkdir()
+    child = "import sys; from assembly.step import reader; reader._loaded = lambda *_: __import__('os').abort()\n"
+    monkeypatch.setattr(reader, "_APART", child + reader._APART)
+    with pytest.raises(StepError, match="OCCT cannot read the rest"):
+        asm.read_step(damaged, strict=False)
+    assert not list((tmp_path / "apart").iterdir())
 
 
 @pytest.mark.parametrize(

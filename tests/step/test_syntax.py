@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from assembly.step.syntax import first_fault, is_step, mended
+from assembly.step.syntax import Fault, first_fault, is_step, mended
 
 HEAD = b"ISO-10303-21;\nHEADER;\nFILE_NAME('a (b;','2026-11-22T00:00:00',('it''s',''),$);\nENDSEC;\nDATA;\n"
 TAIL = b"ENDSEC;\nEND-ISO-10303-21;\n"
@@ -42,8 +42,12 @@ BAD = [
     b"#1 = A(B);",
     b"#7 = B(2);",
     b"#07 = B(2);",
-    b"#1 = A('#7',(#9,#7));",
     b"#1 = A(#1000000000000000000);",
+    b"#1 = A(.1.);",
+    b"#1 = A(.A.2.);",
+]
+LOST = [
+    b"#1 = A('#7',(#9,#7));",
     b"#1 = A(2,(#1));",
     b"#1 = A(#2);#2 = B(#3);#3 = (A(#7)B(#1));",
 ]
@@ -65,10 +69,18 @@ UNENDED = [b"#1 = A(1)"]
 
 @pytest.mark.parametrize("line", BAD)
 def test_others_are_named_by_their_lines(line):
-    assert first_fault(HEAD + b"#7 = A(1);\n" + line + b"\n#8 = A(2);\n" + TAIL) == 7
+    assert first_fault(HEAD + b"#7 = A(1);\n" + line + b"\n#8 = A(2);\n" + TAIL) == Fault(7, False)
 
 
-@pytest.mark.parametrize("line", BAD)
+@pytest.mark.parametrize("line", LOST)
+def test_references_that_lead_nowhere_are_named_by_theirs(line):
+    text = HEAD + b"#7 = A(1);\n" + line + b"\n#8 = A(2);\n"
+    assert first_fault(text + TAIL) == Fault(7, True)
+    # What is no statement comes first: with it, nobody knows what references lead to.
+    assert first_fault(text + b"#10 = A(;\n" + TAIL) == Fault(9, False)
+
+
+@pytest.mark.parametrize("line", BAD + LOST)
 def test_what_is_whole_is_kept(line):
     rest = b"#7 = A(1);\n", b"#8 = A(#7);\n"
     kept = mended(HEAD + rest[0] + line + b"\n" + rest[1] + TAIL)
@@ -90,6 +102,11 @@ def test_references_to_what_is_lost():
     assert mended(HEAD + lost + TAIL[:8] + b"END-ISO") == HEAD + kept + TAIL
 
 
+def test_statements_in_strings_are_none():
+    lost = b"#1 = A(1E0,'x;#2=OTHER();',2);\n#2 = B(1);\n#3 = C(#2);\n"
+    assert mended(HEAD + lost + TAIL) == HEAD + b"\n#2 = B(1);\n#3 = C(#2);\n" + TAIL
+
+
 def test_files_that_end_early_or_are_none():
     whole = HEAD + b"#1 = A(1);\n" + TAIL
     assert is_step(b" /* by hand */\n" + whole) and first_fault(b" /* by hand */\n" + whole) is None
@@ -100,5 +117,6 @@ def test_files_that_end_early_or_are_none():
 
 def test_texts_that_look_like_statements_for_long():
     for piece in (b"(", b"(1,", b"'", b"/*", b"A", b"#1=A(" + b"1,", b"()", b"\n"):
-        assert first_fault(HEAD + 100_000 * piece) == (100_006 if piece == b"\n" else 6)
+        assert first_fault(HEAD + 100_000 * piece) == Fault(100_006 if piece == b"\n" else 6, False)
+    assert first_fault(HEAD + b"#1=A(." + 1_000_000 * b"A" + b"0);" + TAIL) == Fault(6, False)
     assert first_fault(HEAD + b"#1=A" + 100_000 * b"(" + 100_000 * b")" + b";" + TAIL) is None
