@@ -45,7 +45,7 @@ _STOP = re.compile(rb";" + _BLANK)
 _BEGIN = re.compile(_BLANK + rb"(?i:ISO-10303-21)" + _BLANK + rb";")
 _END = re.compile(_BLANK + rb"(?i:END-ISO-10303-21);" + _BLANK)
 _TEXTS = re.compile(_STRING + rb"|" + _COMMENT)
-_NEXT = re.compile(rb"(?:" + _STRING + rb"|" + _COMMENT + rb"|[^;])*?;")
+_PIECES = re.compile(_STRING + rb"|" + _COMMENT + rb"|;")
 # The number of a statement: its own where an equals sign follows, else a reference.
 _NUMBERS = re.compile(rb"(" + _REFERENCE + rb")([ \t]*+=)?")
 _NUMBER = np.dtype([("begin", int), ("end", int), ("value", int), ("own", bool)])
@@ -100,9 +100,7 @@ def mended(text: bytes) -> bytes:
         if after := _after_statement(text, at):
             kept.append(text[at:after])
         else:
-            # What follows is behind the next semicolon, if possible one that is in no string.
-            found = _NEXT.match(text, at)
-            after = found.end() if found else text.find(b";", at) + 1 or len(text)
+            after = _after_semicolon(text, at)
         at = after
     if kept and kept[-1].strip().upper() != b"ENDSEC;":
         kept.append(b"ENDSEC;\n")
@@ -117,6 +115,14 @@ def mended(text: bytes) -> bytes:
         parts += [whole[at:begin], b"$"]
         at = end
     return b"".join(parts) + whole[at:] + b"END-ISO-10303-21;\n"
+
+
+def _after_semicolon(text: bytes, at: int) -> int:
+    """Behind the next semicolon, if possible one that is in no string or comment."""
+    for found in _PIECES.finditer(text, at):
+        if found[0] == b";":
+            return found.end()
+    return text.find(b";", at) + 1 or len(text)
 
 
 def _without(statements: list[bytes], gone: Indices) -> list[bytes]:

@@ -105,6 +105,9 @@ def test_references_to_what_is_lost():
 def test_statements_in_strings_are_none():
     lost = b"#1 = A(1E0,'x;#2=OTHER();',2);\n#2 = B(1);\n#3 = C(#2);\n"
     assert mended(HEAD + lost + TAIL) == HEAD + b"\n#2 = B(1);\n#3 = C(#2);\n" + TAIL
+    # Strings without end are taken as they come, and of many that nothing follows each is read once.
+    assert mended(HEAD + b"#1 = A(1E0,'x;\n#2 = B(1);\n") == HEAD + b"\n#2 = B(1);\n" + TAIL
+    assert mended(HEAD + b"#1 = A(" + 10_000 * b"'x'," + b"/*;*/") == HEAD + TAIL
 
 
 def test_files_that_end_early_or_are_none():
