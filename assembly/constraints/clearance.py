@@ -26,7 +26,8 @@ class Clearance(Constraint):
     does not begin there.
 
     Of solids with edges corners are contacts too: vertices and points of edges over a face, and edges that cross, whose
-    normal misses their cones by less than 0.3 rad. Where faces come to lie on each other, several of them carry.
+    normal misses their cones by less than 0.3 rad, and points of a curve along which two faces all but touch, as a ring
+    and the plate below it. Where faces come to lie on each other, several of them carry.
 
     Parameters
     ----------

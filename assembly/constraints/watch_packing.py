@@ -100,20 +100,22 @@ class _PairPacking:
         self._records: list[list[int]] = []
         self._given: list[int] = []
         self._surfaces: dict[tuple[int, bool], int] = {}
-        # Where the tree of faces is, its smallest radius and how far its facets are off; bodies of a shape share it.
-        self._trees: dict[tuple[Face, ...], tuple[int, float, float]] = {}
+        # Where the tree of faces is, the radius of a ball around it, its smallest radius of curvature and how far its
+        # facets are off; bodies of a shape share it.
+        self._trees: dict[tuple[Face, ...], tuple[int, float, float, float]] = {}
         for faces in dict.fromkeys(side_faces(body) for pair in pairs for body in pair):
             tree = FacetTree.of(faces)
             table, pool, at = pack_tree(tree, writer.scale, writer.table_at, writer.pool_at)
             writer.add(table, pool)
             seams = SEAMS * tree.topology.tolerance if tree.topology.edges else 0.0
-            self._trees[faces] = at, tree.least_radius / writer.scale, (tree.offset + seams) / writer.scale
+            ball = float(tree.nodes.radius[0])
+            self._trees[faces] = at, ball, tree.least_radius / writer.scale, (tree.offset + seams) / writer.scale
 
     def add(self, pair: Pair, least: float, places: Sequence[int]) -> None:
         """Pack a pair with its least gap and where its places begin and end."""
         writer = self._writer
         f, g = (side_faces(body) for body in pair)
-        (tree_f, radius_f, offset_f), (tree_g, radius_g, offset_g) = self._trees[f], self._trees[g]
+        (tree_f, ball_f, radius_f, offset_f), (tree_g, ball_g, radius_g, offset_g) = self._trees[f], self._trees[g]
         flank = max(FLANK * min(radius_f, radius_g), LEAST_FLANK)
         _, minimum = writer.add(pool=[least / writer.scale, flank, offset_f, offset_g])
         given: list[int] = []
@@ -123,7 +125,7 @@ class _PairPacking:
         else:
             shape = [-1, -1, writer.shell(f), writer.shell(g)]
         fields = [*writer.places_of(pair), tree_f, tree_g, *shape, minimum, *places]
-        self._records.append([*fields, len(self._given), len(given) // 2])
+        self._records.append([*fields, len(self._given), len(given) // 2, int(ball_g <= ball_f)])
         self._given += given
 
     def _contacts_of(self, pair: Pair) -> list[int]:

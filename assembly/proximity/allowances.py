@@ -1,7 +1,9 @@
 """How far a pair of bodies may go until it is looked at again, and which part of that it has gone.
 
-What a look does not list is farther than the pair's allowance: until a point of g has moved by that much, seen from f,
-it cannot touch. Where a motion may bring forth a contact, a ball around these patches of g has an allowance of its own.
+What a look does not list is farther than the pair's allowance: until a point of one body has moved by that much, seen
+from the other, it cannot touch. It is the smaller one whose motion is measured (`mover`): a wide plate's rim moves far
+as a small ring turns. Where a motion may bring forth a contact, a ball around these patches of it has an allowance of
+its own.
 """
 
 from __future__ import annotations
@@ -25,7 +27,6 @@ from assembly.proximity.watch_memory import (
     LAST_REACH,
     LENGTHS,
     PAIR_F,
-    PAIR_G,
     PAIR_MEMORY,
     PAIR_MINIMUM,
     PAIR_RECORD,
@@ -34,7 +35,8 @@ from assembly.proximity.watch_memory import (
     PART,
     PLACE,
     REACH,
-    TREE_G,
+    SMALLER,
+    TREE_F,
     TURN,
     memory_places,
 )
@@ -51,6 +53,21 @@ def quaternion_from(q, i, j):
     return quaternion_product((q[i, 3], -q[i, 4], -q[i, 5], -q[i, 6]), (q[j, 3], q[j, 4], q[j, 5], q[j, 6]))
 
 
+@kernel(inner=True)
+def mover(table, watch, p, q):
+    """The body of pair p whose motion is measured: 0 if that is f, its tree, its pose seen from the other body.
+
+    The pose is a quaternion, and the same as a rotation and a shift.
+    """
+    pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
+    side = table[pair + SMALLER]
+    i = table[pair + PAIR_F + 1 - side]
+    j = table[pair + PAIR_F + side]
+    e = quaternion_from(q, i, j)
+    shift = matvec_t(rotation(q, i), (q[j, 0] - q[i, 0], q[j, 1] - q[i, 1], q[j, 2] - q[i, 2]))
+    return side, table[pair + TREE_F + side], e, quaternion_matrix(e[0], e[1], e[2], e[3]), shift
+
+
 @kernel(inline=True)
 def turned_by(memory, o, e):
     """|e - e'|, 2 sin(a / 4) of the angle a by which a pair turned since its last look, in the memory at o."""
@@ -64,20 +81,21 @@ def turned_by(memory, o, e):
 
 @kernel(inline=True)
 def moved_from(pool_or_memory, at, memory, was, turn, shift):
-    """How far a point of g, its place on g and where it was in arrays, is from where it was, seen from f."""
+    """How far a point of a body, its place on it and where it was in arrays, is from where it was."""
     there = add(matvec(turn, three(pool_or_memory, at)), shift)
     d = sub(there, three(memory, was))
     return math.sqrt(dot(d, d))
 
 
 @kernel(inner=True)
-def reach_now(table, pool, watch, memory, p, e, turn, shift):
+def reach_now(table, pool, watch, memory, p, moving):
     """Keep where the bodies of pair p stand at this look. Returns its reach: for MOVES moves as since the last one."""
+    _side, tree, e, turn, shift = moving
     at = memory_places(table, watch)[0] + PAIR_MEMORY * p
     lengths = table[watch + LENGTHS]
     reach = memory[at + REACH]
     pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
-    root = table[table[pair + TREE_G] + NODE_POOL]
+    root = table[tree + NODE_POOL]
     if not math.isnan(memory[at + TURN]):
         pace = moved_from(pool, root + CENTER, memory, at + PLACE, turn, shift)
         pace += 2.0 * pool[root + RADIUS] * turned_by(memory, at, e)
@@ -97,7 +115,10 @@ def reach_now(table, pool, watch, memory, p, e, turn, shift):
 
 @kernel(inner=True)
 def allow_ball(memory, at, ball, allowance):
-    """Keep a ball on g and how far what is in it may go, in the memory of its pair; infinite: there is no ball."""
+    """Keep a ball on the body that moves and how far what is in it may go, in the memory of its pair.
+
+    Infinite: there is no ball.
+    """
     memory[at + BALL_ALLOWANCE] = allowance
     if allowance < math.inf:
         center, place, memory[at + BALL_RADIUS] = ball
@@ -116,13 +137,8 @@ def part_used(table, pool, watch, memory, p, q):
     o = memory_places(table, watch)[0] + PAIR_MEMORY * p
     if math.isnan(memory[o + TURN]):
         return math.inf
-    pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
-    i = table[pair + PAIR_F]
-    j = table[pair + PAIR_G]
-    e = quaternion_from(q, i, j)
-    turn = quaternion_matrix(e[0], e[1], e[2], e[3])
-    shift = matvec_t(rotation(q, i), (q[j, 0] - q[i, 0], q[j, 1] - q[i, 1], q[j, 2] - q[i, 2]))
-    root = table[table[pair + TREE_G] + NODE_POOL]
+    _side, tree, e, turn, shift = mover(table, watch, p, q)
+    root = table[tree + NODE_POOL]
     angle = turned_by(memory, o, e)
     moved = moved_from(pool, root + CENTER, memory, o + PLACE, turn, shift) + 2.0 * pool[root + RADIUS] * angle
     if not moved > 0.0:

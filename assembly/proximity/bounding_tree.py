@@ -169,8 +169,9 @@ def rounding(pool, root_f, root_g, shift):
 def pairs_about(table, pool, tree_f, tree_g, rotation, shift, reach, ring, tilt, stack, out):
     """Elements (k, 2) that may hold an extremal pair with |gap| <= reach at this pose, or at one near it; their number.
 
-    Near are poses at which no point of g is farther than `ring` from where it is now, and no unit vector farther than
-    `tilt`: then the difference g - f of a pair's points is off by as much, and once more by what a cone of g turned.
+    Near are poses at which no point of either body is farther than `ring` from where it is now, seen from the other,
+    and no unit vector farther than `tilt`: then the difference g - f of a pair's points is off by as much, and once
+    more by what a cone, or the axes it is seen in, turned.
 
     -1 where the stack (n, 2) is too short; more than `out` holds where `out` is: then what it holds are the first.
     """

@@ -28,7 +28,15 @@ from assembly._kernel import kernel
 from assembly.geometry.spline import CURVE_BREAKS, CURVE_SPANS, curve_lanes, surface_point, xyz
 from assembly.geometry.vec import add, blend, cross, dot, matvec, scale, sub
 from assembly.proximity.extremal import RANK, into_domain
-from assembly.proximity.shell import EDGE_CURVE, EDGE_POINT, EDGE_START, EDGE_SURFACE, VERTEX, VERTEX_POINT
+from assembly.proximity.shell import (
+    EDGE_CURVE,
+    EDGE_POINT,
+    EDGE_START,
+    EDGE_SURFACE,
+    FACE_POINT,
+    VERTEX,
+    VERTEX_POINT,
+)
 
 # Newton's own matrix is damped below this ratio: its residuals are right to rounding, unlike the rates it stands for.
 FINE = 1e-13
@@ -185,11 +193,13 @@ def across(a, b):
 
 
 @kernel(inner=True)
-def other_jet(table, pool, kind, other, rotation, shift, t):
-    """Point, C_t, C_tt of an edge, or of a point (whose derivatives vanish), moved by a pose."""
+def other_jet(table, pool, kind, other, rotation, shift, t, s):
+    """Point, C_t, C_tt of an edge at t, or of a point (whose derivatives vanish), of a face at (t, s), moved."""
     zero = (0.0, 0.0, 0.0)
     if kind == VERTEX:
         return add(matvec(rotation, vertex_point(table, pool, other)), shift), zero, zero
+    if kind == FACE_POINT:
+        return add(matvec(rotation, surface_point(table, pool, other, t, s)[0]), shift), zero, zero
     p, ct, ctt = edge_jet(table, pool, other, t)
     if kind == EDGE_POINT:
         return add(matvec(rotation, p), shift), zero, zero

@@ -128,8 +128,8 @@ def solve_off_face(table, pool, kind_f, f, kind_g, g, rotation, shift, x, normal
     status = NOT_CONVERGED
     iteration = 0
     while True:
-        p, ct, ctt = other_jet(table, pool, kind_f, f, same, origin, x[0])
-        q, cs, css = other_jet(table, pool, kind_g, g, rotation, shift, x[1])
+        p, ct, ctt = other_jet(table, pool, kind_f, f, same, origin, x[0], 0.0)
+        q, cs, css = other_jet(table, pool, kind_g, g, rotation, shift, x[1], 0.0)
         d = sub(q, p)
         t1, bent1, bend1, speed1 = unit_tangent(ct, ctt)
         t2, bent2, bend2, speed2 = unit_tangent(cs, css)

@@ -56,9 +56,10 @@ LEVEL = 1e-9
 
 @kernel(inner=True)
 def solve_on_face(table, pool, face, kind, other, rotation, shift, x, size, turn, limit):
-    """Newton from x = (u, v, t) for a face and an edge, a vertex or a point of an edge, in the axes of the face.
+    """Newton from x = (u, v, t, s) for a face and an edge, a vertex or a point, in the axes of the face.
 
-    With limit 0 everything is evaluated at x. Returns status, (u, v, t), and
+    A point of an edge stays at t, one of a face at (t, s). With limit 0 everything is evaluated at x. Returns status,
+    (u, v, t, s), and
 
     (n, tx, ty, p, q, beta), (E^-1, A, tangent of the edge, k, |P C_t|, curvature unit), residual,
     (regular, whether the other feature counts as a point, isolated), det H / |H|^2
@@ -69,7 +70,7 @@ def solve_on_face(table, pool, face, kind, other, rotation, shift, x, size, turn
     iteration = 0
     while True:
         p, n, tx, ty, e, a, regular = own_frame(table, pool, face, x[0], x[1])
-        q, ct, ctt = other_jet(table, pool, kind, other, rotation, shift, x[2])
+        q, ct, ctt = other_jet(table, pool, kind, other, rotation, shift, x[2], x[3])
         d = sub(q, p)
         beta = dot(n, d)
         r0 = dot(tx, d)
@@ -185,7 +186,7 @@ def solve_on_face(table, pool, face, kind, other, rotation, shift, x, size, turn
             # Held at the end of the patch and nothing else moves: the pair has left.
             if abs(u - x[0]) + abs(v - x[1]) + abs(t - x[2]) <= 1e-12 * (abs(du) + abs(dv) + abs(dt)):
                 break
-        x = (u, v, t)
+        x = (u, v, t, x[3])
         iteration += 1
     scope = unit * (1.0 + abs(beta) * unit)
     _i, isolated = inverse(h, scope, RANK)

@@ -99,7 +99,7 @@ def element_distance(table, pool, trees, turn, shift, bulk, e, d):
 
 
 @kernel(inner=True)
-def facing_pairs(table, pool, watch, memory, p, scene, e, reach, stack, candidates):
+def facing_pairs(table, pool, watch, memory, p, scene, moving, reach, stack, candidates):
     """The patches of the two bodies of pair p that face each other within its reach, into `candidates`.
 
     Returns how many pairs there are, and the reach: it is less where there is no room for all.
@@ -112,7 +112,9 @@ def facing_pairs(table, pool, watch, memory, p, scene, e, reach, stack, candidat
     ring = RINGS * pool[table[watch + LENGTHS] + FIRST_REACH]
     if lists > 0 and reach <= ring:
         at_list = table[watch + LIST_TABLE] + LIST_INTS * (p % lists)
-        found = listed_pairs(table, pool, at_list, p, trees, turn, shift, e, reach + least, ring, stack, candidates)
+        found = listed_pairs(
+            table, pool, at_list, p, trees, turn, shift, moving, reach + least, ring, stack, candidates
+        )
     while not 0 <= found <= candidates.shape[0]:
         found = pairs_within(table, pool, trees[0], trees[1], turn, shift, reach + least, stack, candidates)
         if 0 <= found <= candidates.shape[0]:

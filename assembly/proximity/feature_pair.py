@@ -43,16 +43,16 @@ def newton_on_features(table, pool, kind_f, f, kind_g, g, rotation, shift, x, n,
     """As `solve_features` for all but two faces, with the number of steps: none evaluates the pair at x."""
     if kind_f == FACE:
         status, y, parts, rates, residual, flags, fold = solve_on_face(
-            table, pool, f, kind_g, g, rotation, shift, (x[0], x[1], x[2]), size, turn, limit
+            table, pool, f, kind_g, g, rotation, shift, x, size, turn, limit
         )
-        return status, (y[0], y[1], y[2], x[3]), face_frame(parts, rates, residual, flags, fold)
+        return status, y, face_frame(parts, rates, residual, flags, fold)
     if kind_g == FACE:
         back = transposed(rotation)
         status, y, parts, rates, residual, flags, fold = solve_on_face(
-            table, pool, g, kind_f, f, back, neg(matvec(back, shift)), (x[2], x[3], x[0]), size, turn, limit
+            table, pool, g, kind_f, f, back, neg(matvec(back, shift)), (x[2], x[3], x[0], x[1]), size, turn, limit
         )
         frame = turned_frame(rotation, shift, parts, rates, residual, flags, fold)
-        return status, (y[2], x[1], y[0], y[1]), frame
+        return status, (y[2], y[3], y[0], y[1]), frame
     status, z, frame = solve_off_face(
         table, pool, kind_f, f, kind_g, g, rotation, shift, (x[0], x[2]), n, size, turn, limit
     )
@@ -66,7 +66,8 @@ def solve_features(table, pool, kind_f, f, kind_g, g, rotation, shift, x, n, siz
     Parameters
     ----------
     kind_f, f, kind_g, g
-        FACE with a surface record, EDGE with an edge record, VERTEX with a vertex record.
+        FACE with a surface record, EDGE with an edge record, VERTEX with a vertex record; EDGE_POINT or FACE_POINT of
+        a point that stays where it is on one, over a face.
     rotation, shift
         The pose of body g seen from body f.
     x

@@ -74,8 +74,8 @@ def is_known(table, pool, scene, e, d, roots, count):
     for k in range(count):
         if roots[k, CODE_F] != codes[0] or roots[k, CODE_G] != codes[1]:
             continue
-        if not roots[k, ROOT_FOLD] > ALONE or roots[k, CORNER] == POINT:
-            # A point that stays where it is on an edge is no root: where the edge is nearest may be beside it.
+        if not roots[k, ROOT_FOLD] > ALONE or roots[k, CORNER] >= POINT:
+            # A point that stays where it is is no root: where the edge, or the face, is nearest may be beside it.
             continue
         x = (roots[k, 0], roots[k, 1], roots[k, 2], roots[k, 3])
         if not is_beside(table, pool, scene[2], x, start, half, BESIDE):

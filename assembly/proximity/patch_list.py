@@ -6,8 +6,9 @@ list is a function of shapes and of the pose that it was made for, whoever asks;
 and pairs of bodies take turns.
 
 In the table: the pair it is for (-1: none), how many (-1: more than there is room for), the pose it is for (the turn's
-quaternion, the middle of g's tree), how far g may go from there, the reach, elements (k, 2). Lengths are multiples of
-GRAIN there: the pool is shared by all who solve a scene at the same time, and a table is one's own.
+quaternion, the middle of the tree of the body that moves), how far that may go from there, the reach, elements (k, 2).
+Lengths are multiples of GRAIN there: the pool is shared by all who solve a scene at the same time, and a table is one's
+own.
 """
 
 from __future__ import annotations
@@ -27,14 +28,15 @@ GRAIN, FAR = 2.0**-48, 1000.0
 
 
 @kernel(inner=True)
-def listed_pairs(table, pool, at, p, trees, turn, shift, e, reach, ring, stack, candidates):
+def listed_pairs(table, pool, at, p, trees, turn, shift, moving, reach, ring, stack, candidates):
     """What `pairs_within` finds, from the list at `at`, which is made anew where it does not reach.
 
-    The pose is that of g seen from f, and e its quaternion; a new list is for motions up to `ring`. -1 where there is
-    no room for a list.
+    The pose is that of g seen from f; `moving` is the body whose motion is measured (`allowances.mover`), and a new
+    list is for motions of it up to `ring`. -1 where there is no room for a list.
     """
-    root = table[trees[1] + NODE_POOL]
-    middle = add(matvec(turn, three(pool, root + CENTER)), shift)
+    _side, tree, e, rotation, place = moving
+    root = table[tree + NODE_POOL]
+    middle = add(matvec(rotation, three(pool, root + CENTER)), place)
     radius = pool[root + RADIUS]
     if table[at + OWNER] == p:
         square = 0.0

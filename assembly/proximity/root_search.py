@@ -83,14 +83,17 @@ def look_into(table, pool, scene, e, d, neglect, roots, count, work, passed, sta
 
 
 @kernel(inner=True)
-def search_patches(table, pool, scene, limits, span, offsets, neglect, facing, found, roots, count, work, passed):
+def search_patches(
+    table, pool, scene, moving, limits, span, offsets, neglect, facing, found, roots, count, work, passed
+):
     """Look into `found` pairs of patches for minima that are not known: new ones where their gaps are in a span.
 
     The `limits` are the flank and how near is near enough to look into. Returns how many roots there are; how near
-    patches are that are beyond both; and how far what is in a ball on g may go, in which a motion may bring forth a
-    contact, with that ball: its middle, where that is seen from f, its radius.
+    patches are that are beyond both; and how far what is in a ball on the body that is `moving` may go, in which a
+    motion may bring forth a contact, with that ball: its middle, where that is seen from the other body, its radius.
     """
     flank, enough = limits
+    side, tree, _e, turn, shift = moving
     candidates, distances = facing
     free = math.inf
     fertile = math.inf
@@ -118,7 +121,7 @@ def search_patches(table, pool, scene, limits, span, offsets, neglect, facing, f
             bound = max(bound, flank)
         if bears:
             fertile = min(fertile, bound)
-            lo, hi = around(table, pool, scene[3][1], candidates[c, 1], lo, hi)
+            lo, hi = around(table, pool, tree, candidates[c, side], lo, hi)
         if new >= 0:
             gap = roots[new, GAP]
             # The far sides of two bodies oppose each other, too.
@@ -127,5 +130,5 @@ def search_patches(table, pool, scene, limits, span, offsets, neglect, facing, f
             roots[new, ORIGIN] = USELESS if alien else NEW
     d = sub(hi, lo)
     center = scale(0.5, add(lo, hi))
-    ball = (center, add(matvec(scene[0], center), scene[1]), 0.5 * math.sqrt(dot(d, d)))
+    ball = (center, add(matvec(turn, center), shift), 0.5 * math.sqrt(dot(d, d)))
     return count, free, fertile, ball

@@ -13,8 +13,8 @@ the same points at t_b = m0 + m1 t, to first order. An edge that is closed smoot
 
 from __future__ import annotations
 
-# Kinds of features; and a point of an edge that stays where it is on it.
-FACE, EDGE, VERTEX, EDGE_POINT = 0, 1, 2, 3
+# Kinds of features; and a point of an edge, or of a face, that stays where it is on it.
+FACE, EDGE, VERTEX, EDGE_POINT, FACE_POINT = 0, 1, 2, 3, 4
 # Header: counts, and where the records begin.
 FACES, FACE_TABLE, EDGES, EDGE_TABLE, VERTICES, VERTEX_TABLE, SHELL = 0, 1, 2, 3, 4, 5, 6
 # A face: its surface record, its trim (-1: no boundary), the list that names the edge of every boundary curve (-1: of

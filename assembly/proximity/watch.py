@@ -17,7 +17,7 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly.kinematics.motion import relative_pose, rotation
-from assembly.proximity.allowances import LEAST_ALLOWANCE, allow_ball, largest_part, quaternion_from, reach_now
+from assembly.proximity.allowances import LEAST_ALLOWANCE, allow_ball, largest_part, mover, reach_now
 from assembly.proximity.bounding_tree import least_distance
 from assembly.proximity.corners import add_corners
 from assembly.proximity.facing import facing_pairs, near_enough
@@ -160,9 +160,9 @@ def look_at_pair(
     least = pool[minimum]
     flank = pool[minimum + 1]
     offsets = (pool[minimum + 2], pool[minimum + 3])
-    e = quaternion_from(q, i, j)
-    reach = reach_now(table, pool, watch, memory, p, e, turn, shift)
-    found, reach = facing_pairs(table, pool, watch, memory, p, scene, e, reach, stack, candidates)
+    moving = mover(table, watch, p, q)
+    reach = reach_now(table, pool, watch, memory, p, moving)
+    found, reach = facing_pairs(table, pool, watch, memory, p, scene, moving, reach, stack, candidates)
     memory[at + REACH] = reach
     count = known_roots(table, pool, watch, memory, p, scene, offsets, tracked, roots, work)
     enough = near_enough(table, pool, scene, least, reach, flank, candidates, found, distances)
@@ -170,8 +170,10 @@ def look_at_pair(
     neglect = pool[lengths + NEGLECT]
     facing = (candidates, distances)
     count, free, fertile, ball = search_patches(
-        table, pool, scene, (flank, enough), span, offsets, neglect, facing, found, roots, count, work, passed
+        table, pool, scene, moving, (flank, enough), span, offsets, neglect, facing, found, roots, count, work, passed
     )
+    if count == ROOTS:
+        memory[CROWDED] = 1.0
     if scene[2][0] >= 0:
         seat_given(table, watch, memory, p, roots, count, tracked)
     elif table[watch + CORNERS] == 1:

@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly.proximity.corners import sunk
 from assembly.proximity.overlap import is_outside
 from assembly.proximity.roots import (
     ALIKE,
@@ -32,6 +33,7 @@ from assembly.proximity.roots import (
     add_root,
 )
 from assembly.proximity.solid_contact import FEATURE_F, FEATURE_G, PAIR_GAP, PAIR_NORMAL, STAYS
+from assembly.proximity.switching import HELD_F
 
 # The record of a watch: counts; where pairs begin; the row of `tracked` that is the first place; address of
 # `track_solids`; where its lengths are in the pool; how many lists there are, where they begin; whether corners are
@@ -44,18 +46,19 @@ PAIRS, PLACES, PAIR_TABLE, FIRST, TRACK_SOLIDS, LENGTHS, LISTS, LIST_TABLE, CORN
 NEGLECT, FIRST_REACH, LAST_REACH, LENGTH_COUNT = 0, 1, 2, 3
 # A pair: bodies, trees, surfaces or else (-1) shells, where its least gap is in the pool (behind it how far it may
 # go between looks where contacts may be born, and how far facets of either are from their surfaces), its places from
-# and to, and rows of given contacts between the two (row, 1 if the bodies are the other way round).
+# and to, rows of given contacts between the two (row, 1 if the bodies are the other way round), and whether it is f (0)
+# or g (1) that is the smaller one.
 PAIR_F, PAIR_G, TREE_F, TREE_G, PAIR_SURFACE_F, PAIR_SURFACE_G, PAIR_SHELL_F, PAIR_SHELL_G = 0, 1, 2, 3, 4, 5, 6, 7
-PAIR_MINIMUM, LOW, HIGH, GIVEN, GIVEN_COUNT, PAIR_RECORD = 8, 9, 10, 11, 12, 13
+PAIR_MINIMUM, LOW, HIGH, GIVEN, GIVEN_COUNT, SMALLER, PAIR_RECORD = 8, 9, 10, 11, 12, 13, 14
 # Memory. Header: events, looks and contacts so far, the time of the caller, whether a near root ever found no place,
 # calls so far.
 EVENT_COUNT, LOOKS, BORN, TIME, CROWDED, CALLS, MEMORY_HEADER = 0, 1, 2, 3, 4, 5, 6
-# Of a pair: how g was turned, seen from f, at its last look (a quaternion, NaN before there was one), and where the
-# middle of its tree was; how far g may go from there, its reach, its state, calls at its last look; a ball on g, where
-# its middle was, and how far what is in it may go; which part of its allowances is used; whether it is looked at after
-# every move, because a contact may be born at a fold beside one that touches; whether the bodies are in each other
-# where no contact says so (NaN: its last look did not ask); whether a near root found no place at the last look; how
-# far a step was to go that was cut since.
+# Of a pair: how the smaller body was turned, seen from the other, at its last look (a quaternion, NaN before there was
+# one), and where the middle of its tree was; how far it may go from there, its reach, its state, calls at its last
+# look; a ball on it, where its middle was, and how far what is in it may go; which part of its allowances is used;
+# whether it is looked at after every move, because a contact may be born at a fold beside one that touches; whether the
+# bodies are in each other where no contact says so (NaN: its last look did not ask); whether a near root found no place
+# at the last look; how far a step was to go that was cut since.
 TURN, PLACE, ALLOWANCE, REACH, STATE, CALLED = 0, 4, 7, 8, 9, 10
 BALL, BALL_RADIUS, BALL_PLACE, BALL_ALLOWANCE, PART, URGENT, CROSSED, WANTING, CUT_SHORT, PAIR_MEMORY = (
     11, 14, 15, 18, 19, 20, 21, 22, 23, 24
@@ -71,6 +74,8 @@ CAME_NEAR, WENT_AWAY, LOST, SAME_ROOT, NO_PLACE = 0, 1, 2, 3, 4
 TAKE, KEEP = 0.4, 0.8
 # Room for roots of a look.
 ROOTS = 96
+# A point of a valley that is held goes to its bottom as often as that is lower by more than this.
+SUNK = 1e-13
 # A given contact goes from a saddle to a minimum that is lower by no more than this.
 SHALLOW = 1e-7
 
@@ -175,12 +180,17 @@ def known_roots(table, pool, watch, memory, p, scene, offsets, tracked, roots, w
             start = (tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3])
             codes = (np.int64(tracked[r, FEATURE_F]), np.int64(tracked[r, FEATURE_G]))
             n = (tracked[r, PAIR_NORMAL], tracked[r, PAIR_NORMAL + 1], tracked[r, PAIR_NORMAL + 2])
+            if corner >= HELD_F:
+                start = sunk(table, pool, scene, codes, corner, start)
             count, found = add_root(table, pool, scene, codes, start, n, neglect, roots, count, work, corner)
             lost = found != ALIKE and found != MINIMUM_FOUND
             if count > before and corner == 0.0 and roots[before, GAP] < 0.0:
                 lost = lost or is_outside(table, pool, scene, roots, before, offsets)
         if count > before and not lost:
             roots[before, ORIGIN] = LISTED + k
+            if corner >= HELD_F and roots[before, GAP] < tracked[r, PAIR_GAP] - SUNK:
+                # The same contact elsewhere: who solves has to know.
+                note(table, watch, memory, HANDED_OFF, SAME_ROOT, p, memory[o + PLACE_NUMBER], roots[before, GAP])
             write_root(roots, before, tracked, r)
         else:
             kind, reason = (HANDED_OFF, LOST) if lost else (MERGED, SAME_ROOT)

@@ -29,6 +29,7 @@ from assembly.proximity.shell import (
     EDGE_START,
     EDGE_SURFACE,
     FACE,
+    FACE_POINT,
     VERTEX,
 )
 from tests.laws.scenes import dome, inside, quadratic, quaternion_of, random_quaternion
@@ -39,7 +40,7 @@ STATUS = {CONVERGED: "CONVERGED", SINGULAR: "SINGULAR", LEFT_PATCH: "LEFT_PATCH"
 
 @dataclass(frozen=True, eq=False)
 class Feature:
-    """A face; an edge on a surface, or in space; a point of one that stays where it is; a vertex."""
+    """A face; an edge on a surface, or in space; a point of one, or of a face, that stays where it is; a vertex."""
 
     kind: int
     face: Face | None = None
@@ -53,6 +54,8 @@ class Feature:
             return (self.point,)
         if self.kind == EDGE_POINT:
             return Feature(EDGE, self.face, self.curve).jet(x)[:1]
+        if self.kind == FACE_POINT:
+            return self.face.surface.evaluate(x[0], x[1], 1)[:1]
         if self.kind == FACE:
             return self.face.surface.evaluate(x[0], x[1], 1)
         if self.face is None:
@@ -97,7 +100,7 @@ class Packed:
                 table += record.tolist()
                 pool += numbers.tolist()
                 assert record.size == CURVE_RECORD
-            if feature.kind == FACE:
+            if feature.kind in (FACE, FACE_POINT):
                 at.append(surface)
                 continue
             at.append(len(table))
@@ -168,8 +171,8 @@ def random_feature(rng, kind, in_space=None):
     surface = dome(rng) if rng.random() < 0.5 else quadratic(rng)
     face = Face(surface, reversed=bool(rng.integers(2)))
     at = inside(rng, surface)
-    if kind == FACE:
-        return Feature(FACE, face=face), tuple(at)
+    if kind in (FACE, FACE_POINT):
+        return Feature(kind, face=face), tuple(at)
     curve, t = plane_curve(rng, surface, at)
     return Feature(kind, face=face, curve=curve), (t, 0.0)
 

@@ -21,7 +21,7 @@ from assembly.proximity import (
     extremal_curve_pair,
 )
 from assembly.proximity.feature_query import GAP, NORMAL
-from assembly.proximity.shell import EDGE, EDGE_POINT, FACE, VERTEX
+from assembly.proximity.shell import EDGE, EDGE_POINT, FACE, FACE_POINT, VERTEX
 from tests.laws.curve_witness import CurveStack, SurfaceCurve, errata_jacobian
 from tests.laws.feature_scenes import Feature, Packed, place, plane_curve, random_feature, space_curve
 from tests.laws.scenes import dome, inside, quadratic, random_gap
@@ -202,9 +202,10 @@ def test_curve_hessian_entry_by_entry(group):
 
 # ---- every pair of kinds: the kernels --------------------------------------------------------------------------------
 
-NAMES = {FACE: "face", EDGE: "edge", VERTEX: "vertex", EDGE_POINT: "point of an edge"}
-# Points that stay where they are on an edge are looked at over faces alone.
-KINDS = [(f, g) for f in NAMES for g in NAMES if EDGE_POINT not in (f, g) or FACE in (f, g)]
+NAMES = {FACE: "face", EDGE: "edge", VERTEX: "vertex", EDGE_POINT: "point of an edge", FACE_POINT: "point of a face"}
+# Points that stay where they are on an edge or a face are looked at over faces alone.
+POINTS = {EDGE_POINT, FACE_POINT}
+KINDS = [(f, g) for f in NAMES for g in NAMES if not POINTS & {f, g} or FACE in (f, g)]
 
 
 @dataclass(frozen=True)
@@ -228,8 +229,8 @@ class Case:
 
     @property
     def moves(self):
-        """Whether each parameter is solved for: a vertex has none, a point of an edge keeps its own."""
-        return np.repeat([self.f.kind != EDGE_POINT, self.g.kind != EDGE_POINT], 2) & (self.x != 0.0)
+        """Whether each parameter is solved for: a vertex has none, a point that stays keeps its own."""
+        return np.repeat([self.f.kind not in POINTS, self.g.kind not in POINTS], 2) & (self.x != 0.0)
 
 
 def random_cases(kind_f, kind_g, count):

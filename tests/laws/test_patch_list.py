@@ -14,9 +14,14 @@ from tests.laws.test_facet_enclosure import BODIES, Descent, placed, sample
 REACH, RING = 0.1, 0.15
 
 
-def around(rng, descent, turn, shift):
-    """A pose at which no point of g's ball is farther than RING from where it is at this one."""
-    root = descent.table[descent.g + NODE_POOL]
+def inverse(turn, shift):
+    """The pose of f seen from g, of that of g seen from f; and the other way round."""
+    return turn.T, -turn.T @ shift
+
+
+def around(rng, descent, tree, turn, shift):
+    """A pose at which no point of a body's ball is farther than RING from where it is at this one."""
+    root = descent.table[tree + NODE_POOL]
     middle = descent.pool[root + CENTER : root + CENTER + 3]
     share = rng.uniform(0.0, 1.0)
     # A turn by an angle a moves what is at a distance r by a r at most.
@@ -26,8 +31,9 @@ def around(rng, descent, turn, shift):
     return turned, turn @ middle + shift - turned @ middle + (1.0 - share) * RING * way
 
 
+@pytest.mark.parametrize("side", [0, 1])
 @pytest.mark.parametrize("names", [("torus", "torus"), ("torus", "ellipsoid, inside out"), ("box", "cylinder")])
-def test_a_list_has_what_is_in_reach_at_poses_near_its_own(names):
+def test_a_list_has_what_is_in_reach_at_poses_near_its_own(names, side):
     rng = np.random.default_rng(4)
     descent = Descent(*(BODIES[name] for name in names))
     table = np.append(descent.table, np.full(LIST_INTS, -1))
@@ -39,12 +45,16 @@ def test_a_list_has_what_is_in_reach_at_poses_near_its_own(names):
         pose = placed(rng, f, n, g, m, rng.uniform(0.0, 0.5 * REACH))
         table[at + OWNER] = -1
         for k in range(4):
-            turn, shift = pose if k == 0 else around(rng, descent, *pose)
-            e = tuple(Rotation.from_matrix(turn).as_quat(scalar_first=True).tolist())
-            there = quaternion_matrix(*e), tuple(shift.tolist())
             trees = descent.f, descent.g
+            # The motion of f is measured seen from g, that of g seen from f.
+            seen = pose if side == 1 else inverse(*pose)
+            seen = seen if k == 0 else around(rng, descent, trees[side], *seen)
+            e = tuple(Rotation.from_matrix(seen[0]).as_quat(scalar_first=True).tolist())
+            moving = side, trees[side], e, quaternion_matrix(*e), tuple(seen[1].tolist())
+            turn, shift = seen if side == 1 else inverse(*seen)
+            there = tuple(turn.ravel().tolist()), tuple(shift.tolist())
             before = table[at:].copy()
-            count = listed_pairs(table, pool, at, 0, trees, *there, e, REACH, 1.01 * RING, descent.stack, room)
+            count = listed_pairs(table, pool, at, 0, trees, *there, moving, REACH, 1.01 * RING, descent.stack, room)
             if count < 0:
                 assert table[at + COUNT] == -1
                 break
