@@ -155,6 +155,8 @@ def solve_program(table, pool, settings, state, history, tips):
     entered = math.inf
     restorations = 0
     kicks = 0
+    cuts = 0
+    room_left = math.inf
     check_at = PATIENCE
     check_violation = math.inf
     iteration = 0
@@ -223,8 +225,11 @@ def solve_program(table, pool, settings, state, history, tips):
         # Rows of vectors depend on one another: their multipliers drift where nothing keeps them short.
         shortened = iteration > 0 and (alpha < 1.0 or table[VECTOR_TRIMS] == 1)
         # At the start both are the same; later a tenth of the last residual is good.
-        good = math.inf if iteration == 0 else 0.1 * last_dual
-        dual = choose_multipliers(shape, rows, here, shortened, good, active, gradient, lines[0], gram, y, better_y)
+        good = math.inf if iteration == 0 else max(0.1 * last_dual, settings[STATIONARITY])
+        touches = violation <= TOUCHING and not tick
+        dual = choose_multipliers(
+            shape, rows, here, shortened, touches, good, active, gradient, lines[0], gram, y, better_y
+        )
         if iteration < history.shape[0]:
             figures = (value, violation, dual, mu, shift, alpha, radius)
             for k in range(HISTORY):
@@ -305,7 +310,7 @@ def solve_program(table, pool, settings, state, history, tips):
         gain = 2.0 * max(violation / max(last_violation, feasible), dual / max(last_dual, settings[STATIONARITY]))
         is_fresh = not (kept and gain * violation <= feasible and gain * dual <= settings[STATIONARITY])
         shift, used, longest, turn = aim(
-            program, here, rows, y, mu, shift, radius, dual, restoring, is_fresh, weights, system
+            program, here, rows, y, mu, shift, min(radius, room_left), cuts, dual, restoring, is_fresh, weights, system
         )
         if used < 0.0:
             status = STALLED
@@ -337,6 +342,8 @@ def solve_program(table, pool, settings, state, history, tips):
                 check_at = iteration + PATIENCE
                 check_violation = violation
         longest *= cut
+        cuts = cuts + 1 if watched and cut < 0.5 and violation <= TOUCHING else 0
+        room_left = 2.0 * longest if cuts > 0 else math.inf
         base = 0.0 if restoring else value
         accepted, alpha, lost = search(
             program, tips, here, trial, rows, y, base, value, restoring, mu, slope, longest, weights, system

@@ -19,6 +19,10 @@ RELEASES, PULLS = 4, 1e-12
 LEFT_OVER, SOFTER, SOFTEST = 0.1, 1e-3, 1e-9
 # Multipliers below this count for nothing against the objective's curvature, which is of order one.
 WEAK = 1e-3
+# One-sided rows that hold by less than this may push; so often they are exchanged for those that would pull, and after
+# so many rounds that gain nothing one at a time. A row is wanted that would take more than this off the objective's
+# slope.
+NEAR, EXCHANGES, BLOCKED, WANTED = 1e-9, 40, 3, 1e-12
 
 
 @kernel(inner=True)
@@ -140,8 +144,8 @@ def dual_residual(bases, jacobian, rows, one_sided, residual, gradient, y, scrat
 
 
 @kernel(inner=True)
-def least_squares_multipliers(bases, jacobian, rows, one_sided, active, gradient, scratch, of_rows, gram, y):
-    """The multipliers of the active rows that leave the smallest grad f + J^T y.
+def least_squares_multipliers(bases, jacobian, rows, active, gradient, scratch, of_rows, gram, y):
+    """The multipliers of the active rows, of either sign, that leave the smallest grad f + J^T y.
 
     The last row of `gram` is room for the right side.
     """
@@ -157,21 +161,83 @@ def least_squares_multipliers(bases, jacobian, rows, one_sided, active, gradient
             s = sequence[l]
             gram[k, l] = times(bases, jacobian, s, scratch) if active[s] > 0.0 else 0.0
         gram[k, k] += 1e-10 if active[r] > 0.0 else 1.0
-        side[k] = -times(bases, jacobian, r, gradient) if active[r] > 0.0 else 0.0
         if active[r] > 0.0:
             clear_row(bases, r, scratch)
-    if factorize(gram, rows, last_row):
+        y[r] = 0.0
+    if not factorize(gram, rows, last_row):
+        return
+    # Again for what that 1e-10 leaves, where rows all but depend on each other.
+    for _ in range(3):
+        for i in range(gradient.size):
+            scratch[i] = gradient[i]
+        add_transposed(bases, jacobian, rows, y, scratch)
+        for k in range(rows):
+            r = sequence[k]
+            side[k] = -times(bases, jacobian, r, scratch) if active[r] > 0.0 else 0.0
         substitute(gram, rows, last_row, side)
-    for k in range(rows):
-        r = sequence[k]
-        y[r] = min(side[k], 0.0) if one_sided[r] == 1 else side[k]
+        for k in range(rows):
+            y[sequence[k]] += side[k]
 
 
 @kernel(inner=True)
-def choose_multipliers(shape, rows, here, shortened, good, active, gradient, scratch, gram, y, better_y):
-    """The better of y, of what the last step proposed, and after a shortened step of least squares; into y.
+def exchange(bases, jacobian, rows, one_sided, residual, active, gradient, scratch, y, most):
+    """Let one-sided rows that pull count no more, and those count that are near and would balance more, the last first.
 
-    Returns the dual residual.
+    `most` of them at most. Returns how many there are.
+    """
+    for i in range(gradient.size):
+        scratch[i] = gradient[i]
+    add_transposed(bases, jacobian, rows, y, scratch)
+    found = 0
+    for r in range(rows - 1, -1, -1):
+        if one_sided[r] == 0:
+            continue
+        pulls = active[r] > 0.0 and y[r] > 0.0
+        wanted = active[r] == 0.0 and abs(residual[r]) <= NEAR and times(bases, jacobian, r, scratch) > WANTED
+        if pulls or wanted:
+            found += 1
+            if found <= most:
+                active[r] = 1.0 if wanted else 0.0
+    return found
+
+
+@kernel(inner=True)
+def pushing_multipliers(
+    bases, jacobian, rows, one_sided, residual, active, exchanges, gradient, scratch, of_rows, gram, y
+):
+    """Multipliers of least squares, none of which pulls: with so many exchanges of the active rows at most.
+
+    Where rows depend on each other, it takes some of them only, and which these are is not known from the gaps. All
+    that are wrong are exchanged at once as long as they become fewer (block pivoting, Portugal, Judice and Vicente
+    1994); what still pulls in the end is set to zero.
+    """
+    fewest = rows + 1
+    patience = BLOCKED
+    for k in range(exchanges + 1):
+        least_squares_multipliers(bases, jacobian, rows, active, gradient, scratch, of_rows, gram, y)
+        if k == exchanges:
+            break
+        found = exchange(
+            bases, jacobian, rows, one_sided, residual, active, gradient, scratch, y, rows if patience > 0 else 1
+        )
+        if found == 0:
+            break
+        if found < fewest:
+            fewest = found
+            patience = BLOCKED
+        else:
+            patience -= 1
+    for r in range(rows):
+        if one_sided[r] == 1:
+            y[r] = min(y[r], 0.0)
+
+
+@kernel(inner=True)
+def choose_multipliers(shape, rows, here, shortened, holds, good, active, gradient, scratch, gram, y, better_y):
+    """The better of y, of what the last step proposed, and of least squares, into y.
+
+    These are for after a shortened step, and for where rows hold and neither of the others is good: it depends on which
+    rows push then. Returns the dual residual.
     """
     bases, one_sided, _order, of_rows = shape
     residual = here[3]
@@ -186,8 +252,11 @@ def choose_multipliers(shape, rows, here, shortened, good, active, gradient, scr
             y[r] = better_y[r]
     else:
         dual = other
-    if shortened:
-        least_squares_multipliers(bases, jacobian, rows, one_sided, active, gradient, scratch, of_rows, gram, better_y)
+    if shortened or (holds and dual > good):
+        exchanges = EXCHANGES if holds and dual > good else 0
+        pushing_multipliers(
+            bases, jacobian, rows, one_sided, residual, active, exchanges, gradient, scratch, of_rows, gram, better_y
+        )
         other = dual_residual(bases, jacobian, rows, one_sided, residual, gradient, better_y, scratch)
         if other < dual:
             dual = other
@@ -211,7 +280,9 @@ def least_multipliers(shape, rows, here, active, gradient, scratch, gram, dual, 
     bases, one_sided, _order, of_rows = shape
     residual = here[3]
     jacobian = here[4]
-    least_squares_multipliers(bases, jacobian, rows, one_sided, active, gradient, scratch, of_rows, gram, better_y)
+    pushing_multipliers(
+        bases, jacobian, rows, one_sided, residual, active, 0, gradient, scratch, of_rows, gram, better_y
+    )
     other = dual_residual(bases, jacobian, rows, one_sided, residual, gradient, better_y, scratch)
     if other > max(10.0 * dual, 1e-11):
         return dual

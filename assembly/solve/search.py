@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from assembly._kernel import kernel
 from assembly.constraints.contact_rows import is_guard
-from assembly.constraints.layout import CONTACTS, MOVING, WATCH
+from assembly.constraints.layout import MOVING, WATCH
 from assembly.constraints.program import evaluate
 from assembly.constraints.terms import objective
 from assembly.proximity.extremal import BEND
@@ -25,12 +25,12 @@ SHORTENINGS = 4
 
 
 @kernel(inner=True)
-def damped_step(table, lagrangian, n, order, shift, radius, matrix, descent, step, scratch):
+def damped_step(table, lagrangian, n, order, shift, radius, damps, matrix, descent, step, scratch):
     """The step of the factor in `matrix`, its shift raised until the step is not much longer than the radius.
 
     Nor may a body turn by much more than a radian. Scaled down instead, a step would lose what its stiff directions
-    gain, those that bring the rows to hold. Not so with contacts: their rows change fast along the step. Returns the
-    shift, and the step's largest component and turn.
+    gain, those that bring the rows to hold. That is for who `damps`; with contacts rows change fast along the step.
+    Returns the shift, and the step's largest component and turn.
     """
     for attempt in range(SHORTENINGS + 1):
         for i in range(n):
@@ -43,7 +43,7 @@ def damped_step(table, lagrangian, n, order, shift, radius, matrix, descent, ste
             if i % 6 >= 3 and i < 6 * table[MOVING]:
                 turn = max(turn, abs(step[i]))
         excess = max(turn / TURN, longest / radius)
-        if excess <= 1.5 or attempt == SHORTENINGS or table[CONTACTS] > 0:
+        if excess <= 1.5 or attempt == SHORTENINGS or not damps:
             break
         # Newton's method on 1 / |step|, whose slope is |U^-T step|^2.
         for i in range(n):

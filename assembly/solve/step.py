@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly.constraints.layout import MOVING, WATCH
+from assembly.constraints.layout import CONTACTS, MOVING, WATCH
 from assembly.constraints.program import evaluate
 from assembly.constraints.row_terms import add_row_terms
 from assembly.solve.guards import allowed_share
@@ -16,13 +16,16 @@ from assembly.solve.search import damped_step
 
 # A step is computed so many times more for one-sided rows that it would break.
 FORESEEN = 4
+# Where so many steps in a row that hold are cut by half and more, the next ones are damped until one is not: most of
+# these may go where nothing holds, as a ring turns about its own axis.
+OFTEN = 25
 # Where violations are stationary, this much curvature downward makes a saddle of it; a small move leads off it, in a
 # direction that nothing but a scene made for it has as a symmetry.
 SADDLE, KICK = 1e-5, 1e-3
 
 
 @kernel(inner=True)
-def aim(program, here, rows, y, mu, shift, radius, dual, restoring, is_fresh, weights, system):
+def aim(program, here, rows, y, mu, shift, radius, cuts, dual, restoring, is_fresh, weights, system):
     """The step of the augmented Lagrangian at a point, into the system's lines; by the last factor unless `is_fresh`.
 
     `weights` gets which rows count, what they push with, and which do because the step would break them. Returns the
@@ -49,7 +52,10 @@ def aim(program, here, rows, y, mu, shift, radius, dual, restoring, is_fresh, we
         shift = factorize_shifted(lagrangian, n, order, max(min(0.25 * shift, dual), 1e-8), matrix)
         if shift < 0.0:
             return shift, shift, 0.0, 0.0
-    used, longest, turn = damped_step(table, lagrangian, n, order, shift, radius, matrix, descent, step, straight)
+    damps = table[CONTACTS] == 0 or cuts >= OFTEN
+    used, longest, turn = damped_step(
+        table, lagrangian, n, order, shift, radius, damps, matrix, descent, step, straight
+    )
     for _ in range(FORESEEN):
         if used < 0.0 or restoring:
             break
@@ -66,7 +72,7 @@ def aim(program, here, rows, y, mu, shift, radius, dual, restoring, is_fresh, we
         used = shift
         if shift >= 0.0:
             used, longest, turn = damped_step(
-                table, lagrangian, n, order, shift, radius, matrix, descent, step, straight
+                table, lagrangian, n, order, shift, radius, damps, matrix, descent, step, straight
             )
     return shift, used, longest, turn
 

@@ -140,3 +140,77 @@ def test_crossing_bars_are_carried_where_their_edges_cross():
     assert solution.success, solution.status
     assert solution.q[1, 2] == pytest.approx(0.2, abs=1e-8)
     assert -1e-11 < apart(solution.q, [(4.0, 0.3, 0.2)] * 2) < 1e-9
+
+
+def height_over(pose, top, major, minor):
+    """How far a ring is above the plane z = top: its center line's lowest point, less the wire's radius."""
+    axis = Rotation.from_quat(pose[3:], scalar_first=True).as_matrix()[:, 2]
+    return pose[2] - major * np.hypot(axis[0], axis[1]) - minor - top
+
+
+def ring_scene(base, shape, place, turn, target, first):
+    """A ring over a fixed body, which is the first one or the second; its middle is drawn to a target."""
+    ring = asm.Body("ring", shape, place, turn)
+    scene = asm.Assembly([base, ring] if first else [ring, base])
+    scene.constrain(asm.Clearance())
+    scene.minimize(asm.PointDistance(ring.point(0.0, 0.0, 0.0), target))
+    return scene
+
+
+def random_turn(rng):
+    return Rotation.random(random_state=int(rng.integers(1 << 30))).as_quat(scalar_first=True)
+
+
+@pytest.mark.parametrize(("major", "minor", "orders"), [(0.7, 0.1, 2), (0.5, 0.02, 1)], ids=["ring", "thin ring"])
+def test_rings_that_come_to_lie_on_a_plate(major, minor, orders):
+    # Of a ring that is all but flat the lowest point runs around it. With that point alone for a row all of these were
+    # rocked through the plate; points of the valley between the two faces hold them.
+    rng = np.random.default_rng(3)
+    plate = asm.Body("plate", asm.shapes.box(4.0, 4.0, 0.1), fixed=True)
+    solved = 0
+    for k in range(20):
+        # As the first of the two bodies a thin ring takes more than 300 steps: how far they may go between looks is
+        # measured at the second, the wide plate, whose rim moves far as the ring turns.
+        order = k % orders
+        place, turn = (*rng.uniform(-0.3, 0.3, 2), 1.5), random_turn(rng)
+        scene = ring_scene(plate, asm.shapes.torus(major, minor), place, turn, (0.0, 0.0, -1.0), order == 0)
+        solution = scene.solve()
+        pose = solution.q[1 - order]
+        # The last pose at which nothing crosses, where it is not SOLVED.
+        assert height_over(pose, 0.05, major, minor) > -1e-9
+        if solution.success:
+            solved += 1
+            # Gaps of 1e-12 of the scene's size, and rounding; flat, with its whole circle on the plate.
+            assert abs(height_over(pose, 0.05, major, minor)) < 1e-10
+            assert np.hypot(*Rotation.from_quat(pose[3:], scalar_first=True).as_matrix()[:2, 2]) < 1e-9
+            # Few stand for all of the circle.
+            assert 3 <= len(solution.contacts) <= 12
+    assert solved >= 18
+
+
+def test_rings_that_come_to_lie_on_a_box_smaller_than_they_are():
+    # They rest on arcs at the four corners of the top. As they lean their points are free to turn about the axis: of
+    # these 11 were SOLVED before steps that are cut time and again were damped.
+    rng = np.random.default_rng(3)
+    box = asm.Body("box", asm.shapes.box(1.2, 1.2, 0.5), fixed=True)
+    solved = 0
+    for k in range(20):
+        place = (*rng.uniform(-0.2, 0.2, 2), 1.0)
+        scene = ring_scene(box, asm.shapes.torus(0.7, 0.1), place, random_turn(rng), (0.1, 0.0, -0.5), k % 2 == 0)
+        solution = scene.solve()
+        solved += solution.success
+        low = solution.q[1 - k % 2, 2]
+        assert low > 0.35 - 1e-9
+        assert not solution.success or low == pytest.approx(0.35, abs=1e-9)
+    assert solved >= 16
+
+
+@pytest.mark.parametrize(("side", "order"), [(4.0, 0), (4.0, 1), (1.2, 0)])
+def test_a_ring_that_begins_level(side, order):
+    # All of its circle is as near; Newton's method finds more roots there than there is room for.
+    base = asm.Body("base", asm.shapes.box(side, side, 0.5), fixed=True)
+    place, turn = (0.02, 0.01, 0.37), (1.0, 0.0, 0.0, 0.0)
+    scene = ring_scene(base, asm.shapes.torus(0.7, 0.1), place, turn, (0.1, 0.0, -0.5), order == 0)
+    solution = scene.solve()
+    assert solution.success
+    assert solution.q[1 - order, :3] == pytest.approx([0.1, 0.0, 0.35], abs=1e-9)

@@ -1,0 +1,63 @@
+"""Multipliers that push: least squares with signs, as by another method."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import nnls
+
+from assembly.solve.multipliers import EXCHANGES, NEAR, pushing_multipliers
+
+
+def pushing(jacobian, one_sided, residual, active, gradient, exchanges=EXCHANGES):
+    """Of rows of one body: their multipliers, and which rows count."""
+    rows = len(jacobian)
+    wide = np.zeros((rows, 18))
+    wide[:, :6] = jacobian
+    bases = np.tile([0, -1, -1], (rows, 1))
+    of_rows = np.arange(rows), np.full(rows, rows - 1)
+    y, active = np.full(rows, np.nan), active.copy()
+    gram, scratch = np.zeros((rows + 1, rows)), np.zeros(6)
+    pushing_multipliers(bases, wide, rows, one_sided, residual, active, exchanges, gradient, scratch, of_rows, gram, y)
+    return y, active > 0.0
+
+
+@pytest.mark.parametrize("rank", [2, 3, 6])
+@pytest.mark.parametrize("balanced", [True, False])
+def test_they_leave_as_little_as_by_another_method(rank, balanced):
+    rng = np.random.default_rng(rank)
+    for rows in (3, 12, 30):
+        for _ in range(20):
+            # As of rows that hold a plane face: many, of a low rank. Some are two-sided, others too far away.
+            jacobian = rng.normal(size=(rows, rank)) @ rng.normal(size=(rank, 6))
+            one_sided = (rng.uniform(size=rows) < 0.8).astype(np.int64)
+            near = rng.uniform(size=rows) < 0.8
+            residual = np.where(near, rng.uniform(-NEAR, NEAR, rows), 1.0)
+            gradient = rng.normal(size=6)
+            if balanced:
+                force = np.where(near | (one_sided == 0), rng.uniform(size=rows) < 0.2, 0.0) * rng.normal(size=rows)
+                gradient = jacobian.T @ np.where(one_sided == 1, abs(force), force)
+            # What the loop takes for active is as good as any.
+            active = np.where(one_sided == 1, near & (rng.uniform(size=rows) < 0.5), 1.0)
+            y, counts = pushing(jacobian, one_sided, residual, active, gradient)
+            assert (y[one_sided == 1] <= 0.0).all() and (y[~counts] == 0.0).all()
+            assert not (counts & ~near & (one_sided == 1)).any()
+            # min |g + J^T y| over y <= 0 of the near rows and y of either sign of the two-sided ones.
+            columns = np.concatenate([-jacobian[near & (one_sided == 1)], jacobian[one_sided == 0]])
+            columns = np.concatenate([columns, -jacobian[one_sided == 0]]).T
+            least = nnls(columns, -gradient, maxiter=1000)[1] if columns.size else np.linalg.norm(gradient)
+            left = np.linalg.norm(gradient + jacobian.T @ y)
+            # The square of the 1e-10 that |y| is weighed with, and rounding of rows that all but depend on others.
+            assert left <= least + 1e-11, (rows, left, least)
+
+
+def test_a_row_that_pulls_is_left_out_only_where_exchanges_are_asked_for():
+    # Two springs of a body on a line: the one that pulls cannot help.
+    jacobian = np.array([[1.0, 0, 0, 0, 0, 0], [1.0, 1.0, 0, 0, 0, 0]])
+    gradient = np.array([1.0, -0.5, 0, 0, 0, 0])
+    one_sided, residual, active = np.ones(2, dtype=np.int64), np.zeros(2), np.ones(2)
+    y, counts = pushing(jacobian, one_sided, residual, active, gradient, 0)
+    np.testing.assert_allclose(y, [-1.5, 0.0], rtol=0, atol=1e-15)
+    y, counts = pushing(jacobian, one_sided, residual, active, gradient)
+    np.testing.assert_allclose(y, [-1.0, 0.0], rtol=0, atol=1e-15)
+    assert counts.tolist() == [True, False]
