@@ -161,17 +161,16 @@ def random_turn(rng):
     return Rotation.random(random_state=int(rng.integers(1 << 30))).as_quat(scalar_first=True)
 
 
-@pytest.mark.parametrize(("major", "minor", "orders"), [(0.7, 0.1, 2), (0.5, 0.02, 1)], ids=["ring", "thin ring"])
-def test_rings_that_come_to_lie_on_a_plate(major, minor, orders):
+@pytest.mark.parametrize(("major", "minor"), [(0.7, 0.1), (0.5, 0.02)], ids=["ring", "thin ring"])
+def test_rings_that_come_to_lie_on_a_plate(major, minor):
     # Of a ring that is all but flat the lowest point runs around it. With that point alone for a row all of these were
-    # rocked through the plate; points of the valley between the two faces hold them.
+    # rocked through the plate; points of the valley between the two faces hold them. Nor got a thin ring there in 300
+    # steps that was the first of the two, before it was the smaller one's motion that looks are measured by.
     rng = np.random.default_rng(3)
     plate = asm.Body("plate", asm.shapes.box(4.0, 4.0, 0.1), fixed=True)
     solved = 0
     for k in range(20):
-        # As the first of the two bodies a thin ring takes more than 300 steps: how far they may go between looks is
-        # measured at the second, the wide plate, whose rim moves far as the ring turns.
-        order = k % orders
+        order = k % 2
         place, turn = (*rng.uniform(-0.3, 0.3, 2), 1.5), random_turn(rng)
         scene = ring_scene(plate, asm.shapes.torus(major, minor), place, turn, (0.0, 0.0, -1.0), order == 0)
         solution = scene.solve()
@@ -205,12 +204,18 @@ def test_rings_that_come_to_lie_on_a_box_smaller_than_they_are():
     assert solved >= 16
 
 
-@pytest.mark.parametrize(("side", "order"), [(4.0, 0), (4.0, 1), (1.2, 0)])
+@pytest.mark.parametrize("order", [0, 1])
+@pytest.mark.parametrize("side", [4.0, 1.2])
 def test_a_ring_that_begins_level(side, order):
-    # All of its circle is as near; Newton's method finds more roots there than there is room for.
+    # All of its circle is as near; Newton's method finds more roots there than there is room for. Where it lies on the
+    # smaller box ten rows depend on each other: which of them push, their gaps do not tell.
     base = asm.Body("base", asm.shapes.box(side, side, 0.5), fixed=True)
     place, turn = (0.02, 0.01, 0.37), (1.0, 0.0, 0.0, 0.0)
     scene = ring_scene(base, asm.shapes.torus(0.7, 0.1), place, turn, (0.1, 0.0, -0.5), order == 0)
     solution = scene.solve()
     assert solution.success
-    assert solution.q[1 - order, :3] == pytest.approx([0.1, 0.0, 0.35], abs=1e-9)
+    x, y, z = solution.q[1 - order, :3]
+    assert z == pytest.approx(0.35, abs=1e-12)
+    # A point of an edge that is d beside the lowest of the ring is d^2 / 0.2 below it and pushes it aside by 10 d:
+    # where that is within the tolerance, 1e-12 of the scene's size, it may hold a ring that is 1e-6 off.
+    assert (x, y) == pytest.approx((0.1, 0.0), abs=1e-6)
