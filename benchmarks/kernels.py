@@ -13,7 +13,8 @@ from assembly.geometry.spline import surface_lanes, surface_point
 from assembly.geometry.vec import add
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.bounding_tree import pairs_within
-from assembly.proximity.extremal import pair_frame, pair_matrix, solve_pair
+from assembly.proximity.extremal import pair_frame, solve_pair
+from assembly.proximity.pair_matrix import pair_matrix
 from assembly.proximity.velocity import RATES, ZED, into_quaternions, pair_derivatives, store_record
 
 

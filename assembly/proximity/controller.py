@@ -35,12 +35,11 @@ from assembly.proximity.extremal import (
     NOT_CONVERGED,
     SINGULAR,
     advance,
-    curvature_bound,
     own_frame,
     pair_frame,
-    pair_matrix,
     solve_pair,
 )
+from assembly.proximity.pair_matrix import curvature_bound, pair_matrix
 
 # Beside the statuses of `solve_pair`: the surfaces cross where the descent led.
 CROSSED = 4

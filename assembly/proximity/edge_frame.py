@@ -27,7 +27,8 @@ import math
 from assembly._kernel import kernel
 from assembly.geometry.spline import CURVE_BREAKS, CURVE_SPANS, curve_lanes, surface_point, xyz
 from assembly.geometry.vec import add, blend, cross, dot, matvec, scale, sub
-from assembly.proximity.extremal import RANK, into_domain
+from assembly.proximity.extremal import into_domain
+from assembly.proximity.pair_matrix import RANK
 from assembly.proximity.shell import (
     EDGE_CURVE,
     EDGE_POINT,

@@ -26,7 +26,8 @@ from assembly.proximity.edge_frame import (
     pair_response,
     vertex_side,
 )
-from assembly.proximity.extremal import BEND, CONVERGED, LEFT_PATCH, NOT_CONVERGED, RANK, SINGULAR, STAGNANT
+from assembly.proximity.extremal import BEND, CONVERGED, LEFT_PATCH, NOT_CONVERGED, SINGULAR, STAGNANT
+from assembly.proximity.pair_matrix import RANK
 from assembly.proximity.shell import VERTEX
 
 # Points closer than this part of the size coincide: their difference has no direction.

@@ -32,6 +32,7 @@ from assembly.geometry.spline import (
     surface_point,
 )
 from assembly.geometry.vec import add, blend, cross, dot, matvec, matvec_t, scale, sub
+from assembly.proximity.pair_matrix import across_first, curvature_bound, pair_matrix, right_side
 from assembly.proximity.pole import CHART, limits, nearest_pole, polar_step, pole_frame
 
 # A step that turns about a pole by more than this part of the domain is taken in the pole's plane.
@@ -40,12 +41,11 @@ TURN = 0.08
 CONVERGED, SINGULAR, LEFT_PATCH, NOT_CONVERGED = 0, 1, 2, 3
 # A parameterization counts as regular where |Su x Sv| is above this times |Su| |Sv|.
 POLE = 1e-9
-# H counts as singular below this ratio of its smallest singular value to its scale.
-RANK = 1e-7
-# Newton's steps: four or five near a solution, more while steps are cut.
-LIMIT = 40
-# After so many steps a singular pair whose residual vanishes is one.
-PATIENCE = 12
+# Newton's steps: four or five near a solution, more while steps are cut; around a ring whose wire turns a normal by as
+# much as a step may, some 60 lead halfway.
+LIMIT, AROUND = 40, 120
+# A singular pair is one whose normals are as parallel as this, in radians, above each other to as much of the size.
+SETTLED = 1e-12
 # The most, in radians, that a step may turn a normal.
 BEND = 0.5
 # Steps below this many radians that do not shrink any more are rounding.
@@ -167,51 +167,6 @@ def pair_frame(table, pool, f, g, rotation, shift, x):
 
 
 @kernel(inline=True)
-def curvature_bound(a):
-    """A bound of the largest principal curvature."""
-    return abs(a[0]) + 2.0 * abs(a[1]) + abs(a[2])
-
-
-@kernel(inline=True)
-def pair_matrix(a, c, beta, flat):
-    """I + beta A, H = C (I + beta A) - A, the inverse of H, and whether H is regular.
-
-    Where H is (nearly) singular the inverse is damped: the least step, so that the current pair of a continuum is kept.
-    `flat` is the curvature below which a scene counts as flat.
-    """
-    k11 = 1.0 + beta * a[0]
-    k12 = beta * a[1]
-    k22 = 1.0 + beta * a[2]
-    h11 = c[0] * k11 + c[1] * k12 - a[0]
-    h12 = c[0] * k12 + c[1] * k22 - a[1]
-    h21 = c[1] * k11 + c[2] * k12 - a[1]
-    h22 = c[1] * k12 + c[2] * k22 - a[2]
-    size = curvature_bound(c) * (abs(k11) + 2.0 * abs(k12) + abs(k22)) + curvature_bound(a)
-    det = h11 * h22 - h12 * h21
-    norm = abs(h11) + abs(h12) + abs(h21) + abs(h22)
-    # The smallest singular value is at least |det| / norm.
-    regular = abs(det) > RANK * size * norm and size > flat
-    if abs(det) > 100.0 * RANK * size * norm and size > flat:
-        i = 1.0 / det
-        inverse = (i * h22, -i * h12, -i * h21, i * h11)
-    else:
-        damping = max(RANK * size, flat)
-        damping *= damping
-        # (H^T H + damping I)^-1 H^T
-        m11 = h11 * h11 + h21 * h21 + damping
-        m12 = h11 * h12 + h21 * h22
-        m22 = h12 * h12 + h22 * h22 + damping
-        i = 1.0 / (m11 * m22 - m12 * m12)
-        inverse = (
-            i * (m22 * h11 - m12 * h12),
-            i * (m22 * h21 - m12 * h22),
-            i * (m11 * h12 - m12 * h11),
-            i * (m11 * h22 - m12 * h21),
-        )
-    return (k11, k12, k22), (h11, h12, h21, h22), inverse, regular
-
-
-@kernel(inline=True)
 def into_domain(table, pool, r, u, v):
     """Parameters wrapped where the surface is closed, clamped where it ends; whether it was clamped."""
     clamped = False
@@ -259,8 +214,7 @@ def advance(table, pool, r, u, v, du, dv, step):
 @kernel(inline=True)
 def pair_step(a, c, r, k, inverse, size):
     """Newton's step along the tangents of f and of g, and by how much either turns its surface's normal."""
-    s0 = c[0] * r[0] + c[1] * r[1] - r[2]
-    s1 = c[1] * r[0] + c[2] * r[1] - r[3]
+    s0, s1 = right_side(c, r)
     ax = inverse[0] * s0 + inverse[1] * s1
     ay = inverse[2] * s0 + inverse[3] * s1
     bx = k[0] * ax + k[1] * ay - r[0]
@@ -300,6 +254,13 @@ def vanishes(r, size):
     return abs(r[2]) + abs(r[3]) < 1e-9 and abs(r[0]) + abs(r[1]) < 1e-9 * size
 
 
+@kernel(inline=True)
+def settled(c, r, size):
+    """Whether a pair is one as far as anything tells that is not rounding."""
+    s0, s1 = right_side(c, r)
+    return abs(s0) + abs(s1) <= SETTLED and abs(r[0]) + abs(r[1]) <= SETTLED * size
+
+
 @kernel(inner=True)
 def solve_pair(table, pool, f, g, rotation, shift, x, size, turn, close):
     """Newton from x to the extremal pair: status, parameters, iterations, frame, and H as `pair_matrix` gives it.
@@ -313,6 +274,7 @@ def solve_pair(table, pool, f, g, rotation, shift, x, size, turn, close):
     flat = 1e-9 / size
     previous = 1e300
     status = NOT_CONVERGED
+    level = False
     iteration = 0
     while True:
         n, tx, ty, pf, pg, e, t, a, c, r, beta, regular = pair_frame(table, pool, f, g, rotation, shift, x)
@@ -320,7 +282,7 @@ def solve_pair(table, pool, f, g, rotation, shift, x, size, turn, close):
         if not regular:
             # An apex or a crease: there is no tangent plane to go on.
             break
-        ax, ay, bx, by, bend_f, bend_g = pair_step(a, c, r, k, inverse, size)
+        ax, ay, bx, by, bend_f, bend_g = pair_step(a, c, r, k, across_first(a, c, r, k, h, inverse, flat), size)
         step = max(abs(ax) + abs(ay), abs(bx) + abs(by))
         bend = max(bend_f, bend_g)
         small = bend < close and isolated
@@ -329,11 +291,13 @@ def solve_pair(table, pool, f, g, rotation, shift, x, size, turn, close):
             # In a singular system a vanishing step is a solution only if the residual vanishes too.
             status = CONVERGED if isolated else (SINGULAR if vanishes(r, size) else NOT_CONVERGED)
             break
-        if iteration >= PATIENCE and not isolated and vanishes(r, size):
+        level = level or not isolated
+        ends = iteration >= (AROUND if level else LIMIT) or not step < 1e300 or bend > turn
+        if not isolated and vanishes(r, size) and (ends or settled(c, r, size)):
             # Along the valley of a fold there is nothing to tell places apart; steps need not shrink.
             status = SINGULAR
             break
-        if iteration == LIMIT or not step < 1e300 or bend > turn:
+        if ends:
             break
         previous = step
         # Each surface by its own measure: a pebble turns while the hill beside it is crossed.

@@ -39,13 +39,12 @@ from assembly.proximity.extremal import (
     CONVERGED,
     LEFT_PATCH,
     NOT_CONVERGED,
-    RANK,
     SINGULAR,
     STAGNANT,
     advance,
-    curvature_bound,
     own_frame,
 )
+from assembly.proximity.pair_matrix import RANK, curvature_bound
 from assembly.proximity.shell import EDGE
 
 # A curve is steep where the part of its tangent along a face is below this (squared, of its length squared).

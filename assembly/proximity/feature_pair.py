@@ -13,8 +13,9 @@ from assembly._kernel import kernel
 from assembly.geometry.vec import cross, matvec, neg, sub
 from assembly.proximity.edge_frame import face_side
 from assembly.proximity.edge_pair import solve_off_face
-from assembly.proximity.extremal import CLOSE, LIMIT, pair_frame, pair_matrix, solve_pair
+from assembly.proximity.extremal import CLOSE, LIMIT, pair_frame, solve_pair
 from assembly.proximity.face_edge import face_frame, solve_on_face, turned_frame
+from assembly.proximity.pair_matrix import pair_matrix
 from assembly.proximity.shell import FACE
 from assembly.proximity.velocity import ARM_F, ARM_G, FORM, GAP, NORMAL, RATES, ZED, put
 

@@ -10,7 +10,8 @@ import math
 
 from assembly._kernel import kernel
 from assembly.geometry.spline import BREAKS_U, BREAKS_V, CLOSED_U, CLOSED_V, SPANS_U, SPANS_V, find_span
-from assembly.proximity.extremal import pair_frame, pair_matrix
+from assembly.proximity.extremal import pair_frame
+from assembly.proximity.pair_matrix import pair_matrix
 
 # A root this far from a fold is the only one in its patches and those beside them, which turn by half a radian at most.
 ALONE, BESIDE = 0.05, 3.0

@@ -13,13 +13,16 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly.geometry.spline import BREAKS_U, BREAKS_V, CLOSED_U, CLOSED_V, SPANS_U, SPANS_V
 from assembly.proximity.bounding_tree import ELEMENT, ELEMENT_FEATURE, ELEMENT_POOL
-from assembly.proximity.extremal import bent_at_most, move_pair, pair_frame, pair_matrix, pair_step
+from assembly.proximity.extremal import bent_at_most, move_pair, pair_frame, pair_step
 from assembly.proximity.folds import ALONE, BESIDE, fold_beyond
+from assembly.proximity.pair_matrix import across_first, pair_matrix
 from assembly.proximity.roots import CODE_F, CODE_G, CORNER, ROOT_BEYOND, ROOT_FOLD, is_alone
 from assembly.proximity.switching import POINT
 
 # Steps; and below so many radians, that a step turns a normal, it is as good as there.
 STEPS, CLOSE = 6, 0.02
+# Curvatures below this, over the scene's size, are rounding.
+FLAT = 1e-9
 # What became of it.
 LEFT, STAYED = -1, -2
 # Sequences whose first steps lead as close together as this part of a patch go the same way. Of one that was followed:
@@ -102,7 +105,8 @@ def stays(table, pool, surfaces, turn, shift, start, half, passed, count):
         _n, tx, ty, _pf, _pg, e, t, a, c, r, beta, regular = pair_frame(table, pool, f, g, turn, shift, x)
         if not regular:
             return STAYED, x, count
-        k, _h, inverse, _isolated = pair_matrix(a, c, beta, 1e-9)
+        k, h, inverse, _isolated = pair_matrix(a, c, beta, FLAT)
+        inverse = across_first(a, c, r, k, h, inverse, FLAT)
         ax, ay, bx, by, bend_f, bend_g = pair_step(a, c, r, k, inverse, 1.0)
         if not max(bend_f, bend_g) > CLOSE:
             return STAYED, x, count

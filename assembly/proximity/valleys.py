@@ -12,8 +12,9 @@ import math
 from assembly._kernel import kernel
 from assembly.geometry.spline import BREAKS_U, BREAKS_V, SPANS_U, SPANS_V
 from assembly.geometry.vec import blend
-from assembly.proximity.extremal import bent_at_most, curvature_bound, move_pair, pair_frame, pair_matrix
+from assembly.proximity.extremal import bent_at_most, move_pair, pair_frame
 from assembly.proximity.near_root import is_beside
+from assembly.proximity.pair_matrix import curvature_bound, pair_matrix
 
 # Across a valley surfaces part by this part of their curvatures at least; along it by this part of that at most.
 STEEP, LEVEL = 0.05, 0.1

@@ -22,7 +22,8 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly.geometry.vec import cross, dot, matvec, scale, sub
 from assembly.kinematics.motion import quaternion_columns, relative_pose, rotation
-from assembly.proximity.extremal import pair_frame, pair_matrix
+from assembly.proximity.extremal import pair_frame
+from assembly.proximity.pair_matrix import pair_matrix
 
 # A record holds what the derivatives of one gap need, all in world axes: the gap, the normal, the arms from the bodies'
 # origins to the point of g, the (4, 4) map from z to parameter rates, the (4, 4) form of beta'', and z as (4, 12)

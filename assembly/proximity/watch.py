@@ -74,8 +74,8 @@ from assembly.proximity.watch_memory import (
 )
 
 # Looks: at pairs that used up their allowance, or at all that moved. The first may be careful, at urgent pairs too, and
-# in turns, earlier at one pair at a time, or both.
-AS_NEEDED, EVERYTHING, CAREFUL, IN_TURNS = 0, 1, 2, 4
+# in turns, earlier at one pair at a time, and ask whether bodies cross where a contact lost its root.
+AS_NEEDED, EVERYTHING, CAREFUL, IN_TURNS, DOUBTFUL = 0, 1, 2, 4, 8
 # A pair is looked at again when so much of its allowance is used; in turns, the one that used most of it at the first.
 USED, SPENT = 0.5, 0.85
 # What moved by less than this part of its allowance, 5e-10 of the scene's size, is where it was for an urgent look.
@@ -86,6 +86,9 @@ CANDIDATES, STACK = 8192, 1024
 FLAT = 0.2
 # Ways of Newton's method that are remembered in a look.
 WAYS = 64
+# Whether a look tells if bodies cross where no contact says so. A contact that lost its root is a reason to ask in a
+# solve; a tick has no time for it.
+NEVER, WHERE_LOST, ALWAYS = 0, 1, 2
 # Bodies cross that are in each other by more than this.
 CROSSING = 1e-6
 
@@ -132,10 +135,8 @@ def crosses_elsewhere(table, pool, watch, memory, p, scene, roots, count, least,
 
 
 @kernel(inner=True)
-def look_at_pair(
-    table, pool, watch, memory, p, q, tracked, stack, candidates, distances, roots, passed, work, thorough
-):
-    """Find and list the roots of pair p; a `thorough` look tells whether the bodies cross elsewhere."""
+def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, distances, roots, passed, work, asks):
+    """Find and list the roots of pair p; `asks` says whether it tells if the bodies cross elsewhere."""
     pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
     at = memory_places(table, watch)[0] + PAIR_MEMORY * p
     i = table[pair + PAIR_F]
@@ -164,7 +165,7 @@ def look_at_pair(
     reach = reach_now(table, pool, watch, memory, p, moving)
     found, reach = facing_pairs(table, pool, watch, memory, p, scene, moving, reach, stack, candidates)
     memory[at + REACH] = reach
-    count = known_roots(table, pool, watch, memory, p, scene, offsets, tracked, roots, work)
+    count, any_gone = known_roots(table, pool, watch, memory, p, scene, offsets, tracked, roots, work)
     enough = near_enough(table, pool, scene, least, reach, flank, candidates, found, distances)
     span = (-pool[lengths + LAST_REACH], reach + least)
     neglect = pool[lengths + NEGLECT]
@@ -186,7 +187,7 @@ def look_at_pair(
     if fertile < math.inf and not urgent:
         fertile = min(fertile, low)
     memory[at + CROSSED] = math.nan
-    if thorough:
+    if asks == ALWAYS or (asks == WHERE_LOST and any_gone):
         crossed = crosses_elsewhere(
             table, pool, watch, memory, p, scene, roots, count, least, offsets, stack, candidates, tracked
         )
@@ -248,8 +249,8 @@ def look(table, pool, watch, memory, q, tracked, how):
             roots = np.empty((ROOTS, ROOT))
             passed = np.empty((WAYS, PASSED))
             work = (np.empty((1, CONTACT_RECORD)), np.empty((1, TRACK)))
-        thorough = how == EVERYTHING or math.isnan(memory[at + PAIR_MEMORY * p + TURN])
-        look_at_pair(
-            table, pool, watch, memory, p, q, tracked, stack, candidates, distances, roots, passed, work, thorough
-        )
+        asks = WHERE_LOST if how & DOUBTFUL != 0 else NEVER
+        if how == EVERYTHING or math.isnan(memory[at + PAIR_MEMORY * p + TURN]):
+            asks = ALWAYS
+        look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, distances, roots, passed, work, asks)
     return np.int64(memory[EVENT_COUNT] - before)

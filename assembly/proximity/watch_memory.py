@@ -155,9 +155,10 @@ def write_root(roots, i, tracked, r):
 
 @kernel(inner=True)
 def known_roots(table, pool, watch, memory, p, scene, offsets, tracked, roots, work):
-    """The roots that contacts of pair p have now: given ones, then listed ones. Returns how many roots there are.
+    """The roots that contacts of pair p have now: given ones, then listed ones.
 
-    A listed contact that lost its root, or came to that of another one or to the far sides, gives up its place.
+    A listed contact that lost its root, or came to that of another one or to the far sides, gives up its place. Returns
+    how many roots there are, and whether any was lost.
     """
     pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
     places = memory_places(table, watch)[1]
@@ -166,6 +167,7 @@ def known_roots(table, pool, watch, memory, p, scene, offsets, tracked, roots, w
     radius = neglect if pool[table[pair + PAIR_MINIMUM]] == 0.0 else math.inf
     count = add_given(table, pool, scene, tracked, table[pair + GIVEN], table[pair + GIVEN_COUNT], radius, roots, work)
     first, last = table[pair + LOW], table[pair + HIGH]
+    any_gone = False
     # Roots first, then corners, which give way to them.
     for step in range(2 * (last - first)):
         k = first + step % (last - first)
@@ -193,10 +195,11 @@ def known_roots(table, pool, watch, memory, p, scene, offsets, tracked, roots, w
                 note(table, watch, memory, HANDED_OFF, SAME_ROOT, p, memory[o + PLACE_NUMBER], roots[before, GAP])
             write_root(roots, before, tracked, r)
         else:
+            any_gone = any_gone or lost
             kind, reason = (HANDED_OFF, LOST) if lost else (MERGED, SAME_ROOT)
             note(table, watch, memory, kind, reason, p, memory[o + PLACE_NUMBER], tracked[r, PAIR_GAP])
             release(table, watch, memory, k, tracked)
-    return count
+    return count, any_gone
 
 
 @kernel(inner=True)

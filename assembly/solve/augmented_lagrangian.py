@@ -10,11 +10,9 @@ factorization of that matrix tells its inertia; d is raised until it exists. dx 
 along which a line search runs (`search.py`); multipliers follow every step. -mu I makes redundant rows harmless.
 
 A contact whose pair comes to a fold gets its coordinates as unknowns (`proximity/free_pair.py`) for the rest of the
-solve.
-Scattered bodies are gathered first (`gather.py`). The objective of a solve that is given none, that bodies move little,
-is then measured from where they are gathered.
-Where rows cannot all hold, the same step with f = 0, y = 0, mu = 1 minimizes |c|^2 / 2, and the loop says INFEASIBLE
-at its stationary point.
+solve. Scattered bodies are gathered first (`gather.py`); an objective that asks them to move little is measured from
+there. Bodies that sank into each other go back (`retreat.py`). Where rows cannot all hold, the same step with f = 0,
+y = 0, mu = 1 minimizes |c|^2 / 2, and the loop says INFEASIBLE at its stationary point.
 """
 
 from __future__ import annotations
@@ -35,17 +33,16 @@ from assembly.constraints.layout import (
     VECTOR_TRIMS,
     WATCH,
 )
-from assembly.constraints.program import evaluate
-from assembly.constraints.sparsity import clear_upper
 from assembly.constraints.terms import objective
 from assembly.proximity.solid_contact import FOLD
-from assembly.proximity.watch import AS_NEEDED, CAREFUL, EVERYTHING, IN_TURNS, any_crossed
+from assembly.proximity.watch import AS_NEEDED, CAREFUL, DOUBTFUL, EVERYTHING, IN_TURNS, any_crossed
 from assembly.solve.contacts import free_folds, is_of_surfaces
-from assembly.solve.ending import finish
+from assembly.solve.ending import finish, return_to
 from assembly.solve.guards import look_again, numbers_of, place_guards
-from assembly.solve.multipliers import choose_multipliers, least_multipliers, strongest, weigh_rows
-from assembly.solve.report import is_clear, keep
+from assembly.solve.multipliers import choose_multipliers, forget_objective, least_multipliers, weigh_rows
+from assembly.solve.report import is_clear, keep, log
 from assembly.solve.restoration import LEAST_SHARE, SHARE, SOFTNESS, WAY, begin_way, step_back
+from assembly.solve.retreat import LONGER, SHORTER, has_sunk
 from assembly.solve.room import held_room, pairs_room, points, results_of, tape_room, unknowns
 from assembly.solve.rows import arrange, record_of_blocks, shape_of, turned, violation_of
 from assembly.solve.search import SHORTEST, goal, search
@@ -59,7 +56,6 @@ from assembly.solve.settings import (
     FREE_BELOW,
     FREE_TRIMS,
     GATHER,
-    HISTORY,
     INFEASIBLE,
     ITERATION_LIMIT,
     ITERATIONS,
@@ -78,7 +74,7 @@ from assembly.solve.settings import (
     TICK,
     VIOLATION,
 )
-from assembly.solve.start import read_state, set_out
+from assembly.solve.start import read_state, rearrange, set_out
 from assembly.solve.step import aim, cut_step, leave_saddle, propose
 from assembly.solve.tangency import off_rows
 
@@ -94,8 +90,6 @@ SLOW, HARDEST = 3, 1e-10
 SETTLING = 30
 # A tick that does not hold after its iterations has so many times more of them.
 EXTRA_TIME = 4
-# Multipliers this much stronger than the objective's slope are looked at once more.
-EXCESS = 10.0
 # So often at most a solve leaves a saddle of its violations.
 KICKS = 3
 
@@ -157,6 +151,9 @@ def solve_program(table, pool, settings, state, history, tips):
     kicks = 0
     cuts = 0
     room_left = math.inf
+    # How long steps may be after one that led bodies deep into each other, and how long the last one was.
+    leash = math.inf
+    longest = 0.0
     check_at = PATIENCE
     check_violation = math.inf
     iteration = 0
@@ -182,7 +179,7 @@ def solve_program(table, pool, settings, state, history, tips):
     while status == RUNNING:
         if watched and not changed:
             holds_now = off_rows(table, loose, one_sided, here, tick) <= (feasible if tick else TOUCHING)
-            how = (CAREFUL if holds_now else AS_NEEDED) | (AS_NEEDED if tick else IN_TURNS)
+            how = (CAREFUL if holds_now else AS_NEEDED) | (AS_NEEDED if tick else IN_TURNS | DOUBTFUL)
             changed = look_again(table, pool, memory, here, how, free, loose[4])
         if changed:
             place_guards(table, memory, here, y, better_y, free, False)
@@ -194,18 +191,9 @@ def solve_program(table, pool, settings, state, history, tips):
             count = free_folds(table, pool, here[2], here[1], active, free, loose[1], below, lost, free_trims)
         if m + 4 * count != rows or changed:
             changed = False
-            for r in range(rows, most):
-                # New rows of tangency say nothing yet: least squares leave them out.
-                y[r] = 0.0
-                better_y[r] = 0.0
-                active[r] = 0.0
-            rows = m + 4 * count
-            n = 6 * table[MOVING] + 4 * count
-            arrange(table, free, shape, rows, n)
-            system = unknowns(n, order)
+            rows, n, system, lost = rearrange(program, count, rows, here, y, better_y, active)
             gradient, lines, lagrangian, _factor = system
             kept = False
-            lost = evaluate(table, pool, here[1], math.inf, loose, room, here)
             begin_way(way)
             if folded:
                 # Perhaps another one is lost.
@@ -230,19 +218,19 @@ def solve_program(table, pool, settings, state, history, tips):
         dual = choose_multipliers(
             shape, rows, here, shortened, touches, good, active, gradient, lines[0], gram, y, better_y
         )
-        if iteration < history.shape[0]:
-            figures = (value, violation, dual, mu, shift, alpha, radius)
-            for k in range(HISTORY):
-                history[iteration, k] = figures[k]
+        log(history, iteration, (value, violation, dual, mu, shift, alpha, radius))
         if status != RUNNING:
             break
         if not math.isfinite(violation) or not math.isfinite(value) or not math.isfinite(dual):
             # Only where the start is so: a step to such a place is not taken.
             status = STALLED
             break
+        sunk = watched and not tick and has_sunk(table, pool, memory, residual)
+        retreats = sunk and holds and ended == RUNNING and iteration < limit
         looks_last = watched and settings[LAST_LOOK] == 1.0
         # Where every last look finds other contacts, the limit ends it.
-        if violation <= feasible and dual <= settings[STATIONARITY] and not (looks_last and iteration > limit):
+        arrived = violation <= feasible and dual <= settings[STATIONARITY] and not retreats
+        if arrived and not (looks_last and iteration > limit):
             if looks_last:
                 changed = look_again(table, pool, memory, here, EVERYTHING, free, loose[4])
                 if changed:
@@ -250,13 +238,13 @@ def solve_program(table, pool, settings, state, history, tips):
                     continue
             # Deeper than looks reach no row tells of a crossing.
             status = STALLED if looks_last and any_crossed(table, table[WATCH], memory) else SOLVED
-            if status == SOLVED and strongest(y, rows) > EXCESS * strongest(gradient, n):
-                # Rows that depend on each other: of all multipliers that balance the objective, the least.
+            if status == SOLVED:
                 dual = least_multipliers(shape, rows, here, active, gradient, lines[0], gram, dual, y, better_y)
             break
         # Of a tick, what holds; of a solve with clearances, the last pose at which nothing crosses.
-        if (tick and violation <= feasible) or (watched and not tick and is_clear(table, residual)):
+        if (tick and violation <= feasible) or (watched and not tick and not sunk and is_clear(table, residual)):
             holds = True
+            leash *= LONGER
             keep(here, y, rows, held)
             if watched:
                 numbers_of(table, numbers)
@@ -273,6 +261,18 @@ def solve_program(table, pool, settings, state, history, tips):
         if settings[BUDGET] > 0.0 and iteration > 0 and call_address(table[CLOCK_AT], ()) - begin > settings[BUDGET]:
             status = OUT_OF_TIME
             break
+        if retreats:
+            leash = SHORTER * min(leash, alpha * longest)
+            if leash < SHORTEST:
+                status = STALLED
+                break
+            return_to(table, pool, held, numbers, loose, rows, here, y, better_y, tick)
+            # Where bodies were in each other there too, and nothing had asked, that is no place to return to.
+            holds = not any_crossed(table, table[WATCH], memory)
+            leash = leash if holds else math.inf
+            changed = True
+            iteration += 1
+            continue
         if ended != RUNNING or (tick and iteration >= limit):
             # Its time is over: the shortest way back onto the rows.
             if step_back(program, here, trial, rows, weights, mu, violation, 0.1 * feasible, system, tick, way):
@@ -301,23 +301,20 @@ def solve_program(table, pool, settings, state, history, tips):
             check_violation = violation
         if restoring:
             mu = 1.0
-            for r in range(rows):
-                y[r] = 0.0
-            for i in range(n):
-                gradient[i] = 0.0
-            clear_upper(order, n, lagrangian)
+            forget_objective(order, rows, y, gradient, lagrangian)
         # Where the last step gained so much that a second one by its factor will do, that is cheaper.
         gain = 2.0 * max(violation / max(last_violation, feasible), dual / max(last_dual, settings[STATIONARITY]))
         is_fresh = not (kept and gain * violation <= feasible and gain * dual <= settings[STATIONARITY])
+        reach = min(radius, leash)
         shift, used, longest, turn = aim(
-            program, here, rows, y, mu, shift, min(radius, room_left), cuts, dual, restoring, is_fresh, weights, system
+            program, here, rows, y, mu, shift, min(reach, room_left), cuts, dual, restoring, is_fresh, weights, system
         )
         if used < 0.0:
             status = STALLED
             break
         last_violation = violation
         last_dual = dual
-        cut, slope, steepest = cut_step(program, here, trial, rows, y, mu, radius, longest, turn, foreseen, lines)
+        cut, slope, steepest = cut_step(program, here, trial, rows, y, mu, reach, longest, turn, foreseen, lines)
         if restoring:
             ends = steepest <= 1e-9 * violation or longest < 1e-12
             slows = iteration >= check_at and violation > 0.99 * check_violation
@@ -356,6 +353,9 @@ def solve_program(table, pool, settings, state, history, tips):
                     if free[k] < 0 and abs(here[2][k, FOLD]) < below and is_of_surfaces(table, k):
                         lost = np.int64(k)
             if lost >= 0 and free[lost] < 0 and is_of_surfaces(table, lost):
+                # A look may put another contact in its place, time and again.
+                freed += 1
+                iteration += 1 if freed > pairs else 0
                 continue
             lost = np.int64(-1)
             if not restoring and violation > feasible and restorations < RESTORATIONS:

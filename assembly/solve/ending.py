@@ -8,7 +8,7 @@ from assembly._kernel import kernel
 from assembly.constraints.layout import ROWS, SCALE, WATCH
 from assembly.constraints.program import evaluate
 from assembly.constraints.row_terms import add_row_terms
-from assembly.proximity.watch import EVERYTHING
+from assembly.proximity.watch import EVERYTHING, any_crossed
 from assembly.solve.guards import clear_guards, go_back, look_around, place_guards
 from assembly.solve.linear import factorize_shifted
 from assembly.solve.multipliers import weigh_rows
@@ -32,12 +32,12 @@ from assembly.solve.settings import (
 
 @kernel(inner=True)
 def tells_crossing(table, pool, loose, room, here, y, better_y):
-    """Look at everything where a solve failed; whether bodies are in each other, of which no row told yet."""
+    """Look at everything where a solve failed; whether bodies are in each other, with or without a row that says so."""
     memory, free = loose[5], loose[0]
     look_around(table, pool, memory, here, EVERYTHING)
     place_guards(table, memory, here, y, better_y, free, False)
     lost = evaluate(table, pool, here[1], math.inf, loose, room, here)
-    return lost >= 0 or not is_clear(table, here[3])
+    return lost >= 0 or not is_clear(table, here[3]) or any_crossed(table, table[WATCH], memory)
 
 
 @kernel(inner=True)

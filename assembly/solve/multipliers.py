@@ -19,6 +19,8 @@ RELEASES, PULLS = 4, 1e-12
 LEFT_OVER, SOFTER, SOFTEST = 0.1, 1e-3, 1e-9
 # Multipliers below this count for nothing against the objective's curvature, which is of order one.
 WEAK = 1e-3
+# Multipliers this much stronger than the objective's slope are looked at once more.
+EXCESS = 10.0
 # One-sided rows that hold by less than this may push; so often they are exchanged for those that would pull, and after
 # so many rounds that gain nothing one at a time. A row is wanted that would take more than this off the objective's
 # slope.
@@ -266,6 +268,16 @@ def choose_multipliers(shape, rows, here, shortened, holds, good, active, gradie
 
 
 @kernel(inner=True)
+def forget_objective(order, rows, y, gradient, lagrangian):
+    """No objective and no multipliers: where rows cannot all hold, what is left is to violate them least."""
+    for r in range(rows):
+        y[r] = 0.0
+    for i in range(gradient.size):
+        gradient[i] = 0.0
+    clear_upper(order, gradient.size, lagrangian)
+
+
+@kernel(inner=True)
 def strongest(values, count):
     """The largest of the first so many, without its sign."""
     most = 0.0
@@ -276,7 +288,12 @@ def strongest(values, count):
 
 @kernel(inner=True)
 def least_multipliers(shape, rows, here, active, gradient, scratch, gram, dual, y, better_y):
-    """The shortest multipliers that balance the objective, if they do so as well as y; into y. The dual residual."""
+    """The shortest multipliers that balance the objective, if they do so as well as y; into y. The dual residual.
+
+    They are for y much stronger than the objective's slope: of rows that depend on each other.
+    """
+    if not strongest(y, rows) > EXCESS * strongest(gradient, gradient.size):
+        return dual
     bases, one_sided, _order, of_rows = shape
     residual = here[3]
     jacobian = here[4]

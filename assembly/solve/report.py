@@ -21,10 +21,19 @@ from assembly.constraints.program import evaluate
 from assembly.proximity.extremal import BEND
 from assembly.proximity.solid_contact import PROPER, TRACK
 from assembly.solve.contacts import free_pairs_hold
+from assembly.solve.settings import HISTORY
 from assembly.solve.tangency import off_rows, off_tangency
 
 # A gap that counts as touching where crossing surfaces are reported.
 TOUCHING = 1e-9
+
+
+@kernel(inner=True)
+def log(history, iteration, figures):
+    """Write the figures of an iteration, if there is room for them."""
+    if iteration < history.shape[0]:
+        for k in range(HISTORY):
+            history[iteration, k] = figures[k]
 
 
 @kernel(inner=True)

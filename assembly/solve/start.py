@@ -11,6 +11,7 @@ from assembly.constraints.layout import (
     BODIES,
     CONTACTS,
     IMPLICIT,
+    MOVING,
     REFERENCE,
     ROWS,
     SCALE,
@@ -26,7 +27,7 @@ from assembly.solve.contacts import free_folds, is_of_surfaces, start_contacts
 from assembly.solve.gather import gather, scattered
 from assembly.solve.guards import forget_guards, look_around, place_guards
 from assembly.solve.recall import recall
-from assembly.solve.room import results_of
+from assembly.solve.room import results_of, unknowns
 from assembly.solve.rows import arrange
 from assembly.solve.settings import (
     CONTACT_LOST,
@@ -149,3 +150,22 @@ def set_out(program, settings, state, here, by_row, n):
     if status == CONTACT_LOST:
         results[CULPRIT] = float(lost)
     return status, np.int64(lost if folded else -1), folded
+
+
+@kernel(inner=True, allocates=True)
+def rearrange(program, count, before, here, y, better_y, active):
+    """Rows and unknowns for other contacts or `count` free pairs, where there were `before` rows.
+
+    Returns how many rows and unknowns there are, room for these, and which contact is lost at this point, or -1.
+    """
+    table, pool, shape, loose, room = program
+    for r in range(before, y.size):
+        # New rows of tangency say nothing yet: least squares leave them out.
+        y[r] = 0.0
+        better_y[r] = 0.0
+        active[r] = 0.0
+    rows = table[ROWS] + 4 * count
+    n = 6 * table[MOVING] + 4 * count
+    arrange(table, loose[0], shape, rows, n)
+    system = unknowns(n, shape[2])
+    return rows, n, system, evaluate(table, pool, here[1], math.inf, loose, room, here)

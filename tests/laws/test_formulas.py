@@ -15,7 +15,7 @@ from assembly.geometry.face import Face
 from assembly.geometry.spline import POLES
 from assembly.kinematics.pose import angular_velocity_map, multiply, rotation_matrix, skew
 from assembly.proximity import gap_hessian
-from assembly.proximity.extremal import RANK, pair_matrix
+from assembly.proximity.pair_matrix import RANK, pair_matrix
 from assembly.proximity.pole import pole_frame
 from tests.laws.witness import STEP, moved
 

@@ -1,0 +1,32 @@
+"""Back from where bodies have sunk into each other: from there rows lead out on either side, the far one as well.
+
+A step may go as far as bodies may between looks, and a contact may slide around a thin wire on the way. Where bodies
+are deeper in each other than half of what bends most there is no telling on which side they were, and where they cross
+unseen no row says so. The solve goes back to the last pose at which nothing crossed, and on from there on a leash.
+"""
+
+from __future__ import annotations
+
+from assembly._kernel import kernel
+from assembly.constraints.layout import FIRST_GUARD, GUARD_NUMBER, GUARDS, MINIMUM, ROW, ROW_TABLE, SHELL_F, WATCH
+from assembly.proximity.watch import any_crossed
+
+# Deeper than this part of how far bodies may go in one step, which is half the least radius of theirs.
+DEEP = 1.0
+# How much shorter steps are after one that led too deep; as often as a pose is clear they may be twice as long.
+SHORTER, LONGER = 0.25, 2.0
+
+
+@kernel(inner=True)
+def has_sunk(table, pool, memory, residual):
+    """Whether bodies are deep in each other, or where no contact says so.
+
+    Of solids rows lead out the way they came: corners stay on their faces.
+    """
+    for k in range(table[GUARDS]):
+        r = table[FIRST_GUARD] + k
+        row = table[ROW_TABLE] + ROW * r
+        if table[row + GUARD_NUMBER] > 0 and table[row + SHELL_F] < 0:
+            if residual[r] < -DEEP * pool[table[row + MINIMUM] + 1]:
+                return True
+    return any_crossed(table, table[WATCH], memory)
