@@ -51,7 +51,7 @@ def solve_pairs(table, pool, records, q, starts, sizes, close, times, parameters
         for _ in range(times):
             turn, shift = relative_pose(q[i], 0, rotation(q[i], 0), 1, rotation(q[i], 1))
             status, x, count, frame, _curvature = solve_pair(
-                table, pool, records[i, 0], records[i, 1], turn, shift, start, sizes[i], math.inf, close
+                table, pool, records[i, 0], records[i, 1], turn, shift, start, sizes[i], math.inf, close, False
             )
             total += count
             statuses[i] = status

@@ -45,8 +45,9 @@ def track_contact(table, pool, row, q, start, patience, records, k):
     j = table[row + BODY_G]
     turn = rotation(q, i)
     relative, shift = relative_pose(q, i, turn, j, rotation(q, j))
+    f, g = table[row + SURFACE_F], table[row + SURFACE_G]
     status, x, _count, frame, curvature = solve_pair(
-        table, pool, table[row + SURFACE_F], table[row + SURFACE_G], relative, shift, start, 1.0, patience, CLOSE
+        table, pool, f, g, relative, shift, start, 1.0, patience, CLOSE, False
     )
     apart = sub(frame[4], frame[3])
     distance = math.sqrt(dot(apart, apart))

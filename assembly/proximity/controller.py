@@ -177,7 +177,7 @@ def finish(table, pool, f, g, turn, shift, x, size, reach):
     n, tx, ty, pf, pg, e, t, a, c, r, beta, regular = pair_frame(table, pool, f, g, turn, shift, x)
     most = TURN_APART if reach > 0.0 else TURN_MET
     cosine = SAME_APART if reach > 0.0 else SAME_MET
-    status, y, count, frame, matrices = solve_pair(table, pool, f, g, turn, shift, x, size, most, 0.0)
+    status, y, count, frame, matrices = solve_pair(table, pool, f, g, turn, shift, x, size, most, 0.0, False)
     same = (status == CONVERGED or status == SINGULAR) and dot(n, frame[0]) > cosine
     if same:
         before = own_frame(table, pool, g, x[2], x[3])[1]

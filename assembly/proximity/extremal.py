@@ -44,8 +44,9 @@ POLE = 1e-9
 # Newton's steps: four or five near a solution, more while steps are cut; around a ring whose wire turns a normal by as
 # much as a step may, some 60 lead halfway.
 LIMIT, AROUND = 40, 120
-# A singular pair is one whose normals are as parallel as this, in radians, above each other to as much of the size.
-SETTLED = 1e-12
+# After so many steps a singular pair whose residual vanishes is one; for who searches it is where normals are as
+# parallel as this, in radians, above each other to as much of the size.
+PATIENCE, SETTLED = 12, 1e-12
 # The most, in radians, that a step may turn a normal.
 BEND = 0.5
 # Steps below this many radians that do not shrink any more are rounding.
@@ -262,19 +263,21 @@ def settled(c, r, size):
 
 
 @kernel(inner=True)
-def solve_pair(table, pool, f, g, rotation, shift, x, size, turn, close):
+def solve_pair(table, pool, f, g, rotation, shift, x, size, turn, close, downhill):
     """Newton from x to the extremal pair: status, parameters, iterations, frame, and H as `pair_matrix` gives it.
 
     `size` is the length against which steps are measured. A step that would turn a normal by more than `BEND` is
     shortened, so that the iteration follows the surface; one that would turn it by more than `turn` says that x was not
     near a pair at all. After a step that turns it by less than `close` the frame is carried along, not evaluated again:
-    what is left is of the order of close^2, and of close^3 in the gap.
+    what is left is of the order of close^2, and of close^3 in the gap. With `downhill` a start along a level valley is
+    led to its least, as a search asks; without, a pair that is followed stays where it is in a continuum.
     """
     tolerance = 4e-14 * size
     flat = 1e-9 / size
     previous = 1e300
     status = NOT_CONVERGED
     level = False
+    rests, rest = False, x
     iteration = 0
     while True:
         n, tx, ty, pf, pg, e, t, a, c, r, beta, regular = pair_frame(table, pool, f, g, rotation, shift, x)
@@ -282,7 +285,10 @@ def solve_pair(table, pool, f, g, rotation, shift, x, size, turn, close):
         if not regular:
             # An apex or a crease: there is no tangent plane to go on.
             break
-        ax, ay, bx, by, bend_f, bend_g = pair_step(a, c, r, k, across_first(a, c, r, k, h, inverse, flat), size)
+        if downhill:
+            inverse, levels = across_first(a, c, r, k, h, inverse, flat)
+            level = level or levels
+        ax, ay, bx, by, bend_f, bend_g = pair_step(a, c, r, k, inverse, size)
         step = max(abs(ax) + abs(ay), abs(bx) + abs(by))
         bend = max(bend_f, bend_g)
         small = bend < close and isolated
@@ -291,12 +297,14 @@ def solve_pair(table, pool, f, g, rotation, shift, x, size, turn, close):
             # In a singular system a vanishing step is a solution only if the residual vanishes too.
             status = CONVERGED if isolated else (SINGULAR if vanishes(r, size) else NOT_CONVERGED)
             break
-        level = level or not isolated
-        ends = iteration >= (AROUND if level else LIMIT) or not step < 1e300 or bend > turn
-        if not isolated and vanishes(r, size) and (ends or settled(c, r, size)):
+        ends = iteration >= (AROUND if level and status != LEFT_PATCH else LIMIT) or not step < 1e300 or bend > turn
+        if not isolated and vanishes(r, size):
             # Along the valley of a fold there is nothing to tell places apart; steps need not shrink.
-            status = SINGULAR
-            break
+            if (ends or settled(c, r, size)) if downhill else iteration >= PATIENCE:
+                status = SINGULAR
+                break
+            if not rests:
+                rests, rest = True, x
         if ends:
             break
         previous = step
@@ -328,4 +336,9 @@ def solve_pair(table, pool, f, g, rotation, shift, x, size, turn, close):
             break
         x = y
         iteration += 1
+    if downhill and rests and status != CONVERGED and status != SINGULAR:
+        # The valley goes down to where a face ends, by as little as a cylinder leans: a pair of the continuum.
+        status, x = SINGULAR, rest
+        n, tx, ty, pf, pg, e, t, a, c, r, beta, regular = pair_frame(table, pool, f, g, rotation, shift, x)
+        k, h, inverse, isolated = pair_matrix(a, c, beta, flat)
     return status, x, iteration, (n, tx, ty, pf, pg, e, t, a, c, r, beta, regular), (k, h, inverse, isolated)

@@ -101,7 +101,9 @@ def solve_features(table, pool, kind_f, f, kind_g, g, rotation, shift, x, n, siz
         fold : determinant over squared norm of the equations' matrix: zero where a pair ceases to be isolated
     """
     if kind_f == FACE and kind_g == FACE:
-        status, y, _count, frame, curvature = solve_pair(table, pool, f, g, rotation, shift, x, size, turn, CLOSE)
+        status, y, _count, frame, curvature = solve_pair(
+            table, pool, f, g, rotation, shift, x, size, turn, CLOSE, False
+        )
         return status, y, two_face_frame(frame, curvature)
     return newton_on_features(table, pool, kind_f, f, kind_g, g, rotation, shift, x, n, size, turn, LIMIT)
 

@@ -106,7 +106,7 @@ def stays(table, pool, surfaces, turn, shift, start, half, passed, count):
         if not regular:
             return STAYED, x, count
         k, h, inverse, _isolated = pair_matrix(a, c, beta, FLAT)
-        inverse = across_first(a, c, r, k, h, inverse, FLAT)
+        inverse, _level = across_first(a, c, r, k, h, inverse, FLAT)
         ax, ay, bx, by, bend_f, bend_g = pair_step(a, c, r, k, inverse, 1.0)
         if not max(bend_f, bend_g) > CLOSE:
             return STAYED, x, count

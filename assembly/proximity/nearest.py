@@ -106,7 +106,7 @@ def extremum_near(table, pool, kind_f, f, kind_g, g, turn, shift, x, n, size):
     """Newton from x: whether it led to an extremum, its coordinates, gap, least relative curvature, stretch of f's."""
     if kind_f == FACE and kind_g == FACE:
         status, y, _count, frame, curvature = solve_pair(
-            table, pool, table[f + FACE_SURFACE], table[g + FACE_SURFACE], turn, shift, x, size, 1.5, 0.0
+            table, pool, table[f + FACE_SURFACE], table[g + FACE_SURFACE], turn, shift, x, size, 1.5, 0.0, False
         )
         least, stretch = relative_curvature(curvature[0], curvature[1], frame[10])
         return status, y, frame[10], least, stretch

@@ -10,12 +10,13 @@ import math
 
 from assembly._kernel import kernel
 
-# H counts as singular below this ratio of its smallest singular value to its scale.
-RANK = 1e-7
+# H counts as singular below this ratio of its smallest singular value to its scale, and is not inverted as it is below
+# the second.
+RANK, WEAK = 1e-7, 1e-5
 # Along a valley -H counts as this part of the angle by which the pair is off, if it is less, and as this at least: what
 # the pair is off across it says nothing of where it is least, and below the second curvatures are rounding.
 UNSURE, LEVEL = 0.1, 1e-10
-# So many times as much is not raised.
+# A highest pair along a valley that bends by so many times as much is kept.
 PLAIN = 10.0
 
 
@@ -58,7 +59,7 @@ def pair_matrix(a, c, beta, flat):
     norm = abs(h11) + abs(h12) + abs(h21) + abs(h22)
     # The smallest singular value is at least |det| / norm.
     regular = abs(det) > RANK * size * norm and size > flat
-    if abs(det) > 100.0 * RANK * size * norm and size > flat:
+    if abs(det) > WEAK * size * norm and size > flat:
         i = 1.0 / det
         inverse = (i * h22, -i * h12, -i * h21, i * h11)
     else:
@@ -86,24 +87,28 @@ def null_ways(h):
 
 @kernel(inline=True)
 def across_first(a, c, r, k, h, inverse, flat):
-    """The inverse of H for a step from here, which goes down a valley that is all but level once it is at its bottom.
+    """The inverse of H for a step from here, and whether it goes along a valley that is all but level.
 
-    Along it Newton's step is the quotient of two small numbers: until the pair is at the bottom either is mostly what
-    it is off across it, and beyond an inflection the step leads up. There -H is raised along the valley to its amount
-    and a part of what the pair is off. Near the solution the step is Newton's.
+    There Newton's step is the quotient of two small numbers: until the pair is at the bottom either is mostly what it
+    is off across it, and beyond an inflection the step leads up. So -H is raised along the valley to its amount and a
+    part of what the pair is off: steps go across first, and then down. Near the solution they are Newton's.
     """
-    s0, s1 = right_side(c, r)
     size = curvature_bound(c) * (abs(k[0]) + 2.0 * abs(k[1]) + abs(k[2])) + curvature_bound(a)
-    damping = max(max(UNSURE * (abs(s0) + abs(s1)), LEVEL) * size, flat)
     norm = abs(h[0]) + abs(h[1]) + abs(h[2]) + abs(h[3])
-    if abs(h[0] * h[3] - h[1] * h[2]) > max(PLAIN * damping, 100.0 * RANK * size) * norm:
-        return inverse
+    if abs(h[0] * h[3] - h[1] * h[2]) > WEAK * size * norm:
+        return inverse, False
+    s0, s1 = right_side(c, r)
+    damping = max(max(UNSURE * (abs(s0) + abs(s1)), LEVEL) * size, flat)
     v, w = null_ways(h)
     bend = v[0] * (h[0] * w[0] + h[1] * w[1]) + v[1] * (h[2] * w[0] + h[3] * w[1])
     if not h[0] + h[3] < -damping or bend > PLAIN * damping:
         # A ridge, or near the highest pair along a valley, which is one as well.
-        return damped_inverse(h, damping)
+        return damped_inverse(h, damping), True
     more = -(abs(bend) + damping) - bend
     b = (h[0] + more * v[0] * w[0], h[1] + more * v[0] * w[1], h[2] + more * v[1] * w[0], h[3] + more * v[1] * w[1])
-    i = 1.0 / (b[0] * b[3] - b[1] * b[2])
-    return i * b[3], -i * b[1], -i * b[2], i * b[0]
+    det = b[0] * b[3] - b[1] * b[2]
+    if not det > 0.25 * damping * max(abs(b[0]), abs(b[3])):
+        # Too far from singular for these to be its axes.
+        return damped_inverse(h, damping), True
+    i = 1.0 / det
+    return (i * b[3], -i * b[1], -i * b[2], i * b[0]), True

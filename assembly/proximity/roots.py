@@ -99,7 +99,7 @@ def surfaces_root(table, pool, scene, start, roots, k):
     """
     turn, shift = scene[0], scene[1]
     f, g = scene[2][0], scene[2][1]
-    status, x, _count, frame, curvature = solve_pair(table, pool, f, g, turn, shift, start, 1.0, math.inf, 0.0)
+    status, x, _count, frame, curvature = solve_pair(table, pool, f, g, turn, shift, start, 1.0, math.inf, 0.0, True)
     if status == NOT_CONVERGED:
         # The controller leads down from anywhere, to a minimum of the distance.
         status, x, _count, frame, curvature = descend_pair(table, pool, f, g, turn, shift, start, 1.0, DESCENTS)

@@ -216,7 +216,7 @@ def global_start(table, pool, f, g, rotation, shift, size):
         start = (pool[o], pool[o + 1], pool[p], pool[p + 1])
         if attempt == 0:
             best = (3.0, math.inf, np.int64(NOT_CONVERGED), start)
-        status, x, _count, frame, _h = solve_pair(table, pool, f, g, rotation, shift, start, size, math.inf, 0.0)
+        status, x, _count, frame, _h = solve_pair(table, pool, f, g, rotation, shift, start, size, math.inf, 0.0, False)
         limit = score[i]
         if not is_near(status, frame, limit):
             start, reached = approach(table, pool, f, g, rotation, shift, start)
@@ -227,7 +227,9 @@ def global_start(table, pool, f, g, rotation, shift, size):
             # The minimum is no farther than the points found.
             limit = reached + 1e-12 * size
             upper = min(upper, limit)
-            status, x, _count, frame, _h = solve_pair(table, pool, f, g, rotation, shift, start, size, math.inf, 0.0)
+            status, x, _count, frame, _h = solve_pair(
+                table, pool, f, g, rotation, shift, start, size, math.inf, 0.0, False
+            )
         if is_near(status, frame, limit):
             best = take(table, pool, g, rotation, status, x, frame, best)
         i = next_candidate(table, pool, f, a, nearest, score, i)
@@ -244,7 +246,9 @@ def global_start(table, pool, f, g, rotation, shift, size):
             o = table[f + CELLS] + CELL_SIZE * i
             p = table[g + CELLS] + CELL_SIZE * nearest[i]
             start = (pool[o], pool[o + 1], pool[p], pool[p + 1])
-            status, x, _count, frame, _h = solve_pair(table, pool, f, g, rotation, shift, start, size, math.inf, 0.0)
+            status, x, _count, frame, _h = solve_pair(
+                table, pool, f, g, rotation, shift, start, size, math.inf, 0.0, False
+            )
             if status != NOT_CONVERGED:
                 best = take(table, pool, g, rotation, status, x, frame, best)
             i = next_candidate(table, pool, f, a, nearest, score, i)
@@ -266,7 +270,7 @@ def find_pair(table, pool, f, g, q, x, size, out):
         status, x, _gap = global_start(table, pool, f, g, turn, shift, size)
         frame = pair_frame(table, pool, f, g, turn, shift, x)
     else:
-        status, x, _count, frame, _h = solve_pair(table, pool, f, g, turn, shift, x, size, math.inf, 0.0)
+        status, x, _count, frame, _h = solve_pair(table, pool, f, g, turn, shift, x, size, math.inf, 0.0, False)
     origin = position(q, 0)
     out[0], out[1], out[2], out[3] = x
     out[4], out[5], out[6] = add(matvec(turn_f, frame[3]), origin)

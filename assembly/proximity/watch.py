@@ -173,8 +173,6 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, d
     count, free, fertile, ball = search_patches(
         table, pool, scene, moving, (flank, enough), span, offsets, neglect, facing, found, roots, count, work, passed
     )
-    if count == ROOTS:
-        memory[CROWDED] = 1.0
     if scene[2][0] >= 0:
         seat_given(table, watch, memory, p, roots, count, tracked)
     elif table[watch + CORNERS] == 1:
@@ -200,7 +198,7 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, d
     memory[at + ALLOWANCE] = max(min(min(reach, rest), free), LEAST_ALLOWANCE)
     listed = any_listed(table, watch, memory, p)
     memory[at + STATE] = float(TRACKING if listed else (NEAR if found > 0 else FAR))
-    if wanting or count == ROOTS:
+    if wanting:
         memory[CROWDED] = 1.0
 
 

@@ -195,7 +195,8 @@ def known_roots(table, pool, watch, memory, p, scene, offsets, tracked, roots, w
                 note(table, watch, memory, HANDED_OFF, SAME_ROOT, p, memory[o + PLACE_NUMBER], roots[before, GAP])
             write_root(roots, before, tracked, r)
         else:
-            any_gone = any_gone or lost
+            # A corner that went past its face is none of these.
+            any_gone = any_gone or (lost and corner == 0.0)
             kind, reason = (HANDED_OFF, LOST) if lost else (MERGED, SAME_ROOT)
             note(table, watch, memory, kind, reason, p, memory[o + PLACE_NUMBER], tracked[r, PAIR_GAP])
             release(table, watch, memory, k, tracked)

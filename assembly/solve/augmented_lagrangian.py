@@ -151,8 +151,9 @@ def solve_program(table, pool, settings, state, history, tips):
     kicks = 0
     cuts = 0
     room_left = math.inf
-    # How long steps may be after one that led bodies deep into each other, and how long the last one was.
+    # How long steps may be after one that led bodies deep into each other, when that was, how long the last one was.
     leash = math.inf
+    back_at = -1
     longest = 0.0
     check_at = PATIENCE
     check_violation = math.inf
@@ -212,9 +213,10 @@ def solve_program(table, pool, settings, state, history, tips):
         value = goal(table, pool, shape, rows, loose, room, tips, here, 1, gradient, lagrangian)
         # Rows of vectors depend on one another: their multipliers drift where nothing keeps them short.
         shortened = iteration > 0 and (alpha < 1.0 or table[VECTOR_TRIMS] == 1)
+        # Of contacts that touch, which of them push is not known from their gaps.
+        touches = watched and not tick and violation <= TOUCHING
         # At the start both are the same; later a tenth of the last residual is good.
-        good = math.inf if iteration == 0 else max(0.1 * last_dual, settings[STATIONARITY])
-        touches = violation <= TOUCHING and not tick
+        good = max(math.inf if iteration == 0 else 0.1 * last_dual, settings[STATIONARITY] if touches else 0.0)
         dual = choose_multipliers(
             shape, rows, here, shortened, touches, good, active, gradient, lines[0], gram, y, better_y
         )
@@ -226,6 +228,10 @@ def solve_program(table, pool, settings, state, history, tips):
             status = STALLED
             break
         sunk = watched and not tick and has_sunk(table, pool, memory, residual)
+        if sunk and iteration == back_at:
+            # Bodies were in each other there too, and nothing had asked: that is no place to return to.
+            holds = False
+            leash = math.inf
         retreats = sunk and holds and ended == RUNNING and iteration < limit
         looks_last = watched and settings[LAST_LOOK] == 1.0
         # Where every last look finds other contacts, the limit ends it.
@@ -244,7 +250,7 @@ def solve_program(table, pool, settings, state, history, tips):
         # Of a tick, what holds; of a solve with clearances, the last pose at which nothing crosses.
         if (tick and violation <= feasible) or (watched and not tick and not sunk and is_clear(table, residual)):
             holds = True
-            leash *= LONGER
+            leash *= LONGER if iteration != back_at else 1.0
             keep(here, y, rows, held)
             if watched:
                 numbers_of(table, numbers)
@@ -267,11 +273,10 @@ def solve_program(table, pool, settings, state, history, tips):
                 status = STALLED
                 break
             return_to(table, pool, held, numbers, loose, rows, here, y, better_y, tick)
-            # Where bodies were in each other there too, and nothing had asked, that is no place to return to.
-            holds = not any_crossed(table, table[WATCH], memory)
-            leash = leash if holds else math.inf
+            rows = m
             changed = True
             iteration += 1
+            back_at = iteration
             continue
         if ended != RUNNING or (tick and iteration >= limit):
             # Its time is over: the shortest way back onto the rows.
@@ -289,16 +294,14 @@ def solve_program(table, pool, settings, state, history, tips):
         if restoring and violation <= max(0.1 * entered, feasible):
             restoring = False
             mu = 1e-4
-            check_at = iteration + PATIENCE
-            check_violation = violation
+            check_at, check_violation = iteration + PATIENCE, violation
         if not restoring and iteration >= check_at:
             # The rows gain nothing: see whether they can hold at all.
             if violation > feasible and violation > 0.5 * check_violation and restorations < RESTORATIONS:
                 restoring = True
                 restorations += 1
                 entered = violation
-            check_at = iteration + PATIENCE
-            check_violation = violation
+            check_at, check_violation = iteration + PATIENCE, violation
         if restoring:
             mu = 1.0
             forget_objective(order, rows, y, gradient, lagrangian)
@@ -336,8 +339,7 @@ def solve_program(table, pool, settings, state, history, tips):
                 status = STALLED
                 break
             if iteration >= check_at:
-                check_at = iteration + PATIENCE
-                check_violation = violation
+                check_at, check_violation = iteration + PATIENCE, violation
         longest *= cut
         cuts = cuts + 1 if watched and cut < 0.5 and violation <= TOUCHING else 0
         room_left = 2.0 * longest if cuts > 0 else math.inf

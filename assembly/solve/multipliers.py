@@ -23,8 +23,8 @@ WEAK = 1e-3
 EXCESS = 10.0
 # One-sided rows that hold by less than this may push; so often they are exchanged for those that would pull, and after
 # so many rounds that gain nothing one at a time. A row is wanted that would take more than this off the objective's
-# slope.
-NEAR, EXCHANGES, BLOCKED, WANTED = 1e-9, 40, 3, 1e-12
+# slope. Their least squares are refined so often.
+NEAR, EXCHANGES, BLOCKED, WANTED, ROUNDS = 1e-9, 40, 3, 1e-12, 3
 
 
 @kernel(inner=True)
@@ -146,10 +146,12 @@ def dual_residual(bases, jacobian, rows, one_sided, residual, gradient, y, scrat
 
 
 @kernel(inner=True)
-def least_squares_multipliers(bases, jacobian, rows, active, gradient, scratch, of_rows, gram, y):
+def least_squares_multipliers(bases, jacobian, rows, active, rounds, gradient, scratch, of_rows, gram, y):
     """The multipliers of the active rows, of either sign, that leave the smallest grad f + J^T y.
 
-    The last row of `gram` is room for the right side.
+    After the first round it is again for what that 1e-10 leaves, where rows all but depend on each other; where they do
+    so altogether every round adds rounding to what nothing determines. The last row of `gram` is room for the right
+    side.
     """
     sequence, last_row = of_rows
     side = gram[gram.shape[0] - 1]
@@ -168,8 +170,7 @@ def least_squares_multipliers(bases, jacobian, rows, active, gradient, scratch, 
         y[r] = 0.0
     if not factorize(gram, rows, last_row):
         return
-    # Again for what that 1e-10 leaves, where rows all but depend on each other.
-    for _ in range(3):
+    for _ in range(rounds):
         for i in range(gradient.size):
             scratch[i] = gradient[i]
         add_transposed(bases, jacobian, rows, y, scratch)
@@ -215,8 +216,9 @@ def pushing_multipliers(
     """
     fewest = rows + 1
     patience = BLOCKED
+    rounds = ROUNDS if exchanges > 0 else 1
     for k in range(exchanges + 1):
-        least_squares_multipliers(bases, jacobian, rows, active, gradient, scratch, of_rows, gram, y)
+        least_squares_multipliers(bases, jacobian, rows, active, rounds, gradient, scratch, of_rows, gram, y)
         if k == exchanges:
             break
         found = exchange(

@@ -13,7 +13,7 @@ from assembly.proximity.watch import any_crossed
 
 # Deeper than this part of how far bodies may go in one step, which is half the least radius of theirs.
 DEEP = 1.0
-# How much shorter steps are after one that led too deep; as often as a pose is clear they may be twice as long.
+# How much shorter steps are after one that led too deep; as often as another pose is clear they may be twice as long.
 SHORTER, LONGER = 0.25, 2.0
 
 
@@ -27,6 +27,8 @@ def has_sunk(table, pool, memory, residual):
         r = table[FIRST_GUARD] + k
         row = table[ROW_TABLE] + ROW * r
         if table[row + GUARD_NUMBER] > 0 and table[row + SHELL_F] < 0:
-            if residual[r] < -DEEP * pool[table[row + MINIMUM] + 1]:
+            # How far bodies may go in one step is behind the least gap, which the residual is less.
+            at = table[row + MINIMUM]
+            if residual[r] + pool[at] < -DEEP * pool[at + 1]:
                 return True
     return any_crossed(table, table[WATCH], memory)

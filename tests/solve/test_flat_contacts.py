@@ -216,6 +216,6 @@ def test_a_ring_that_begins_level(side, order):
     assert solution.success
     x, y, z = solution.q[1 - order, :3]
     assert z == pytest.approx(0.35, abs=1e-12)
-    # A point of an edge that is d beside the lowest of the ring is d^2 / 0.2 below it and pushes it aside by 10 d:
-    # where that is within the tolerance, 1e-12 of the scene's size, it may hold a ring that is 1e-6 off.
-    assert (x, y) == pytest.approx((0.1, 0.0), abs=1e-6)
+    # A point of an edge that is d beside the lowest of the ring is d^2 / 0.2 below it and pushes it aside by 10 d: a
+    # row with a gap of 1e-10 of the scene's size may push, so that the ring may be held 6e-6 off.
+    assert (x, y) == pytest.approx((0.1, 0.0), abs=1e-5)
