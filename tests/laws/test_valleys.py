@@ -9,10 +9,10 @@ from scipy.spatial.transform import Rotation
 import assembly as asm
 from assembly.constraints.layout import WATCH
 from assembly.geometry.spline import BREAKS_U, BREAKS_V, SPANS_U, SPANS_V, surface_point
-from assembly.proximity.corners import hold_continua
+from assembly.proximity.corners import hold_continua, sunk
 from assembly.proximity.roots import CODE_F, CODE_G, CORNER, LISTED, NEW, ORIGIN, ROOT, ROOT_FOLD, USELESS
 from assembly.proximity.shell import FACES
-from assembly.proximity.switching import HELD_G, feature_at
+from assembly.proximity.switching import HELD_F, HELD_G, feature_at
 from assembly.proximity.valleys import ARRIVED, across_valley, into_valley
 from assembly.proximity.watch_memory import PAIR_SHELL_F, PAIR_SHELL_G, PAIR_TABLE
 
@@ -117,7 +117,8 @@ def test_no_valley_where_nothing_or_everything_is_level(shape):
             assert not across_valley(table, pool, top, other, tuple(turn.ravel()), tuple(shift), x)[0]
 
 
-def test_few_of_a_continuum_are_held():
+def ring_on_a_slab():
+    """Table and pool of the two, the scale, their shells, which face is the slab's top."""
     scene = asm.Assembly(
         [
             asm.Body("slab", asm.shapes.box(4.0, 4.0, 0.5), fixed=True),
@@ -126,10 +127,31 @@ def test_few_of_a_continuum_are_held():
     )
     scene.constrain(asm.Clearance())
     packed = scene.packed()
-    table, pool, scale = packed.table, packed.pool, packed.scale
-    pair = table[table[WATCH] + PAIR_TABLE]
-    shells = (table[pair + PAIR_SHELL_F], table[pair + PAIR_SHELL_G])
-    top = [face.name for face in scene.bodies[0].faces].index("top")
+    pair = packed.table[packed.table[WATCH] + PAIR_TABLE]
+    shells = (packed.table[pair + PAIR_SHELL_F], packed.table[pair + PAIR_SHELL_G])
+    return packed.table, packed.pool, packed.scale, shells, [face.name for face in scene.bodies[0].faces].index("top")
+
+
+def test_a_point_that_is_held_goes_back_to_the_bottom():
+    table, pool, scale, shells, top = ring_on_a_slab()
+    surface = asm.shapes.torus(MAJOR, MINOR)
+    (_, u1), (v0, v1) = surface.domain
+    rng = np.random.default_rng(8)
+    for tilt in (0.0, 1e-6, 1e-3):
+        turn, shift = tilted(rng, tilt, scale)
+        scene = (tuple(turn.ravel()), tuple(shift), (-1, -1, *shells))
+        start = (0.0, 0.0, rng.uniform(0.0, u1), v0 + (0.75 + rng.uniform(-0.03, 0.03)) * (v1 - v0))
+        x = sunk(table, pool, scene, (top, 0), HELD_G, start)
+        p = surface.evaluate(x[2], x[3])
+        low, _ = lowest_across(turn, shift, np.arctan2(p[1], p[0]), scale)
+        assert (turn @ p / scale + shift)[2] == pytest.approx(low, abs=ARRIVED**2 + 1e-15 + MINOR * tilt**4)
+        # Beyond the rim of the slab none of its points is at the bottom.
+        beyond = (*scene[:1], tuple(shift + [4.0 / scale, 0.0, 0.0]), *scene[2:])
+        assert sunk(table, pool, beyond, (top, 0), HELD_F, start) == start
+
+
+def test_few_of_a_continuum_are_held():
+    table, pool, scale, shells, top = ring_on_a_slab()
     (_, u1), (v0, v1) = asm.shapes.torus(MAJOR, MINOR).domain
     turn, shift = tuple(np.eye(3).ravel()), (0.0, 0.0, 0.35 / scale)
     looked_into = (turn, shift, (-1, -1, *shells), None, None)
