@@ -16,6 +16,8 @@ RANK, WEAK = 1e-7, 1e-5
 # Along a valley -H counts as this part of the angle by which the pair is off, if it is less, and as this at least: what
 # the pair is off across it says nothing of where it is least, and below the second curvatures are rounding.
 UNSURE, LEVEL = 0.1, 1e-10
+# Farther off than this, in radians, it is not known whether there is a valley.
+NEAR = 0.1
 # A highest pair along a valley that bends by so many times as much is kept.
 PLAIN = 10.0
 
@@ -98,7 +100,10 @@ def across_first(a, c, r, k, h, inverse, flat):
     if abs(h[0] * h[3] - h[1] * h[2]) > WEAK * size * norm:
         return inverse, False
     s0, s1 = right_side(c, r)
-    damping = max(max(UNSURE * (abs(s0) + abs(s1)), LEVEL) * size, flat)
+    off = abs(s0) + abs(s1)
+    if off > NEAR:
+        return inverse, False
+    damping = max(max(UNSURE * off, LEVEL) * size, flat)
     v, w = null_ways(h)
     bend = v[0] * (h[0] * w[0] + h[1] * w[1]) + v[1] * (h[2] * w[0] + h[3] * w[1])
     if not h[0] + h[3] < -damping or bend > PLAIN * damping:

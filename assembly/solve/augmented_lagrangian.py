@@ -175,7 +175,7 @@ def solve_program(table, pool, settings, state, history, tips):
     # How a solve with clearances ended whose bodies are only pushed apart any more, and until when.
     ended = RUNNING
     settled_by = 0
-    # Whether other contacts are near now than rows were placed for.
+    # Whether other contacts are near than rows are placed for.
     changed = watched and settings[GATHER] == 1.0 and results[SCATTER] == 1.0
     while status == RUNNING:
         if watched and not changed:
@@ -212,13 +212,14 @@ def solve_program(table, pool, settings, state, history, tips):
         violation = off_rows(table, loose, one_sided, here, tick)
         value = goal(table, pool, shape, rows, loose, room, tips, here, 1, gradient, lagrangian)
         # Rows of vectors depend on one another: their multipliers drift where nothing keeps them short.
-        shortened = iteration > 0 and (alpha < 1.0 or table[VECTOR_TRIMS] == 1)
+        vectors = table[VECTOR_TRIMS] == 1
+        shortened = iteration > 0 and (alpha < 1.0 or vectors)
         # Of contacts that touch, which of them push is not known from their gaps.
         touches = watched and not tick and violation <= TOUCHING
         # At the start both are the same; later a tenth of the last residual is good.
         good = max(math.inf if iteration == 0 else 0.1 * last_dual, settings[STATIONARITY] if touches else 0.0)
         dual = choose_multipliers(
-            shape, rows, here, shortened, touches, good, active, gradient, lines[0], gram, y, better_y
+            shape, rows, here, shortened, vectors, touches, good, active, gradient, lines[0], gram, y, better_y
         )
         log(history, iteration, (value, violation, dual, mu, shift, alpha, radius))
         if status != RUNNING:
@@ -230,8 +231,7 @@ def solve_program(table, pool, settings, state, history, tips):
         sunk = watched and not tick and has_sunk(table, pool, memory, residual)
         if sunk and iteration == back_at:
             # Bodies were in each other there too, and nothing had asked: that is no place to return to.
-            holds = False
-            leash = math.inf
+            holds, leash = False, math.inf
         retreats = sunk and holds and ended == RUNNING and iteration < limit
         looks_last = watched and settings[LAST_LOOK] == 1.0
         # Where every last look finds other contacts, the limit ends it.

@@ -206,7 +206,7 @@ def exchange(bases, jacobian, rows, one_sided, residual, active, gradient, scrat
 
 @kernel(inner=True)
 def pushing_multipliers(
-    bases, jacobian, rows, one_sided, residual, active, exchanges, gradient, scratch, of_rows, gram, y
+    bases, jacobian, rows, one_sided, residual, active, exchanges, rounds, gradient, scratch, of_rows, gram, y
 ):
     """Multipliers of least squares, none of which pulls: with so many exchanges of the active rows at most.
 
@@ -216,7 +216,6 @@ def pushing_multipliers(
     """
     fewest = rows + 1
     patience = BLOCKED
-    rounds = ROUNDS if exchanges > 0 else 1
     for k in range(exchanges + 1):
         least_squares_multipliers(bases, jacobian, rows, active, rounds, gradient, scratch, of_rows, gram, y)
         if k == exchanges:
@@ -237,11 +236,13 @@ def pushing_multipliers(
 
 
 @kernel(inner=True)
-def choose_multipliers(shape, rows, here, shortened, holds, good, active, gradient, scratch, gram, y, better_y):
+def choose_multipliers(
+    shape, rows, here, shortened, vectors, holds, good, active, gradient, scratch, gram, y, better_y
+):
     """The better of y, of what the last step proposed, and of least squares, into y.
 
     These are for after a shortened step, and for where rows hold and neither of the others is good: it depends on which
-    rows push then. Returns the dual residual.
+    rows push then. There, and with rows of `vectors`, they are refined. Returns the dual residual.
     """
     bases, one_sided, _order, of_rows = shape
     residual = here[3]
@@ -258,8 +259,21 @@ def choose_multipliers(shape, rows, here, shortened, holds, good, active, gradie
         dual = other
     if shortened or (holds and dual > good):
         exchanges = EXCHANGES if holds and dual > good else 0
+        rounds = ROUNDS if exchanges > 0 or vectors else 1
         pushing_multipliers(
-            bases, jacobian, rows, one_sided, residual, active, exchanges, gradient, scratch, of_rows, gram, better_y
+            bases,
+            jacobian,
+            rows,
+            one_sided,
+            residual,
+            active,
+            exchanges,
+            rounds,
+            gradient,
+            scratch,
+            of_rows,
+            gram,
+            better_y,
         )
         other = dual_residual(bases, jacobian, rows, one_sided, residual, gradient, better_y, scratch)
         if other < dual:
@@ -300,7 +314,7 @@ def least_multipliers(shape, rows, here, active, gradient, scratch, gram, dual, 
     residual = here[3]
     jacobian = here[4]
     pushing_multipliers(
-        bases, jacobian, rows, one_sided, residual, active, 0, gradient, scratch, of_rows, gram, better_y
+        bases, jacobian, rows, one_sided, residual, active, 0, 1, gradient, scratch, of_rows, gram, better_y
     )
     other = dual_residual(bases, jacobian, rows, one_sided, residual, gradient, better_y, scratch)
     if other > max(10.0 * dual, 1e-11):

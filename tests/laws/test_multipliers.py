@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 
-from assembly.solve.multipliers import EXCHANGES, NEAR, pushing_multipliers
+from assembly.solve.multipliers import EXCHANGES, NEAR, ROUNDS, pushing_multipliers
 
 
 def pushing(jacobian, one_sided, residual, active, gradient, exchanges=EXCHANGES):
@@ -18,7 +18,9 @@ def pushing(jacobian, one_sided, residual, active, gradient, exchanges=EXCHANGES
     of_rows = np.arange(rows), np.full(rows, rows - 1)
     y, active = np.full(rows, np.nan), active.copy()
     gram, scratch = np.zeros((rows + 1, rows)), np.zeros(6)
-    pushing_multipliers(bases, wide, rows, one_sided, residual, active, exchanges, gradient, scratch, of_rows, gram, y)
+    pushing_multipliers(
+        bases, wide, rows, one_sided, residual, active, exchanges, ROUNDS, gradient, scratch, of_rows, gram, y
+    )
     return y, active > 0.0
 
 
