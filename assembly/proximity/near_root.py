@@ -15,9 +15,9 @@ from assembly.geometry.spline import BREAKS_U, BREAKS_V, CLOSED_U, CLOSED_V, SPA
 from assembly.proximity.bounding_tree import ELEMENT, ELEMENT_FEATURE, ELEMENT_POOL
 from assembly.proximity.extremal import bent_at_most, move_pair, pair_frame, pair_step
 from assembly.proximity.folds import ALONE, BESIDE, fold_beyond
+from assembly.proximity.holding import POINT
 from assembly.proximity.pair_matrix import across_first, pair_matrix
 from assembly.proximity.roots import CODE_F, CODE_G, CORNER, ROOT_BEYOND, ROOT_FOLD, is_alone
-from assembly.proximity.switching import POINT
 
 # Steps; and below so many radians, that a step turns a normal, it is as good as there.
 STEPS, CLOSE = 6, 0.02

@@ -29,6 +29,12 @@ def curvature_bound(a):
 
 
 @kernel(inline=True)
+def scale_of(a, c, k):
+    """What H = C K - A is measured against, K = I + beta A."""
+    return curvature_bound(c) * (abs(k[0]) + 2.0 * abs(k[1]) + abs(k[2])) + curvature_bound(a)
+
+
+@kernel(inline=True)
 def damped_inverse(h, damping):
     """(H^T H + damping^2 I)^-1 H^T, in products that do not cancel where H is singular."""
     square = damping * damping
@@ -56,7 +62,7 @@ def pair_matrix(a, c, beta, flat):
     h12 = c[0] * k12 + c[1] * k22 - a[1]
     h21 = c[1] * k11 + c[2] * k12 - a[1]
     h22 = c[1] * k12 + c[2] * k22 - a[2]
-    size = curvature_bound(c) * (abs(k11) + 2.0 * abs(k12) + abs(k22)) + curvature_bound(a)
+    size = scale_of(a, c, (k11, k12, k22))
     det = h11 * h22 - h12 * h21
     norm = abs(h11) + abs(h12) + abs(h21) + abs(h22)
     # The smallest singular value is at least |det| / norm.
@@ -95,7 +101,7 @@ def across_first(a, c, r, k, h, inverse, flat):
     is off across it, and beyond an inflection the step leads up. So -H is raised along the valley to its amount and a
     part of what the pair is off: steps go across first, and then down. Near the solution they are Newton's.
     """
-    size = curvature_bound(c) * (abs(k[0]) + 2.0 * abs(k[1]) + abs(k[2])) + curvature_bound(a)
+    size = scale_of(a, c, k)
     norm = abs(h[0]) + abs(h[1]) + abs(h[2]) + abs(h[3])
     if abs(h[0] * h[3] - h[1] * h[2]) > WEAK * size * norm:
         return inverse, False

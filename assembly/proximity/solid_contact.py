@@ -16,9 +16,10 @@ from assembly.geometry.vec import matvec_t
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.extremal import CONVERGED, SINGULAR
 from assembly.proximity.feature_pair import feature_record
+from assembly.proximity.holding import hold_features
 from assembly.proximity.nearest import CROSSING
 from assembly.proximity.nearest_query import NORMAL, PAIR
-from assembly.proximity.switching import hold_features, track_features
+from assembly.proximity.switching import track_features
 from assembly.proximity.velocity import RECORD
 
 FEATURE_F, FEATURE_G, PAIR_NORMAL, PAIR_GAP, STAYS, TRACK = 4, 5, 6, 9, 10, 11

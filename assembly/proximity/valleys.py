@@ -13,13 +13,11 @@ from assembly._kernel import kernel
 from assembly.geometry.spline import BREAKS_U, BREAKS_V, SPANS_U, SPANS_V
 from assembly.geometry.vec import blend
 from assembly.proximity.extremal import bent_at_most, move_pair, pair_frame
-from assembly.proximity.near_root import is_beside
+from assembly.proximity.near_root import FLAT, is_beside
 from assembly.proximity.pair_matrix import curvature_bound, pair_matrix
 
 # Across a valley surfaces part by this part of their curvatures at least; along it by this part of that at most.
 STEEP, LEVEL = 0.05, 0.1
-# Curvatures below this, over the scene's size, are rounding.
-FLAT = 1e-9
 # Steps into a valley, and radians below which one counts as arrived.
 STEPS, ARRIVED = 8, 1e-6
 # More turn than any step.

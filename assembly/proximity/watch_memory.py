@@ -12,7 +12,8 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
-from assembly.proximity.corners import sunk
+from assembly.proximity.held_valleys import sunk
+from assembly.proximity.holding import HELD_F
 from assembly.proximity.overlap import is_outside
 from assembly.proximity.roots import (
     ALIKE,
@@ -33,7 +34,6 @@ from assembly.proximity.roots import (
     add_root,
 )
 from assembly.proximity.solid_contact import FEATURE_F, FEATURE_G, PAIR_GAP, PAIR_NORMAL, STAYS
-from assembly.proximity.switching import HELD_F
 
 # The record of a watch: counts; where pairs begin; the row of `tracked` that is the first place; address of
 # `track_solids`; where its lengths are in the pool; how many lists there are, where they begin; whether corners are

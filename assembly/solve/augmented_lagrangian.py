@@ -273,10 +273,10 @@ def solve_program(table, pool, settings, state, history, tips):
                 status = STALLED
                 break
             return_to(table, pool, held, numbers, loose, rows, here, y, better_y, tick)
+            # Rows of tangency have other pairs now.
             rows = m
             changed = True
-            iteration += 1
-            back_at = iteration
+            back_at = iteration = iteration + 1
             continue
         if ended != RUNNING or (tick and iteration >= limit):
             # Its time is over: the shortest way back onto the rows.

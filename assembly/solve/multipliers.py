@@ -205,15 +205,14 @@ def exchange(bases, jacobian, rows, one_sided, residual, active, gradient, scrat
 
 
 @kernel(inner=True)
-def pushing_multipliers(
-    bases, jacobian, rows, one_sided, residual, active, exchanges, rounds, gradient, scratch, of_rows, gram, y
-):
+def pushing_multipliers(shape, rows, residual, jacobian, active, exchanges, rounds, gradient, scratch, gram, y):
     """Multipliers of least squares, none of which pulls: with so many exchanges of the active rows at most.
 
     Where rows depend on each other, it takes some of them only, and which these are is not known from the gaps. All
     that are wrong are exchanged at once as long as they become fewer (block pivoting, Portugal, Judice and Vicente
     1994); what still pulls in the end is set to zero.
     """
+    bases, one_sided, _order, of_rows = shape
     fewest = rows + 1
     patience = BLOCKED
     for k in range(exchanges + 1):
@@ -244,7 +243,7 @@ def choose_multipliers(
     These are for after a shortened step, and for where rows hold and neither of the others is good: it depends on which
     rows push then. There, and with rows of `vectors`, they are refined. Returns the dual residual.
     """
-    bases, one_sided, _order, of_rows = shape
+    bases, one_sided, _order, _of_rows = shape
     residual = here[3]
     jacobian = here[4]
     dual = dual_residual(bases, jacobian, rows, one_sided, residual, gradient, better_y, scratch)
@@ -261,19 +260,7 @@ def choose_multipliers(
         exchanges = EXCHANGES if holds and dual > good else 0
         rounds = ROUNDS if exchanges > 0 or vectors else 1
         pushing_multipliers(
-            bases,
-            jacobian,
-            rows,
-            one_sided,
-            residual,
-            active,
-            exchanges,
-            rounds,
-            gradient,
-            scratch,
-            of_rows,
-            gram,
-            better_y,
+            shape, rows, residual, jacobian, active, exchanges, rounds, gradient, scratch, gram, better_y
         )
         other = dual_residual(bases, jacobian, rows, one_sided, residual, gradient, better_y, scratch)
         if other < dual:
@@ -310,12 +297,10 @@ def least_multipliers(shape, rows, here, active, gradient, scratch, gram, dual, 
     """
     if not strongest(y, rows) > EXCESS * strongest(gradient, gradient.size):
         return dual
-    bases, one_sided, _order, of_rows = shape
+    bases, one_sided, _order, _of_rows = shape
     residual = here[3]
     jacobian = here[4]
-    pushing_multipliers(
-        bases, jacobian, rows, one_sided, residual, active, 0, 1, gradient, scratch, of_rows, gram, better_y
-    )
+    pushing_multipliers(shape, rows, residual, jacobian, active, 0, 1, gradient, scratch, gram, better_y)
     other = dual_residual(bases, jacobian, rows, one_sided, residual, gradient, better_y, scratch)
     if other > max(10.0 * dual, 1e-11):
         return dual

@@ -20,6 +20,7 @@ from assembly.proximity.pair_matrix import (
     curvature_bound,
     damped_inverse,
     pair_matrix,
+    scale_of,
 )
 
 MAJOR, MINOR = 0.7, 0.1
@@ -171,3 +172,16 @@ def test_no_step_leads_uphill_where_surfaces_part():
             # -r2 is the right side, and r2 the slope of the gap downward.
             assert step @ slope > -1e-12 * np.linalg.norm(step)
     assert raised > 400
+
+
+def test_steps_are_bounded_where_h_is_small_but_not_singular():
+    # A ball in a socket as round, but for a saddle: the ways of least H are none, and what is raised may be singular.
+    small = 1e-6
+    a, c = (1.0, 0.0, 1.0), (1.0 - 0.25 * small, -0.75 * small, 1.0 - 0.25 * small)
+    k_f, h, inverse, _isolated = pair_matrix(a, c, 0.0, 1e-12)
+    for off in np.linspace(0.3, 0.8, 501) * small:
+        r = (0.0, 0.0, 0.5 * off, 0.5 * off)
+        way, level = across_first(a, c, r, k_f, h, inverse, 1e-12)
+        assert level
+        # The least singular value of what is inverted is a part of the damping.
+        assert np.linalg.norm(way) * UNSURE * off * scale_of(a, c, k_f) < 20.0

@@ -18,9 +18,8 @@ def pushing(jacobian, one_sided, residual, active, gradient, exchanges=EXCHANGES
     of_rows = np.arange(rows), np.full(rows, rows - 1)
     y, active = np.full(rows, np.nan), active.copy()
     gram, scratch = np.zeros((rows + 1, rows)), np.zeros(6)
-    pushing_multipliers(
-        bases, wide, rows, one_sided, residual, active, exchanges, ROUNDS, gradient, scratch, of_rows, gram, y
-    )
+    shape = bases, one_sided, None, of_rows
+    pushing_multipliers(shape, rows, residual, wide, active, exchanges, ROUNDS, gradient, scratch, gram, y)
     return y, active > 0.0
 
 

@@ -9,10 +9,11 @@ from scipy.spatial.transform import Rotation
 import assembly as asm
 from assembly.constraints.layout import WATCH
 from assembly.geometry.spline import BREAKS_U, BREAKS_V, SPANS_U, SPANS_V, surface_point
-from assembly.proximity.corners import hold_continua, sunk
+from assembly.proximity.held_valleys import hold_continua, is_next_in_valley, sunk
+from assembly.proximity.holding import HELD_F, HELD_G
 from assembly.proximity.roots import CODE_F, CODE_G, CORNER, LISTED, NEW, ORIGIN, ROOT, ROOT_FOLD, USELESS
 from assembly.proximity.shell import FACES
-from assembly.proximity.switching import HELD_F, HELD_G, feature_at
+from assembly.proximity.switching import feature_at
 from assembly.proximity.valleys import ARRIVED, across_valley, into_valley
 from assembly.proximity.watch_memory import PAIR_SHELL_F, PAIR_SHELL_G, PAIR_TABLE
 
@@ -117,11 +118,11 @@ def test_no_valley_where_nothing_or_everything_is_level(shape):
             assert not across_valley(table, pool, top, other, tuple(turn.ravel()), tuple(shift), x)[0]
 
 
-def ring_on_a_slab():
+def ring_on_a_slab(slab=None):
     """Table and pool of the two, the scale, their shells, which face is the slab's top."""
     scene = asm.Assembly(
         [
-            asm.Body("slab", asm.shapes.box(4.0, 4.0, 0.5), fixed=True),
+            asm.Body("slab", slab or asm.shapes.box(4.0, 4.0, 0.5), fixed=True),
             asm.Body("ring", asm.shapes.torus(MAJOR, MINOR), (0.0, 0.0, 0.35)),
         ]
     )
@@ -145,9 +146,16 @@ def test_a_point_that_is_held_goes_back_to_the_bottom():
         p = surface.evaluate(x[2], x[3])
         low, _ = lowest_across(turn, shift, np.arctan2(p[1], p[0]), scale)
         assert (turn @ p / scale + shift)[2] == pytest.approx(low, abs=ARRIVED**2 + 1e-15 + MINOR * tilt**4)
-        # Beyond the rim of the slab none of its points is at the bottom.
-        beyond = (*scene[:1], tuple(shift + [4.0 / scale, 0.0, 0.0]), *scene[2:])
-        assert sunk(table, pool, beyond, (top, 0), HELD_F, start) == start
+
+
+def test_a_point_that_is_held_stays_where_its_bottom_is_over_a_hole():
+    table, pool, scale, shells, top = ring_on_a_slab(asm.shapes.plate(4.0, 4.0, 0.5, [(MAJOR, 0.0, 0.2)]))
+    _, (v0, v1) = asm.shapes.torus(MAJOR, MINOR).domain
+    scene = (tuple(np.eye(3).ravel()), (0.0, 0.0, 0.35 / scale), (-1, -1, *shells))
+    start = (MAJOR, 0.0, 0.0, v0 + 0.77 * (v1 - v0))
+    # Of the slab nothing is below it; of the ring there is.
+    assert sunk(table, pool, scene, (top, 0), HELD_F, start) == start
+    assert sunk(table, pool, scene, (top, 0), HELD_G, start)[3] == pytest.approx(v0 + 0.75 * (v1 - v0), abs=1e-9)
 
 
 def test_few_of_a_continuum_are_held():
@@ -171,3 +179,26 @@ def test_few_of_a_continuum_are_held():
     np.testing.assert_array_equal(found[:5, :4], before)
     assert found[:5, CORNER].tolist() == [HELD_G, HELD_G, 0.0, HELD_G, 0.0]
     assert found[:5, ORIGIN].tolist() == [NEW, LISTED, USELESS, NEW, NEW]
+
+
+def test_what_lies_beside_a_point_is_in_another_valley():
+    table, pool, scale, shells, top = ring_on_a_slab()
+    (_, u1), (v0, v1) = asm.shapes.torus(MAJOR, MINOR).domain
+    turn, shift = tuple(np.eye(3).ravel()), (0.0, 0.0, 0.35 / scale)
+    surfaces = feature_at(table, shells[0], top), feature_at(table, shells[1], 0)
+    start = (0.0, 0.0, 0.1 * u1, v0 + 0.75 * (v1 - v0))
+    _found, x, _on_f, along = into_valley(table, pool, *surfaces, turn, shift, start, WIDE)
+    roots = np.zeros((1, ROOT))
+    roots[0, :4], roots[0, CODE_F], roots[0, ORIGIN], roots[0, CORNER] = x, top, NEW, HELD_G
+    scene = turn, shift, (-1, -1, *shells)
+    # The slab's parameters are lengths. More beside than along is another valley; a turn by 60 degrees is far, too.
+    across = np.cross([0.0, 0.0, 1.0], along)
+    turned = 0.4 * np.array(along) + np.sqrt(0.84) * across
+    for way, direction, other in (
+        (0.3 * np.array(along), along, False),
+        (0.3 * across, along, True),
+        (0.3 * np.array(along) + 0.2 * across, along, False),
+        (0.3 * turned, tuple(turned), True),
+    ):
+        there = (x[0] + way[0], x[1] + way[1], x[2], x[3])
+        assert is_next_in_valley(table, pool, scene, (top, 0), surfaces, there, direction, roots, 1) == other
