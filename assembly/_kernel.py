@@ -1,17 +1,16 @@
-"""The one door to Numba: `@kernel`, a cache that cannot be stale, and values of four lanes.
+"""The one door to Numba: `@kernel`, and a cache that cannot be stale.
 
-A kernel is a compiled function. Kernels that other kernels call in their inner loops are marked
-``@kernel(inline=True)``; the rest are cached on disk, in a folder named by a hash of all kernel
-sources, because Numba's own cache does not notice an edit in another file. An entry is one file
-with its own checksum, so that no reader can meet a half-written or damaged one.
+A kernel is a compiled function. Those that kernels call are marked ``inline`` or ``inner``; the others are cached on
+disk, in a folder named by a hash of all kernel sources, because Numba's own cache does not notice an edit in another
+file. An entry is one file with its own checksum, so that no reader can meet a half-written or damaged one.
 """
 
 from __future__ import annotations
 
 import ctypes
+import functools
 import hashlib
 import logging
-import operator
 import os
 import pickle
 import shutil
@@ -25,6 +24,7 @@ from pathlib import Path
 from typing import Any
 
 import llvmlite
+import llvmlite.binding as llvm
 import numba
 import numpy as np
 from llvmlite import ir
@@ -32,11 +32,10 @@ from numba import njit, types
 from numba.core import caching, cgutils, config, serialize
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, CompileResult
-from numba.core.datamodel import models
 from numba.core.typing.templates import infer, infer_global, make_overload_template
-from numba.extending import intrinsic, overload, register_model
+from numba.extending import intrinsic, overload
 
-__all__ = ["address_of", "call_address", "clock_address", "kernel", "lane", "load_lanes", "store_xyz"]
+__all__ = ["address_of", "call_address", "clock_address", "kernel"]
 
 _PACKAGE = Path(__file__).resolve().parent
 _LOG = logging.getLogger("assembly")
@@ -47,8 +46,8 @@ _FOLDERS_KEPT = 4
 def _source_stamp(package: Path) -> str | None:
     """Hash of every kernel source and of what compiles it; None where the sources cannot be read.
 
-    A kernel source is a file of the package that names this module. Settings that change the
-    machine code, and versions whose entries cannot be exchanged, are part of the hash.
+    A kernel source is a file of the package that names this module. Settings that change the machine code, and versions
+    whose entries cannot be exchanged, are part of the hash.
     """
     toolchain = (sys.implementation.cache_tag, numba.__version__, llvmlite.__version__, np.__version__)
     settings = (config.OPT, config.BOUNDSCHECK, config.LOOP_VECTORIZE, config.SLP_VECTORIZE)
@@ -124,6 +123,8 @@ class _Cache(caching._Cache):
     """
 
     _announced = False
+    # What an entry holds of its code for others to link to: nothing, until one does.
+    _no_code = b""
 
     def __init__(self, function: Callable[..., Any], folder: Path) -> None:
         self._function = function
@@ -151,21 +152,34 @@ class _Cache(caching._Cache):
             payload = entry[32:]
             if hashlib.sha256(payload).digest() != entry[:32]:
                 raise ValueError("the checksum does not fit")
-            return CompileResult._rebuild(target_context, *pickle.loads(payload))
+            return self._rebuilt(target_context, *pickle.loads(payload))
         except FileNotFoundError:
             if not _Cache._announced:
                 _Cache._announced = True
                 _LOG.warning("compiling kernels for the first time (some seconds; kept in %s)", self._folder)
         except Exception as error:  # loading is a shortcut: nothing that goes wrong in it may stop a solve
             _LOG.warning("compiling %s again: its cache entry %s is damaged (%s)", self._title(), path, error)
+        _make_callable()
         return None
+
+    @classmethod
+    def _rebuilt(cls, target_context: Any, library: Any, names: Any, *rest: Any) -> Any:
+        """A kernel from its parts, as Numba does it, but that bitcode is not read unless another kernel links to it."""
+        name, kind, (machine_code, bitcode) = library
+        cls._no_code = cls._no_code or llvm.parse_assembly("").as_bitcode()
+        # What Numba would read from there.
+        symbols = (names.llvm_func_name, names.llvm_cpython_wrapper_name, names.llvm_cfunc_wrapper_name)
+        target_context.codegen()._engine._defined_symbols.update(symbols)
+        parts = (name, kind, (machine_code, cls._no_code))
+        result = CompileResult._rebuild(target_context, parts, names, *rest)
+        result.library._get_module_for_linking = functools.cache(lambda: llvm.parse_bitcode(bitcode))
+        return result
 
     def save_overload(self, sig: Any, data: Any) -> None:
         if data.library.has_dynamic_globals:
             warnings.warn(f"{self._title()} uses an address or a large global array and is not cached", stacklevel=2)
             return
-        payload = serialize.dumps(data._reduce())
-        path = self._path(sig, data.codegen)
+        payload, path = serialize.dumps(data._reduce()), self._path(sig, data.codegen)
         try:
             self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
             handle, unfinished = tempfile.mkstemp(dir=self._folder)
@@ -189,6 +203,13 @@ class _Cache(caching._Cache):
         key = repr((sig, codegen.magic_tuple())).encode() + self._function.__code__.co_code
         key += serialize.dumps(closed_over)
         return self._folder / f"{self._title()}-{hashlib.sha256(key).hexdigest()[:32]}"
+
+
+class _NoCache(caching.NullCache):
+    """Of a kernel that every process compiles."""
+
+    def load_overload(self, _sig: Any, _target_context: Any) -> None:
+        _make_callable()
 
 
 class _NoEnvironment:
@@ -240,8 +261,7 @@ class _InnerCompiler(Compiler):
 class _OncePerSignature(dict[Any, Any]):
     """Numba keys what it has compiled for kernels by types and by the caller's flags. Ours have flags of their own.
 
-    Without this a kernel is compiled once for callers that are copied into theirs, once for those that are not, and
-    once more for those that make arrays.
+    Without this a kernel is compiled up to three times: for inline callers, for inner ones, for those that make arrays.
     """
 
     def __getitem__(self, key: Any) -> Any:
@@ -249,6 +269,16 @@ class _OncePerSignature(dict[Any, Any]):
 
     def __setitem__(self, key: Any, value: Any) -> None:
         super().__setitem__(key[:-1], value)
+
+
+# Functions that kernels may call, and how they are compiled, of which Numba has not been told.
+_WAITING: list[tuple[Callable[..., Any], dict[str, Any]]] = []
+
+
+def _make_callable() -> None:
+    """Tell Numba of all functions that kernels may call: when it is to compile one, and not before."""
+    while _WAITING:
+        _callable_from_kernels(*_WAITING.pop())
 
 
 def _callable_from_kernels(function: Callable[..., Any], settings: dict[str, Any]) -> None:
@@ -303,16 +333,15 @@ def kernel(
     fastmath: Any = False if exact else {"contract"}
     settings: dict[str, Any] = {"fastmath": fastmath, "error_model": "numpy", "nogil": True}
     if inline or inner:
-        _callable_from_kernels(function, {**settings, "forceinline": inline, "_nrt": allocates})
+        _WAITING.append((function, {**settings, "forceinline": inline, "_nrt": allocates}))
         return function
     compiled = njit(**settings)(function)
-    stamped = _PACKAGE in Path(function.__code__.co_filename).resolve().parents
-    if not config.DISABLE_JIT and stamped and _FOLDER is not None:
-        compiled._cache = _Cache(function, _FOLDER)
+    if not config.DISABLE_JIT:
+        stamped = _PACKAGE in Path(function.__code__.co_filename).resolve().parents
+        compiled._cache = _Cache(function, _FOLDER) if stamped and _FOLDER is not None else _NoCache()
     return compiled
 
 
-# ------------------------------------------------------------------------------------------------
 # Kernels called by address. What calls another kernel is optimized together with it, as often as it is called; a
 # large kernel that is rarely needed is compiled for itself, and its caller is given the address of its machine code.
 
@@ -355,45 +384,7 @@ def clock_address() -> int:
     return 0
 
 
-# ------------------------------------------------------------------------------------------------
-# Four lanes: (x, y, z, w) as one vector value. Without JIT the same names work on numpy 4-vectors.
-
-
-class _LanesType(types.Type):
-    def __init__(self) -> None:
-        super().__init__(name="Lanes4")
-
-
-_lanes = _LanesType()
-_VECTOR = ir.VectorType(ir.DoubleType(), 4)
-_I32 = ir.IntType(32)
-
-
-@register_model(_LanesType)
-class _LanesModel(models.PrimitiveModel):
-    def __init__(self, dmm: Any, fe_type: Any) -> None:
-        super().__init__(dmm, fe_type, _VECTOR)
-
-
-if config.DISABLE_JIT:
-
-    def load_lanes(array: np.ndarray, offset: int) -> Any:
-        """Four consecutive doubles of a flat array."""
-        return array[offset : offset + 4].copy()
-
-    def lane(value: Any, index: int) -> float:
-        """One component of a four-lane value."""
-        return float(value[index])
-
-    def store_lanes(value: Any, array: np.ndarray, offset: int) -> None:
-        """Write all four lanes to a flat array."""
-        array[offset : offset + 4] = value
-
-    def store_xyz(value: Any, array: np.ndarray, offset: int) -> None:
-        """Write lanes 0 to 2 to a flat array."""
-        array[offset : offset + 3] = value[:3]
-
-else:
+if not config.DISABLE_JIT:
 
     @intrinsic
     def _call(_typing: Any, address: Any, arguments: Any) -> Any:
@@ -407,85 +398,3 @@ else:
     @overload(call_address)
     def _call_address(address, arguments):  # type: ignore[no-untyped-def]  # Numba compares the two signatures
         return lambda address, arguments: _call(address, arguments)
-
-    @intrinsic
-    def load_lanes(_typing: Any, array: Any, offset: Any) -> Any:
-        """Four consecutive doubles of a flat array."""
-
-        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
-            pointer = builder.bitcast(builder.gep(data, [arguments[1]]), _VECTOR.as_pointer())
-            return builder.load(pointer, align=8)
-
-        return _lanes(array, offset), generate
-
-    @intrinsic
-    def lane(_typing: Any, value: Any, index: Any) -> Any:
-        """One component of a four-lane value; the index is a literal."""
-        if not isinstance(index, types.IntegerLiteral):
-            return None
-
-        def generate(_context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            return builder.extract_element(arguments[0], _I32(signature.args[1].literal_value))
-
-        return types.float64(value, index), generate
-
-    @intrinsic
-    def store_lanes(_typing: Any, value: Any, array: Any, offset: Any) -> Any:
-        """Write all four lanes to a flat array."""
-
-        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            data = context.make_array(signature.args[1])(context, builder, arguments[1]).data
-            pointer = builder.bitcast(builder.gep(data, [arguments[2]]), _VECTOR.as_pointer())
-            builder.store(arguments[0], pointer, align=8)
-            return context.get_dummy_value()
-
-        return types.none(value, array, offset), generate
-
-    @intrinsic
-    def store_xyz(_typing: Any, value: Any, array: Any, offset: Any) -> Any:
-        """Write lanes 0 to 2 to a flat array."""
-
-        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            data = context.make_array(signature.args[1])(context, builder, arguments[1]).data
-            for k in range(3):
-                place = builder.gep(data, [builder.add(arguments[2], arguments[2].type(k))])
-                builder.store(builder.extract_element(arguments[0], _I32(k)), place)
-            return context.get_dummy_value()
-
-        return types.none(value, array, offset), generate
-
-    def _spread(builder: Any, scalar: Any) -> Any:
-        first = builder.insert_element(ir.Constant(_VECTOR, ir.Undefined), scalar, _I32(0))
-        return builder.shuffle_vector(
-            first, ir.Constant(_VECTOR, ir.Undefined), ir.Constant(ir.VectorType(_I32, 4), [0, 0, 0, 0])
-        )
-
-    def _register(symbol: Any, instruction: str) -> None:
-        flags = ("contract",)
-
-        @intrinsic
-        def vector_vector(_typing: Any, x: Any, y: Any) -> Any:
-            def generate(_c: Any, builder: Any, _s: Any, a: Any) -> Any:
-                return getattr(builder, instruction)(a[0], a[1], flags=flags)
-
-            return _lanes(x, y), generate
-
-        @intrinsic
-        def scalar_vector(_typing: Any, x: Any, y: Any) -> Any:
-            def generate(_c: Any, builder: Any, _s: Any, a: Any) -> Any:
-                return getattr(builder, instruction)(_spread(builder, a[0]), a[1], flags=flags)
-
-            return _lanes(types.float64, y), generate
-
-        @overload(symbol)
-        def _operator(x, y):  # type: ignore[no-untyped-def]  # Numba compares the two signatures
-            if isinstance(x, _LanesType) and isinstance(y, _LanesType):
-                return lambda x, y: vector_vector(x, y)
-            if isinstance(x, types.Float) and isinstance(y, _LanesType):
-                return lambda x, y: scalar_vector(x, y)
-            return None
-
-    _register(operator.add, "fadd")
-    _register(operator.sub, "fsub")
-    _register(operator.mul, "fmul")

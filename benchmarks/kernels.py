@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 
-from assembly._kernel import kernel, lane, load_lanes
+from assembly._kernel import kernel
+from assembly._lanes import lane, load_lanes
 from assembly.geometry.spline import surface_lanes, surface_point
 from assembly.geometry.vec import add
 from assembly.kinematics.motion import relative_pose, rotation

@@ -38,8 +38,12 @@ assert scene.solve().success
 
 
 def start(code: str, environment: Mapping[str, str] | None = None) -> str:
-    """Run code in a fresh interpreter; what it says on standard error."""
+    """Run code in a fresh interpreter; what it says on standard error.
+
+    It may keep its byte code, as packages that are installed do.
+    """
     variables = {**os.environ, **(environment or {})}
+    variables.pop("PYTHONDONTWRITEBYTECODE", None)
     done = subprocess.run([sys.executable, "-c", code], check=True, env=variables, stderr=subprocess.PIPE, text=True)
     return done.stderr
 

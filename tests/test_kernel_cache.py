@@ -226,6 +226,26 @@ def test_an_entry_that_cannot_be_replaced(package):
     assert len(package.entries(folder)) == 2  # nothing unfinished beside them
 
 
+def test_what_is_found_on_disk_needs_no_word_to_numba(package):
+    package.call()
+    code = CALL + "print([function.__name__ for function, _ in _kernel._WAITING])\n"
+    assert package.run(code).splitlines()[-1] == "['helper']"
+
+
+def test_a_kernel_links_to_one_that_was_found_on_disk(package):
+    package.call()
+    code = """
+from small._kernel import kernel
+from small.callee import helper, inner
+assert inner(1.0) == 2.0 and inner.stats.cache_hits.total() == 1
+@kernel
+def mine(x):
+    return helper(inner(x)) + 1.0
+print(mine(1.0), inner.stats.cache_misses.total())
+"""
+    assert package.run(code).splitlines()[-1] == "3.0 0"
+
+
 def test_a_kernel_tied_to_this_process_is_not_cached(package):
     # Numba passes an array of more than a megabyte by its address.
     package.edit("caller.py", "@kernel\ndef outer", "import numpy as np\nTABLE = np.ones(200_000)\n@kernel\ndef outer")

@@ -7,7 +7,8 @@ with B_i^n(x) = C(n, i) x^i (1 - x)^(n - i), about a center of the curve's own, 
 
 from __future__ import annotations
 
-from assembly._kernel import kernel, lane, load_lanes, store_xyz
+from assembly._kernel import kernel
+from assembly._lanes import lane, load_lanes, store_xyz
 from assembly.geometry.spline import find_span, into_domain
 
 # Integers of a record: degree, spans, 1 where weights differ, and where in the pool its tables are.

@@ -12,7 +12,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from assembly._kernel import kernel, lane, load_lanes
+from assembly._kernel import kernel
+from assembly._lanes import lane, load_lanes
 
 # Fields of a trim record: boundary curves and where their records begin, pieces (all, then those of the boundary
 # alone), table and pool offsets of the pieces, table offset of the first piece of every curve, pool offset of the

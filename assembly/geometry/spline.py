@@ -13,7 +13,8 @@ offsets point into the pool of doubles.
 
 from __future__ import annotations
 
-from assembly._kernel import kernel, lane, load_lanes, store_xyz
+from assembly._kernel import kernel
+from assembly._lanes import lane, load_lanes, store_xyz
 
 SURFACE_RECORD = 13
 # Fields of a surface record.

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import math
 
-from assembly._kernel import kernel, lane
+from assembly._kernel import kernel
+from assembly._lanes import lane
 from assembly.geometry.bezier_pieces import BINOMIALS, DEGREE, bezier_derivatives, bezier_value
 from assembly.geometry.spline import xyz
 from assembly.geometry.vec import dot

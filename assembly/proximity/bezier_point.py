@@ -17,7 +17,8 @@ import math
 
 import numpy as np
 
-from assembly._kernel import kernel, lane
+from assembly._kernel import kernel
+from assembly._lanes import lane
 from assembly.geometry.bezier_pieces import (
     BINOMIALS,
     BOX,

@@ -277,7 +277,6 @@ def solve_pair(table, pool, f, g, rotation, shift, x, size, turn, close, downhil
     previous = 1e300
     status = NOT_CONVERGED
     level = False
-    rests, rest = False, x
     iteration = 0
     while True:
         n, tx, ty, pf, pg, e, t, a, c, r, beta, regular = pair_frame(table, pool, f, g, rotation, shift, x)
@@ -303,8 +302,6 @@ def solve_pair(table, pool, f, g, rotation, shift, x, size, turn, close, downhil
             if (ends or settled(c, r, size)) if downhill else iteration >= PATIENCE:
                 status = SINGULAR
                 break
-            if not rests:
-                rests, rest = True, x
         if ends:
             break
         previous = step
@@ -336,9 +333,4 @@ def solve_pair(table, pool, f, g, rotation, shift, x, size, turn, close, downhil
             break
         x = y
         iteration += 1
-    if downhill and rests and status != CONVERGED and status != SINGULAR:
-        # The valley goes down to where a face ends, by as little as a cylinder leans: a pair of the continuum.
-        status, x = SINGULAR, rest
-        n, tx, ty, pf, pg, e, t, a, c, r, beta, regular = pair_frame(table, pool, f, g, rotation, shift, x)
-        k, h, inverse, isolated = pair_matrix(a, c, beta, flat)
     return status, x, iteration, (n, tx, ty, pf, pg, e, t, a, c, r, beta, regular), (k, h, inverse, isolated)

@@ -6,9 +6,6 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from assembly.proximity.rims import Batch, Rim, Survey
 
@@ -64,6 +61,11 @@ def merged(rims: Sequence[Rim], tolerance: float) -> tuple[Array, dict[Rim, tupl
     anchored = [rim for rim in rims if rim.anchored]
     if not anchored:
         return np.empty((0, 3)), {}
+    # Loaded only here: it takes a tenth of a second, and bodies without edges do without.
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
     ends = np.concatenate([rim.ends for rim in anchored])
     pairs = cKDTree(ends).query_pairs(tolerance, output_type="ndarray")
     links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(ends), len(ends)))
@@ -84,6 +86,8 @@ def _crossings(
     """
     if not len(points):
         return {}
+    from scipy.spatial import cKDTree
+
     tolerance = survey.tolerance
     balls = np.concatenate([rim.balls for rim in rims])
     owners = np.repeat(np.arange(len(rims)), [len(rim.balls) for rim in rims])

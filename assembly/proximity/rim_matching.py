@@ -10,7 +10,6 @@ from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from assembly.geometry.curve_parts import CORNER
 from assembly.proximity.rims import Batch, Rim, Survey, cross
@@ -103,6 +102,8 @@ def matches_of(rims: Sequence[Rim], ends: dict[Rim, tuple[int, int]], signs: Arr
     candidates = [pair for group in groups.values() for pair in combinations(group, 2)]
     rings = [rim for rim in rims if not rim.anchored]
     if rings:
+        from scipy.spatial import cKDTree
+
         middles = np.array([rim.middle for rim in rings])
         near = cKDTree(middles).query_ball_point(middles, [0.05 * rim.length for rim in rings])
         candidates += [(rings[i], rings[j]) for i, found in enumerate(near) for j in found if i < j]

@@ -13,7 +13,8 @@ from __future__ import annotations
 
 import math
 
-from assembly._kernel import kernel, load_lanes, store_lanes
+from assembly._kernel import kernel
+from assembly._lanes import load_lanes, store_lanes
 from assembly.constraints.blocks import (
     ACROSS,
     COUNT,
