@@ -64,12 +64,13 @@ KINDS: dict[str, tuple[Callable[[np.random.Generator], NurbsCurve], float]] = {
 
 
 def sampled_minimum(a: NurbsCurve, b: NurbsCurve, count: int = 200) -> float:
-    """The least distance that samples and a search around the nearest ones find."""
+    """The least distance that samples and a search around each that is nearer than those beside it find."""
     s, t = np.linspace(0.0, 1.0, count), np.linspace(0.0, 1.0, count)
     d = np.linalg.norm(a.evaluate(s)[:, None] - b.evaluate(t)[None], axis=2)
     least = float(d.min())
-    for k in np.argsort(d, axis=None)[:3]:
-        x, y = s[k // count], t[k % count]
+    beside = np.lib.stride_tricks.sliding_window_view(np.pad(d, 1, constant_values=np.inf), (3, 3))
+    for i, j in np.argwhere(d <= beside.min(axis=(2, 3))):
+        x, y = s[i], t[j]
         width = 1.0 / count
         while width > 1e-9:
             u = np.clip(x + width * np.linspace(-1.0, 1.0, 9), 0.0, 1.0)
@@ -78,7 +79,7 @@ def sampled_minimum(a: NurbsCurve, b: NurbsCurve, count: int = 200) -> float:
             i, j = np.unravel_index(near.argmin(), near.shape)
             x, y = u[i], v[j]
             least = min(least, float(near.min()))
-            width *= 0.5
+            width *= 0.8
     return least
 
 
