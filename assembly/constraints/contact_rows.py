@@ -37,6 +37,9 @@ from assembly.proximity.solid_contact import CONTACT_RECORD, FOLD, PAIR_GAP, PRO
 from assembly.proximity.start import global_start
 from assembly.proximity.velocity import GAP, RATES, gradient_row, store_record
 
+# What a clearance's contact of solids holds on to, where it may be given up.
+MAY_GO = -1.0
+
 
 @kernel(inner=True)
 def track_contact(table, pool, row, q, start, patience, records, k):
@@ -104,6 +107,12 @@ def is_guard(table, r):
 
 
 @kernel(inline=True)
+def may_go(table, r):
+    """Whether row r is a clearance's of solids, whose pair may end where they are in each other."""
+    return is_guard(table, r) and table[table[ROW_TABLE] + ROW * r + SHELL_F] >= 0
+
+
+@kernel(inline=True)
 def copy_tracked(start, r, tracked):
     """All that is tracked of a row, also what its kind has no use for: nothing is to depend on what was in memory."""
     for i in range(TRACK):
@@ -124,13 +133,14 @@ def idle_row(r, gap, point):
 def lost_guard(table, pool, r, start, point, past):
     """Row r of a clearance whose pair was lost: idle, if its gap would be open, or it is a corner `past` its face.
 
-    What the neighborhood holds now is for the next look to find.
+    Or if it may go, though it is not open: one that ends where bodies are in each other would hold every step. What the
+    neighborhood holds now is for the next look to find.
     """
     row = table[ROW_TABLE] + ROW * r
     gap = start[r, PAIR_GAP] - pool[table[row + MINIMUM]]
     if past:
         gap = max(gap, 0.0)
-    elif not gap > 0.0:
+    elif not gap > 0.0 and start[r, STAYS] != MAY_GO:
         return False
     idle_row(r, gap, point)
     # Nothing moves it: its pair is not known.
@@ -165,6 +175,7 @@ def solids_row(table, pool, r, start, patience, point):
     if found:
         residual[r] = records[r, GAP] - pool[table[row + MINIMUM]]
         tracked[r, PAIR_GAP] = records[r, GAP]
+        tracked[r, STAYS] = max(tracked[r, STAYS], 0.0)
         gradient_row(records, r, jacobian, r)
     return found
 

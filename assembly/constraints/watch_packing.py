@@ -22,7 +22,7 @@ __all__ = ["LAST_REACH", "guarded_pairs", "pack_watch", "place_count"]
 
 Pair = tuple[Body, Body]
 # Of a watch, in parts of the scene's size: how far its looks reach at least, and at most.
-FIRST_REACH, LAST_REACH = 0.005, 0.05
+FIRST_REACH, LAST_REACH = 0.005, 0.1
 # How far bodies may go between looks where contacts may be born, in parts of the smallest radius of curvature of the
 # two; in parts of the scene's size, it is no less than this.
 FLANK, LEAST_FLANK = 0.5, 1e-4

@@ -132,8 +132,7 @@ def solve_program(table, pool, settings, state, history, tips):
     feasible = max(settings[FEASIBILITY], 4e-16 * reach)
     limit = int(settings[ITERATIONS])
     mu = settings[PENALTY]
-    floor = settings[PENALTY_FLOOR]
-    slow_steps = 0
+    floor, slow_steps = settings[PENALTY_FLOOR], 0
     way = np.empty(WAY)
     way[SOFTNESS] = 1.0
     begin_way(way)
@@ -142,8 +141,7 @@ def solve_program(table, pool, settings, state, history, tips):
     violation = math.inf
     dual = math.inf
     value = math.inf
-    last_violation = math.inf
-    last_dual = math.inf
+    last_violation = last_dual = math.inf
     kept = False
     restoring = False
     entered = math.inf
@@ -195,6 +193,8 @@ def solve_program(table, pool, settings, state, history, tips):
             rows, n, system, lost = rearrange(program, count, rows, here, y, better_y, active)
             gradient, lines, lagrangian, _factor = system
             kept = False
+            # What was hard for other rows need not be for these.
+            floor, slow_steps, mu = settings[PENALTY_FLOOR], 0, max(mu, settings[PENALTY_FLOOR])
             begin_way(way)
             if folded:
                 # Perhaps another one is lost.

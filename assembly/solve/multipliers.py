@@ -38,11 +38,13 @@ def weigh_rows(rows, one_sided, residual, y, mu, forces, active):
 
 
 @kernel(inner=True)
-def foresee(table, shape, rows, residual, jacobian, y, mu, step, in_matrix, active, foreseen, descent, lagrangian):
+def foresee(
+    table, shape, rows, residual, jacobian, y, mu, step, in_matrix, active, foreseen, descent, lagrangian, ends
+):
     """Let one-sided rows count that are idle here and would push at the end of the step; those that would not, no more.
 
-    Their sign is that of y + (c + J step) / mu. Descent changes with them, and so does the Lagrangian, if it holds the
-    rows' terms (`in_matrix`). Returns how many rows changed.
+    Their sign is that of y + (c + J step) / mu; none counts any more where this `ends`. Descent changes with them, and
+    so does the Lagrangian, if it holds the rows' terms (`in_matrix`). Returns how many rows changed.
     """
     bases, one_sided = shape[0], shape[1]
     changed = 0
@@ -52,7 +54,7 @@ def foresee(table, shape, rows, residual, jacobian, y, mu, step, in_matrix, acti
         if table[CONTACTS] <= r < table[CONTACTS] + table[TRIMS]:
             # Their slopes change too fast for that.
             continue
-        pushes = y[r] + (residual[r] + times(bases, jacobian, r, step)) / mu < 0.0
+        pushes = not ends and y[r] + (residual[r] + times(bases, jacobian, r, step)) / mu < 0.0
         if pushes == (foreseen[r] == 1.0):
             continue
         changed += 1

@@ -7,11 +7,12 @@ shortened.
 from __future__ import annotations
 
 from assembly._kernel import kernel
-from assembly.constraints.contact_rows import is_guard
+from assembly.constraints.contact_rows import MAY_GO, is_guard, may_go
 from assembly.constraints.layout import MOVING, WATCH
 from assembly.constraints.program import evaluate
 from assembly.constraints.terms import objective
 from assembly.proximity.extremal import BEND
+from assembly.proximity.solid_contact import STAYS
 from assembly.solve.dexterity import add_dexterities
 from assembly.solve.guards import is_too_far
 from assembly.solve.linear import factorize_shifted, forward_step, solve_step
@@ -22,6 +23,8 @@ SHORTEST = 1e-6
 # A body turns by this much at most in a step, and this often a step is shortened by a larger shift.
 TURN = 1.0
 SHORTENINGS = 4
+# A clearance's contact that no longer step finds again is given up.
+LETS_GO = 1e-5
 
 
 @kernel(inner=True)
@@ -126,6 +129,9 @@ def search(program, tips, here, trial, rows, y, base, value, restoring, mu, slop
                 bends = 3
                 for i in range(n):
                     step[i] = straight[i]
+        if lost >= 0 and alpha * longest < LETS_GO and may_go(table, lost) and here[1][lost, STAYS] == 0.0:
+            here[1][lost, STAYS] = MAY_GO
+            continue
         alpha *= 0.5
         # A pair near a fold is freed; a clearance's is given up where its gap does not close.
         if lost >= 0 and alpha * longest < 0.01 and not is_guard(table, lost):

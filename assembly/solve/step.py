@@ -14,8 +14,9 @@ from assembly.solve.multipliers import curve_rows, foresee, weigh_rows
 from assembly.solve.rows import add_transposed, carry, move, times
 from assembly.solve.search import damped_step
 
-# A step is computed so many times more for one-sided rows that it would break.
-FORESEEN = 4
+# A step is computed so many times more for one-sided rows that it would break. Where they change places for ever, it
+# is the one without them: half of an exchange may lead uphill.
+FORESEEN = 12
 # Where so many steps in a row that hold are cut by half and more, the next ones are damped until one is not: most of
 # these may go where nothing holds, as a ring turns about its own axis.
 OFTEN = 25
@@ -56,11 +57,12 @@ def aim(program, here, rows, y, mu, shift, radius, cuts, dual, restoring, is_fre
     used, longest, turn = damped_step(
         table, lagrangian, n, order, shift, radius, damps, matrix, descent, step, straight
     )
-    for _ in range(FORESEEN):
+    for attempt in range(FORESEEN + 1):
         if used < 0.0 or restoring:
             break
+        ends = attempt == FORESEEN
         changed = foresee(
-            table, shape, rows, residual, jacobian, y, mu, step, is_fresh, active, foreseen, descent, lagrangian
+            table, shape, rows, residual, jacobian, y, mu, step, is_fresh, active, foreseen, descent, lagrangian, ends
         )
         if changed == 0:
             break
