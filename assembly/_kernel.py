@@ -1,8 +1,8 @@
 """The one door to Numba: `@kernel`, and a cache that cannot be stale.
 
-A kernel is a compiled function. Those that kernels call are marked ``inline`` or ``inner``; the others are cached on
-disk, in a folder named by a hash of all kernel sources, because Numba's own cache does not notice an edit in another
-file. An entry is one file with its own checksum, so that no reader can meet a half-written or damaged one.
+Kernels that kernels call are marked ``inline`` or ``inner``; the others are cached on disk, in a folder named by a hash
+of all kernel sources, because Numba's own cache does not notice an edit in another file. An entry is one file with its
+own checksum, so that no reader can meet a half-written or damaged one.
 """
 
 from __future__ import annotations
@@ -137,8 +137,7 @@ class _Cache(caching._Cache):
     def enable(self) -> None:
         """Nothing to do: whether a kernel is cached is decided when it is made."""
 
-    def disable(self) -> None:
-        """Nothing to do, as in `enable`."""
+    disable = enable
 
     def flush(self) -> None:
         for path in self._folder.glob(f"{self._title()}-*"):
@@ -278,7 +277,8 @@ _WAITING: list[tuple[Callable[..., Any], dict[str, Any]]] = []
 def _make_callable() -> None:
     """Tell Numba of all functions that kernels may call: when it is to compile one, and not before."""
     while _WAITING:
-        _callable_from_kernels(*_WAITING.pop())
+        _callable_from_kernels(*_WAITING[-1])
+        del _WAITING[-1]
 
 
 def _callable_from_kernels(function: Callable[..., Any], settings: dict[str, Any]) -> None:

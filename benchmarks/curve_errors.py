@@ -22,9 +22,9 @@ Pairs of random curves of each kind, as in `curves`, called from Python; a line'
 a pair over all of them at one tolerance, from 1e-3 to 1e-14. The known distance is that of a direct search from 200 x
 200 samples, each that is nearer than those beside it, until parameters move by less than 1e-9. Of certified answers an
 error is that of the worse bound, lower or upper, and 1e-17 where it is zero; of OCCT (BRepExtrema_DistShapeShape, its
-deflection at the tolerance), which has no bounds, that of its distance. "Plain" is the method of Lakshmanan et al.: bounds by ellipsoids and halving alone
-(`bound="ellipsoid"`, `polish=False`), of fewer pairs, with 200,000 bounds at most a query; right is an error within the
-tolerance or 1e-12, whichever is larger."""
+deflection at the tolerance), which has no bounds, that of its distance. "Plain" is the method of Lakshmanan et al.:
+bounds by ellipsoids and halving alone (`bound="ellipsoid"`, `polish=False`), of fewer pairs, with 200,000 bounds at
+most a query; right is an error within the tolerance or 1e-12, whichever is larger."""
 
 TOLERANCES = [10.0**-k for k in range(3, 15)]
 OURS, PLAIN, OCCT = "ours", "plain", "OCCT"

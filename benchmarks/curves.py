@@ -28,7 +28,7 @@ from benchmarks.timing import measure
 ABOUT = """\
 Distances of random shapes in the unit cube to 1e-10, one call from Python each unless said otherwise, curves packed
 and their capsules made before (both are apart). Right is an answer with a certificate that no sample of 200 x 200 nor
-a direct search from the nearest one undercuts, and whose bounds are within 1e-10. "In a kernel" are calls from
+a direct search from its dips undercuts, and whose bounds are within 1e-10. "In a kernel" are calls from
 compiled code, or a batch of points. Parts of a distance's time are one median over another: from Python both have the
 cost of a call, in a kernel neither. A clearance is asked at half the distance. Subdivision is that of
 benchmarks/query_kernels.py, in a kernel as well, without a certificate that holds in floating point."""

@@ -21,7 +21,7 @@ class Clearance(Constraint):
     Pairs of points that a `Contact` of the same two bodies has are that contact's: its gap of zero is no violation. Of
     bodies with edges the contact counts for both, so a `minimum` above zero contradicts it there.
 
-    Bodies that cross at the start are pushed apart where they are in each other by less than a twentieth of the scene's
+    Bodies that cross at the start are pushed apart where they are in each other by less than a tenth of the scene's
     size and less than their radii of curvature. Deeper ones stay, and the solve ends STALLED, never SOLVED; a tracker
     does not begin there.
 

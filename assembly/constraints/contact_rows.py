@@ -37,8 +37,9 @@ from assembly.proximity.solid_contact import CONTACT_RECORD, FOLD, PAIR_GAP, PRO
 from assembly.proximity.start import global_start
 from assembly.proximity.velocity import GAP, RATES, gradient_row, store_record
 
-# What a clearance's contact of solids holds on to, where it may be given up.
-MAY_GO = -1.0
+# A clearance's contact of solids that are hardly in each other may be given up where its pair ends: then MAY_GO - k
+# stands for what it holds on to, k.
+MAY_GO, HARDLY = -1.0, 1e-3
 
 
 @kernel(inner=True)
@@ -107,9 +108,17 @@ def is_guard(table, r):
 
 
 @kernel(inline=True)
-def may_go(table, r):
-    """Whether row r is a clearance's of solids, whose pair may end where they are in each other."""
-    return is_guard(table, r) and table[table[ROW_TABLE] + ROW * r + SHELL_F] >= 0
+def may_go(table, r, residual):
+    """Whether row r is a clearance's of solids that are hardly in each other: there, its pair may end."""
+    return is_guard(table, r) and table[table[ROW_TABLE] + ROW * r + SHELL_F] >= 0 and residual[r] > -HARDLY
+
+
+@kernel(inner=True)
+def hold_all(table, tracked):
+    """No contact may be given up any more."""
+    for r in range(table[FIRST_GUARD], table[FIRST_GUARD] + table[GUARDS]):
+        if tracked[r, STAYS] <= MAY_GO:
+            tracked[r, STAYS] = MAY_GO - tracked[r, STAYS]
 
 
 @kernel(inline=True)
@@ -130,19 +139,20 @@ def idle_row(r, gap, point):
 
 
 @kernel(inner=True)
-def lost_guard(table, pool, r, start, point, past):
+def lost_guard(table, pool, r, start, point, past, goes):
     """Row r of a clearance whose pair was lost: idle, if its gap would be open, or it is a corner `past` its face.
 
-    Or if it may go, though it is not open: one that ends where bodies are in each other would hold every step. What the
-    neighborhood holds now is for the next look to find.
+    Or if it `goes`, though it is not open: one that ends where bodies are in each other would hold every step. One that
+    is lost already stays as it is. What the neighborhood holds now is for the next look to find.
     """
     row = table[ROW_TABLE] + ROW * r
     gap = start[r, PAIR_GAP] - pool[table[row + MINIMUM]]
     if past:
         gap = max(gap, 0.0)
-    elif not gap > 0.0 and start[r, STAYS] != MAY_GO:
+    elif not gap > 0.0 and not goes and not math.isnan(start[r, 0]):
         return False
     idle_row(r, gap, point)
+    point[1][r, PAIR_GAP] = gap + pool[table[row + MINIMUM]]
     # Nothing moves it: its pair is not known.
     for i in range(RATES, CONTACT_RECORD - 2):
         point[2][r, i] = 0.0
@@ -161,12 +171,16 @@ def solids_row(table, pool, r, start, patience, point):
     """
     q, tracked, records, residual, jacobian = point
     row = table[ROW_TABLE] + ROW * r
+    goes = start[r, STAYS] <= MAY_GO
+    if goes:
+        start[r, STAYS] = MAY_GO - start[r, STAYS]
+        tracked[r, STAYS] = start[r, STAYS]
     status = track_row(table, pool, row, q, start, patience, records, tracked, r)
     found = status == CONVERGED or status == SINGULAR
     if not found:
         if is_guard(table, r):
             past = start[r, STAYS] > 0.0 and status == LEFT_PATCH
-            return lost_guard(table, pool, r, start, point, past)
+            return lost_guard(table, pool, r, start, point, past, goes)
         if table[row + ONE_SIDED] == 1 or patience == math.inf:
             found = search_row(table, pool, row, q, tracked, r)
             if found:
@@ -175,7 +189,6 @@ def solids_row(table, pool, r, start, patience, point):
     if found:
         residual[r] = records[r, GAP] - pool[table[row + MINIMUM]]
         tracked[r, PAIR_GAP] = records[r, GAP]
-        tracked[r, STAYS] = max(tracked[r, STAYS], 0.0)
         gradient_row(records, r, jacobian, r)
     return found
 
@@ -229,7 +242,7 @@ def contact_row(table, pool, r, start, patience, loose, point):
             if table[row + ONE_SIDED] == 0:
                 return False
             if is_guard(table, r):
-                return lost_guard(table, pool, r, start, point, False)
+                return lost_guard(table, pool, r, start, point, False, False)
             # A one-sided contact is of the nearest pair, whichever that is now.
             held = status == LEFT_PATCH and distance > 0.0
             status, x = restart_contact(table, pool, row, q, records, r)

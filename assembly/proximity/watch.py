@@ -78,9 +78,9 @@ from assembly.proximity.watch_memory import (
 # in turns, earlier at one pair at a time, and ask whether bodies cross where a contact lost its root.
 AS_NEEDED, EVERYTHING, CAREFUL, IN_TURNS, DOUBTFUL = 0, 1, 2, 4, 8
 # A pair is looked at again when so much of its allowance is used; in turns, the one that used most of it at the first,
-# and any that cut the last step at the third: what is left of its allowance would cut the next one to nothing.
+# and any that cut a step since its last look at the third: what is left would cut the next one to nothing.
 USED, SPENT, BRIEF = 0.5, 0.85, 0.35
-# What moved by less than this part of its allowance, 5e-10 of the scene's size, is where it was for an urgent look.
+# What moved by less than this part of its allowance, 1e-9 of the scene's size, is where it was for an urgent look.
 STILL = 1e-8
 # Room: pairs of patches of a look.
 CANDIDATES, STACK = 8192, 1024
@@ -238,7 +238,8 @@ def look(table, pool, watch, memory, q, tracked, how):
             due = part > 0.0 or math.isnan(memory[at + PAIR_MEMORY * p + CROSSED])
         else:
             due = part > SPENT or (how & IN_TURNS != 0 and p == next_pair and part > USED)
-            due = due or (how & IN_TURNS != 0 and part > BRIEF and memory[at + PAIR_MEMORY * p + CUT_SHORT] > 0.0)
+            asked = memory[at + PAIR_MEMORY * p + CUT_SHORT]
+            due = due or (how & IN_TURNS != 0 and part > BRIEF and asked > memory[at + PAIR_MEMORY * p + ALLOWANCE])
             due = due or (how & CAREFUL != 0 and part > STILL and memory[at + PAIR_MEMORY * p + URGENT] == 1.0)
         if not due and not any_lost(table, watch, memory, p, tracked):
             continue

@@ -345,7 +345,7 @@ def solve_program(table, pool, settings, state, history, tips):
         room_left = 2.0 * longest if cuts > 0 else math.inf
         base = 0.0 if restoring else value
         accepted, alpha, lost = search(
-            program, tips, here, trial, rows, y, base, value, restoring, mu, slope, longest, weights, system
+            program, tips, here, trial, rows, y, base, value, restoring, not tick, mu, slope, longest, weights, system
         )
         if not accepted:
             if lost < 0:

@@ -37,14 +37,25 @@ def weigh_rows(rows, one_sided, residual, y, mu, forces, active):
         active[r] = 0.0 if idle else 1.0 / mu
 
 
+@kernel(inline=True)
+def let_count(shape, r, counts, residual, jacobian, y, mu, in_matrix, active, foreseen, descent, lagrangian):
+    """Let row r, which is idle here, count in the step, or no more.
+
+    Descent changes with it, and so does the Lagrangian, if it holds the rows' terms (`in_matrix`).
+    """
+    sign = 1.0 if counts else -1.0
+    foreseen[r] = 1.0 if counts else 0.0
+    active[r] = 1.0 / mu if counts else 0.0
+    add_row(shape[0], jacobian, r, -sign * (y[r] + residual[r] / mu), descent)
+    if in_matrix:
+        add_square(shape[2], shape[0], jacobian, r, sign / mu, lagrangian)
+
+
 @kernel(inner=True)
-def foresee(
-    table, shape, rows, residual, jacobian, y, mu, step, in_matrix, active, foreseen, descent, lagrangian, ends
-):
+def foresee(table, shape, rows, residual, jacobian, y, mu, step, in_matrix, active, foreseen, descent, lagrangian):
     """Let one-sided rows count that are idle here and would push at the end of the step; those that would not, no more.
 
-    Their sign is that of y + (c + J step) / mu; none counts any more where this `ends`. Descent changes with them, and
-    so does the Lagrangian, if it holds the rows' terms (`in_matrix`). Returns how many rows changed.
+    Their sign is that of y + (c + J step) / mu. Returns how many rows changed.
     """
     bases, one_sided = shape[0], shape[1]
     changed = 0
@@ -54,17 +65,19 @@ def foresee(
         if table[CONTACTS] <= r < table[CONTACTS] + table[TRIMS]:
             # Their slopes change too fast for that.
             continue
-        pushes = not ends and y[r] + (residual[r] + times(bases, jacobian, r, step)) / mu < 0.0
-        if pushes == (foreseen[r] == 1.0):
-            continue
-        changed += 1
-        sign = 1.0 if pushes else -1.0
-        foreseen[r] = 1.0 if pushes else 0.0
-        active[r] = 1.0 / mu if pushes else 0.0
-        add_row(bases, jacobian, r, -sign * (y[r] + residual[r] / mu), descent)
-        if in_matrix:
-            add_square(shape[2], bases, jacobian, r, sign / mu, lagrangian)
+        pushes = y[r] + (residual[r] + times(bases, jacobian, r, step)) / mu < 0.0
+        if pushes != (foreseen[r] == 1.0):
+            changed += 1
+            let_count(shape, r, pushes, residual, jacobian, y, mu, in_matrix, active, foreseen, descent, lagrangian)
     return changed
+
+
+@kernel(inner=True)
+def leave_out(shape, rows, residual, jacobian, y, mu, in_matrix, active, foreseen, descent, lagrangian):
+    """No row that is idle here counts in the step."""
+    for r in range(rows):
+        if foreseen[r] == 1.0:
+            let_count(shape, r, False, residual, jacobian, y, mu, in_matrix, active, foreseen, descent, lagrangian)
 
 
 @kernel(inner=True)

@@ -7,7 +7,7 @@ shortened.
 from __future__ import annotations
 
 from assembly._kernel import kernel
-from assembly.constraints.contact_rows import MAY_GO, is_guard, may_go
+from assembly.constraints.contact_rows import MAY_GO, hold_all, is_guard, may_go
 from assembly.constraints.layout import MOVING, WATCH
 from assembly.constraints.program import evaluate
 from assembly.constraints.terms import objective
@@ -23,8 +23,8 @@ SHORTEST = 1e-6
 # A body turns by this much at most in a step, and this often a step is shortened by a larger shift.
 TURN = 1.0
 SHORTENINGS = 4
-# A clearance's contact that no longer step finds again is given up.
-LETS_GO = 1e-5
+# A clearance's contact that no longer step, nor one halved so far, finds again is given up.
+LETS_GO, HALVED = 1e-5, 0.0625
 
 
 @kernel(inner=True)
@@ -76,11 +76,12 @@ def goal(table, pool, shape, rows, loose, room, tips, point, order, gradient, he
 
 
 @kernel(inner=True)
-def search(program, tips, here, trial, rows, y, base, value, restoring, mu, slope, longest, weights, system):
+def search(program, tips, here, trial, rows, y, base, value, restoring, lets_go, mu, slope, longest, weights, system):
     """Try alpha times the step, alpha from 1 down, until the augmented Lagrangian falls enough.
 
     The trial point is left in `trial`. Returns whether one was accepted, alpha, and the contact lost by the last trial
-    or -1. `base` is the objective's part of the merit here, `longest` the largest component of the step.
+    or -1. `base` is the objective's part of the merit here, `longest` the largest component of the step; `lets_go` says
+    whether a contact that ends where solids are in each other may be given up.
     """
     table, pool, shape, loose, room = program
     active, forces, _foreseen = weights
@@ -96,6 +97,7 @@ def search(program, tips, here, trial, rows, y, base, value, restoring, mu, slop
         noise += 4e-16 * abs(gradient[i])
     for r in range(rows):
         noise += 4e-16 * (abs(y[r]) + abs(residual[r]) / mu)
+    hold_all(table, here[1])
     alpha = 1.0
     bends = 0
     lost = -1
@@ -129,11 +131,13 @@ def search(program, tips, here, trial, rows, y, base, value, restoring, mu, slop
                 bends = 3
                 for i in range(n):
                     step[i] = straight[i]
-        if lost >= 0 and alpha * longest < LETS_GO and may_go(table, lost) and here[1][lost, STAYS] == 0.0:
-            here[1][lost, STAYS] = MAY_GO
+        short = lets_go and alpha <= HALVED and alpha * longest < LETS_GO
+        if lost >= 0 and short and may_go(table, lost, residual) and here[1][lost, STAYS] >= 0.0:
+            here[1][lost, STAYS] = MAY_GO - here[1][lost, STAYS]
             continue
         alpha *= 0.5
         # A pair near a fold is freed; a clearance's is given up where its gap does not close.
         if lost >= 0 and alpha * longest < 0.01 and not is_guard(table, lost):
             break
+    hold_all(table, here[1])
     return False, alpha, lost

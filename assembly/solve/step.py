@@ -10,7 +10,7 @@ from assembly.constraints.program import evaluate
 from assembly.constraints.row_terms import add_row_terms
 from assembly.solve.guards import allowed_share
 from assembly.solve.linear import factorize_shifted
-from assembly.solve.multipliers import curve_rows, foresee, weigh_rows
+from assembly.solve.multipliers import curve_rows, foresee, leave_out, weigh_rows
 from assembly.solve.rows import add_transposed, carry, move, times
 from assembly.solve.search import damped_step
 
@@ -60,12 +60,13 @@ def aim(program, here, rows, y, mu, shift, radius, cuts, dual, restoring, is_fre
     for attempt in range(FORESEEN + 1):
         if used < 0.0 or restoring:
             break
-        ends = attempt == FORESEEN
         changed = foresee(
-            table, shape, rows, residual, jacobian, y, mu, step, is_fresh, active, foreseen, descent, lagrangian, ends
+            table, shape, rows, residual, jacobian, y, mu, step, is_fresh, active, foreseen, descent, lagrangian
         )
         if changed == 0:
             break
+        if attempt == FORESEEN:
+            leave_out(shape, rows, residual, jacobian, y, mu, is_fresh, active, foreseen, descent, lagrangian)
         if not is_fresh:
             is_fresh = True
             curve_rows(rows, residual, y, active, restoring, forces)

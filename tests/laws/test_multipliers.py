@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 
-from assembly.solve.multipliers import EXCHANGES, NEAR, ROUNDS, pushing_multipliers
+from assembly.solve.multipliers import EXCHANGES, NEAR, ROUNDS, foresee, leave_out, pushing_multipliers
 
 
 def pushing(jacobian, one_sided, residual, active, gradient, exchanges=EXCHANGES):
@@ -62,3 +62,36 @@ def test_a_row_that_pulls_is_left_out_only_where_exchanges_are_asked_for():
     y, counts = pushing(jacobian, one_sided, residual, active, gradient)
     np.testing.assert_allclose(y, [-1.0, 0.0], rtol=0, atol=1e-15)
     assert counts.tolist() == [True, False]
+
+
+def test_rows_are_foreseen_until_they_agree_and_left_out_again():
+    rng = np.random.default_rng(4)
+    table, mu, rounds = np.zeros(200, dtype=np.int64), 1e-3, []
+    for _ in range(200):
+        rows = 8
+        wide = np.zeros((rows, 18))
+        wide[:, :6] = rng.normal(size=(rows, 6))
+        shape = np.tile([0, -1, -1], (rows, 1)), np.ones(rows, dtype=np.int64), None
+        residual, y, gradient = rng.uniform(0.01, 1.0, rows), np.zeros(rows), rng.normal(size=6)
+        active, foreseen, descent = np.zeros(rows), np.zeros(rows), -gradient
+        given = (rows, residual, wide, y, mu)
+        step = descent.copy()
+        for count in range(100):
+            if foresee(table, shape, *given, step, False, active, foreseen, descent, None) == 0:
+                rounds.append(count)
+                break
+            pushing = wide[foreseen == 1.0, :6]
+            step = np.linalg.solve(np.eye(6) + pushing.T @ pushing / mu, descent)
+        else:
+            pytest.fail("rows that change places for ever are rare, and none of these do")
+        # The least of |d|^2 / 2 + g.d + sum min(c + J d, 0)^2 / 2 mu, and so downhill all the way.
+        below = np.minimum(residual + wide[:, :6] @ step, 0.0)
+        slope = step + gradient + wide[:, :6].T @ below / mu
+        assert abs(slope).max() < 1e-10 / mu
+        assert gradient @ step < 0.0
+        leave_out(shape, rows, residual, wide, y, mu, False, active, foreseen, descent, None)
+        assert not foreseen.any() and not active.any()
+        # Added and taken off again: rounding of c / mu.
+        assert abs(descent + gradient).max() < 1e-15 * 1e2 / mu
+    # More than the loop once allowed.
+    assert max(rounds) > 4

@@ -1,0 +1,50 @@
+"""Several boxes drawn together under a clearance: most come to rest, none in another, none after a wrong SOLVED."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import assembly as asm
+from tests.solve.test_flat_contacts import BOX, apart
+
+SCENES = 24
+
+
+def least(q, sides):
+    """How far the two boxes are apart that are nearest to each other, or deepest in each other."""
+    return min(apart(q[[i, j]], (sides[i], sides[j])) for i in range(len(sides)) for j in range(i))
+
+
+def drawn_together(rng, sides):
+    """Boxes anywhere, apart, all but the first one drawn to the middle of it."""
+    count = len(sides)
+    while True:
+        turns = Rotation.random(count, random_state=int(rng.integers(1 << 30)))
+        q = np.c_[rng.uniform(-1.6, 1.6, (count, 3)), turns.as_quat(scalar_first=True)]
+        q[0] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
+        if least(q, sides) > 0.02:
+            break
+    bodies = [
+        asm.Body(str(k), asm.shapes.box(*side), row[:3], row[3:], fixed=k == 0)
+        for k, (side, row) in enumerate(zip(sides, q, strict=True))
+    ]
+    scene = asm.Assembly(bodies)
+    scene.constrain(asm.Clearance())
+    scene.minimize(*[asm.PointDistance(b.point(*(0.2 * rng.normal(size=3))), (0.0, 0.0, 0.0)) for b in bodies[1:]])
+    return scene
+
+
+@pytest.mark.parametrize(("sides", "most"), [([BOX] * 3, 23), ([BOX] * 4, 19)], ids=["three", "four"])
+def test_boxes_that_are_drawn_together_come_to_rest(sides, most):
+    # Of these 20 and 16 were SOLVED while a step could be by rows that do not agree, looks did not follow steps that
+    # they cut, contacts that end held every step, and a hard penalty outlived its rows; now 24 and 21, but rounding
+    # decides about some.
+    solved = 0
+    for number in range(SCENES):
+        solution = drawn_together(np.random.default_rng([6, number]), sides).solve()
+        solved += solution.success
+        # Gaps of 1e-12 of the scene's size, and rounding.
+        assert not solution.success or least(solution.q, sides) > -1e-11
+    assert solved >= most
