@@ -179,8 +179,8 @@ def test_rings_that_come_to_lie_on_a_plate(major, minor):
         assert height_over(pose, 0.05, major, minor) > -1e-9
         if solution.success:
             solved += 1
-            # Deep by 1e-12 of the scene's size, or high by the 1e-10 of it that count as stationary; flat, with its whole
-            # circle on the plate.
+            # Deep by 1e-12 of the scene's size, or high by the 1e-10 of it that count as stationary; flat, with its
+            # whole circle on the plate.
             assert -1e-11 < height_over(pose, 0.05, major, minor) < 6e-10
             assert np.hypot(*Rotation.from_quat(pose[3:], scalar_first=True).as_matrix()[:2, 2]) < 1e-9
             # Few stand for all of the circle.
