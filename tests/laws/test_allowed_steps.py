@@ -92,8 +92,8 @@ def test_steps_end_within_what_looks_allow():
             share = looked.allowed(before, step, 1.0)
             cut = end.max() > 1.0
             assert share == 1.0 if not cut else 0.0 < share < 1.0
-            # Norms of what moves are below their chords; of turns by a tenth of a radian hardly above.
-            assert looked.parts(looked.moved(before, step, share)).max() <= (0.96 if cut else 1.0)
+            # Norms of what moves are below their chords; of turns by some tenths of a radian hardly above.
+            assert looked.parts(looked.moved(before, step, share)).max() <= (0.98 if cut else 1.0)
             if cut:
                 cuts += 1
                 # What is asked of the next looks: as far as each pair was to go.

@@ -77,7 +77,7 @@ def test_pairs_go_from_far_to_near_to_tracking_and_back():
     names = ("a", "b")
     assert manager.states == {names: PairState.FAR} and manager.gaps == {names: -np.inf}
     assert manager.update(apart(1.0)) == () and manager.states[names] is PairState.FAR
-    assert manager.update(apart(0.1)) == () and manager.states[names] is PairState.NEAR
+    assert manager.update(apart(0.3)) == () and manager.states[names] is PairState.NEAR
     (event,) = manager.update(apart(0.03))
     assert (event.kind, event.reason, event.bodies, event.contact) == (EventKind.ADDED, EventReason.CAME_NEAR, names, 1)
     assert event.gap == pytest.approx(0.03, abs=1e-14)
