@@ -7,7 +7,6 @@ own checksum, so that no reader can meet a half-written or damaged one.
 
 from __future__ import annotations
 
-import ctypes
 import functools
 import hashlib
 import logging
@@ -17,7 +16,6 @@ import shutil
 import stat
 import sys
 import tempfile
-import time
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -27,15 +25,13 @@ import llvmlite
 import llvmlite.binding as llvm
 import numba
 import numpy as np
-from llvmlite import ir
 from numba import njit, types
-from numba.core import caching, cgutils, config, serialize
+from numba.core import caching, config, serialize
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, CompileResult
 from numba.core.typing.templates import infer, infer_global, make_overload_template
-from numba.extending import intrinsic, overload
 
-__all__ = ["address_of", "call_address", "clock_address", "kernel"]
+__all__ = ["kernel"]
 
 _PACKAGE = Path(__file__).resolve().parent
 _LOG = logging.getLogger("assembly")
@@ -137,7 +133,8 @@ class _Cache(caching._Cache):
     def enable(self) -> None:
         """Nothing to do: whether a kernel is cached is decided when it is made."""
 
-    disable = enable
+    def disable(self) -> None:
+        """Nothing to do, as in `enable`."""
 
     def flush(self) -> None:
         for path in self._folder.glob(f"{self._title()}-*"):
@@ -178,7 +175,8 @@ class _Cache(caching._Cache):
         if data.library.has_dynamic_globals:
             warnings.warn(f"{self._title()} uses an address or a large global array and is not cached", stacklevel=2)
             return
-        payload, path = serialize.dumps(data._reduce()), self._path(sig, data.codegen)
+        payload = serialize.dumps(data._reduce())
+        path = self._path(sig, data.codegen)
         try:
             self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
             handle, unfinished = tempfile.mkstemp(dir=self._folder)
@@ -340,61 +338,3 @@ def kernel(
         stamped = _PACKAGE in Path(function.__code__.co_filename).resolve().parents
         compiled._cache = _Cache(function, _FOLDER) if stamped and _FOLDER is not None else _NoCache()
     return compiled
-
-
-# Kernels called by address. What calls another kernel is optimized together with it, as often as it is called; a
-# large kernel that is rarely needed is compiled for itself, and its caller is given the address of its machine code.
-
-_ADDRESSED: dict[int, Callable[..., int]] = {}
-
-
-def address_of(entry: Any, *examples: Any) -> int:
-    """The address of a kernel that is an entry, compiled for arguments of the types of these examples.
-
-    It returns an integer. Only for this process: not to be kept in a file.
-    """
-    if config.DISABLE_JIT:
-        address = id(entry)
-        _ADDRESSED[address] = entry
-        return address
-    signature = tuple(numba.typeof(example) for example in examples)
-    entry.compile(signature)
-    compiled = entry.overloads[signature]
-    address = int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name))
-    _ADDRESSED[address] = entry
-    return address
-
-
-def call_address(address: int, arguments: tuple[Any, ...]) -> int:
-    """Call the kernel at an address that `address_of` gave; the arguments have the types of its examples."""
-    return int(_ADDRESSED[int(address)](*arguments))
-
-
-def clock_address() -> int:
-    """Address of what tells the time in nanoseconds to `call_address`, without arguments; 0 where nothing does.
-
-    It is the interpreter's own counter, which needs none of its locks. Python 3.13 has it under another name.
-    """
-    for name in ("_PyTime_GetPerfCounter", "_PyTime_PerfCounterUnchecked"):
-        function = getattr(ctypes.pythonapi, name, None)
-        if function is not None:
-            address = int(ctypes.cast(function, ctypes.c_void_p).value or 0)
-            _ADDRESSED[address] = time.perf_counter_ns
-            return address
-    return 0
-
-
-if not config.DISABLE_JIT:
-
-    @intrinsic
-    def _call(_typing: Any, address: Any, arguments: Any) -> Any:
-        def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-            kinds = [context.get_value_type(kind) for kind in signature.args[1]]
-            function = ir.FunctionType(ir.IntType(64), kinds).as_pointer()
-            return builder.call(builder.inttoptr(values[0], function), cgutils.unpack_tuple(builder, values[1]))
-
-        return types.int64(address, arguments), generate
-
-    @overload(call_address)
-    def _call_address(address, arguments):  # type: ignore[no-untyped-def]  # Numba compares the two signatures
-        return lambda address, arguments: _call(address, arguments)

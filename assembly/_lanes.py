@@ -124,13 +124,17 @@ else:
 
             return _lanes(types.float64, y), generate
 
+        def of_vectors(x: Any, y: Any) -> Any:
+            return vector_vector(x, y)
+
+        def of_scalar(x: Any, y: Any) -> Any:
+            return scalar_vector(x, y)
+
         @overload(symbol)
-        def _operator(x, y):  # type: ignore[no-untyped-def]  # Numba compares the two signatures
-            if isinstance(x, _LanesType) and isinstance(y, _LanesType):
-                return lambda x, y: vector_vector(x, y)
-            if isinstance(x, types.Float) and isinstance(y, _LanesType):
-                return lambda x, y: scalar_vector(x, y)
-            return None
+        def _operator(x: Any, y: Any) -> Any:  # the same signature as those two, as Numba asks
+            if not isinstance(y, _LanesType):
+                return None
+            return of_vectors if isinstance(x, _LanesType) else of_scalar if isinstance(x, types.Float) else None
 
     _register(operator.add, "fadd")
     _register(operator.sub, "fsub")

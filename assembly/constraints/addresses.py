@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from assembly._kernel import address_of
+from assembly._address import address_of
 from assembly.constraints.trim_rows import trim_rows, trim_terms
 from assembly.proximity.nearest_query import find_deepest, find_nearest
 from assembly.proximity.solid_contact import search_solids, track_solids

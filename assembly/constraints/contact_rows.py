@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 
-from assembly._kernel import call_address, kernel
+from assembly._address import call_address
+from assembly._kernel import kernel
 from assembly.constraints.layout import (
     BODY_F,
     BODY_G,

@@ -24,7 +24,7 @@ SLOTS, ROW_TABLE, JOINT_TABLE, TAPE_TABLE, TERM_TABLE, TAPE_ROOM, GATHER_TABLE =
 IMPLICIT, DEXTERITIES = 16, 17
 # Rows of trims follow those of contacts; whether some are vectors, which take a record of their own.
 TRIMS, VECTOR_TRIMS = 18, 19
-# Addresses of kernels that few scenes need (`_kernel.call_address`).
+# Addresses of kernels that few scenes need (`_address.call_address`).
 TRACK_AT, SEARCH_AT, NEAREST_AT, DEEPEST_AT, TRIM_ROWS_AT, TRIM_TERMS_AT = 20, 21, 22, 23, 24, 25
 # Rows of clearances stand behind those of given contacts and among them: where the first one is, and how many. A row
 # without bodies is idle. The record of the watch (`proximity/watch.py`; -1: no clearance), and its kernel's address.

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import math
 
-from assembly._kernel import call_address, kernel
+from assembly._address import call_address
+from assembly._kernel import kernel
 from assembly.constraints.contact_rows import contact_row, copy_tracked
 from assembly.constraints.layout import (
     CONTACTS,

@@ -6,7 +6,8 @@ Whose columns a row has is in `bases` (`solve/rows.py`), the blocks of large sce
 
 from __future__ import annotations
 
-from assembly._kernel import call_address, kernel
+from assembly._address import call_address
+from assembly._kernel import kernel
 from assembly.constraints.blocks import add_patch, block_row, clear_patch, is_blocked, spot
 from assembly.constraints.layout import (
     BODY_F,

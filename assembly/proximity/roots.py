@@ -11,7 +11,8 @@ import math
 
 import numpy as np
 
-from assembly._kernel import call_address, kernel
+from assembly._address import call_address
+from assembly._kernel import kernel
 from assembly.geometry.spline import BREAKS_U, BREAKS_V, CLOSED_U, CLOSED_V, SPANS_U, SPANS_V, surface_point
 from assembly.geometry.vec import add, dot, matvec, matvec_t, scale, sub
 from assembly.kinematics.motion import rotation

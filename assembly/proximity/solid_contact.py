@@ -4,14 +4,15 @@ Of every contact a solve keeps `TRACK` numbers: the coordinates of the pair (4),
 axes of body f, which tells on which side of each other two edges are where they touch, the gap, and what the pair
 stays with: a corner over a face, which need not be the closest one (`corners.py`), has its features for good.
 
-The kernels here are large, and few scenes need them: loops call them by address (`_kernel.call_address`).
+The kernels here are large, and few scenes need them: loops call them by address (`_address.call_address`).
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from assembly._kernel import call_address, kernel
+from assembly._address import call_address
+from assembly._kernel import kernel
 from assembly.geometry.vec import matvec_t
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.extremal import CONVERGED, SINGULAR

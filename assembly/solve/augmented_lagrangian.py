@@ -21,7 +21,8 @@ import math
 
 import numpy as np
 
-from assembly._kernel import call_address, kernel
+from assembly._address import call_address
+from assembly._kernel import kernel
 from assembly.constraints.layout import (
     CLOCK_AT,
     CONTACTS,

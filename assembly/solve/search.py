@@ -97,7 +97,6 @@ def search(program, tips, here, trial, rows, y, base, value, restoring, lets_go,
         noise += 4e-16 * abs(gradient[i])
     for r in range(rows):
         noise += 4e-16 * (abs(y[r]) + abs(residual[r]) / mu)
-    hold_all(table, here[1])
     alpha = 1.0
     bends = 0
     lost = -1
@@ -131,7 +130,8 @@ def search(program, tips, here, trial, rows, y, base, value, restoring, lets_go,
                 bends = 3
                 for i in range(n):
                     step[i] = straight[i]
-        short = lets_go and alpha <= HALVED and alpha * longest < LETS_GO
+        # A bent step may be longer than it was.
+        short = lets_go and bends % 3 == 0 and alpha <= HALVED and alpha * longest < LETS_GO
         if lost >= 0 and short and may_go(table, lost, residual) and here[1][lost, STAYS] >= 0.0:
             here[1][lost, STAYS] = MAY_GO - here[1][lost, STAYS]
             continue

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly._kernel import clock_address
+from assembly._address import clock_address
 from assembly.assembly import Assembly
 from assembly.constraints.layout import CLOCK_AT, WATCH
 from assembly.constraints.objectives import FrameDistance, PointDistance
