@@ -39,8 +39,8 @@ from assembly.proximity.start import global_start
 from assembly.proximity.velocity import GAP, RATES, gradient_row, store_record
 
 # A clearance's contact of solids that are hardly in each other may be given up where its pair ends: then MAY_GO - k
-# stands for what it holds on to, k.
-MAY_GO, HARDLY = -1.0, 1e-3
+# stands for what it holds on to, k. One that ends where they touch, which rounding decides, is as good as open.
+MAY_GO, HARDLY, TOUCHING = -1.0, 1e-3, 1e-9
 
 
 @kernel(inner=True)
@@ -143,14 +143,15 @@ def idle_row(r, gap, point):
 def lost_guard(table, pool, r, start, point, past, goes):
     """Row r of a clearance whose pair was lost: idle, if its gap would be open, or it is a corner `past` its face.
 
-    Or if it `goes`, though it is not open: one that ends where bodies are in each other would hold every step. One that
-    is lost already stays as it is. What the neighborhood holds now is for the next look to find.
+    Solids need only touch. Or if it `goes`, though it is not open: one that ends where bodies are in each other would
+    hold every step. One that is lost already stays as it is. What the neighborhood holds now is for the next look to
+    find.
     """
     row = table[ROW_TABLE] + ROW * r
     gap = start[r, PAIR_GAP] - pool[table[row + MINIMUM]]
     if past:
         gap = max(gap, 0.0)
-    elif not gap > 0.0 and not goes and not math.isnan(start[r, 0]):
+    elif not gap > (-TOUCHING if table[row + SHELL_F] >= 0 else 0.0) and not goes and not math.isnan(start[r, 0]):
         return False
     idle_row(r, gap, point)
     point[1][r, PAIR_GAP] = gap + pool[table[row + MINIMUM]]

@@ -37,6 +37,7 @@ from assembly.constraints.layout import (
 from assembly.constraints.terms import objective
 from assembly.proximity.solid_contact import FOLD
 from assembly.proximity.watch import AS_NEEDED, CAREFUL, DOUBTFUL, EVERYTHING, IN_TURNS, any_crossed
+from assembly.solve.afresh import BEGINNINGS, BEGUN, PACE, begin_again, creeps, set_pace
 from assembly.solve.contacts import free_folds, is_of_surfaces
 from assembly.solve.ending import finish, return_to
 from assembly.solve.guards import look_again, numbers_of, place_guards
@@ -174,9 +175,26 @@ def solve_program(table, pool, settings, state, history, tips):
     # How a solve with clearances ended whose bodies are only pushed apart any more, and until when.
     ended = RUNNING
     settled_by = 0
+    # When a last look found other contacts than rows stood for.
+    looked_at = -1
+    pace = np.empty(PACE)
+    set_pace(pace, 0.0, 0)
     # Whether other contacts are near than rows are placed for.
     changed = watched and settings[GATHER] == 1.0 and results[SCATTER] == 1.0
-    while status == RUNNING:
+    while True:
+        stuck = status == STALLED or (status == ended == RUNNING and not restoring and creeps(pace, iteration, value))
+        if stuck and watched and not tick and holds and pace[BEGUN] < BEGINNINGS and iteration < limit:
+            begin_again(table, pool, held, loose, here, y, better_y)
+            iteration += 1
+            set_pace(pace, pace[BEGUN] + 1.0, iteration)
+            status = ended = RUNNING
+            rows = m
+            mu, radius, leash = settings[PENALTY], settings[RADIUS], math.inf
+            restoring, restorations, cuts, room_left = False, 0, 0, math.inf
+            check_at, check_violation = iteration + PATIENCE, math.inf
+            changed = True
+        if status != RUNNING:
+            break
         if watched and not changed:
             holds_now = off_rows(table, loose, one_sided, here, tick) <= (feasible if tick else TOUCHING)
             how = (CAREFUL if holds_now else AS_NEEDED) | (AS_NEEDED if tick else IN_TURNS | DOUBTFUL)
@@ -228,7 +246,7 @@ def solve_program(table, pool, settings, state, history, tips):
         if not math.isfinite(violation) or not math.isfinite(value) or not math.isfinite(dual):
             # Only where the start is so: a step to such a place is not taken.
             status = STALLED
-            break
+            continue
         sunk = watched and not tick and has_sunk(table, pool, memory, residual)
         if sunk and iteration == back_at:
             # Bodies were in each other there too, and nothing had asked: that is no place to return to.
@@ -238,10 +256,11 @@ def solve_program(table, pool, settings, state, history, tips):
         # Where every last look finds other contacts, the limit ends it.
         arrived = violation <= feasible and dual <= settings[STATIONARITY] and not retreats
         if arrived and not (looks_last and iteration > limit):
-            if looks_last:
+            # A contact that ends right here is lost and found again, however often it is looked for.
+            if looks_last and iteration != looked_at:
                 changed = look_again(table, pool, memory, here, EVERYTHING, free, loose[4])
                 if changed:
-                    iteration += 1
+                    looked_at = iteration = iteration + 1
                     continue
             # Deeper than looks reach no row tells of a crossing.
             status = STALLED if looks_last and any_crossed(table, table[WATCH], memory) else SOLVED
@@ -264,7 +283,7 @@ def solve_program(table, pool, settings, state, history, tips):
                 break
         if ended != RUNNING and (violation <= feasible or iteration >= settled_by):
             status = ended
-            break
+            continue
         if settings[BUDGET] > 0.0 and iteration > 0 and call_address(table[CLOCK_AT], ()) - begin > settings[BUDGET]:
             status = OUT_OF_TIME
             break
@@ -272,7 +291,7 @@ def solve_program(table, pool, settings, state, history, tips):
             leash = SHORTER * min(leash, alpha * longest)
             if leash < SHORTEST:
                 status = STALLED
-                break
+                continue
             return_to(table, pool, held, numbers, loose, rows, here, y, better_y, tick)
             # Rows of tangency have other pairs now.
             rows = m
@@ -287,7 +306,7 @@ def solve_program(table, pool, settings, state, history, tips):
                     better_y[r] = y[r]
             elif way[SHARE] < LEAST_SHARE:
                 status = STALLED if ended == RUNNING else ended
-                break
+                continue
             kept = False
             alpha = 1.0
             iteration += 1
@@ -315,7 +334,7 @@ def solve_program(table, pool, settings, state, history, tips):
         )
         if used < 0.0:
             status = STALLED
-            break
+            continue
         last_violation = violation
         last_dual = dual
         cut, slope, steepest = cut_step(program, here, trial, rows, y, mu, reach, longest, turn, foreseen, lines)
@@ -338,7 +357,7 @@ def solve_program(table, pool, settings, state, history, tips):
                 break
             if slows:
                 status = STALLED
-                break
+                continue
             if iteration >= check_at:
                 check_at, check_violation = iteration + PATIENCE, violation
         longest *= cut
@@ -371,7 +390,7 @@ def solve_program(table, pool, settings, state, history, tips):
                 settled_by = iteration + SETTLING
                 continue
             status = STALLED
-            break
+            continue
         propose(shape, here, rows, y, mu, active, lines[2], alpha, better_y)
         here, trial = trial, here
         if alpha == 1.0:

@@ -91,10 +91,6 @@ def two_rings(minimum, place, target):
     return scene, WireOracle([torus_wire(MAJOR, MINOR)] * 2)
 
 
-# Rounding decides where such a solve ends: another machine may see some of these solved.
-STUCK = pytest.mark.xfail(strict=False, reason="cubes that are drawn into each other stall where they still cross")
-
-
 @pytest.mark.parametrize("minimum", [0.0, 0.05, 0.3])
 def test_the_gap_is_at_least_the_minimum(minimum):
     scene, oracle = two_rings(minimum, (1.0, 0.05, 0.1), (9.0, 0.3, 0.2))
@@ -173,7 +169,7 @@ def apart(q, i, j, side=1.0):
     return float((np.abs(axes @ (q[j, :3] - q[i, :3])) - halves).max())
 
 
-@pytest.mark.parametrize("exclude", [pytest.param((), marks=STUCK), ((1, 2),), ((0, 1), (0, 2))])
+@pytest.mark.parametrize("exclude", [((1, 2),), ((0, 1), (0, 2))])
 def test_pairs_that_are_excluded_may_overlap_and_no_others(exclude):
     scene = boxes(exclude)
     solution = scene.solve()
@@ -183,6 +179,20 @@ def test_pairs_that_are_excluded_may_overlap_and_no_others(exclude):
             assert apart(solution.q, i, j) < -0.2
         else:
             assert apart(solution.q, i, j) > -1e-9
+
+
+def test_three_cubes_that_are_drawn_into_each_other_come_to_lie_side_by_side():
+    # Flush faces: which corners are listed is decided by rounding, of 60 such starts 53 are SOLVED.
+    rng = np.random.default_rng(0)
+    solved = 0
+    for _ in range(20):
+        scene = boxes(())
+        q = scene.q.copy()
+        q[1:, :3] += 1e-7 * rng.normal(size=(2, 3))
+        solution = scene.solve(q)
+        solved += solution.success
+        assert min(apart(solution.q, i, j) for i, j in combinations(range(3), 2)) > -1e-9
+    assert solved >= 13
 
 
 @pytest.mark.parametrize("axis", [(0.3, -0.8, 0.4), (1.0, 0.2, 0.1)])

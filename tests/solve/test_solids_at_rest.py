@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import assembly as asm
-from tests.solve.test_flat_contacts import BOX, apart
+from tests.solve.test_flat_contacts import BOX, PLATE, apart
 
 SCENES = 24
 
@@ -36,15 +36,27 @@ def drawn_together(rng, sides):
     return scene
 
 
-@pytest.mark.parametrize(("sides", "most"), [([BOX] * 3, 23), ([BOX] * 4, 19)], ids=["three", "four"])
-def test_boxes_that_are_drawn_together_come_to_rest(sides, most):
-    # Of these 20 and 16 were SOLVED while a step could be by rows that do not agree, looks did not follow steps that
-    # they cut, contacts that end held every step, and a hard penalty outlived its rows; now 24 and 21, but rounding
-    # decides about some.
+@pytest.mark.parametrize(("sides", "seed", "most"), [([BOX] * 3, 6, 23), ([BOX] * 4, 5, 21)], ids=["three", "four"])
+def test_boxes_that_are_drawn_together_come_to_rest(sides, seed, most):
+    # Of these 20 and 12 were SOLVED while a step could be by rows that do not agree, looks did not follow steps that
+    # they cut, contacts that end held every step, and a hard penalty outlived its rows; 24 and 18 while a solve that
+    # was stuck did not begin again; now 24 and 24, but rounding decides about some.
     solved = 0
     for number in range(SCENES):
-        solution = drawn_together(np.random.default_rng([6, number]), sides).solve()
+        solution = drawn_together(np.random.default_rng([seed, number]), sides).solve()
         solved += solution.success
         # Gaps of 1e-12 of the scene's size, and rounding.
         assert not solution.success or least(solution.q, sides) > -1e-11
     assert solved >= most
+
+
+def test_a_contact_that_ends_where_it_touches_is_not_looked_for_forever():
+    # A corner just over the border of a face, to the last bit: there these solves had arrived, and each look found the
+    # contact that evaluating its row had lost, until their steps were used up.
+    scenes = [([BOX] * 4, 5, 15), ([BOX] * 3, 5, 7), ([BOX, PLATE, BOX], 5, 8), ([BOX, PLATE, BOX], 6, 6)]
+    solved = 0
+    for sides, seed, number in scenes:
+        solution = drawn_together(np.random.default_rng([seed, number]), sides).solve()
+        solved += solution.success
+        assert not solution.success or least(solution.q, sides) > -1e-11
+    assert solved >= 3

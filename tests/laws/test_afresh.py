@@ -1,0 +1,97 @@
+"""When a solve begins again, and which contacts that end may stay behind."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from assembly.constraints.contact_rows import HARDLY, MAY_GO, TOUCHING, hold_all, lost_guard, may_go
+from assembly.constraints.layout import FIRST_GUARD, FREE_COLUMN, GUARDS, HEADER, MINIMUM, ROW, ROW_TABLE, SHELL_F
+from assembly.proximity.solid_contact import CONTACT_RECORD, PAIR_GAP, STAYS, TRACK
+from assembly.solve.afresh import BEGUN, LEAST_PART, PACE, STRIDE, creeps, set_pace
+
+LEAST = 0.25
+
+
+def creeping(values, begun=1.0, start=0):
+    """At which steps a solve with these objectives is said to creep."""
+    pace = np.full(PACE, np.nan)
+    set_pace(pace, begun, start)
+    assert pace[BEGUN] == begun
+    return [k for k, value in enumerate(values, start) if creeps(pace, k, value)]
+
+
+def test_a_solve_creeps_where_its_objective_stays_about_the_same():
+    few = 3 * STRIDE + 1
+    # There is nothing to compare the first one with.
+    assert creeping(np.ones(few)) == [2 * STRIDE, 3 * STRIDE]
+    assert creeping(np.ones(few), start=7) == [2 * STRIDE + 7, 3 * STRIDE + 7]
+    # By a little more and by a little less than what counts, down and up.
+    for sign in (-1.0, 1.0):
+        for factor, found in ((1.01, []), (0.99, [2 * STRIDE, 3 * STRIDE])):
+            values = (1.0 + sign * factor * LEAST_PART) ** -(np.arange(few) / STRIDE)
+            assert creeping(values) == found
+    assert creeping(np.zeros(few)) == []
+
+
+def test_a_solve_that_gets_on_does_not_creep():
+    assert creeping(0.9 ** (np.arange(500) / STRIDE)) == []
+    # Between two that are compared it may do what it likes.
+    values = 0.9 ** (np.arange(500) // STRIDE) * np.where(np.arange(500) % STRIDE == 0, 1.0, 7.0)
+    assert creeping(values) == []
+
+
+def guards(gap, solids=True):
+    """The table, the pool, what is tracked and a point of two rows of a clearance, of which the first is open."""
+    table = np.zeros(HEADER + 2 * ROW, dtype=np.int64)
+    table[ROW_TABLE], table[FIRST_GUARD], table[GUARDS] = HEADER, 0, 2
+    table[[HEADER + MINIMUM, HEADER + ROW + MINIMUM]] = 1
+    table[[HEADER + SHELL_F, HEADER + ROW + SHELL_F]] = 0 if solids else -1
+    start = np.full((2, TRACK), 0.5)
+    start[:, STAYS] = 0.0
+    start[:, PAIR_GAP] = LEAST + 1.0, LEAST + gap
+    point = None, start.copy(), np.full((2, CONTACT_RECORD), np.nan), np.full(2, np.nan), np.full((2, 16), np.nan)
+    return table, np.array([0.0, LEAST]), start, point
+
+
+@pytest.mark.parametrize("solids", [True, False])
+@pytest.mark.parametrize("gap", [1.0, 1e-12, -1e-12, -0.5 * TOUCHING, -2.0 * TOUCHING, -0.5])
+def test_a_contact_that_ends_stays_behind_where_it_is_open_or_solids_touch(gap, solids):
+    table, pool, start, point = guards(gap, solids)
+    stays_behind = lost_guard(table, pool, 1, start, point, False, False)
+    assert stays_behind == (gap > (-TOUCHING if solids else 0.0))
+    _q, tracked, records, residual, jacobian = point
+    if not stays_behind:
+        # Nothing was written: the step is refused.
+        assert np.isnan(residual).all() and (tracked == start).all()
+        return
+    # What is known of it is told, also that it is not open; it moves nothing, and the next look finds it lost.
+    assert residual[1] == pytest.approx(gap, abs=1e-16) and tracked[1, PAIR_GAP] == LEAST + residual[1]
+    assert np.isnan(tracked[1, 0]) and (jacobian[1, :FREE_COLUMN] == 0.0).all() and np.isfinite(records[1]).any()
+    assert np.isnan(residual[0])
+    # It may be evaluated again, however often.
+    assert lost_guard(table, pool, 1, tracked, point, False, False) and residual[1] == pytest.approx(gap, abs=1e-16)
+
+
+def test_a_contact_that_is_not_open_stays_behind_where_it_goes_or_is_past_its_face():
+    for past, goes, told in ((False, True, -0.5), (True, False, 0.0)):
+        table, pool, start, point = guards(-0.5)
+        assert lost_guard(table, pool, 1, start, point, past, goes)
+        assert point[3][1] == told and np.isnan(point[1][1, 0])
+
+
+def test_only_contacts_of_solids_that_are_hardly_in_each_other_may_go():
+    for gap, solids, expected in ((-0.9 * HARDLY, True, True), (-1.1 * HARDLY, True, False), (-1e-12, False, False)):
+        table, *_rest = guards(gap, solids)
+        assert may_go(table, 1, np.array([1.0, gap])) == expected
+    # A row of the scene's own is no clearance's.
+    table[FIRST_GUARD], table[GUARDS] = 0, 1
+    assert not may_go(table, 1, np.array([1.0, 0.0]))
+
+
+def test_contacts_that_could_go_are_held_again_as_before():
+    table, _pool, start, _point = guards(0.0)
+    for holds in (0.0, 1.0, 2.0, 3.0):
+        start[:, STAYS] = MAY_GO - holds, holds
+        hold_all(table, start)
+        assert (start[:, STAYS] == holds).all()
