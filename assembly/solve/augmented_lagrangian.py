@@ -37,7 +37,7 @@ from assembly.constraints.layout import (
 from assembly.constraints.terms import objective
 from assembly.proximity.solid_contact import FOLD
 from assembly.proximity.watch import AS_NEEDED, CAREFUL, DOUBTFUL, EVERYTHING, IN_TURNS, any_crossed
-from assembly.solve.afresh import BEGINNINGS, BEGUN, PACE, begin_again, creeps, set_pace
+from assembly.solve.afresh import BEGUN, PACE, begin_again, creeps, has_solids, may_begin, set_pace
 from assembly.solve.contacts import free_folds, is_of_surfaces
 from assembly.solve.ending import finish, return_to
 from assembly.solve.guards import look_again, numbers_of, place_guards
@@ -179,20 +179,20 @@ def solve_program(table, pool, settings, state, history, tips):
     looked_at = -1
     pace = np.empty(PACE)
     set_pace(pace, 0.0, 0)
+    creeping = watched and not tick and has_solids(table)
     # Whether other contacts are near than rows are placed for.
     changed = watched and settings[GATHER] == 1.0 and results[SCATTER] == 1.0
     while True:
-        stuck = status == STALLED or (status == ended == RUNNING and not restoring and creeps(pace, iteration, value))
-        if stuck and watched and not tick and holds and pace[BEGUN] < BEGINNINGS and iteration < limit:
+        if status == STALLED and watched and not tick and holds and may_begin(pace, iteration, limit):
             begin_again(table, pool, held, loose, here, y, better_y)
             iteration += 1
             set_pace(pace, pace[BEGUN] + 1.0, iteration)
             status = ended = RUNNING
             rows = m
-            mu, radius, leash = settings[PENALTY], settings[RADIUS], math.inf
+            mu, radius, leash, shift, last_dual = settings[PENALTY], settings[RADIUS], math.inf, 0.0, math.inf
             restoring, restorations, cuts, room_left = False, 0, 0, math.inf
             check_at, check_violation = iteration + PATIENCE, math.inf
-            changed = True
+            lost, below, changed = np.int64(-1), FREE_BELOW, True
         if status != RUNNING:
             break
         if watched and not changed:
@@ -274,6 +274,10 @@ def solve_program(table, pool, settings, state, history, tips):
             keep(here, y, rows, held)
             if watched:
                 numbers_of(table, numbers)
+        if creeping and ended == RUNNING and not restoring and holds and may_begin(pace, iteration, limit):
+            if creeps(pace, iteration, value):
+                status = STALLED
+                continue
         if iteration >= limit and (not tick or violation <= feasible or iteration >= EXTRA_TIME * limit):
             if watched and not tick and ended == RUNNING:
                 ended = ITERATION_LIMIT

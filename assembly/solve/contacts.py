@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly.constraints.contact_rows import search_row
+from assembly.constraints.contact_rows import is_guard, search_row
 from assembly.constraints.layout import (
     BODY_F,
     BODY_G,
@@ -65,7 +65,8 @@ def start_contacts(table, pool, q, contacts, free, lengths):
     """
     for k in range(table[CONTACTS]):
         row = table[ROW_TABLE] + ROW * k
-        if not math.isnan(contacts[k, 0]) or table[row + BODY_F] < 0:
+        # What a clearance has lost its watch looks for.
+        if not math.isnan(contacts[k, 0]) or table[row + BODY_F] < 0 or is_guard(table, k):
             continue
         i = table[row + BODY_F]
         j = table[row + BODY_G]

@@ -8,37 +8,52 @@ import pytest
 from assembly.constraints.contact_rows import HARDLY, MAY_GO, TOUCHING, hold_all, lost_guard, may_go
 from assembly.constraints.layout import FIRST_GUARD, FREE_COLUMN, GUARDS, HEADER, MINIMUM, ROW, ROW_TABLE, SHELL_F
 from assembly.proximity.solid_contact import CONTACT_RECORD, PAIR_GAP, STAYS, TRACK
-from assembly.solve.afresh import BEGUN, LEAST_PART, PACE, STRIDE, creeps, set_pace
+from assembly.solve.afresh import BEGINNINGS, BEGUN, LEAST_PART, LEFT, PACE, STRIDE, creeps, may_begin, set_pace
 
 LEAST = 0.25
 
 
-def creeping(values, begun=1.0, start=0):
+def creeping(values, begun=0.0, start=0):
     """At which steps a solve with these objectives is said to creep."""
     pace = np.full(PACE, np.nan)
-    set_pace(pace, begun, start)
+    set_pace(pace, 0.0, 0)
+    creeps(pace, 0, values[0])
+    if begun > 0.0:
+        set_pace(pace, begun, start)
     assert pace[BEGUN] == begun
-    return [k for k, value in enumerate(values, start) if creeps(pace, k, value)]
+    return [k for k, value in enumerate(values[1:], start + 1) if creeps(pace, k, value)]
 
 
-def test_a_solve_creeps_where_its_objective_stays_about_the_same():
-    few = 3 * STRIDE + 1
-    # There is nothing to compare the first one with.
-    assert creeping(np.ones(few)) == [2 * STRIDE, 3 * STRIDE]
-    assert creeping(np.ones(few), start=7) == [2 * STRIDE + 7, 3 * STRIDE + 7]
-    # By a little more and by a little less than what counts, down and up.
-    for sign in (-1.0, 1.0):
-        for factor, found in ((1.01, []), (0.99, [2 * STRIDE, 3 * STRIDE])):
-            values = (1.0 + sign * factor * LEAST_PART) ** -(np.arange(few) / STRIDE)
-            assert creeping(values) == found
-    assert creeping(np.zeros(few)) == []
+@pytest.mark.parametrize("offset", [10.0, -10.0, 1e3])
+@pytest.mark.parametrize("factor", [0.99, 1.01])
+def test_a_solve_creeps_where_its_objective_gains_little_of_what_it_gained_in_all(factor, offset):
+    # From 2 to 1 in the first steps, then by so much every so many.
+    gains = np.arange(3 * STRIDE + 1) // STRIDE
+    least = LEAST_PART * factor
+    values = np.where(np.arange(len(gains)) < STRIDE, 2.0, 1.0 / (1.0 - least) ** (1.0 - gains)) + offset
+    values[STRIDE:] = offset + 2.0 - 1.0 / (1.0 - least) ** (gains[STRIDE:] - 1.0)
+    assert creeping(values) == ([2 * STRIDE, 3 * STRIDE] if factor < 1.0 else [])
+    # It began again: what it gained before counts, and there is nothing to compare the first one with.
+    again = np.r_[values[0], np.full(2 * STRIDE, values[STRIDE])]
+    assert creeping(again, begun=1.0, start=70) == [70 + 2 * STRIDE]
 
 
-def test_a_solve_that_gets_on_does_not_creep():
+def test_a_solve_that_gets_on_does_not_creep_nor_one_that_had_nothing_to_gain():
     assert creeping(0.9 ** (np.arange(500) / STRIDE)) == []
+    assert creeping(np.ones(500)) == []
+    # One that comes near to nothing by a part of it each time.
+    assert creeping(1e-6 * 0.9 ** (np.arange(500) / STRIDE) + (np.arange(500) < STRIDE)) == []
     # Between two that are compared it may do what it likes.
     values = 0.9 ** (np.arange(500) // STRIDE) * np.where(np.arange(500) % STRIDE == 0, 1.0, 7.0)
     assert creeping(values) == []
+
+
+def test_a_solve_begins_again_a_few_times_while_there_are_steps():
+    pace = np.zeros(PACE)
+    for begun in range(BEGINNINGS + 2):
+        set_pace(pace, float(begun), 0)
+        assert may_begin(pace, 10, 10 + LEFT) == (begun < BEGINNINGS)
+        assert not may_begin(pace, 11, 10 + LEFT)
 
 
 def guards(gap, solids=True):
