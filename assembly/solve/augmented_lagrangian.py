@@ -23,6 +23,7 @@ import numpy as np
 
 from assembly._address import call_address
 from assembly._kernel import kernel
+from assembly.constraints.contact_rows import TOUCHING
 from assembly.constraints.layout import (
     CLOCK_AT,
     CONTACTS,
@@ -37,14 +38,13 @@ from assembly.constraints.layout import (
 from assembly.constraints.terms import objective
 from assembly.proximity.solid_contact import FOLD
 from assembly.proximity.watch import AS_NEEDED, CAREFUL, DOUBTFUL, EVERYTHING, IN_TURNS, any_crossed
-from assembly.solve.afresh import BEGUN, PACE, begin_again, creeps, has_solids, may_begin, set_pace
 from assembly.solve.contacts import free_folds, is_of_surfaces
 from assembly.solve.ending import finish, return_to
 from assembly.solve.guards import look_again, numbers_of, place_guards
 from assembly.solve.multipliers import choose_multipliers, forget_objective, least_multipliers, weigh_rows
 from assembly.solve.report import is_clear, keep, log
 from assembly.solve.restoration import LEAST_SHARE, SHARE, SOFTNESS, WAY, begin_way, step_back
-from assembly.solve.retreat import LONGER, SHORTER, has_sunk
+from assembly.solve.retreat import BEGINNINGS, LEFT, LONGER, SHORTER, begin_again, has_sunk
 from assembly.solve.room import held_room, pairs_room, points, results_of, tape_room, unknowns
 from assembly.solve.rows import arrange, record_of_blocks, shape_of, turned, violation_of
 from assembly.solve.search import SHORTEST, goal, search
@@ -83,8 +83,6 @@ from assembly.solve.tangency import off_rows
 # Every so many steps the largest violation must have halved, or the loop sees whether the rows can hold; so many times.
 PATIENCE = 25
 RESTORATIONS = 3
-# A violation above this, at the stationary point of all violations, tells that the rows cannot hold.
-TOUCHING = 1e-9
 # Where so many whole steps in a row do not halve the violation, the floor of the penalty gives way, down to here:
 # rounding, times its inverse, must stay small against the objective's curvature.
 SLOW, HARDEST = 3, 1e-10
@@ -177,16 +175,15 @@ def solve_program(table, pool, settings, state, history, tips):
     settled_by = 0
     # When a last look found other contacts than rows stood for.
     looked_at = -1
-    pace = np.empty(PACE)
-    set_pace(pace, 0.0, 0)
-    creeping = watched and not tick and has_solids(table)
+    begun = 0
     # Whether other contacts are near than rows are placed for.
     changed = watched and settings[GATHER] == 1.0 and results[SCATTER] == 1.0
     while True:
-        if status == STALLED and watched and not tick and holds and may_begin(pace, iteration, limit):
+        may_begin = watched and not tick and holds and begun < BEGINNINGS and iteration + LEFT <= limit
+        if status == STALLED and may_begin:
             begin_again(table, pool, held, loose, here, y, better_y)
+            begun += 1
             iteration += 1
-            set_pace(pace, pace[BEGUN] + 1.0, iteration)
             status = ended = RUNNING
             rows = m
             mu, radius, leash, shift, last_dual = settings[PENALTY], settings[RADIUS], math.inf, 0.0, math.inf
@@ -274,10 +271,6 @@ def solve_program(table, pool, settings, state, history, tips):
             keep(here, y, rows, held)
             if watched:
                 numbers_of(table, numbers)
-        if creeping and ended == RUNNING and not restoring and holds and may_begin(pace, iteration, limit):
-            if creeps(pace, iteration, value):
-                status = STALLED
-                continue
         if iteration >= limit and (not tick or violation <= feasible or iteration >= EXTRA_TIME * limit):
             if watched and not tick and ended == RUNNING:
                 ended = ITERATION_LIMIT

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
+from assembly.constraints.contact_rows import TOUCHING
 from assembly.constraints.layout import (
     BODIES,
     CONTACTS,
@@ -23,9 +24,6 @@ from assembly.proximity.solid_contact import PROPER, TRACK
 from assembly.solve.contacts import free_pairs_hold
 from assembly.solve.settings import HISTORY
 from assembly.solve.tangency import off_rows, off_tangency
-
-# A gap that counts as touching where crossing surfaces are reported.
-TOUCHING = 1e-9
 
 
 @kernel(inner=True)

@@ -167,13 +167,13 @@ class Tracker:
         self._settings[RECALL] = self._size
         self._pose = self._state[: self._size]
         # Numbers are read from a view in half the time it takes to read them from the array.
-        self._view: Any = memoryview(self._state)  # type: ignore[arg-type]  # an array is a buffer
+        self._view: Any = self._state.data
         self._before = self._pose.copy()
-        self._knobs: Any = memoryview(self._settings)  # type: ignore[arg-type]  # as above
+        self._knobs: Any = self._settings.data
         self._arguments = (packed.table, packed.pool, self._settings, self._state, self._history, packed.tips)
         self._radius = float(self._settings[RADIUS])
         self._seen = float(self._state[packed.memory_at + EVENT_COUNT]) if packed.guards else 0.0
-        self._pool = memoryview(packed.pool)  # type: ignore[arg-type]  # as above
+        self._pool = packed.pool.data
         self._reference = packed.reference.tolist()
         self._at = next(at for target, at in packed._targets if target is self._hand)
         # Whatever else may change between ticks is written by the scene itself.

@@ -1,59 +1,15 @@
-"""When a solve begins again, and which contacts that end may stay behind."""
+"""Which contacts that end may stay behind, and which are given up."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from assembly.constraints.contact_rows import HARDLY, MAY_GO, TOUCHING, hold_all, lost_guard, may_go
+from assembly.constraints.contact_rows import HARDLY, MAY_GO, hold_all, lost_guard, may_go
 from assembly.constraints.layout import FIRST_GUARD, FREE_COLUMN, GUARDS, HEADER, MINIMUM, ROW, ROW_TABLE, SHELL_F
 from assembly.proximity.solid_contact import CONTACT_RECORD, PAIR_GAP, STAYS, TRACK
-from assembly.solve.afresh import BEGINNINGS, BEGUN, LEAST_PART, LEFT, PACE, STRIDE, creeps, may_begin, set_pace
 
 LEAST = 0.25
-
-
-def creeping(values, begun=0.0, start=0):
-    """At which steps a solve with these objectives is said to creep."""
-    pace = np.full(PACE, np.nan)
-    set_pace(pace, 0.0, 0)
-    creeps(pace, 0, values[0])
-    if begun > 0.0:
-        set_pace(pace, begun, start)
-    assert pace[BEGUN] == begun
-    return [k for k, value in enumerate(values[1:], start + 1) if creeps(pace, k, value)]
-
-
-@pytest.mark.parametrize("offset", [10.0, -10.0, 1e3])
-@pytest.mark.parametrize("factor", [0.99, 1.01])
-def test_a_solve_creeps_where_its_objective_gains_little_of_what_it_gained_in_all(factor, offset):
-    # From 2 to 1 in the first steps, then by so much every so many.
-    gains = np.arange(3 * STRIDE + 1) // STRIDE
-    least = LEAST_PART * factor
-    values = np.where(np.arange(len(gains)) < STRIDE, 2.0, 1.0 / (1.0 - least) ** (1.0 - gains)) + offset
-    values[STRIDE:] = offset + 2.0 - 1.0 / (1.0 - least) ** (gains[STRIDE:] - 1.0)
-    assert creeping(values) == ([2 * STRIDE, 3 * STRIDE] if factor < 1.0 else [])
-    # It began again: what it gained before counts, and there is nothing to compare the first one with.
-    again = np.r_[values[0], np.full(2 * STRIDE, values[STRIDE])]
-    assert creeping(again, begun=1.0, start=70) == [70 + 2 * STRIDE]
-
-
-def test_a_solve_that_gets_on_does_not_creep_nor_one_that_had_nothing_to_gain():
-    assert creeping(0.9 ** (np.arange(500) / STRIDE)) == []
-    assert creeping(np.ones(500)) == []
-    # One that comes near to nothing by a part of it each time.
-    assert creeping(1e-6 * 0.9 ** (np.arange(500) / STRIDE) + (np.arange(500) < STRIDE)) == []
-    # Between two that are compared it may do what it likes.
-    values = 0.9 ** (np.arange(500) // STRIDE) * np.where(np.arange(500) % STRIDE == 0, 1.0, 7.0)
-    assert creeping(values) == []
-
-
-def test_a_solve_begins_again_a_few_times_while_there_are_steps():
-    pace = np.zeros(PACE)
-    for begun in range(BEGINNINGS + 2):
-        set_pace(pace, float(begun), 0)
-        assert may_begin(pace, 10, 10 + LEFT) == (begun < BEGINNINGS)
-        assert not may_begin(pace, 11, 10 + LEFT)
 
 
 def guards(gap, solids=True):
@@ -70,11 +26,11 @@ def guards(gap, solids=True):
 
 
 @pytest.mark.parametrize("solids", [True, False])
-@pytest.mark.parametrize("gap", [1.0, 1e-12, -1e-12, -0.5 * TOUCHING, -2.0 * TOUCHING, -0.5])
+@pytest.mark.parametrize("gap", [1.0, 1e-12, -1e-12, -5e-10, -2e-9, -0.5])
 def test_a_contact_that_ends_stays_behind_where_it_is_open_or_solids_touch(gap, solids):
     table, pool, start, point = guards(gap, solids)
     stays_behind = lost_guard(table, pool, 1, start, point, False, False)
-    assert stays_behind == (gap > (-TOUCHING if solids else 0.0))
+    assert stays_behind == (gap > (-1e-9 if solids else 0.0))
     _q, tracked, records, residual, jacobian = point
     if not stays_behind:
         # Nothing was written: the step is refused.
