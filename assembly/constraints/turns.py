@@ -93,7 +93,8 @@ class Turns:
         upper = min((-e.current() for e in self._limits[k] if e.terms[0][0] < 0.0), default=inf)
         if upper - lower < 2.0 * pi:
             return 0.5 * (lower + upper)
-        return min(max(0.0, lower), upper)
+        # Angles are found within pi of this: all of them are within the limits.
+        return min(max(0.0, lower + pi), upper - pi)
 
     def _follow(self, equation: Equation, near: Array, known: list[bool], evaluate: Evaluate) -> bool:
         """Find the turn of one side of a coupling from the other; whether there was one to find."""

@@ -63,7 +63,7 @@ def crossing_point(table, pool, kind_f, f, kind_g, g, turn, shift, x, size):
         if off <= 1e-13 * size:
             return x, True
         if off > 0.9 * previous:
-            return x, off <= 1e-9 * size
+            return x, False
         previous = off
         # W = J J^T over tangents of unit length: steps in lengths, the least that remove d.
         su = 1.0 / max(math.sqrt(dot(pu, pu)), 1e-300)

@@ -11,7 +11,7 @@ from assembly.proximity.cell_tree import feature_cells
 from assembly.proximity.crossing import tangents
 from assembly.proximity.extremal import CONVERGED, SINGULAR
 from assembly.proximity.feature_pair import solve_features
-from assembly.proximity.nearest import CROSSING, search
+from assembly.proximity.nearest import APART, CROSSING, search
 from assembly.proximity.penetration import PENETRATING, deepest
 from assembly.proximity.switching import feature_at, feature_kind, track_features
 
@@ -76,7 +76,10 @@ def find_nearest(table, pool, shell_f, shell_g, q, size, codes, out):
 
 @kernel
 def find_deepest(table, pool, shell_f, shell_g, q, size, codes, out):
-    """The pair of two shells that cross at the features and coordinates in codes and out. Returns the status."""
+    """The pair of two shells that cross at the features and coordinates in codes and out. Returns the status.
+
+    APART where they turn out to touch, and rounding said that they cross.
+    """
     turn_f = rotation(q, 0)
     turn, shift = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
     x = (out[0], out[1], out[2], out[3])
@@ -84,7 +87,7 @@ def find_deepest(table, pool, shell_f, shell_g, q, size, codes, out):
     if not found:
         return CROSSING
     write_features(table, pool, shell_f, shell_g, q, turn_f, turn, shift, f, g, y, n, gap, size, codes, out)
-    return PENETRATING
+    return PENETRATING if gap <= 0.0 else APART
 
 
 @kernel

@@ -26,6 +26,8 @@ PENETRATING = 3
 FIRST, DOUBLINGS = 0.02, 7
 # Steps of the way back, and how often one may be halved.
 STEPS, HALVINGS = 12, 8
+# Shells that are apart by this part of the size may seem to cross: rounding says so of those that touch.
+TOUCHING = 1e-12
 
 
 @kernel(inner=True)
@@ -115,7 +117,7 @@ def deepest(table, pool, shell_f, shell_g, turn, shift, f, g, x, size):
             )
             if status == APART:
                 found, cf, cg, y, n, gap = walk_back(table, pool, shell_f, shell_g, turn, shift, away, cf, cg, y, size)
-                if found == CONVERGED and 0.0 >= gap > best[5]:
+                if found == CONVERGED and TOUCHING * size >= gap > best[5]:
                     best = (True, cf, cg, y, n, gap)
                 break
             reach *= 2.0

@@ -11,8 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly._address import clock_address
 from assembly.assembly import Assembly
+from assembly.constraints.constraint import structure_changes
 from assembly.constraints.layout import CLOCK_AT, WATCH
 from assembly.constraints.objectives import FrameDistance, PointDistance
+from assembly.constraints.packing import structure_of
 from assembly.errors import InputError, integer, number, positive
 from assembly.kinematics.body import Body, Frame, Point
 from assembly.kinematics.pose import Pose, axes_quaternion, rotation_matrix
@@ -42,10 +44,10 @@ from assembly.solve.settings import (
 from assembly.solve.solution import Scene, Solution
 from assembly.tracking.log import TrackLog
 from assembly.tracking.tick import Step, TrackStatus
+from assembly.tracking.trace import Trace
 
 if TYPE_CHECKING:
     from assembly.constraints.packing import Packed
-    from assembly.tracking.trace import Trace
 
 __all__ = ["Tracker"]
 
@@ -67,7 +69,8 @@ class Tracker:
     Parameters
     ----------
     scene : Assembly
-        Its bodies, constraints and objectives as they are now; driven values may change between ticks.
+        Its bodies, constraints and objectives as they are now; driven values and limits may change between ticks, but
+        none may come or go.
     follow : Point, Frame or Body
         What the hand holds. A target is a point (3,) for a `Point`, a pose (7,) or a `Pose` for the others.
     q0 : (n, 7) or Solution, optional
@@ -117,7 +120,10 @@ class Tracker:
             poses = begin.q
         else:
             poses = scene.q if q0 is None else scene.solve(q0, max_iterations=0).q
-        self._place = scene.bodies.index(follow if isinstance(follow, Body) else follow.body)
+        held = follow if isinstance(follow, Body) else follow.body
+        if held not in scene.bodies:
+            raise InputError(f"follow is of body {held.name!r}; expected one of {[body.name for body in scene.bodies]}")
+        self._place = scene.bodies.index(held)
         self._hand: PointDistance | FrameDistance
         row = poses[self._place]
         if isinstance(follow, Point):
@@ -200,9 +206,11 @@ class Tracker:
         """
         begin = perf_counter()
         packed = self._packed
-        row = self._aimed(target)
+        changed = packed.stamp != structure_changes() and self._has_changed()
+        row = None if changed else self._aimed(target)
         if row is None:
-            return Step(self, self._pose.copy(), TrackStatus.BAD_TARGET, self._where(), (), perf_counter() - begin)
+            status = TrackStatus.CHANGED if changed else TrackStatus.BAD_TARGET
+            return Step(self, self._pose.copy(), status, self._where(), (), perf_counter() - begin)
         before, view = self._before, self._view
         before[:] = self._pose
         code = solve_program(*self._arguments)
@@ -228,6 +236,14 @@ class Tracker:
             self._seen = view[packed.memory_at + EVENT_COUNT]
         return Step(self, self._pose.copy(), status, row, events, perf_counter() - begin)
 
+    def _has_changed(self) -> bool:
+        """Whether a constraint of the scene, and not of another one, gained or lost a row."""
+        packed = self._packed
+        if packed.structure != structure_of(self._inner.constraints):
+            return True
+        packed.stamp = structure_changes()
+        return False
+
     def _where(self) -> Array:
         """The target that the loop has."""
         hand = self._hand
@@ -237,7 +253,10 @@ class Tracker:
         """The target as an array, after the loop was told; None for what is none."""
         hand, packed = self._hand, self._packed
         try:
-            row = np.array(target.q if isinstance(target, Pose) else target, dtype=np.float64)
+            row = np.array(target.q if isinstance(target, Pose) else target)
+            if row.dtype.kind not in "iuf" or isinstance(target, np.ma.MaskedArray):
+                return None
+            row = np.asarray(row, dtype=np.float64)
             if isinstance(hand, PointDistance):
                 if row.shape != (3,):
                     return None
@@ -289,6 +308,8 @@ class Tracker:
         TrackLog
         """
         bodies, budget = len(self._scene.bodies), self._budget
+        if not isinstance(trace, Trace):
+            raise TypeError(f"trace is {trace!r}; expected a Trace")
         recorder = TrackLog.recorder(trace.times, bodies, TrackStatus, stride=stride, budget=budget)
         start = perf_counter()
         for k, (time, target) in enumerate(trace):

@@ -112,3 +112,26 @@ def test_bad_input_is_named():
         closest_features(box, ball, q_b=[np.nan] * 7)
     with pytest.raises(InputError, match=r"q_b\[3:\]"):
         FeatureTracker(box, ball).step(None, [1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("gap", [1e-6, 1e-9, 1e-10, 1e-12, 1e-14, 0.0, -1e-14, -1e-12, -1e-9])
+def test_bodies_that_all_but_touch_are_told_apart_to_rounding(gap):
+    # A ball beside faces, edges and corners of a box: the gap is the distance to the foot, minus the radius.
+    rng = np.random.default_rng(5)
+    side, radius = np.array([1.0, 1.4, 0.7]), 0.35
+    box, ball = Body("box", shapes.box(*side)), Body("ball", shapes.sphere(radius))
+    for kind in (1, 2, 3, 2, 3, 2):
+        axes = rng.permutation(3)[:kind]
+        signs = rng.choice([-1.0, 1.0], 3)
+        foot = rng.uniform(-0.45, 0.45, 3) * side
+        foot[axes] = 0.5 * (signs * side)[axes]
+        n = np.zeros(3)
+        n[axes] = signs[axes] * rng.uniform(0.1, 1.0, kind)
+        n /= np.linalg.norm(n)
+        q = np.concatenate([foot + (radius + gap) * n, random_quaternion(rng)])
+        q[3:] /= np.linalg.norm(q[3:])
+        pair = closest_features(box, ball, q_b=q)
+        # Rounding of numbers near one.
+        assert abs(pair.gap - gap) < 2e-15
+        np.testing.assert_allclose(pair.normal, n, atol=1e-12)
+        assert pair.status is FeatureStatus.APART or (pair.status is FeatureStatus.PENETRATING and pair.gap <= 0.0)

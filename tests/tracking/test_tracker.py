@@ -9,6 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import assembly as asm
+from assembly.errors import InputError
 from assembly.tracking.tick import TrackStatus
 from benchmarks.hands import paper_clips
 
@@ -64,6 +65,10 @@ def circling(center, radius, ticks, turns=1.0):
         object(),
         asm.Pose(),
         10**400,
+        ["1", "2", "3"],
+        (True, False, True),
+        np.array(["2026-01-01"] * 3, dtype="datetime64[D]"),
+        np.ma.masked_array([1.0, 2.0, 3.0], mask=True),
     ],
     ids=lambda value: type(value).__name__,
 )
@@ -298,3 +303,49 @@ def test_a_clearance_is_kept_while_a_hand_pushes_through():
     if names:
         assert names == ["clearance: a-b"]
         assert np.abs(step.solution.wrenches["clearance"]["b"].force - step.force).max() < 1e-4
+
+
+def hinge(**values):
+    """A hinge at the origin, about z, and a tracker that holds a point of what it carries."""
+    ground, arm = asm.Body("ground", fixed=True), asm.Body("arm")
+    scene = asm.Assembly([ground, arm])
+    joint = asm.Revolute(ground, arm, "hinge", **values)
+    scene.constrain(joint)
+    return joint, scene.tracker(arm.point(1.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("values", "attribute", "value"),
+    [({}, "angle", 0.1), ({"angle": 0.3}, "angle", None), ({"limits": (-0.5, 0.5)}, "limits", None)],
+    ids=["driven", "released", "no longer limited"],
+)
+def test_a_tracker_says_that_a_row_came_or_went(values, attribute, value):
+    joint, tracker = hinge(**values)
+    tracker.step((1.0, 0.1, 0.0))
+    before, was = tracker.q, getattr(joint, attribute)
+    setattr(joint, attribute, value)
+    step = tracker.step((0.0, 1.0, 0.0))
+    assert step.status is TrackStatus.CHANGED and "another" in step.status.value
+    assert step.q.tobytes() == before.tobytes() == tracker.q.tobytes() and step.feasibility < 1e-12
+    # Rows that are there again may be followed; so may rows while those of another scene change.
+    setattr(joint, attribute, was)
+    hinge()[0].angle = 0.2
+    assert tracker.step((1.0, 0.1, 0.0)).status is not TrackStatus.CHANGED
+
+
+def test_a_driven_value_or_a_limit_may_change_between_ticks():
+    joint, tracker = hinge(limits=(-0.5, 0.5))
+    for limit in (0.5, 0.2):
+        joint.limits = (-0.5, limit)
+        for _ in range(20):
+            step = tracker.step((0.0, 1.0, 0.0))
+        assert step.status is TrackStatus.FOLLOWED
+        assert step.solution.values["hinge.angle"] == pytest.approx(limit, abs=1e-11)
+
+
+def test_what_is_no_hand_and_no_trace():
+    scene, _ = arm()
+    with pytest.raises(InputError, match="other"):
+        scene.tracker(asm.Body("other"))
+    with pytest.raises(TypeError, match="trace"):
+        scene.tracker(scene.bodies[2]).run("trace")
