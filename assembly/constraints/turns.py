@@ -2,7 +2,7 @@
 
 A driven angle starts on the turn of its value, one that is coupled to a driven freedom on the turn that the coupling
 asks for. Other coupled angles keep, in a warm start, the turn they have; otherwise they too are on the turn of their
-coupling, where the other side is known. What is left is looked for within its limits.
+coupling, where the other side is known, within its limits. What is left is looked for within its own.
 """
 
 from __future__ import annotations
@@ -34,16 +34,16 @@ class Turns:
     def __init__(self, angles: Sequence[Coordinate], equations: Sequence[tuple[Equation, int]]) -> None:
         self._places = {angle: k for k, angle in enumerate(angles)}
         self._drives: list[int | None] = [None] * len(angles)
-        self._limits: list[list[Equation]] = [[] for _ in angles]
+        self._limits: dict[Coordinate, list[Equation]] = {}
         self._couplings = [equation for equation, _ in equations if len(equation.terms) > 1]
         for equation, at in equations:
-            k = self._places.get(equation.terms[0][1])
-            if k is None or len(equation.terms) > 1:
+            coordinate = equation.terms[0][1]
+            if len(equation.terms) > 1:
                 continue
             if equation.one_sided:
-                self._limits[k].append(equation)
-            else:
-                self._drives[k] = at
+                self._limits.setdefault(coordinate, []).append(equation)
+            elif coordinate in self._places:
+                self._drives[self._places[coordinate]] = at
         self._driven = [(k, drive) for k, drive in enumerate(self._drives) if drive is not None]
         coupled = {coordinate for equation in self._couplings for _, coordinate in equation.terms}
         self._coupled = [angle in coupled for angle in angles]
@@ -76,21 +76,25 @@ class Turns:
 
         `evaluate` gives the value of a coordinate at the start, an angle nearest to a number.
         """
-        known = [True] * len(near)
+        known, angles = [True] * len(near), list(self._places)
         for k, drive in enumerate(self._drives):
             if drive is not None:
                 near[k] = pool[drive]
             elif not warm or self._led[k]:
                 known[k] = not self._coupled[k]
-                near[k] = self._within_limits(k) if not warm else near[k]
+                near[k] = self._within_limits(angles[k]) if not warm else near[k]
         while not all(known):
             if not any(self._follow(equation, near, known, evaluate) for equation in self._couplings):
                 # Nothing tells: it is where its limits are.
                 known[known.index(False)] = True
 
-    def _within_limits(self, k: int) -> float:
-        lower = max((e.current() for e in self._limits[k] if e.terms[0][0] > 0.0), default=-inf)
-        upper = min((-e.current() for e in self._limits[k] if e.terms[0][0] < 0.0), default=inf)
+    def _range(self, coordinate: Coordinate) -> tuple[float, float]:
+        limits = self._limits.get(coordinate, [])
+        lower = max((e.current() for e in limits if e.terms[0][0] > 0.0), default=-inf)
+        return lower, min((-e.current() for e in limits if e.terms[0][0] < 0.0), default=inf)
+
+    def _within_limits(self, angle: Coordinate) -> float:
+        lower, upper = self._range(angle)
         if upper - lower < 2.0 * pi:
             return 0.5 * (lower + upper)
         # Angles are found within pi of this: all of them are within the limits.
@@ -107,6 +111,8 @@ class Turns:
                     value = target.current()
                 else:
                     value = evaluate(other, 0.0 if j is None else float(near[j]))
+                    lower, upper = self._range(other)
+                    value = min(max(value, lower), upper)
                 near[k] = (equation.current() - other_factor * value) / factor
                 known[k] = True
                 return True

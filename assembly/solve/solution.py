@@ -101,8 +101,8 @@ class Solution:
         In the user's units.
     feasibility : float
         Largest violation of a constraint, in the user's units, evaluated at `q`. Of a contact that has no extremal pair
-        there it is the distance of the points in `contacts`. Infinite only where an `Expression` has no finite value,
-        and so is the objective of one.
+        there it is the distance of the points in `contacts`. Infinite only where an `Expression` or a derivative of it
+        has no finite value, and so is the objective of one.
     stationarity : float
         Largest component of the Lagrangian's gradient, scaled; of the objective's where a contact was lost.
     violations : dict of name -> float
