@@ -138,15 +138,15 @@ def ball_bound(a, i, b, j):
 
 
 @kernel(inner=True, allocates=True)
-def search(table, pool, shell_f, shell_g, turn, shift, size, upper):
-    """The nearest points of two shells, g seen from f.
+def search(table, pool, shell_f, shell_g, turn, shift, size, rough):
+    """The nearest points of two shells, g seen from f, or any that are farther by a part of that, `rough`, at most.
 
     Returns
     -------
     status
         APART: all else is excluded. CROSSING: the shells cross at the point returned. UNPROVEN: out of room.
     code_f, code_g
-        Numbers of the features; -1 where nothing nearer than `upper` was found.
+        Numbers of the features.
     x
         Their coordinates, (u_f, v_f, u_g, v_g).
     gap
@@ -180,6 +180,7 @@ def search(table, pool, shell_f, shell_g, turn, shift, size, upper):
     known = 0
     tolerance = 1e-13 * size
     status = APART
+    upper = math.inf
     best = (-1, -1)
     at = (0.0, 0.0, 0.0, 0.0)
     gap = upper
@@ -224,7 +225,7 @@ def search(table, pool, shell_f, shell_g, turn, shift, size, upper):
     while waiting > 0:
         key = keys[0]
         slot = slots[0]
-        if key >= upper - tolerance:
+        if key >= (1.0 - rough) * upper - tolerance:
             break
         drop_first(keys, slots, waiting)
         waiting -= 1
@@ -249,7 +250,7 @@ def search(table, pool, shell_f, shell_g, turn, shift, size, upper):
             g = bi[j, RECORD]
             if ready == 0:
                 key, n = pair_bound(a, i, b, j, n, upper)
-                if key >= upper - tolerance:
+                if key >= (1.0 - rough) * upper - tolerance:
                     continue
                 if waiting > 0 and key > keys[0]:
                     released -= 1
@@ -344,7 +345,7 @@ def search(table, pool, shell_f, shell_g, turn, shift, size, upper):
             else:
                 key = ball_bound(a, p, b, q)
                 m = n
-            if key >= upper - tolerance:
+            if key >= (1.0 - rough) * upper - tolerance:
                 continue
             if released > 0:
                 released -= 1
@@ -361,7 +362,7 @@ def search(table, pool, shell_f, shell_g, turn, shift, size, upper):
             push(keys, slots, waiting, key, slot)
             waiting += 1
     if status == APART:
-        lower = upper - tolerance
+        lower = (1.0 - rough) * upper - tolerance
     elif best[0] < 0 and upper == math.inf:
         # Out of room before any point inside the trims: where the search began.
         best = (ai[first_f, FEATURE], bi[first_g, FEATURE])

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from assembly._kernel import kernel
 from assembly.geometry.vec import add, dot, matvec, matvec_t, scale, sub
 from assembly.kinematics.motion import position, relative_pose, rotation
@@ -12,8 +14,9 @@ from assembly.proximity.crossing import tangents
 from assembly.proximity.extremal import CONVERGED, SINGULAR
 from assembly.proximity.feature_pair import solve_features
 from assembly.proximity.nearest import APART, CROSSING, search
-from assembly.proximity.penetration import PENETRATING, deepest
+from assembly.proximity.penetration import PENETRATING, TOUCHING, deepest
 from assembly.proximity.switching import feature_at, feature_kind, track_features
+from assembly.proximity.ways_apart import WAYS, overlap_at
 
 # What is written of a pair: parameters (4), point of f, point of g, normal, gap, lower bound, pairs of cells looked
 # at, switches.
@@ -66,8 +69,12 @@ def find_nearest(table, pool, shell_f, shell_g, q, size, codes, out):
     """The nearest pair at the poses q (2, 7); its features into codes (2,), the pair into out. Returns the status."""
     turn_f = rotation(q, 0)
     turn, shift = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
-    status, f, g, x, gap, lower, effort = search(table, pool, shell_f, shell_g, turn, shift, size, math.inf)
+    status, f, g, x, gap, lower, effort = search(table, pool, shell_f, shell_g, turn, shift, size, 0.0)
     none = (0.0, 0.0, 0.0)
+    if status == APART and abs(gap) <= TOUCHING * size:
+        # Solids whose faces are flush have points in common before a search comes to where they cross.
+        if overlap_at(table, pool, shell_f, shell_g, turn, f, g, x, np.empty((WAYS, 3))):
+            status = CROSSING
     write_features(table, pool, shell_f, shell_g, q, turn_f, turn, shift, f, g, x, none, gap, size, codes, out)
     out[LOWER] = lower
     out[EFFORT] = effort
@@ -87,7 +94,7 @@ def find_deepest(table, pool, shell_f, shell_g, q, size, codes, out):
     if not found:
         return CROSSING
     write_features(table, pool, shell_f, shell_g, q, turn_f, turn, shift, f, g, y, n, gap, size, codes, out)
-    return PENETRATING if gap <= 0.0 else APART
+    return PENETRATING if gap < 0.0 else APART
 
 
 @kernel

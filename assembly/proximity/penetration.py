@@ -2,23 +2,24 @@
 
 Nearest points say nothing where shells cross: all crossing points are at distance zero. The pair wanted has normals
 that oppose each other and a negative gap. Two faces without boundaries have it by `global_start`. Of other shells, g is
-moved along the normal of the crossing until they are apart; from the nearest points there the pair is followed on the
-way back (`switching.py`), through touching, to a negative gap.
+moved along normals of the faces that cross (`ways_apart.py`) until they are apart on one of them; from the nearest
+points there the pair is followed on the way back (`switching.py`), through touching, to a negative gap.
 """
 
 from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from assembly._kernel import kernel
-from assembly.geometry.spline import SIGN
-from assembly.geometry.vec import add, blend, cross, dot, neg, scale
-from assembly.proximity.crossing import tangents
+from assembly.geometry.vec import add, blend, dot, scale
 from assembly.proximity.extremal import CONVERGED, NOT_CONVERGED, SINGULAR
-from assembly.proximity.nearest import APART, search
-from assembly.proximity.shell import EDGES, FACE, FACE_RECORD, FACE_SURFACE, FACE_TABLE, FACE_TRIM, FACES, VERTICES
+from assembly.proximity.nearest import CROSSING, search
+from assembly.proximity.shell import EDGES, FACE_TABLE, FACE_TRIM, FACES, VERTICES
 from assembly.proximity.start import global_start
-from assembly.proximity.switching import feature_at, feature_kind, track_features
+from assembly.proximity.switching import feature_at, track_features
+from assembly.proximity.ways_apart import WAYS, add_way, add_ways
 
 # A pair of shells that cross was found.
 PENETRATING = 3
@@ -26,6 +27,8 @@ PENETRATING = 3
 FIRST, DOUBLINGS = 0.02, 7
 # Steps of the way back, and how often one may be halved.
 STEPS, HALVINGS = 12, 8
+# On the way out the nearest points are good to this part of their distance: of parallel faces all are nearest.
+ROUGH = 0.01
 # Shells that are apart by this part of the size may seem to cross: rounding says so of those that touch.
 TOUCHING = 1e-12
 
@@ -36,19 +39,6 @@ def has_one_face(table, shell):
     if table[shell + FACES] != 1 or table[shell + EDGES] != 0 or table[shell + VERTICES] != 0:
         return False
     return table[table[shell + FACE_TABLE] + FACE_TRIM] < 0
-
-
-@kernel(inner=True)
-def face_normal(table, pool, shell, code, turn, u, v):
-    """The outward unit normal of a face, turned; zero where it has none."""
-    record = table[shell + FACE_TABLE] + FACE_RECORD * code
-    zero = (0.0, 0.0, 0.0)
-    _p, su, sv = tangents(table, pool, FACE, record, turn, zero, u, v)
-    n = cross(su, sv)
-    length = math.sqrt(dot(n, n))
-    if not length > 0.0:
-        return zero
-    return scale(float(table[table[record + FACE_SURFACE] + SIGN]) / length, n)
 
 
 @kernel(inner=True)
@@ -94,31 +84,33 @@ def deepest(table, pool, shell_f, shell_g, turn, shift, f, g, x, size):
         a = feature_at(table, shell_f, 0)
         b = feature_at(table, shell_g, 0)
         status, y, gap = global_start(table, pool, a, b, turn, shift, size)
-        return status == CONVERGED or status == SINGULAR, 0, 0, y, none, gap
+        # The far side of a thin body may be nearer than where it is in the other one.
+        if (status == CONVERGED or status == SINGULAR) and gap <= TOUCHING * size:
+            return True, 0, 0, y, none, gap
     same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+    ways = np.empty((WAYS, 3))
+    count = add_ways(table, pool, shell_f, f, x[0], x[1], same, 1.0, ways, 0)
+    count = add_ways(table, pool, shell_g, g, x[2], x[3], turn, -1.0, ways, count)
     best = (False, f, g, x, none, -math.inf)
-    for attempt in range(3):
-        m = none
-        if attempt == 0 and feature_kind(table, shell_f, f) == FACE:
-            m = face_normal(table, pool, shell_f, f, same, x[0], x[1])
-        elif attempt == 1 and feature_kind(table, shell_g, g) == FACE:
-            m = neg(face_normal(table, pool, shell_g, g, turn, x[2], x[3]))
-        elif attempt == 2 and not best[0]:
-            # From one body's origin to the other's, for want of a normal.
-            length = math.sqrt(dot(shift, shift))
-            m = scale(1.0 / length, shift) if length > 1e-9 * size else (0.0, 0.0, 1.0)
-        if dot(m, m) < 0.5:
-            continue
+    for attempt in range(2):
+        if attempt == 1:
+            # From one body's origin to the other's, where no normal leads out.
+            count = add_way(shift if dot(shift, shift) > 1e-18 * size * size else (0.0, 0.0, 1.0), ways, 0)
         reach = FIRST * size
+        # The shortest way out, of all of them.
         for _ in range(DOUBLINGS):
-            away = scale(reach, m)
-            status, cf, cg, y, _gap, _lower, _effort = search(
-                table, pool, shell_f, shell_g, turn, add(shift, away), size, math.inf
-            )
-            if status == APART:
+            for k in range(count):
+                away = scale(reach, (ways[k, 0], ways[k, 1], ways[k, 2]))
+                place = add(shift, away)
+                status, cf, cg, y, _gap, lower, _effort = search(
+                    table, pool, shell_f, shell_g, turn, place, size, ROUGH
+                )
+                if status == CROSSING or not lower > 0.0:
+                    continue
                 found, cf, cg, y, n, gap = walk_back(table, pool, shell_f, shell_g, turn, shift, away, cf, cg, y, size)
                 if found == CONVERGED and TOUCHING * size >= gap > best[5]:
                     best = (True, cf, cg, y, n, gap)
-                break
+            if best[0]:
+                return best
             reach *= 2.0
     return best
