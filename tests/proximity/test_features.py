@@ -135,3 +135,44 @@ def test_bodies_that_all_but_touch_are_told_apart_to_rounding(gap):
         assert abs(pair.gap - gap) < 2e-15
         np.testing.assert_allclose(pair.normal, n, atol=1e-12)
         assert pair.status is FeatureStatus.APART or (pair.status is FeatureStatus.PENETRATING and pair.gap <= 0.0)
+
+
+BOX, PLATE = shapes.box(1.0, 1.0, 1.0), shapes.box(2.0, 2.0, 0.1)
+BLOCK, ROD = shapes.box(2.0, 2.0, 1.0), shapes.solid_cylinder(0.5, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "place", "gap"),
+    [
+        (BLOCK, ROD, (0.3, 0.2, 1.0), 0.0),
+        (BLOCK, ROD, (0.3, 0.2, 0.999), -0.001),
+        (PLATE, PLATE, (0.3, 0.2, 0.1), 0.0),
+        (BOX, BOX, (0.3, 0.2, 1.0 - 1e-9), -1e-9),
+        (BOX, BOX, (0.9, 0.1, 0.1), -0.1),
+        (BOX, BOX, (0.1, -0.95, 0.2), -0.05),
+        (shapes.torus(1.0, 0.72), shapes.sphere(0.57), (0.04, 0.01, 0.79), None),
+    ],
+    ids=["rod on block", "rod in block", "plates", "stacked", "side by side", "behind", "ball in a torus"],
+)
+def test_bodies_in_each_other_come_apart_by_the_shortest_way(a, b, place, gap):
+    # Ways out along other faces than the nearest ones are longer by hundreds.
+    if gap is None:
+        # A ball beside the ring of a torus: the distance from its middle to the circle, less both radii.
+        gap = np.hypot(np.hypot(*place[:2]) - 1.0, place[2]) - 0.72 - 0.57
+    for first, second, sign in ((a, b, 1.0), (b, a, -1.0)):
+        pair = closest_features(first, second, q_b=[*(sign * np.array(place)), 1.0, 0.0, 0.0, 0.0])
+        assert pair.gap == pytest.approx(gap, abs=1e-12)
+        assert pair.status is (FeatureStatus.PENETRATING if pair.gap < 0.0 else FeatureStatus.APART)
+
+
+@pytest.mark.parametrize("place", [(0.5, 0.0, 0.0), (0.0, -0.25, 0.0), (0.0, 0.5, 0.5), (0.0, 0.0, 0.0)], ids=str)
+def test_solids_with_flush_faces_that_overlap_are_not_apart(place):
+    # All that a search finds first are points in common, at distance zero.
+    pair = closest_features(BOX, BOX, q_b=[*place, 1.0, 0.0, 0.0, 0.0])
+    assert pair.status is FeatureStatus.PENETRATING and pair.gap <= -0.5
+
+
+@pytest.mark.parametrize("place", [(1.0, 0.0, 0.0), (1.0, 1.0, 0.0), (1.0, -1.0, 1.0), (1.0, 0.3, 0.2)], ids=str)
+def test_solids_that_touch_do_not_overlap(place):
+    pair = closest_features(BOX, BOX, q_b=[*place, 1.0, 0.0, 0.0, 0.0])
+    assert pair.status is not FeatureStatus.CROSSING and abs(pair.gap) < 1e-14
