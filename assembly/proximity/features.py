@@ -92,7 +92,8 @@ class FeaturePair:
     normal : (3,)
         Unit vector from a towards b; the outward normal of a, of b reversed, where one of the features is a face.
     gap : float
-        normal . (b - a): positive apart, negative interpenetrating.
+        normal . (b - a): positive apart, negative interpenetrating; of a body inside the other one, whose surfaces are
+        apart, the side of a's face on which b is.
     lower : float
         No points of the two are nearer than this; 0 where the bodies cross. Of a tracked pair, NaN.
     status : FeatureStatus

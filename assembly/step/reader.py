@@ -290,7 +290,7 @@ def read_step(path: str | PathLike[str], *, unit: str = "mm", strict: bool = Tru
         raise InputError(f"strict is {strict!r}; expected True or False")
     file = Path(fspath(path))
     if not file.is_file():
-        raise FileNotFoundError(f"path is {str(file)!r}; no such file")
+        raise FileNotFoundError(f"path is {str(file)!r}; {'a folder' if file.is_dir() else 'no such file'}")
     damage = ""
     try:
         bodies, left = bodies_of(str(file), unit, bool(strict))
