@@ -42,6 +42,8 @@ Table = NDArray[np.int64]
 Shape = Body | BodyFace | Face | NurbsSurface | Iterable[Face | NurbsSurface]
 Faces = tuple[Face, ...]
 _IDENTITY = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+# The squares of distances beyond this would overflow.
+_FARTHEST = 1e150
 
 
 class FeatureStatus(Enum):
@@ -145,6 +147,8 @@ def _pose(name: str, shape: Shape, q: ArrayLike | None) -> Array:
     row = vector(name, q, 7)
     if not float(np.abs(row[3:]).max()) > 1e-100:
         nonzero_quaternion(f"{name}[3:]", row[3:])
+    if not float(np.abs(row[:3]).max()) < _FARTHEST:
+        raise InputError(f"{name}[:3] is {row[:3].tolist()}; expected coordinates below {_FARTHEST:g}")
     return row
 
 
@@ -213,12 +217,13 @@ def closest_features(a: Shape, b: Shape, q_a: ArrayLike | None = None, q_b: Arra
     -------
     FeaturePair
         Where the bodies are apart, their nearest points. Where they cross, a pair with normals that oppose each other
-        and a negative gap: one that closes as the bodies come apart along the normal of a crossing.
+        and a negative gap: one that closes as the bodies come apart along the normal of a face that crosses, of these
+        the one that leads out first.
 
     Raises
     ------
     InputError, TypeError
-        Shapes without faces, wrong poses.
+        Shapes without faces, wrong poses, coordinates of 1e150 and more.
 
     Notes
     -----

@@ -6,8 +6,19 @@ import numpy as np
 import pytest
 
 from assembly.constraints.contact_rows import HARDLY, MAY_GO, hold_all, lost_guard, may_go
-from assembly.constraints.layout import FIRST_GUARD, FREE_COLUMN, GUARDS, HEADER, MINIMUM, ROW, ROW_TABLE, SHELL_F
+from assembly.constraints.layout import (
+    CONTACTS,
+    FIRST_GUARD,
+    FREE_COLUMN,
+    GUARDS,
+    HEADER,
+    MINIMUM,
+    ROW,
+    ROW_TABLE,
+    SHELL_F,
+)
 from assembly.proximity.solid_contact import CONTACT_RECORD, PAIR_GAP, STAYS, TRACK
+from assembly.solve.contacts import start_contacts
 
 LEAST = 0.25
 
@@ -66,3 +77,12 @@ def test_contacts_that_could_go_are_held_again_as_before():
         start[:, STAYS] = MAY_GO - holds, holds
         hold_all(table, start)
         assert (start[:, STAYS] == holds).all()
+
+
+def test_a_start_leaves_to_the_watch_what_a_clearance_has_lost():
+    for solids in (True, False):
+        table, pool, start, _point = guards(0.0, solids)
+        table[CONTACTS] = 2
+        start[:, 0] = np.nan
+        assert start_contacts(table, pool, None, start, np.full(2, -1), None) == -1
+        assert np.isnan(start[:, 0]).all()

@@ -219,6 +219,8 @@ def test_large_deviations_are_said(tmp_path, monkeypatch):
 def test_bad_arguments_are_named(tmp_path, nested):
     with pytest.raises(FileNotFoundError, match="no such file"):
         asm.read_step(tmp_path / "none.step")
+    with pytest.raises(FileNotFoundError, match="a folder"):
+        asm.read_step(tmp_path)
     with pytest.raises(ValueError, match="unit is 'inch'; expected one of 'um', 'mm', 'cm', 'm', 'in', 'ft'"):
         asm.read_step(nested, unit="inch")
     with pytest.raises(ValueError, match="strict is 1; expected True or False"):
