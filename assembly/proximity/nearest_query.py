@@ -73,7 +73,7 @@ def find_nearest(table, pool, shell_f, shell_g, q, size, codes, out):
     none = (0.0, 0.0, 0.0)
     if status == APART and abs(gap) <= TOUCHING * size:
         # Solids whose faces are flush have points in common before a search comes to where they cross.
-        if overlap_at(table, pool, shell_f, shell_g, turn, f, g, x, np.empty((WAYS, 3))):
+        if overlap_at(table, pool, shell_f, shell_g, turn, f, g, x, size, np.empty((WAYS, 3))):
             status = CROSSING
     write_features(table, pool, shell_f, shell_g, q, turn_f, turn, shift, f, g, x, none, gap, size, codes, out)
     out[LOWER] = lower

@@ -31,6 +31,8 @@ STEPS, HALVINGS = 12, 8
 ROUGH = 0.01
 # Shells that are apart by this part of the size may seem to cross: rounding says so of those that touch.
 TOUCHING = 1e-12
+# A move by this part of the size parts what only touches.
+PARTED = 1e-6
 
 
 @kernel(inner=True)
@@ -89,8 +91,13 @@ def deepest(table, pool, shell_f, shell_g, turn, shift, f, g, x, size):
             return True, 0, 0, y, none, gap
     same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
     ways = np.empty((WAYS, 3))
-    count = add_ways(table, pool, shell_f, f, x[0], x[1], same, 1.0, ways, 0)
-    count = add_ways(table, pool, shell_g, g, x[2], x[3], turn, -1.0, ways, count)
+    count = add_ways(table, pool, shell_f, f, x[0], x[1], same, 1.0, size, ways, 0)
+    count = add_ways(table, pool, shell_g, g, x[2], x[3], turn, -1.0, size, ways, count)
+    # Out of a corner it leads between the walls.
+    total = none
+    for k in range(count):
+        total = add(total, (ways[k, 0], ways[k, 1], ways[k, 2]))
+    count = add_way(total, ways, count)
     best = (False, f, g, x, none, -math.inf)
     for attempt in range(2):
         if attempt == 1:
@@ -108,8 +115,17 @@ def deepest(table, pool, shell_f, shell_g, turn, shift, f, g, x, size):
                 if status == CROSSING or not lower > 0.0:
                     continue
                 found, cf, cg, y, n, gap = walk_back(table, pool, shell_f, shell_g, turn, shift, away, cf, cg, y, size)
-                if found == CONVERGED and TOUCHING * size >= gap > best[5]:
-                    best = (True, cf, cg, y, n, gap)
+                if found != CONVERGED or not TOUCHING * size >= gap > best[5]:
+                    continue
+                if gap >= -TOUCHING * size:
+                    # They touch here. If that is all, the least move parts them.
+                    place = add(shift, scale(PARTED / reach * size, away))
+                    status, _cf, _cg, _y, _gap, lower, _effort = search(
+                        table, pool, shell_f, shell_g, turn, place, size, ROUGH
+                    )
+                    if status == CROSSING or not lower > 0.0:
+                        continue
+                best = (True, cf, cg, y, n, gap)
             if best[0]:
                 return best
             reach *= 2.0

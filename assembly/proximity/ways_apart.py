@@ -1,15 +1,17 @@
 """Ways in which two shells may come apart from where they meet: the normals of the faces there.
 
-At a point of a face that is its normal, of an edge those of its two faces, of a vertex those of all faces around it;
-of g they are turned back. Where one direction leads into all of these faces at once, the solids overlap there.
+At a point of a face that is its normal, of an edge, or on the border of a face, those of its two faces, of a vertex
+those of all faces around it; of g they are turned back. Where one direction leads into all of these faces at once, the
+solids overlap there.
 """
 
 from __future__ import annotations
 
 from assembly._kernel import kernel
 from assembly.geometry.spline import SIGN
-from assembly.geometry.vec import add, cross, dot, matvec, scale
+from assembly.geometry.vec import add, cross, dot, matvec, scale, sub
 from assembly.proximity.crossing import tangents
+from assembly.proximity.edge_frame import edge_jet
 from assembly.proximity.shell import (
     EDGE,
     EDGE_CURVE,
@@ -24,17 +26,20 @@ from assembly.proximity.shell import (
     FACE_RECORD,
     FACE_SURFACE,
     FACE_TABLE,
+    FACE_TRIM,
     FACES,
     VERTEX_EDGE_LIST,
     VERTEX_EDGES,
     VERTEX_RECORD,
     VERTEX_TABLE,
 )
-from assembly.proximity.switching import edge_end, feature_kind, on_surface, other_parameter
+from assembly.proximity.switching import edge_end, feature_kind, nearest_edge, on_surface, other_parameter
 from assembly.proximity.tips import unit
 
 # Room for ways; cosine of the angle below which two are one.
-WAYS, ALIKE = 12, 1.0 - 1e-9
+WAYS, ALIKE = 32, 1.0 - 1e-9
+# A point of a face this near to its border, in parts of the size, is on it.
+BORDER = 1e-9
 # A direction leads into a face that leans from its normal by a cosine below minus this.
 INTO = 0.05
 
@@ -69,15 +74,22 @@ def add_edge_ways(table, pool, edge, t, turn, side, ways, count):
 
 
 @kernel(inner=True)
-def add_ways(table, pool, shell, code, u, v, turn, side, ways, count):
+def add_ways(table, pool, shell, code, u, v, turn, side, size, ways, count):
     """The normals of the faces at a point (u, v) of a feature; turned, times `side`. How many ways there are then."""
     kind = feature_kind(table, shell, code)
     faces, edges = table[shell + FACES], table[shell + EDGES]
     if kind == FACE:
         record = table[shell + FACE_TABLE] + FACE_RECORD * code
-        _p, su, sv = tangents(table, pool, FACE, record, turn, (0.0, 0.0, 0.0), u, v)
+        p, su, sv = tangents(table, pool, FACE, record, turn, (0.0, 0.0, 0.0), u, v)
         sign = float(table[table[record + FACE_SURFACE] + SIGN])
-        return add_way(scale(side * sign, cross(su, sv)), ways, count)
+        count = add_way(scale(side * sign, cross(su, sv)), ways, count)
+        if table[record + FACE_TRIM] >= 0:
+            code, at = nearest_edge(table, pool, shell, code, u, v)
+            edge = table[shell + EDGE_TABLE] + EDGE_RECORD * (code - faces)
+            d = sub(matvec(turn, edge_jet(table, pool, edge, at[0])[0]), p)
+            if dot(d, d) <= BORDER * BORDER * size * size:
+                count = add_edge_ways(table, pool, edge, at[0], turn, side, ways, count)
+        return count
     if kind == EDGE:
         edge = table[shell + EDGE_TABLE] + EDGE_RECORD * (code - faces)
         return add_edge_ways(table, pool, edge, u, turn, side, ways, count)
@@ -100,16 +112,23 @@ def is_open(table, shell):
 
 
 @kernel(inner=True)
-def overlap_at(table, pool, shell_f, shell_g, turn, f, g, x, ways):
+def overlap_at(table, pool, shell_f, shell_g, turn, f, g, x, size, ways):
     """Whether solids that meet at x of features f and g have insides in common there, as where faces are flush.
 
-    One direction is tried, against the sum of all normals: True is certain, False is not.
+    One direction is tried, against the sum of all normals. False is not certain, nor of what overlaps elsewhere.
     """
     if is_open(table, shell_f) or is_open(table, shell_g):
         return False
     same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-    count = add_ways(table, pool, shell_f, f, x[0], x[1], same, 1.0, ways, 0)
-    count = add_ways(table, pool, shell_g, g, x[2], x[3], turn, 1.0, ways, count)
+    if add_ways(table, pool, shell_g, g, x[2], x[3], turn, 1.0, size, ways, 0) == 0:
+        # A tip has no normal.
+        return False
+    count = add_ways(table, pool, shell_f, f, x[0], x[1], same, 1.0, size, ways, 0)
+    if count == 0:
+        return False
+    count = add_ways(table, pool, shell_g, g, x[2], x[3], turn, 1.0, size, ways, count)
+    if count == ways.shape[0]:
+        return False
     total = (0.0, 0.0, 0.0)
     for k in range(count):
         total = add(total, (ways[k, 0], ways[k, 1], ways[k, 2]))
@@ -117,4 +136,4 @@ def overlap_at(table, pool, shell_f, shell_g, turn, f, g, x, ways):
     for k in range(count):
         if not dot(total, (ways[k, 0], ways[k, 1], ways[k, 2])) > INTO:
             return False
-    return count > 0
+    return True

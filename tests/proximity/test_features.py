@@ -7,6 +7,7 @@ import pytest
 
 from assembly.errors import InputError
 from assembly.geometry import shapes, solids
+from assembly.geometry.curve import NurbsCurve
 from assembly.geometry.face import Face
 from assembly.kinematics.body import Body
 from assembly.proximity import Feature, FeaturePair, FeatureStatus, FeatureTracker, closest_features
@@ -165,6 +166,31 @@ def test_bodies_in_each_other_come_apart_by_the_shortest_way(a, b, place, gap):
         pair = closest_features(first, second, q_b=[*(sign * np.array(place)), 1.0, 0.0, 0.0, 0.0])
         assert pair.gap == pytest.approx(gap, abs=1e-12)
         assert pair.status is (FeatureStatus.PENETRATING if pair.gap < 0.0 else FeatureStatus.APART)
+
+
+def stair():
+    """A block with a step: the tread is y = 1 from x = 1 on, the riser x = 1 above it."""
+    corners = np.array([(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)], dtype=float)
+    sides = [np.array([corners[k], corners[(k + 1) % 6]]) for k in range(6)]
+    return shapes.extrusion([NurbsCurve(side, [0.0, 0.0, 1.0, 1.0], 1) for side in sides], 1.0)
+
+
+def test_what_touches_at_one_place_and_crosses_at_another_is_not_apart():
+    # A box that rests on the tread, a tenth deep in the riser: a way out upward ends at the tread, gap zero.
+    for height in (0.0, 0.13):
+        there = np.array([1.4, 1.5, height])
+        pair = closest_features(stair(), BOX, q_b=[*there, 1.0, 0.0, 0.0, 0.0])
+        assert pair.status is FeatureStatus.PENETRATING and pair.gap == pytest.approx(-0.1, abs=1e-13)
+        back = closest_features(BOX, stair(), q_b=[*-there, 1.0, 0.0, 0.0, 0.0])
+        assert back.status is FeatureStatus.PENETRATING and back.gap < -0.09
+
+
+@pytest.mark.parametrize(("radius", "place"), [(0.4, (0.1, 0.0, 1.0)), (0.5, (0.17, -0.12, 1.0))])
+def test_stacked_cylinders_touch(radius, place):
+    # Their walls meet on the rims, to rounding: the way out is along the caps' normal.
+    lower, upper = shapes.solid_cylinder(radius, 1.0), shapes.solid_cylinder(0.4, 1.0)
+    pair = closest_features(lower, upper, q_b=[*place, 1.0, 0.0, 0.0, 0.0])
+    assert pair.status is FeatureStatus.APART and abs(pair.gap) < 1e-15
 
 
 @pytest.mark.parametrize("place", [(0.5, 0.0, 0.0), (0.0, -0.25, 0.0), (0.0, 0.5, 0.5), (0.0, 0.0, 0.0)], ids=str)
