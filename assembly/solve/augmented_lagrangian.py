@@ -313,9 +313,9 @@ def solve_program(table, pool, settings, state, history, tips):
             mu = 1e-4
             check_at, check_violation = iteration + PATIENCE, violation
         if not restoring and iteration >= check_at:
-            # The rows gain nothing, though they did not hold before: see whether they can hold at all.
-            gains = check_violation <= feasible or violation <= max(feasible, 0.5 * check_violation)
-            if not gains and restorations < RESTORATIONS:
+            # The rows gain nothing: see whether they can hold at all. One that has just closed has had no time to.
+            least = TOUCHING if check_violation <= feasible else feasible
+            if violation > max(least, 0.5 * check_violation) and restorations < RESTORATIONS:
                 restoring = True
                 restorations += 1
                 entered = violation
