@@ -118,12 +118,10 @@ def deepest(table, pool, shell_f, shell_g, turn, shift, f, g, x, size):
                 if found != CONVERGED or not TOUCHING * size >= gap > best[5]:
                     continue
                 if gap >= -TOUCHING * size:
-                    # They touch here. If that is all, the least move parts them.
+                    # They touch here. If that is all, the least move parts them. Where they touch along a line or
+                    # all over a face a search so near may not come to its proof: that none is found has to do.
                     place = add(shift, scale(PARTED / reach * size, away))
-                    status, _cf, _cg, _y, _gap, lower, _effort = search(
-                        table, pool, shell_f, shell_g, turn, place, size, ROUGH
-                    )
-                    if status == CROSSING or not lower > 0.0:
+                    if search(table, pool, shell_f, shell_g, turn, place, size, ROUGH)[0] == CROSSING:
                         continue
                 best = (True, cf, cg, y, n, gap)
             if best[0]:
