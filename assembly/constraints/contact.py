@@ -7,6 +7,7 @@ import numpy as np
 from assembly.constraints.constraint import Constraint
 from assembly.errors import InputError
 from assembly.geometry.face import Face
+from assembly.geometry.smooth_faces import has_creases
 from assembly.kinematics.body import Body, BodyFace
 
 __all__ = ["Contact", "side_faces"]
@@ -28,8 +29,8 @@ class Contact(Constraint):
     unilateral : bool
         gap >= 0 instead of gap = 0.
     edges : bool, optional
-        Whether the faces' edges and vertices take part. By default where a side has several faces, or one with loops;
-        without them a contact that would have to leave a surface is lost.
+        Whether the faces' edges and vertices take part. By default where a side has several faces, or one with loops
+        or creases; without them a contact that would have to leave a surface is lost.
 
     Raises
     ------
@@ -65,7 +66,7 @@ class Contact(Constraint):
         several = any(len(faces) > 1 for faces in sides)
         if several and edges is not None and not edges:
             raise InputError("edges is False for a body with several faces; expected a contact of two single faces")
-        self._edges = bool(edges) if edges is not None else several or any(_has_loops(faces[0]) for faces in sides)
+        self._edges = bool(edges) if edges is not None else several or any(_has_edges(faces[0]) for faces in sides)
 
     @property
     def a(self) -> Body | BodyFace:
@@ -106,6 +107,6 @@ def side_faces(side: Body | BodyFace) -> tuple[Face, ...]:
     return (side.face,) if isinstance(side, BodyFace) else tuple(part.face for part in side.faces)
 
 
-def _has_loops(face: Face) -> bool:
-    """Whether a face was given loops."""
-    return face.outer is not None or bool(face.holes)
+def _has_edges(face: Face) -> bool:
+    """Whether a face was given loops, or has creases."""
+    return face.outer is not None or bool(face.holes) or has_creases(face)

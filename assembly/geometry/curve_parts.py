@@ -8,13 +8,18 @@ from numpy.typing import NDArray
 from assembly.geometry import bezier
 from assembly.geometry.curve import NurbsCurve
 
-__all__ = ["CORNER", "between", "crease_knots", "smooth_parts"]
+__all__ = ["CORNER", "between", "crease_knots", "sampled", "smooth_parts"]
 
 Array = NDArray[np.float64]
 # A jump of the tangent by more than this makes a corner [rad].
 CORNER = 1e-6
 # Parameters closer than this part of the domain are one: a piece between them would be too short for doubles.
 _SNAP = 1e-10
+
+
+def sampled(breaks: Array, count: int) -> Array:
+    """Parameters between breaks, with the breaks."""
+    return np.unique(np.concatenate([np.linspace(a, b, count) for a, b in zip(breaks[:-1], breaks[1:], strict=True)]))
 
 
 def _cut(points: Array, x: float) -> tuple[Array, Array]:

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.errors import InputError, integer, number, real_array
 from assembly.geometry import bezier
 from assembly.geometry.cells import surface_cells
+from assembly.geometry.creases import crease_lines
 from assembly.geometry.curve import COINCIDENT, checked_name, checked_weights, flat, parameters, similarity
 from assembly.geometry.spline import CELL_COUNT, CELLS, SURFACE_RECORD, evaluate_surface
 
@@ -139,6 +140,11 @@ class NurbsSurface:
             for bit, edge in zip((1, 2, 4, 8), points, strict=True)
             if float(np.ptp(edge, axis=(0, 1)).max()) <= COINCIDENT * self.size
         )
+
+    @cached_property
+    def _creases(self) -> tuple[Array, Array]:
+        """Parameters in u and v at which the normal jumps; the low end for a seam where it does."""
+        return crease_lines(self)
 
     @property
     def _homogeneous(self) -> Array:

@@ -10,14 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.geometry.bezier import bernstein, elevation
+from assembly.geometry.bezier import elevation
 from assembly.geometry.face import Face
-from assembly.proximity.cones import FULL, around_vectors, between
+from assembly.proximity.cones import around_vectors
 from assembly.proximity.edge_cells import CLEAR, OUTSIDE, box_sides
 from assembly.proximity.normal_nets import Nets, bezier_product, nets_of, restricted
 
@@ -34,8 +33,6 @@ _MOST, _FINEST = 20_000, 1e-4
 _ASPECT, _SHORT, _AT_BOUNDARY = 4.0, 0.03125, 0.125
 # Patches are measured so many at a time, for the memory that their nets take.
 _BATCH = 4096
-# Normals on both sides of a knot line that differ by more make a crease.
-_CREASE = 1e-6
 # A round halves all patches whose chord error is above this part of the largest.
 _ROUND = 0.5
 
@@ -172,37 +169,6 @@ class _Divided:
         high[rows, first] = middle
         return self.inside(self.measured(np.concatenate([patches.piece] * 2), np.concatenate([low, high])))
 
-    def finished(self, patches: Patches) -> Patches:
-        """With full cones along creases, where normals of both sides count."""
-        creased = self._creased
-        if not any(lines.any() for lines in creased):
-            return patches
-        half = patches.half_angle.copy()
-        for k, lines in enumerate(creased):
-            along = patches.piece[:, 1 - k]
-            for side in range(2):
-                at = (patches.piece[:, k] + side) % lines.shape[0]
-                half[(patches.box[:, 2 * k + side] == side) & lines[at, along]] = FULL
-        values = {field.name: getattr(patches, field.name) for field in fields(patches)}
-        return Patches(**{**values, "half_angle": half})
-
-    @cached_property
-    def _creased(self) -> tuple[Mask, Mask]:
-        """Whether knot lines of u (line, span in v), then of v, are creases; the first is the last of a seam."""
-        result = []
-        for k in range(2):
-            net = self.nets.normals if k == 0 else self.nets.normals.transpose(1, 0, 3, 2, 4)
-            basis = bernstein(net.shape[3] - 1, np.linspace(0.0, 1.0, 7))
-            before, after = basis @ np.roll(net[:, :, -1], 1, axis=0), basis @ net[:, :, 0]
-            sizes = np.linalg.norm(before, axis=-1) * np.linalg.norm(after, axis=-1)
-            with np.errstate(divide="ignore", invalid="ignore"):
-                units = (x / np.linalg.norm(x, axis=-1, keepdims=True) for x in (before, after))
-                lines = ((between(*units) > _CREASE) & (sizes > 0.0)).any(axis=2)
-            if not self.face.surface.closed[k]:
-                lines[0] = False
-            result.append(lines)
-        return result[0], result[1]
-
 
 def _turn(normals: Array) -> Array:
     """How far normals (n, rows, columns, 3) turn along the rows, at most."""
@@ -249,7 +215,7 @@ def patches_by_angle(face: Face, angle: float) -> tuple[Patches, Array]:
         # A normal that turns in neither direction by what is told: the longer side, as for the shape.
         told = turned & (np.abs(np.diff(chosen.turns, axis=1)[:, 0]) > 1e-3 * angle)
         active = divided.halved(chosen, np.where(told, chosen.turns[:, 1] > chosen.turns[:, 0], in_v))
-    patches = divided.finished(Patches.joined(done))
+    patches = Patches.joined(done)
     return patches, divided.parameters(patches)
 
 
@@ -276,5 +242,4 @@ def patches_by_count(faces: Sequence[Face], count: int) -> list[tuple[Patches, A
             longer, bulgier = (x[:, 1] > x[:, 0] for x in (some.lengths, some.bulges))
             in_v = np.where(_slender(some, one.size), longer, bulgier)
             state[k] = Patches.joined([part.at(~mine), one.halved(some, in_v)])
-    finished = [one.finished(part) for one, part in zip(divided, state, strict=True)]
-    return [(part, one.parameters(part)) for one, part in zip(divided, finished, strict=True)]
+    return [(part, one.parameters(part)) for one, part in zip(divided, state, strict=True)]

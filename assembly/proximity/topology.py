@@ -18,6 +18,7 @@ from assembly.errors import InputError, positive
 from assembly.geometry.curve import NurbsCurve
 from assembly.geometry.curve_parts import CORNER
 from assembly.geometry.face import Face
+from assembly.geometry.smooth_faces import smooth_faces
 from assembly.proximity.recut import with_cuts
 from assembly.proximity.rim_cutting import all_live, cut_at_vertices, live_rims, merged
 from assembly.proximity.rim_matching import STATIONS, matches_of
@@ -89,7 +90,8 @@ class Topology:
     Attributes
     ----------
     faces : tuple of Face
-        As they were given, but for boundary curves that had to be cut where other faces' edges end.
+        As they were given, but for boundary curves that had to be cut where other faces' edges end, and for faces with
+        creases, which are cut along these and count as several.
     edges : tuple of Edge
     vertices : tuple of Vertex
     face_edges : tuple of tuple of (int or None)
@@ -135,7 +137,7 @@ def topology_of(faces: Iterable[Face], tolerance: float | None = None) -> Topolo
     TypeError
         Something that is not a Face.
     """
-    given = _checked(faces)
+    given = [part for face in _checked(faces) for part in smooth_faces(face)]
     if tolerance is None:
         boxes = [face.surface.bounding_box() for face in given]
         low, high = np.min([box[0] for box in boxes], axis=0), np.max([box[1] for box in boxes], axis=0)

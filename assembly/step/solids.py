@@ -13,13 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.geometry.curve import NurbsCurve
+from assembly.geometry.curve_parts import sampled
 from assembly.geometry.face import Face
+from assembly.geometry.region_cuts import cut_open
+from assembly.geometry.region_pieces import POLE, SEAM, Piece
 from assembly.geometry.surface import NurbsSurface
-from assembly.step.cuts import cut_open
 from assembly.step.occt import occt, parts
-from assembly.step.pieces import POLE, SEAM, Piece
 from assembly.step.profiles import approximated
-from assembly.step.trims import crossings, sampled
+from assembly.step.trims import crossings
 
 __all__ = ["Sewn", "sewn"]
 

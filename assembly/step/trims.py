@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from assembly.geometry.curve import NurbsCurve
+from assembly.geometry.curve_parts import sampled
 from assembly.step.occt import occt
 from assembly.step.profiles import Direction, Spline, Straight, Turning, Unreadable, approximated, profile, spline
 from assembly.step.surfaces import Patch
 
-__all__ = ["Edge", "chained", "crossings", "edge_curve", "head_to_tail", "sampled"]
+__all__ = ["Edge", "chained", "crossings", "edge_curve", "head_to_tail"]
 
 Array = NDArray[np.float64]
 # Deviation allowed to curves without rational form, over the shorter side of the surface's domain.
@@ -77,11 +78,6 @@ class Edge:
         """As the loops of a face take it, its u and v multiplied."""
         points, weights = self.curve.cartesian
         return NurbsCurve(points * scales, self.curve.knots, self.curve.degree, weights, name=self.name)
-
-
-def sampled(breaks: Array, count: int) -> Array:
-    """Parameters between breaks, with the breaks."""
-    return np.unique(np.concatenate([np.linspace(a, b, count) for a, b in zip(breaks[:-1], breaks[1:], strict=True)]))
 
 
 def crossings(values: Array, at: Array, function: Any, joints: Array) -> list[float]:

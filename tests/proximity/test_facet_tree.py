@@ -112,19 +112,22 @@ def test_a_reversed_face_turns_its_cones():
     np.testing.assert_allclose(one.axis, -other.axis, atol=1e-12)
 
 
-def test_creases_have_all_directions():
-    """A square tube: four knot lines of u, the seam among them, are creases, and no edges of the topology."""
+def test_creases_are_edges():
+    """A square tube: four knot lines of u, the seam among them, are creases."""
     corners = np.array([(1, -1), (1, 1), (-1, 1), (-1, -1), (1, -1)], dtype=float)
     points = np.stack([np.column_stack([corners, np.full(5, z)]) for z in (0.0, 2.0)], axis=1)
     tube = Face(NurbsSurface(points, ([0, 0, 1, 2, 3, 4, 4], [0, 0, 1, 1]), (1, 1)))
     assert tube.surface.closed == (True, False)
     tree = FacetTree.of((tube,), count=400)
     patches = slice(0, len(tree.corners))
-    u = tree.parameters[patches, :2]
-    creased = (u == np.round(u)).any(axis=1)
-    assert 0 < creased.sum() < 0.9 * len(u)
-    assert (tree.half_angle[patches][creased] == FULL).all()
-    assert (tree.half_angle[patches][~creased] < 1e-12).all()
+    assert (tree.half_angle[patches] < 1e-12).all()
+    # Four sides; four edges between two of them hold the normals of both, at right angles.
+    convex = np.flatnonzero([edge.convex is True for edge in tree.topology.edges])
+    assert len(tree.topology.faces) == 4 and len(convex) == 4
+    for edge in convex:
+        half = tree.half_angle[tree.feature == 4 + edge]
+        assert (np.abs(half - np.pi / 4) < 1e-9).all()
+    assert tree.check_enclosure() <= 0.0
     # A wire has knots, too, but no creases.
     assert FacetTree.of(TORUS).half_angle.max() < FULL
 

@@ -9,12 +9,12 @@ import pytest
 
 import assembly as asm
 from assembly.geometry.bezier import full_knots
-from assembly.step.cuts import cut_open, part_of
-from assembly.step.pieces import EDGE, POLE, SEAM, Uncut
+from assembly.geometry.region_cuts import cut_open, part_of
+from assembly.geometry.region_pieces import EDGE, POLE, SEAM, Uncut
+from assembly.geometry.region_strips import strip
 from assembly.step.profiles import Straight, Turning, Unreadable, approximated, arc, spline
 from assembly.step.surfaces import Patch
 from assembly.step.trims import Edge, chained
-from assembly.step.unrolled import strip
 
 
 def circle(center, radius, clockwise=False):

@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.geometry import bezier
+from assembly.geometry.region_pieces import Piece, Uncut, periods, shifted
 from assembly.geometry.surface import NurbsSurface
-from assembly.step.pieces import Piece, Uncut, periods, shifted
-from assembly.step.profiles import SLACK
 
 __all__ = ["opened", "strip"]
 
 Array = NDArray[np.float64]
+# How far a strip reaches beyond a region, as a part of its extent.
+_SLACK = 1.0 / 32.0
 # Parts of a span within which a strip ends at the span's end.
 _NEAR = 1e-6
 
@@ -72,17 +73,17 @@ def _continuous(row: list[Piece], around: list[float]) -> Array:
     return way
 
 
-def _corners(row: list[Piece]) -> Array:
+def corners_of(row: list[Piece]) -> Array:
     """Points along a chain (n, 2)."""
     return np.concatenate([piece.curve.evaluate(np.linspace(*piece.curve.domain, 17)[:-1]) for piece in row])
 
 
-def _area(corners: Array) -> float:
+def area_of(corners: Array) -> float:
     x, y = corners.T
     return 0.5 * float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
 
 
-def _winds(corners: Array, point: Array) -> bool:
+def winds(corners: Array, point: Array) -> bool:
     """Whether a polygon goes round a point."""
     x, y = (corners - point).T
     turn = np.diff(np.unwrap(np.arctan2(np.append(y, y[0]), np.append(x, x[0])))).sum()
@@ -95,7 +96,7 @@ def opened(chains: list[list[Piece]], surface: NurbsSurface, axis: int) -> Nurbs
     around = periods(surface)
     period = around[axis]
     turns = [_continuous(row, around) for row in chains]
-    corners = [_corners(row) for row in chains]
+    corners = [corners_of(row) for row in chains]
     # Which way chains go round in the other direction, seen so that the material is above where it is positive.
     way = 1.0 if axis == 1 else -1.0
     rings = [way * turn[1 - axis] for turn in turns]
@@ -112,7 +113,7 @@ def opened(chains: list[list[Piece]], surface: NurbsSurface, axis: int) -> Nurbs
         _shift_all(chains[top], axis, shift)
         bounds = start, corners[top][:, axis].max() + shift
     else:
-        outer = [k for k, each in enumerate(corners) if _area(each) > 0.0]
+        outer = [k for k, each in enumerate(corners) if area_of(each) > 0.0]
         if not outer:
             return surface
         frame = outer[:1]
@@ -127,12 +128,12 @@ def opened(chains: list[list[Piece]], surface: NurbsSurface, axis: int) -> Nurbs
         for turn in turns_of:
             there = middle.copy()
             there[axis] += turn * period
-            if len(frame) == 2 or _winds(corners[frame[0]], there):
+            if len(frame) == 2 or winds(corners[frame[0]], there):
                 _shift_all(row, axis, turn * period)
                 break
         else:
             raise Uncut("a hole of it lies outside of its outer loop")
-    slack = SLACK * (bounds[1] - bounds[0])
+    slack = _SLACK * (bounds[1] - bounds[0])
     return strip(surface, axis, bounds[0] - slack, bounds[1] + slack)
 
 

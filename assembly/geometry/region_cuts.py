@@ -1,10 +1,10 @@
-"""Regions of closed surfaces cut open along the seams, as STEP and OCCT want them.
+"""Regions of closed surfaces cut open along the seams, as STEP and OCCT want them; and any region cut in two.
 
 A face's boundary lives in the unrolled plane: a ring closes up to a period, and windows may lie across the seam. Here
 every curve is cut where it crosses a seam and moved into the domain. Where a boundary crosses the seam upwards (in
 the sense that the material, on its left, is above the crossing), a stretch of the seam begins, and it ends where the
 next one crosses downwards, or at a pole. Each stretch becomes two pieces, one on either side of the domain, and the
-pieces are linked again.
+pieces are linked again. A line inside of the domain cuts a region in the same way, but that nothing moves.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from assembly.geometry.curve import NurbsCurve
+from assembly.geometry.curve_parts import sampled
+from assembly.geometry.region_pieces import NEAR, POLE, SEAM, Piece, Uncut, closed_at_poles, segment
+from assembly.geometry.region_strips import opened
 from assembly.geometry.surface import NurbsSurface
-from assembly.step.pieces import NEAR, POLE, SEAM, Piece, Uncut, closed_at_poles, segment
-from assembly.step.trims import sampled
-from assembly.step.unrolled import opened
 
-__all__ = ["cut_open", "part_of"]
+__all__ = ["cut_in_two", "cut_open", "part_of"]
 
 Array = NDArray[np.float64]
 
@@ -53,10 +53,15 @@ def part_of(curve: NurbsCurve, cuts: list[float]) -> list[NurbsCurve]:
 class _Axis:
     """One closed direction: across the seam s, and h along it so that (s, h) is right-handed."""
 
+    # Whether a line that no boundary crosses may lie inside of the region.
+    goes_round = True
+
     def __init__(self, surface: NurbsSurface, axis: int) -> None:
         self.axis, self.other = axis, 1 - axis
         self.low, self.high = surface.domain[axis]
         self.period = self.high - self.low
+        # By what a piece moves for every seam between it and the domain.
+        self.shift = self.period
         # u, v itself; for v, s = v and h = -u.
         self.sign = 1.0 if axis == 0 else -1.0
         ends = sorted(self.sign * x for x in surface.domain[self.other])
@@ -76,6 +81,20 @@ class _Axis:
     def height(self, point: Array) -> float:
         """h of (u, v)."""
         return float(self.sign * point[self.other])
+
+
+class _Line(_Axis):
+    """A line inside of the domain of a region that is bounded: a seam with a period beyond the domain."""
+
+    goes_round = False
+
+    def __init__(self, surface: NurbsSurface, axis: int, at: float) -> None:
+        super().__init__(surface, axis)
+        self.period *= 4.0
+        self.shift = 0.0
+        self.low = self.high = at
+        self.around = 0.0
+        self.poles = (False, False)
 
 
 def _root(curve: NurbsCurve, axis: int, line: float, low: float, high: float) -> float:
@@ -136,7 +155,7 @@ def _strip(piece: Piece, axis: _Axis) -> int:
 def _moved(piece: Piece, axis: _Axis, strips: int) -> None:
     """Move a piece by whole periods into the domain."""
     points = piece.curve.control_points.copy()
-    at = points[:, axis.axis] - strips * axis.period
+    at = points[:, axis.axis] - strips * axis.shift
     # The two sides of the domain are a period apart to rounding only.
     for side in (axis.low, axis.high):
         at[np.abs(at - side) < 1e-12 * axis.period] = side
@@ -157,6 +176,8 @@ class _Crossing:
 
 def _seam_inside(chains: list[list[Piece]], axis: _Axis) -> bool:
     """Whether a seam that no boundary crosses lies within the region: decided by the boundary nearest to it."""
+    if not axis.goes_round:
+        return False
     if not chains:
         return True
     reach = [min(float(p.curve.control_points[:, axis.axis].min()) for p in chain) for chain in chains]
@@ -276,6 +297,24 @@ def cut_open(face: Any) -> tuple[NurbsSurface, list[list[Piece]]]:
         if surface.closed[axis]:
             chains = _cut(chains, _Axis(surface, axis))
     return surface, chains
+
+
+def cut_in_two(
+    chains: list[list[Piece]], surface: NurbsSurface, axis: int, at: float
+) -> tuple[list[list[Piece]], list[list[Piece]]]:
+    """The chains around the parts of a bounded region below and above a parameter of u (axis 0) or v (1).
+
+    Raises
+    ------
+    Uncut
+        The chains enclose no region.
+    """
+    below: list[list[Piece]] = []
+    above: list[list[Piece]] = []
+    for chain in _cut(chains, _Line(surface, axis, at)):
+        middle = np.mean([piece.curve.evaluate(np.linspace(*piece.curve.domain, 9))[:, axis] for piece in chain])
+        (below if middle < at else above).append(chain)
+    return below, above
 
 
 def _is_clamped(curve: NurbsCurve) -> bool:
