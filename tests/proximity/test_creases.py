@@ -81,7 +81,7 @@ def resting(contact, start):
 def test_a_ball_comes_to_rest_on_a_ridge(contact):
     solution = resting(contact, (0.3, 2.0, 1.2))
     assert solution.success, solution.message
-    # On the line from the ridge through the point; along a circle around the ridge the distance is flat to second order.
+    # On the line from the ridge through the point.
     np.testing.assert_allclose(solution.q[1, :2], [0.5 / np.sqrt(17.0), 1.0 + 2.0 / np.sqrt(17.0)], atol=1e-8)
 
 
