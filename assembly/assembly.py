@@ -25,6 +25,7 @@ from assembly.proximity.solid_contact import TRACK
 from assembly.solve.augmented_lagrangian import solve_program
 from assembly.solve.options import Options
 from assembly.solve.settings import (
+    ANY_POSE,
     CONTACT_LOST,
     FREE_TRIMS,
     GATHER,
@@ -203,6 +204,8 @@ class Assembly:
     ) -> Solution:
         """Find the pose where every constraint holds and the objective is stationary.
 
+        Without an objective the least move is sought; where that is not found, any pose does at which all holds.
+
         Parameters
         ----------
         q0 : (n, 7) or Solution, optional
@@ -237,9 +240,10 @@ class Assembly:
             solve_program(*arguments, _LOADING, state.copy(), history, tips)
             Assembly._loaded.add(tips)
         gathers = not warm and not self._objectives
-        if gathers:
+        if not self._objectives:
             settings = settings.copy()
-            settings[GATHER] = 1.0
+            settings[ANY_POSE] = 1.0
+            settings[GATHER] = 0.0 if warm else 1.0
         begin = perf_counter()
         code = solve_program(*arguments, settings, state, history, tips)
         if code == CONTACT_LOST and packed.seek_penetration():

@@ -183,11 +183,12 @@ def solids_row(table, pool, r, start, patience, point):
         if is_guard(table, r):
             past = start[r, STAYS] > 0.0 and status == LEFT_PATCH
             return lost_guard(table, pool, r, start, point, past, goes)
-        if table[row + ONE_SIDED] == 1 or patience == math.inf:
-            found = search_row(table, pool, row, q, tracked, r)
-            if found:
-                status = track_row(table, pool, row, q, tracked, math.inf, records, tracked, r)
-                found = status == CONVERGED or status == SINGULAR
+        # Near touching a search takes long, and steps are short.
+        far = abs(start[r, PAIR_GAP]) > HARDLY
+        found = far or table[row + ONE_SIDED] == 1 or patience == math.inf
+        if found and search_row(table, pool, row, q, tracked, r):
+            status = track_row(table, pool, row, q, tracked, math.inf, records, tracked, r)
+        found = status == CONVERGED or status == SINGULAR
     if found:
         residual[r] = records[r, GAP] - pool[table[row + MINIMUM]]
         tracked[r, PAIR_GAP] = records[r, GAP]

@@ -53,10 +53,10 @@ from assembly.geometry.spline import curve_point, surface_point
 from assembly.geometry.trim_nearest import trim_nearest
 from assembly.geometry.vec import add, cross, dot, matvec, matvec_t, scale, sub
 from assembly.kinematics.motion import position, relative_pose, rotation
+from assembly.proximity.borders import on_surface
 from assembly.proximity.extremal import CONVERGED, SINGULAR
 from assembly.proximity.feature_pair import feature_record, solve_features
 from assembly.proximity.shell import EDGE, EDGE_CURVE, EDGE_RECORD, FACE
-from assembly.proximity.switching import on_surface
 from assembly.proximity.trim_distance import trim_distance
 from assembly.proximity.velocity import GAP, NORMAL, RATES, ZED
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly.geometry.vec import cross, dot
+from assembly.proximity.borders import feature_at, feature_kind
 from assembly.proximity.bounding_tree import ELEMENT, ELEMENT_FEATURE, ELEMENT_POOL, pairs_about
 from assembly.proximity.edge_frame import edge_jet
 from assembly.proximity.held_valleys import hold_continua, is_next_in_valley, is_of_faces, is_on_face
@@ -32,7 +33,6 @@ from assembly.proximity.roots import (
     solids_root,
 )
 from assembly.proximity.shell import EDGE, FACE
-from assembly.proximity.switching import feature_at, feature_kind
 from assembly.proximity.tips import unit
 from assembly.proximity.valleys import into_valley
 

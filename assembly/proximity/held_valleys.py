@@ -9,11 +9,11 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly.geometry.spline import surface_point
 from assembly.geometry.vec import dot, sub
+from assembly.proximity.borders import feature_at, feature_kind
 from assembly.proximity.holding import HELD_F, HELD_G
 from assembly.proximity.pair_tests import is_feasible
 from assembly.proximity.roots import CODE_F, CODE_G, CORNER, NEW, ORIGIN, ROOT, ROOT_FOLD, USELESS
 from assembly.proximity.shell import FACE, FACE_RECORD, FACE_TABLE
-from assembly.proximity.switching import feature_at, feature_kind
 from assembly.proximity.valleys import across_valley, into_valley
 
 # Cosine of the angle by which a valley turns from one of its points that are held to the next.

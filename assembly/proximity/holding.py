@@ -9,6 +9,7 @@ import math
 
 from assembly._kernel import kernel
 from assembly.geometry.vec import dot, matvec_t, neg
+from assembly.proximity.borders import feature_at, feature_kind, on_surface
 from assembly.proximity.extremal import CONVERGED, LEFT_PATCH, SINGULAR, own_frame
 from assembly.proximity.feature_pair import solve_features
 from assembly.proximity.pair_tests import is_feasible
@@ -23,7 +24,7 @@ from assembly.proximity.shell import (
     FACE_TABLE,
     VERTEX,
 )
-from assembly.proximity.switching import between_edges, feature_at, feature_kind, from_edge, from_vertex, on_surface
+from assembly.proximity.switching import between_edges, from_edge, from_vertex
 from assembly.proximity.tips import unit
 
 # How far a unit normal may lean over what is beside a feature that is held.

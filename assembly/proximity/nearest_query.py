@@ -9,13 +9,14 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly.geometry.vec import add, dot, matvec, matvec_t, scale, sub
 from assembly.kinematics.motion import position, relative_pose, rotation
+from assembly.proximity.borders import feature_at, feature_kind
 from assembly.proximity.cell_tree import feature_cells
 from assembly.proximity.crossing import tangents
 from assembly.proximity.extremal import CONVERGED, SINGULAR
 from assembly.proximity.feature_pair import solve_features
-from assembly.proximity.nearest import APART, CROSSING, search
+from assembly.proximity.nearest import APART, CROSSING, UNPROVEN, search
 from assembly.proximity.penetration import PENETRATING, TOUCHING, deepest
-from assembly.proximity.switching import feature_at, feature_kind, track_features
+from assembly.proximity.switching import track_features
 from assembly.proximity.ways_apart import WAYS, overlap_at
 
 # What is written of a pair: parameters (4), point of f, point of g, normal, gap, lower bound, pairs of cells looked
@@ -75,6 +76,13 @@ def find_nearest(table, pool, shell_f, shell_g, q, size, codes, out):
         # Solids whose faces are flush have points in common before a search comes to where they cross.
         if overlap_at(table, pool, shell_f, shell_g, turn, f, g, x, size, np.empty((WAYS, 3))):
             status = CROSSING
+    if status == UNPROVEN:
+        # The search was over before it came to the nearest one; beside what it found there may be nearer ones.
+        found, near_f, near_g, y, frame, _switches = track_features(
+            table, pool, shell_f, shell_g, turn, shift, f, g, x, none, size, math.inf
+        )
+        if (found == CONVERGED or found == SINGULAR) and lower <= abs(frame[5]) < abs(gap):
+            f, g, x, gap = near_f, near_g, y, frame[5]
     write_features(table, pool, shell_f, shell_g, q, turn_f, turn, shift, f, g, x, none, gap, size, codes, out)
     out[LOWER] = lower
     out[EFFORT] = effort

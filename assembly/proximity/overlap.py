@@ -14,6 +14,7 @@ from assembly._kernel import kernel
 from assembly.geometry.spline import SIGN, surface_point
 from assembly.geometry.trim import trim_side
 from assembly.geometry.vec import add, cross, matvec, matvec_t, scale, sub
+from assembly.proximity.borders import feature_at
 from assembly.proximity.bounding_tree import (
     CENTER,
     CHILD,
@@ -36,7 +37,6 @@ from assembly.proximity.near_root import is_within
 from assembly.proximity.piercing import cut_at, patch_corners, pierces
 from assembly.proximity.roots import GAP, POINT_F, POINT_G
 from assembly.proximity.shell import FACE_RECORD, FACE_TABLE, FACE_TRIM, FACES
-from assembly.proximity.switching import feature_at
 from assembly.proximity.tips import unit
 
 # Room for the descent of a segment.

@@ -14,11 +14,12 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly.geometry.vec import add, blend, dot, scale
+from assembly.proximity.borders import feature_at
 from assembly.proximity.extremal import CONVERGED, NOT_CONVERGED, SINGULAR
 from assembly.proximity.nearest import CROSSING, search
 from assembly.proximity.shell import EDGES, FACE_TABLE, FACE_TRIM, FACES, VERTICES
 from assembly.proximity.start import global_start
-from assembly.proximity.switching import feature_at, track_features
+from assembly.proximity.switching import track_features
 from assembly.proximity.ways_apart import WAYS, add_way, add_ways
 
 # A pair of shells that cross was found.

@@ -16,10 +16,10 @@ from assembly._kernel import kernel
 from assembly.geometry.spline import surface_point
 from assembly.geometry.trim import trim_side
 from assembly.geometry.vec import add, cross, dot, matvec, matvec_t, scale, sub
+from assembly.proximity.borders import feature_at, feature_kind
 from assembly.proximity.bounding_tree import COS, ELEMENT, ELEMENT_FEATURE, ELEMENT_POOL, SIN, node_of
 from assembly.proximity.edge_frame import edge_jet, edge_limits
 from assembly.proximity.shell import EDGE, FACE, FACE_RECORD, FACE_TABLE, FACE_TRIM
-from assembly.proximity.switching import feature_at, feature_kind
 
 # A part of an edge is looked at with so much of its neighbors, in half widths: what goes through where two meet counts.
 WIDER = 1.5

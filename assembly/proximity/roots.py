@@ -16,13 +16,13 @@ from assembly._kernel import kernel
 from assembly.geometry.spline import BREAKS_U, BREAKS_V, CLOSED_U, CLOSED_V, SPANS_U, SPANS_V, surface_point
 from assembly.geometry.vec import add, dot, matvec, matvec_t, scale, sub
 from assembly.kinematics.motion import rotation
+from assembly.proximity.borders import feature_at
 from assembly.proximity.controller import descend_pair
 from assembly.proximity.extremal import CONVERGED, NOT_CONVERGED, SINGULAR, pair_frame, solve_pair
 from assembly.proximity.folds import ALONE, fold_of
 from assembly.proximity.shell import FACES
 from assembly.proximity.solid_contact import FEATURE_F, FEATURE_G, FOLD, PAIR_NORMAL, PROPER, STAYS
 from assembly.proximity.start import opposed
-from assembly.proximity.switching import feature_at
 from assembly.proximity.velocity import ARM_F
 from assembly.proximity.velocity import GAP as RECORD_GAP
 

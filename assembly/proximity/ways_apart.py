@@ -10,6 +10,7 @@ from __future__ import annotations
 from assembly._kernel import kernel
 from assembly.geometry.spline import SIGN
 from assembly.geometry.vec import add, cross, dot, matvec, scale, sub
+from assembly.proximity.borders import edge_end, feature_kind, nearest_edge, on_surface, other_parameter
 from assembly.proximity.crossing import tangents
 from assembly.proximity.edge_frame import edge_jet
 from assembly.proximity.shell import (
@@ -33,7 +34,6 @@ from assembly.proximity.shell import (
     VERTEX_RECORD,
     VERTEX_TABLE,
 )
-from assembly.proximity.switching import edge_end, feature_kind, nearest_edge, on_surface, other_parameter
 from assembly.proximity.tips import unit
 
 # Room for ways; cosine of the angle below which two are one.

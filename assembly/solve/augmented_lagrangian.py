@@ -49,6 +49,7 @@ from assembly.solve.room import held_room, pairs_room, points, results_of, tape_
 from assembly.solve.rows import arrange, record_of_blocks, shape_of, turned, violation_of
 from assembly.solve.search import SHORTEST, goal, search
 from assembly.solve.settings import (
+    ANY_POSE,
     BUDGET,
     CONTACT_LOST,
     COUNT,
@@ -88,6 +89,8 @@ RESTORATIONS = 3
 SLOW, HARDEST = 3, 1e-10
 # Where a solve with clearances ends at a pose that does not hold, so many more steps lead back onto the rows.
 SETTLING = 30
+# Where nothing is asked for but that constraints hold: so many iterations may follow one with a violation this small.
+LINGERS, NEARLY = 40, 1e-6
 # A tick that does not hold after its iterations has so many times more of them.
 EXTRA_TIME = 4
 # So often at most a solve leaves a saddle of its violations.
@@ -159,6 +162,10 @@ def solve_program(table, pool, settings, state, history, tips):
     alpha = 0.0
     free_trims = settings[FREE_TRIMS] == 1.0
     tick = settings[TICK] == 1.0
+    any_pose = settings[ANY_POSE] == 1.0
+    # Whether what fails is led back onto its rows at the end.
+    settles = not tick and (watched or any_pose)
+    lingers = 0
     begin = call_address(table[CLOCK_AT], ()) if settings[BUDGET] > 0.0 else 0
     # The last pose that held, its tracked values and multipliers; none yet.
     held = held_room(table, most)
@@ -265,19 +272,29 @@ def solve_program(table, pool, settings, state, history, tips):
                 dual = least_multipliers(shape, rows, here, active, gradient, lines[0], gram, dual, y, better_y)
             break
         # Of a tick, what holds; of a solve with clearances, the last pose at which nothing crosses.
-        if (tick and violation <= feasible) or (watched and not tick and not sunk and is_clear(table, residual)):
+        wished = any_pose and not watched and violation <= feasible
+        if (
+            wished
+            or (tick and violation <= feasible)
+            or (watched and not tick and not sunk and is_clear(table, residual))
+        ):
             holds = True
             leash *= LONGER if iteration != back_at else 1.0
             keep(here, y, rows, held)
             if watched:
                 numbers_of(table, numbers)
         if iteration >= limit and (not tick or violation <= feasible or iteration >= EXTRA_TIME * limit):
-            if watched and not tick and ended == RUNNING:
+            if settles and ended == RUNNING:
                 ended = ITERATION_LIMIT
                 settled_by = iteration + SETTLING
             if ended == RUNNING:
                 status = ITERATION_LIMIT
                 break
+        # A least move may be at a kink, where steps go to and fro.
+        lingers += 1 if any_pose and (lingers > 0 or violation <= NEARLY) else 0
+        if settles and ended == RUNNING and lingers > LINGERS:
+            ended = STALLED
+            settled_by = iteration + SETTLING
         if ended != RUNNING and (violation <= feasible or iteration >= settled_by):
             status = ended
             continue
@@ -354,7 +371,11 @@ def solve_program(table, pool, settings, state, history, tips):
                 status = INFEASIBLE if violation > TOUCHING else STALLED
                 break
             if slows:
-                status = STALLED
+                if any_pose and not watched and ended == RUNNING:
+                    ended = STALLED
+                    settled_by = iteration + SETTLING
+                else:
+                    status = STALLED
                 continue
             if iteration >= check_at:
                 check_at, check_violation = iteration + PATIENCE, violation
@@ -383,7 +404,7 @@ def solve_program(table, pool, settings, state, history, tips):
                 restorations += 1
                 entered = violation
                 continue
-            if watched and not tick and ended == RUNNING and violation > feasible:
+            if settles and ended == RUNNING and violation > feasible:
                 ended = STALLED
                 settled_by = iteration + SETTLING
                 continue

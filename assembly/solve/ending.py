@@ -17,10 +17,13 @@ from assembly.solve.report import bring_back, is_clear, judge, write_pose, write
 from assembly.solve.room import results_of
 from assembly.solve.search import goal
 from assembly.solve.settings import (
+    ANY_POSE,
     CONTACT_LOST,
     CURVED,
     HELD,
     IMPROPER,
+    INFEASIBLE,
+    ITERATION_LIMIT,
     PENALTY_FLOOR,
     RECALL,
     SECOND_ORDER,
@@ -67,7 +70,9 @@ def finish(program, settings, state, tips, here, trial, by_row, at_end, held, nu
     watched = table[WATCH] >= 0
     tells = watched and not tick and status != SOLVED and status != CONTACT_LOST
     crosses = tells and tells_crossing(table, pool, loose, room, here, y, better_y)
-    if holds and ((tick and not violation <= feasible) or crosses):
+    fails = status == STALLED or status == ITERATION_LIMIT or status == INFEASIBLE
+    is_wish = settings[ANY_POSE] == 1.0 and fails and not crosses
+    if holds and (((tick or (is_wish and not watched)) and not violation <= feasible) or crosses):
         return_to(table, pool, held, numbers, loose, rows, here, y, better_y, tick)
         results[HELD] = 1.0
     write_pose(table, pool, here[0], state)
@@ -76,6 +81,8 @@ def finish(program, settings, state, tips, here, trial, by_row, at_end, held, nu
         good, violation = judge(table, pool, state, loose, room, shape, rows, here, trial, 1.25 * feasible, tick)
         if status == SOLVED and not good:
             status = STALLED
+        elif is_wish and good:
+            status = SOLVED
     results[IMPROPER] = write_rows(table, here, y, loose, tick, pool[SCALE], state)
     if settings[SECOND_ORDER] == 1.0 and results[HELD] == 0.0 and status != CONTACT_LOST:
         goal(table, pool, shape, rows, loose, room, tips, here, 1, gradient, lagrangian)

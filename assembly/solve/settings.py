@@ -12,8 +12,8 @@ FEASIBILITY, STATIONARITY, ITERATIONS, PENALTY, PENALTY_FLOOR, RADIUS, GATHER, F
 # Whether all that moved is looked at once more before a pose counts as solved. Of a tick: whether it is one, which ends
 # at a pose that holds after so many iterations, and at the last one that held where it ends otherwise; how long it may
 # take (0: as long as it takes); whether its end is tested for a minimum; where in the state the rows are that the last
-# one left (0: nowhere).
-LAST_LOOK, TICK, BUDGET, SECOND_ORDER, RECALL, SETTINGS = 8, 9, 10, 11, 12, 13
+# one left (0: nowhere). Whether nothing is asked for but that constraints hold: the least move is a wish.
+LAST_LOOK, TICK, BUDGET, SECOND_ORDER, RECALL, ANY_POSE, SETTINGS = 8, 9, 10, 11, 12, 13, 14
 # Results at the end of the state.
 STATUS, COUNT, OBJECTIVE, VIOLATION, DUAL, CULPRIT, IMPROPER, SCATTER = 0, 1, 2, 3, 4, 5, 6, 7
 # Of a tick: whether it ended at a pose that held before; whether its end is a minimum (0: not tested, 1, or -1: no).

@@ -38,7 +38,7 @@ MOST_COUNTED = 200
 class Status(Enum):
     """How a solve ended; the value says what to do."""
 
-    SOLVED = "every constraint holds and the objective is stationary"
+    SOLVED = "every constraint holds and the objective, if there is one, is stationary"
     INFEASIBLE = "the constraints cannot all hold near this start; the pose violates them least: drop or move one"
     STALLED = "no further progress; look at the worst violation, start elsewhere or loosen the tolerance"
     ITERATION_LIMIT = "out of iterations; raise max_iterations or start nearer"
@@ -96,7 +96,8 @@ class Solution:
         A row a body: x y z qw qx qy qz.
     status : Status
     success : bool
-        True only where the constraints, evaluated afresh at `q`, hold to the tolerance and the objective is stationary.
+        True only where the constraints, evaluated afresh at `q`, hold to the tolerance, and the objective, if there is
+        one, is stationary.
     objective : float
         In the user's units.
     feasibility : float

@@ -10,13 +10,13 @@ import assembly as asm
 from assembly.constraints.layout import MOVING, WATCH
 from assembly.proximity import watch
 from assembly.proximity.allowances import part_used
+from assembly.proximity.borders import feature_kind
 from assembly.proximity.bounding_tree import ELEMENT, ELEMENT_FEATURE, ELEMENT_POOL
 from assembly.proximity.holding import FEATURES, NOTHING, POINT
 from assembly.proximity.near_root import is_known
 from assembly.proximity.roots import CORNER, ROOT, ROOT_BEYOND, ROOT_FOLD
 from assembly.proximity.shell import EDGE, FACE
 from assembly.proximity.solid_contact import TRACK
-from assembly.proximity.switching import feature_kind
 from assembly.proximity.watch_memory import (
     ALLOWANCE,
     CUT_SHORT,
