@@ -48,9 +48,12 @@ def test_a_pair_follows_the_slope(name, scale):
             assert not of_faces or level.gap < 0.0 or pair.status is FeatureStatus.TRACKED
             followed += of_faces
             known = closest_features(a, b, q_b=leaning)
-            # Another corner would be off by the slope times the way between them. How deep solids are is found on a way
-            # back that does not follow slopes of 1e-9.
-            assert pair.gap == pytest.approx(known.gap, abs=(1e-12 if known.gap > 0.0 else 1e-9) * scale)
+            # Another corner would be off by the slope times the way between them.
+            if known.gap > 0.0:
+                assert pair.gap == pytest.approx(known.gap, abs=1e-12 * scale)
+            else:
+                # Two edges may be less deep in each other than the corner is in the face.
+                assert -0.05 * scale < pair.gap <= known.gap + 1e-12 * scale
     # A level pair that is found may be one of faces or of their edges; of boxes it is one of faces.
     assert followed > 0 or name != "boxes"
 
