@@ -89,8 +89,8 @@ RESTORATIONS = 3
 SLOW, HARDEST = 3, 1e-10
 # Where a solve with clearances ends at a pose that does not hold, so many more steps lead back onto the rows.
 SETTLING = 30
-# Where nothing is asked for but that constraints hold: so many iterations may follow one with a violation this small.
-LINGERS, NEARLY = 40, 1e-6
+# Where nothing is asked for but that constraints hold: so many iterations may follow one at which bodies touch.
+LINGERS = 40
 # A tick that does not hold after its iterations has so many times more of them.
 EXTRA_TIME = 4
 # So often at most a solve leaves a saddle of its violations.
@@ -284,14 +284,14 @@ def solve_program(table, pool, settings, state, history, tips):
             if watched:
                 numbers_of(table, numbers)
         if iteration >= limit and (not tick or violation <= feasible or iteration >= EXTRA_TIME * limit):
-            if settles and ended == RUNNING:
+            if watched and not tick and ended == RUNNING:
                 ended = ITERATION_LIMIT
                 settled_by = iteration + SETTLING
             if ended == RUNNING:
                 status = ITERATION_LIMIT
                 break
         # A least move may be at a kink, where steps go to and fro.
-        lingers += 1 if any_pose and (lingers > 0 or violation <= NEARLY) else 0
+        lingers += 1 if any_pose and (lingers > 0 or violation <= TOUCHING) else 0
         if settles and ended == RUNNING and lingers > LINGERS:
             ended = STALLED
             settled_by = iteration + SETTLING
@@ -368,10 +368,11 @@ def solve_program(table, pool, settings, state, history, tips):
                     here, trial = trial, here
                     iteration += 1
                     continue
-                status = INFEASIBLE if violation > TOUCHING else STALLED
-                break
-            if slows:
-                if any_pose and not watched and ended == RUNNING:
+                if violation > TOUCHING or watched or not any_pose:
+                    status = INFEASIBLE if violation > TOUCHING else STALLED
+                    break
+            if ends or slows:
+                if any_pose and not watched:
                     ended = STALLED
                     settled_by = iteration + SETTLING
                 else:

@@ -40,10 +40,10 @@ def test_solids_are_brought_to_touch(turned, guarded):
         solution = scene.solve()
         solved += solution.success
         if solution.success:
-            # Found afresh: they touch, and are not in each other. A search proves no distance below 1e-7 of lines that
-            # lie along each other.
+            # Found afresh: they touch, and are not in each other. Slopes of 1e-9 count as level, and a search proves no
+            # distance below 1e-7 of lines that lie along each other.
             pair = closest_features(a, b, solution.q[0], solution.q[1])
-            assert -1e-11 < pair.gap < 1e-7
+            assert -3e-9 < pair.gap < 1e-7
             assert solution.feasibility < 1e-11
     assert solved >= 24
 
@@ -59,7 +59,7 @@ def test_solids_in_each_other_are_brought_apart(turned):
         solution = scene.solve()
         assert solution.success, solution.message
         pair = closest_features(a, b, solution.q[0], solution.q[1])
-        assert pair.gap > -1e-11
+        assert pair.gap > -3e-9
         moved += np.linalg.norm(solution.q[1, :3] - b.q[:3]) > 1e-3
     assert moved > 6
 
