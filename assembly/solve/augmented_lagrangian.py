@@ -271,13 +271,9 @@ def solve_program(table, pool, settings, state, history, tips):
             if status == SOLVED:
                 dual = least_multipliers(shape, rows, here, active, gradient, lines[0], gram, dual, y, better_y)
             break
-        # Of a tick, what holds; of a solve with clearances, the last pose at which nothing crosses.
-        wished = any_pose and not watched and violation <= feasible
-        if (
-            wished
-            or (tick and violation <= feasible)
-            or (watched and not tick and not sunk and is_clear(table, residual))
-        ):
+        # What holds, of a tick or where nothing else is asked for; with clearances, what does not cross.
+        clear = watched and not tick and not sunk and is_clear(table, residual)
+        if clear or (violation <= feasible and (tick or (any_pose and not watched))):
             holds = True
             leash *= LONGER if iteration != back_at else 1.0
             keep(here, y, rows, held)
@@ -372,7 +368,7 @@ def solve_program(table, pool, settings, state, history, tips):
                     status = INFEASIBLE if violation > TOUCHING else STALLED
                     break
             if ends or slows:
-                if any_pose and not watched:
+                if settles and not watched:
                     ended = STALLED
                     settled_by = iteration + SETTLING
                 else:
