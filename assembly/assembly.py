@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from functools import partial
 from operator import is_
 from os import PathLike
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.constraints.constraint import Constraint, structure_changes
 from assembly.constraints.expression import Expression
-from assembly.constraints.layout import DEEPEST_AT
 from assembly.constraints.objectives import Objective
 from assembly.constraints.packing import Packed, lone_surfaces, pack, structure_of
 from assembly.constraints.trim_contact import TrimContact
@@ -22,17 +22,9 @@ from assembly.kinematics.body import Body, Frame, Point
 from assembly.kinematics.pose import Pose, pose_rows
 from assembly.proximity.pairs import inside
 from assembly.proximity.solid_contact import TRACK
-from assembly.solve.augmented_lagrangian import solve_program
+from assembly.solve.attempts import attempt, load
 from assembly.solve.options import Options
-from assembly.solve.settings import (
-    ANY_POSE,
-    CONTACT_LOST,
-    FREE_TRIMS,
-    GATHER,
-    HISTORY,
-    ITERATIONS,
-    SCATTER,
-)
+from assembly.solve.settings import ANY_POSE, GATHER, ITERATIONS
 from assembly.solve.solution import Scene, Solution, Status
 
 if TYPE_CHECKING:
@@ -45,11 +37,8 @@ Array = NDArray[np.float64]
 _STATUSES = tuple(Status)
 _SETTINGS = Options().settings()
 _WARM_SETTINGS = Options().settings(warm=True)
-_LOADING = Options(max_iterations=0).settings()
 # How many times as many places as they ask for a solve gives to clearances.
 MOST_CROWDING = 16
-# Rows of history that are kept.
-MOST_HISTORY = 1000
 
 
 class Assembly:
@@ -65,8 +54,6 @@ class Assembly:
     The scene is packed once, at the first solve after a change of its bodies, constraints or terms. Targets,
     weights' ratios aside, and starts may change between solves without packing again.
     """
-
-    _loaded: ClassVar[set[int | None]] = set()  # which kernels this process has
 
     def __init__(self, bodies: Iterable[Body] = ()) -> None:
         self._bodies: list[Body] = []
@@ -221,58 +208,57 @@ class Assembly:
         Solution
             Check `success`; the status and the message say what happened otherwise.
         """
-        packed = self.packed()
-        assert self._scene is not None
         warm = isinstance(q0, Solution)
-        verbose = 0
         if options:
             chosen = Options.of(options)
             settings, verbose = chosen.settings(warm), chosen.verbose
         else:
-            settings = _WARM_SETTINGS if warm else _SETTINGS
-        state = self._start(packed, q0, starts)
-        history = np.empty((min(int(settings[ITERATIONS]), MOST_HISTORY) + 1, HISTORY))
-        # The loop writes contacts of clearances into its table: every solve has its own, also in another thread.
-        arguments = (packed.table.copy() if packed.guards else packed.table, packed.pool)
-        tips = packed.tips
-        if tips not in Assembly._loaded:
-            # Loading the kernel, or compiling it, is no part of a solve's time.
-            solve_program(*arguments, _LOADING, state.copy(), history, tips)
-            Assembly._loaded.add(tips)
-        gathers = not warm and not self._objectives
+            settings, verbose = (_WARM_SETTINGS if warm else _SETTINGS), 0
         if not self._objectives:
             settings = settings.copy()
             settings[ANY_POSE] = 1.0
             settings[GATHER] = 0.0 if warm else 1.0
-        begin = perf_counter()
-        code = solve_program(*arguments, settings, state, history, tips)
-        if code == CONTACT_LOST and packed.seek_penetration():
-            # Perhaps solids cross at the start.
-            arguments[0][DEEPEST_AT] = packed.table[DEEPEST_AT]
-            state = self._start(packed, q0, starts)
-            code = solve_program(*arguments, settings, state, history, tips)
-        if code != 0 and packed.trims:
-            # With the coordinates of contacts as unknowns trims have exact second derivatives, except at poles.
-            settings = settings.copy()
-            settings[FREE_TRIMS] = 1.0
-            other, rows = self._start(packed, q0, starts), np.empty_like(history)
-            if solve_program(*arguments, settings, other, rows, tips) == 0:
-                code, state, history = 0, other, rows
-        if code != 0 and not gathers and state[packed.results_at + SCATTER] == 1.0:
-            # What the start itself did not lead to may be reached from gathered bodies.
-            settings = settings.copy()
-            settings[GATHER] = 1.0
-            other, rows = self._start(packed, q0, starts), np.empty_like(history)
-            if solve_program(*arguments, settings, other, rows, tips) == 0:
-                code, state, history = 0, other, rows
-        if packed.is_crowded(state) and self._crowding < MOST_CROWDING and not warm:
-            self._crowding *= 2
-            self._packed = None
-            return self.solve(q0, starts=starts, **options)
-        solution = Solution(self._scene, packed, state, _STATUSES[code], perf_counter() - begin, history)
+        solution = self._solved(settings, q0, starts)
+        if (
+            not solution.success
+            and solution._packed.guards
+            and not isinstance(q0, Solution)
+            and settings[ITERATIONS] > 0.0
+        ):
+            from assembly.studies.separation import separated
+
+            begin = perf_counter()
+            poses = separated(self, self.q if q0 is None else pose_rows("q0", q0, len(self._bodies)), options)
+            spent = solution.seconds + perf_counter() - begin
+            for apart in poses:
+                solution = self._solved(settings, apart, starts, spent)
+                if solution.success:
+                    break
+                spent = solution.seconds
         if verbose:
             print(solution.iteration_table())
         return solution
+
+    def _solved(
+        self,
+        settings: Array,
+        q0: ArrayLike | Solution | None,
+        starts: Mapping[str, ArrayLike] | None,
+        spent: float = 0.0,
+    ) -> Solution:
+        """A solve from q0, with as many places for contacts of clearances as it turns out to need."""
+        while True:
+            packed = self.packed()
+            start = partial(self._start, packed, q0, starts)
+            load(packed, start)
+            begin = perf_counter()
+            code, state, history = attempt(packed, settings, start)
+            spent += perf_counter() - begin
+            if not packed.is_crowded(state) or self._crowding >= MOST_CROWDING or isinstance(q0, Solution):
+                assert self._scene is not None
+                return Solution(self._scene, packed, state, _STATUSES[code], spent, history)
+            self._crowding *= 2
+            self._packed = None
 
     def solve_all(self, *, starts: int = 16, seed: int = 0, **options: Any) -> list[Solution]:
         """The distinct solutions found from several starts: the bodies' poses, then random ones.
