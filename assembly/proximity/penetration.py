@@ -20,7 +20,7 @@ from assembly.proximity.nearest import CROSSING, search
 from assembly.proximity.shell import EDGES, FACE_TABLE, FACE_TRIM, FACES, VERTICES
 from assembly.proximity.start import global_start
 from assembly.proximity.switching import track_features
-from assembly.proximity.ways_apart import WAYS, add_way, add_ways
+from assembly.proximity.ways_apart import WAYS, add_end_ways, add_way, add_ways
 
 # A pair of shells that cross was found.
 PENETRATING = 3
@@ -99,7 +99,11 @@ def deepest(table, pool, shell_f, shell_g, turn, shift, f, g, x, size):
     for k in range(count):
         total = add(total, (ways[k, 0], ways[k, 1], ways[k, 2]))
     count = add_way(total, ways, count)
+    # Flush bodies meet all along edges, also where another face leads out sooner.
+    count = add_end_ways(table, pool, shell_f, f, x[0], x[1], same, 1.0, size, ways, count)
+    count = add_end_ways(table, pool, shell_g, g, x[2], x[3], turn, -1.0, size, ways, count)
     best = (False, f, g, x, none, -math.inf)
+    other = best
     for attempt in range(2):
         if attempt == 1:
             # From one body's origin to the other's, where no normal leads out.
@@ -118,6 +122,11 @@ def deepest(table, pool, shell_f, shell_g, turn, shift, f, g, x, size):
                 found, cf, cg, y, n, gap = walk_back(table, pool, shell_f, shell_g, turn, shift, away, cf, cg, y, size)
                 if found != CONVERGED or not TOUCHING * size >= gap > best[5]:
                     continue
+                if gap < -reach:
+                    # The way back went off to another pair: it is not so far as that.
+                    if gap > other[5]:
+                        other = (True, cf, cg, y, n, gap)
+                    continue
                 if gap >= -TOUCHING * size:
                     # They touch here. If that is all, the least move parts them. Where they touch along a line or
                     # all over a face a search so near may not come to its proof: that none is found has to do.
@@ -128,4 +137,4 @@ def deepest(table, pool, shell_f, shell_g, turn, shift, f, g, x, size):
             if best[0]:
                 return best
             reach *= 2.0
-    return best
+    return other

@@ -17,8 +17,10 @@ from assembly.proximity.shell import (
     EDGE,
     EDGE_CURVE,
     EDGE_CURVE_B,
+    EDGE_END,
     EDGE_FACE_B,
     EDGE_RECORD,
+    EDGE_START,
     EDGE_SURFACE,
     EDGE_SURFACE_B,
     EDGE_TABLE,
@@ -99,6 +101,22 @@ def add_ways(table, pool, shell, code, u, v, turn, side, size, ways, count):
         edge = table[shell + EDGE_TABLE] + EDGE_RECORD * table[at]
         t = edge_end(table, pool, edge, table[at + 1])
         count = add_edge_ways(table, pool, edge, t, turn, side, ways, count)
+    return count
+
+
+@kernel(inner=True)
+def add_end_ways(table, pool, shell, code, u, v, turn, side, size, ways, count):
+    """The normals of the faces at both ends of an edge, or of the edge of a face that is nearest to (u, v)."""
+    kind = feature_kind(table, shell, code)
+    faces, edges = table[shell + FACES], table[shell + EDGES]
+    if kind == FACE and table[table[shell + FACE_TABLE] + FACE_RECORD * code + FACE_TRIM] >= 0:
+        code = nearest_edge(table, pool, shell, code, u, v)[0]
+        kind = EDGE
+    if kind == EDGE:
+        edge = table[shell + EDGE_TABLE] + EDGE_RECORD * (code - faces)
+        for end in (table[edge + EDGE_START], table[edge + EDGE_END]):
+            if end >= 0:
+                count = add_ways(table, pool, shell, faces + edges + end, 0.0, 0.0, turn, side, size, ways, count)
     return count
 
 
