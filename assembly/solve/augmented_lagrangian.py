@@ -426,8 +426,10 @@ def solve_program(table, pool, settings, state, history, tips):
 
     if folded and status == CONTACT_LOST:
         violation = math.inf
-    at_end = (status, violation, feasible, rows, holds)
-    status, violation = finish(program, settings, state, tips, here, trial, by_row, at_end, held, numbers, system)
+    at_end = (status, value, violation, dual, feasible, rows, holds)
+    status, value, violation, dual = finish(
+        program, settings, state, tips, here, trial, by_row, at_end, held, numbers, system, gram
+    )
     results[STATUS] = float(status)
     results[COUNT] = float(min(iteration, limit) if ended != RUNNING else iteration)
     results[OBJECTIVE] = value

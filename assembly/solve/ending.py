@@ -11,7 +11,7 @@ from assembly.constraints.row_terms import add_row_terms
 from assembly.proximity.watch import EVERYTHING, any_crossed
 from assembly.solve.guards import clear_guards, go_back, look_around, place_guards
 from assembly.solve.linear import factorize_shifted
-from assembly.solve.multipliers import weigh_rows
+from assembly.solve.multipliers import multipliers_at, weigh_rows
 from assembly.solve.recall import leave
 from assembly.solve.report import bring_back, is_clear, judge, write_pose, write_rows
 from assembly.solve.room import results_of
@@ -56,33 +56,42 @@ def return_to(table, pool, held, numbers, loose, rows, here, y, better_y, tick):
 
 
 @kernel(inner=True, allocates=True)
-def finish(program, settings, state, tips, here, trial, by_row, at_end, held, numbers, system):
-    """Write the end into the state; returns the status and the violation of the pose as it is returned.
+def finish(program, settings, state, tips, here, trial, by_row, at_end, held, numbers, system, gram):
+    """Write the end into the state; returns the status, and objective, violation, dual of the pose as it is returned.
 
-    `at_end`: the status, the violation, what of it is none, how many rows there are, whether `held` has a pose.
+    `at_end`: these where the loop ended, what of a violation is none, how many rows there are, whether `held` has a
+    pose.
     """
     table, pool, shape, loose, room = program
-    gradient, _lines, lagrangian, matrix = system
+    gradient, lines, lagrangian, matrix = system
     y, better_y, active, forces = by_row[2], by_row[3], by_row[4], by_row[5]
-    status, violation, feasible, rows, holds = at_end
+    status, value, violation, dual, feasible, rows, holds = at_end
     results = results_of(table, state)
     tick = settings[TICK] == 1.0
     watched = table[WATCH] >= 0
     tells = watched and not tick and status != SOLVED and status != CONTACT_LOST
     crosses = tells and tells_crossing(table, pool, loose, room, here, y, better_y)
     fails = status == STALLED or status == ITERATION_LIMIT or status == INFEASIBLE
-    is_wish = settings[ANY_POSE] == 1.0 and fails and not crosses
-    if holds and (((tick or (is_wish and not watched)) and not violation <= feasible) or crosses):
+    is_wish = settings[ANY_POSE] == 1.0 and (fails or status == SOLVED) and not crosses
+    if holds and ((tick and not violation <= feasible) or crosses):
         return_to(table, pool, held, numbers, loose, rows, here, y, better_y, tick)
         results[HELD] = 1.0
     write_pose(table, pool, here[0], state)
     if status != CONTACT_LOST and not (tick and results[HELD] == 0.0):
         # A tick that went well ends at a pose that was just evaluated.
-        good, violation = judge(table, pool, state, loose, room, shape, rows, here, trial, 1.25 * feasible, tick)
-        if status == SOLVED and not good:
-            status = STALLED
-        elif is_wish and good:
+        bound = 1.25 * feasible
+        good, violation = judge(table, pool, state, loose, room, shape, rows, here, trial, bound, tick)
+        if is_wish and holds and not good and not watched:
+            return_to(table, pool, held, numbers, loose, rows, here, y, better_y, tick)
+            results[HELD] = 1.0
+            write_pose(table, pool, here[0], state)
+            good, violation = judge(table, pool, state, loose, room, shape, rows, here, trial, bound, tick)
+        if is_wish and good and (fails or results[HELD] == 1.0):
             status = SOLVED
+            value = goal(table, pool, shape, rows, loose, room, tips, trial, 1, gradient, lagrangian)
+            dual = multipliers_at(shape, rows, trial, active, gradient, lines[0], gram, y)
+        elif status == SOLVED and not good:
+            status = STALLED
     results[IMPROPER] = write_rows(table, here, y, loose, tick, pool[SCALE], state)
     if settings[SECOND_ORDER] == 1.0 and results[HELD] == 0.0 and status != CONTACT_LOST:
         goal(table, pool, shape, rows, loose, room, tips, here, 1, gradient, lagrangian)
@@ -96,4 +105,4 @@ def finish(program, settings, state, tips, here, trial, by_row, at_end, held, nu
         leave(table, state, int(settings[RECALL]), here, good and results[HELD] == 0.0 and rows == table[ROWS])
     if watched:
         clear_guards(table)
-    return status, violation
+    return status, value, violation, dual

@@ -322,3 +322,15 @@ def least_multipliers(shape, rows, here, active, gradient, scratch, gram, dual, 
     for r in range(rows):
         y[r] = better_y[r]
     return max(dual, other)
+
+
+@kernel(inner=True)
+def multipliers_at(shape, rows, point, active, gradient, scratch, gram, y):
+    """Multipliers of least squares at a point that may be no extremum, of rows that touch there. The dual residual."""
+    bases, one_sided, _order, _of_rows = shape
+    residual = point[3]
+    jacobian = point[4]
+    for r in range(rows):
+        active[r] = 1.0 if one_sided[r] == 0 or residual[r] <= NEAR else 0.0
+    pushing_multipliers(shape, rows, residual, jacobian, active, EXCHANGES, ROUNDS, gradient, scratch, gram, y)
+    return dual_residual(bases, jacobian, rows, one_sided, residual, gradient, y, scratch)
