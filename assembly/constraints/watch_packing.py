@@ -11,11 +11,13 @@ from assembly.constraints.contact import Contact, side_faces
 from assembly.constraints.scene_writer import SceneWriter
 from assembly.errors import InputError
 from assembly.geometry.face import Face
+from assembly.geometry.spine import spine_of
 from assembly.kinematics.body import Body
 from assembly.proximity import watch_memory
 from assembly.proximity.facet_tree import FacetTree
 from assembly.proximity.patch_list import LIST_INTS
 from assembly.proximity.solid import is_one_smooth
+from assembly.proximity.spine_packing import pack_spine
 from assembly.proximity.tree_packing import pack_tree
 
 __all__ = ["LAST_REACH", "guarded_pairs", "pack_watch", "place_count"]
@@ -100,6 +102,7 @@ class _PairPacking:
         self._records: list[list[int]] = []
         self._given: list[int] = []
         self._surfaces: dict[tuple[int, bool], int] = {}
+        self._spines: dict[Face, int] = {}
         # Where the tree of faces is, the radius of a ball around it, its smallest radius of curvature and how far its
         # facets are off; bodies of a shape share it.
         self._trees: dict[tuple[Face, ...], tuple[int, float, float, float]] = {}
@@ -119,14 +122,29 @@ class _PairPacking:
         flank = max(FLANK * min(radius_f, radius_g), LEAST_FLANK)
         _, minimum = writer.add(pool=[least / writer.scale, flank, offset_f, offset_g])
         given: list[int] = []
+        spines = [-1, -1]
         if is_one_smooth(f) and is_one_smooth(g):
             shape = [writer.surface(self._surfaces, f[0]), writer.surface(self._surfaces, g[0]), -1, -1]
             given = self._contacts_of(pair)
+            spines = self._spines_of(f[0], g[0])
         else:
             shape = [-1, -1, writer.shell(f), writer.shell(g)]
         fields = [*writer.places_of(pair), tree_f, tree_g, *shape, minimum, *places]
-        self._records.append([*fields, len(self._given), len(given) // 2, int(ball_g <= ball_f)])
+        self._records.append([*fields, len(self._given), len(given) // 2, int(ball_g <= ball_f), *spines])
         self._given += given
+
+    def _spines_of(self, f: Face, g: Face) -> list[int]:
+        """Where the spines of two faces are, if both are round wires."""
+        for face in (f, g):
+            spine = spine_of(face)
+            if spine is None:
+                return [-1, -1]
+            if face not in self._spines:
+                writer = self._writer
+                table, pool, at = pack_spine(spine, writer.scale, writer.table_at, writer.pool_at)
+                writer.add(table, pool)
+                self._spines[face] = at
+        return [self._spines[f], self._spines[g]]
 
     def _contacts_of(self, pair: Pair) -> list[int]:
         """The rows of given contacts between two bodies, each with whether they are the other way round there."""

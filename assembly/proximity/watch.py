@@ -18,7 +18,7 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.allowances import LEAST_ALLOWANCE, allow_ball, largest_part, mover, reach_now
-from assembly.proximity.bounding_tree import least_distance
+from assembly.proximity.bounding_tree import NODE_POOL, RADIUS, least_distance
 from assembly.proximity.corners import add_corners
 from assembly.proximity.facing import facing_pairs, near_enough
 from assembly.proximity.near_root import PASSED
@@ -26,6 +26,7 @@ from assembly.proximity.overlap import crosses
 from assembly.proximity.root_search import search_patches
 from assembly.proximity.roots import CORNER, GAP, LISTED, ORIGIN, ROOT, USELESS, is_alone
 from assembly.proximity.solid_contact import CONTACT_RECORD, PAIR_GAP, STAYS, TRACK
+from assembly.proximity.spine_search import BOX, BOXES, search_spines
 from assembly.proximity.watch_memory import (
     ALLOWANCE,
     CALLS,
@@ -59,7 +60,10 @@ from assembly.proximity.watch_memory import (
     PLACE_MEMORY,
     REACH,
     ROOTS,
+    SPINE_F,
+    SPINE_G,
     STATE,
+    TAKE,
     TRACK_SOLIDS,
     TRACKING,
     TREE_F,
@@ -137,34 +141,20 @@ def crosses_elsewhere(table, pool, watch, memory, p, scene, roots, count, least,
 
 
 @kernel(inner=True)
-def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, distances, roots, passed, work, asks):
-    """Find and list the roots of pair p; `asks` says whether it tells if the bodies cross elsewhere."""
-    pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
-    at = memory_places(table, watch)[0] + PAIR_MEMORY * p
-    i = table[pair + PAIR_F]
-    j = table[pair + PAIR_G]
-    turn, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
-    trees = (table[pair + TREE_F], table[pair + TREE_G])
-    scene = (
-        turn,
-        shift,
-        (
-            table[pair + PAIR_SURFACE_F],
-            table[pair + PAIR_SURFACE_G],
-            table[pair + PAIR_SHELL_F],
-            table[pair + PAIR_SHELL_G],
-        ),
-        trees,
-        (i, j, q, table[watch + TRACK_SOLIDS]),
-    )
-    memory[LOOKS] += 1.0
+def search_by_patches(table, pool, watch, memory, p, scene, moving, reach, offsets, tracked, rooms, roots):
+    """Find the roots of pair p by patches that face each other; what a look knows of the pair then.
+
+    Returns
+    -------
+    How many roots there are; whether a listed one was lost; the reach; how far bodies may go for what is not listed;
+    how far what is in a ball may go, and that ball; whether a fold is beside a contact that is near; whether there is
+    anything within reach.
+    """
+    stack, candidates, distances, passed, work, _boxes, _marks = rooms
     lengths = table[watch + LENGTHS]
-    minimum = table[pair + PAIR_MINIMUM]
-    least = pool[minimum]
-    flank = pool[minimum + 1]
-    offsets = (pool[minimum + 2], pool[minimum + 3])
-    moving = mover(table, watch, p, q)
-    reach = reach_now(table, pool, watch, memory, p, moving)
+    minimum = table[table[watch + PAIR_TABLE] + PAIR_RECORD * p + PAIR_MINIMUM]
+    least, flank = pool[minimum], pool[minimum + 1]
+    at = memory_places(table, watch)[0] + PAIR_MEMORY * p
     found, reach = facing_pairs(table, pool, watch, memory, p, scene, moving, reach, stack, candidates)
     memory[at + REACH] = reach
     count, any_gone = known_roots(table, pool, watch, memory, p, scene, offsets, tracked, roots, work)
@@ -175,31 +165,104 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, d
     count, free, fertile, ball = search_patches(
         table, pool, scene, moving, (flank, enough), span, offsets, neglect, facing, found, roots, count, work, passed
     )
-    if scene[2][0] >= 0:
-        seat_given(table, watch, memory, p, roots, count, tracked)
-    elif table[watch + CORNERS] == 1:
-        count = list_corners(
-            table, pool, watch, scene, reach, least, offsets, stack, candidates, roots, count, work, tracked
-        )
-    rest, wanting = list_roots(table, pool, watch, memory, p, roots, count, tracked)
     low = nearest_fold(roots, count, least, reach)
     urgent = fertile < math.inf and low <= FLAT * pool[lengths + FIRST_REACH]
     if fertile < math.inf and not urgent:
         fertile = min(fertile, low)
+    free = min(free, reach)
+    if found == 0:
+        # Nothing faces the other body within reach: the boxes tell how far that is so.
+        trees = scene[3]
+        free = max(free, least_distance(table, pool, trees[0], trees[1], scene[0], scene[1], math.inf, stack) - least)
+    return count, any_gone, free, fertile, ball, urgent, found > 0
+
+
+@kernel(inner=True)
+def search_by_spines(table, pool, watch, memory, p, scene, moving, reach, offsets, tracked, rooms, roots):
+    """The same for two round wires, by their spines."""
+    stack, _candidates, _distances, _passed, work, boxes, marks = rooms
+    lengths = table[watch + LENGTHS]
+    minimum = table[table[watch + PAIR_TABLE] + PAIR_RECORD * p + PAIR_MINIMUM]
+    least, flank = pool[minimum], pool[minimum + 1]
+    memory[memory_places(table, watch)[0] + PAIR_MEMORY * p + REACH] = reach
+    count, any_gone = known_roots(table, pool, watch, memory, p, scene, offsets, tracked, roots, work)
+    largest = pool[table[moving[1] + NODE_POOL] + RADIUS]
+    count, free, fertile, ball, folds, found = search_spines(
+        table,
+        pool,
+        scene,
+        moving,
+        largest,
+        (least, TAKE * reach, reach, flank),
+        pool[lengths + NEGLECT],
+        roots,
+        count,
+        work,
+        stack,
+        boxes,
+        marks,
+    )
+    return count, any_gone, free, fertile, ball, folds, found
+
+
+@kernel(inner=True)
+def look_at_pair(table, pool, watch, memory, p, q, tracked, rooms, roots, asks):
+    """Find and list the roots of pair p; `asks` says whether it tells if the bodies cross elsewhere."""
+    pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
+    at = memory_places(table, watch)[0] + PAIR_MEMORY * p
+    i = table[pair + PAIR_F]
+    j = table[pair + PAIR_G]
+    turn, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
+    scene = (
+        turn,
+        shift,
+        (
+            table[pair + PAIR_SURFACE_F],
+            table[pair + PAIR_SURFACE_G],
+            table[pair + PAIR_SHELL_F],
+            table[pair + PAIR_SHELL_G],
+        ),
+        (table[pair + TREE_F], table[pair + TREE_G]),
+        (i, j, q, table[watch + TRACK_SOLIDS]),
+        (table[pair + SPINE_F], table[pair + SPINE_G]),
+    )
+    memory[LOOKS] += 1.0
+    minimum = table[pair + PAIR_MINIMUM]
+    least = pool[minimum]
+    offsets = (pool[minimum + 2], pool[minimum + 3])
+    moving = mover(table, watch, p, q)
+    reach = reach_now(table, pool, watch, memory, p, moving)
+    wires = scene[5][0] >= 0
+    if wires:
+        count, any_gone, free, fertile, ball, urgent, found = search_by_spines(
+            table, pool, watch, memory, p, scene, moving, reach, offsets, tracked, rooms, roots
+        )
+    else:
+        count, any_gone, free, fertile, ball, urgent, found = search_by_patches(
+            table, pool, watch, memory, p, scene, moving, reach, offsets, tracked, rooms, roots
+        )
+    if scene[2][0] >= 0:
+        seat_given(table, watch, memory, p, roots, count, tracked)
+    elif table[watch + CORNERS] == 1:
+        count = list_corners(
+            table, pool, watch, scene, memory[at + REACH], least, offsets, rooms[0], rooms[1], roots, count, rooms[4],
+            tracked,
+        )  # fmt: skip
+    rest, wanting = list_roots(table, pool, watch, memory, p, roots, count, tracked)
     memory[at + CROSSED] = math.nan
-    if asks == ALWAYS or (asks == WHERE_LOST and any_gone):
+    if wires and asks != NEVER:
+        # All that is as near as this is known, and most of it is listed.
+        memory[at + CROSSED] = 1.0 if rest + least < -CROSSING else 0.0
+    elif asks == ALWAYS or (asks == WHERE_LOST and any_gone):
         crossed = crosses_elsewhere(
-            table, pool, watch, memory, p, scene, roots, count, least, offsets, stack, candidates, tracked
+            table, pool, watch, memory, p, scene, roots, count, least, offsets, rooms[0], rooms[1], tracked
         )
         memory[at + CROSSED] = 1.0 if crossed else 0.0
     memory[at + URGENT] = 1.0 if urgent else 0.0
     allow_ball(memory, at, ball, fertile)
-    if found == 0:
-        # Nothing faces the other body within reach: the boxes tell how far that is so.
-        reach = max(reach, least_distance(table, pool, trees[0], trees[1], turn, shift, math.inf, stack) - least)
-    memory[at + ALLOWANCE] = max(min(min(reach, rest), free), LEAST_ALLOWANCE)
+    memory[at + ALLOWANCE] = max(min(rest, free), LEAST_ALLOWANCE)
     listed = any_listed(table, watch, memory, p)
-    memory[at + STATE] = float(TRACKING if listed else (NEAR if found > 0 else FAR))
+    memory[at + STATE] = float(TRACKING if listed else (NEAR if found else FAR))
     if wanting:
         memory[CROWDED] = 1.0
 
@@ -224,11 +287,14 @@ def look(table, pool, watch, memory, q, tracked, how):
     before = memory[EVENT_COUNT]
     memory[CALLS] += 1.0
     ready = False
+    with_patches = False
     stack = np.empty((1, 2), np.int64)
     candidates = stack
     distances = np.empty(1)
     roots = np.empty((1, ROOT))
     passed = np.empty((1, PASSED))
+    boxes = roots
+    marks = roots
     work = (roots, roots)
     next_pair, _part = largest_part(table, pool, watch, memory, q)
     at = memory_places(table, watch)[0]
@@ -246,13 +312,18 @@ def look(table, pool, watch, memory, q, tracked, how):
         if not ready:
             ready = True
             stack = np.empty((STACK, 2), np.int64)
+            roots = np.empty((ROOTS, ROOT))
+            boxes = np.empty((BOXES, BOX))
+            marks = np.empty((ROOTS, 4))
+            work = (np.empty((1, CONTACT_RECORD)), np.empty((1, TRACK)))
+        if not with_patches and table[table[watch + PAIR_TABLE] + PAIR_RECORD * p + SPINE_F] < 0:
+            with_patches = True
             candidates = np.empty((CANDIDATES, 2), np.int64)
             distances = np.empty(CANDIDATES)
-            roots = np.empty((ROOTS, ROOT))
             passed = np.empty((WAYS, PASSED))
-            work = (np.empty((1, CONTACT_RECORD)), np.empty((1, TRACK)))
         asks = WHERE_LOST if how & DOUBTFUL != 0 else NEVER
         if how == EVERYTHING or math.isnan(memory[at + PAIR_MEMORY * p + TURN]):
             asks = ALWAYS
-        look_at_pair(table, pool, watch, memory, p, q, tracked, stack, candidates, distances, roots, passed, work, asks)
+        rooms = (stack, candidates, distances, passed, work, boxes, marks)
+        look_at_pair(table, pool, watch, memory, p, q, tracked, rooms, roots, asks)
     return np.int64(memory[EVENT_COUNT] - before)

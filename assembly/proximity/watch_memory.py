@@ -34,6 +34,7 @@ from assembly.proximity.roots import (
     add_root,
 )
 from assembly.proximity.solid_contact import FEATURE_F, FEATURE_G, PAIR_GAP, PAIR_NORMAL, STAYS
+from assembly.proximity.spine_curve import both_radii
 
 # The record of a watch: counts; where pairs begin; the row of `tracked` that is the first place; address of
 # `track_solids`; where its lengths are in the pool; how many lists there are, where they begin; whether corners are
@@ -46,10 +47,10 @@ PAIRS, PLACES, PAIR_TABLE, FIRST, TRACK_SOLIDS, LENGTHS, LISTS, LIST_TABLE, CORN
 NEGLECT, FIRST_REACH, LAST_REACH, LENGTH_COUNT = 0, 1, 2, 3
 # A pair: bodies, trees, surfaces or else (-1) shells, where its least gap is in the pool (behind it how far it may
 # go between looks where contacts may be born, and how far facets of either are from their surfaces), its places from
-# and to, rows of given contacts between the two (row, 1 if the bodies are the other way round), and whether it is f (0)
-# or g (1) that is the smaller one.
+# and to, rows of given contacts between the two (row, 1 if the bodies are the other way round), whether it is f (0) or
+# g (1) that is the smaller one, and the spines of two round wires (-1: others).
 PAIR_F, PAIR_G, TREE_F, TREE_G, PAIR_SURFACE_F, PAIR_SURFACE_G, PAIR_SHELL_F, PAIR_SHELL_G = 0, 1, 2, 3, 4, 5, 6, 7
-PAIR_MINIMUM, LOW, HIGH, GIVEN, GIVEN_COUNT, SMALLER, PAIR_RECORD = 8, 9, 10, 11, 12, 13, 14
+PAIR_MINIMUM, LOW, HIGH, GIVEN, GIVEN_COUNT, SMALLER, SPINE_F, SPINE_G, PAIR_RECORD = 8, 9, 10, 11, 12, 13, 14, 15, 16
 # Memory. Header: events, looks and contacts so far, the time of the caller, whether a near root ever found no place,
 # calls so far.
 EVENT_COUNT, LOOKS, BORN, TIME, CROWDED, CALLS, MEMORY_HEADER = 0, 1, 2, 3, 4, 5, 6
@@ -154,6 +155,14 @@ def write_root(roots, i, tracked, r):
 
 
 @kernel(inner=True)
+def is_of_far_sides(table, pool, scene, roots, k, offsets):
+    """Whether root k, with a negative gap, is of sides that are turned away from each other."""
+    if scene[5][0] >= 0:
+        return roots[k, GAP] < -both_radii(table, pool, scene[5])
+    return is_outside(table, pool, scene, roots, k, offsets)
+
+
+@kernel(inner=True)
 def known_roots(table, pool, watch, memory, p, scene, offsets, tracked, roots, work):
     """The roots that contacts of pair p have now: given ones, then listed ones.
 
@@ -187,7 +196,7 @@ def known_roots(table, pool, watch, memory, p, scene, offsets, tracked, roots, w
             count, found = add_root(table, pool, scene, codes, start, n, neglect, roots, count, work, corner)
             lost = found != ALIKE and found != MINIMUM_FOUND
             if count > before and corner == 0.0 and roots[before, GAP] < 0.0:
-                lost = lost or is_outside(table, pool, scene, roots, before, offsets)
+                lost = lost or is_of_far_sides(table, pool, scene, roots, before, offsets)
         if count > before and not lost:
             roots[before, ORIGIN] = LISTED + k
             if corner >= HELD_F and roots[before, GAP] < tracked[r, PAIR_GAP] - SUNK:

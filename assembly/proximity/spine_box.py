@@ -1,0 +1,129 @@
+"""What is known of two spines over a box, lengths s and t along a piece of either.
+
+Two wires touch where the distance of their spines has a minimum: with d = g(t) - f(s) and F = |d|^2 / 2,
+
+    F_s = -d.f',   F_t = d.g',   F_ss = 1 - d.f'',   F_st = -f'.g',   F_tt = 1 + d.g''
+
+(f', g' unit tangents, f'', g'' the curvature vectors). From the middle of a box, half widths h and k, these go no
+farther than pieces of constant curvature let them. So a box may be told to hold no point of F's slope zero, to hold one
+minimum at most (F convex), or none (F'' indefinite); and after which motion that may no longer be so.
+
+A motion by m moves no point of one spine by more than m, seen from the other, and turns its tangents by no more than
+m / rho.
+"""
+
+from __future__ import annotations
+
+import math
+
+from assembly._kernel import kernel
+from assembly.geometry.vec import add, blend, dot, matvec, sub
+from assembly.proximity.spine_curve import BEND, spine_point
+
+# What a box is: nothing is known, no slope zero in it, F convex over it, F'' indefinite over it.
+UNKNOWN, EMPTY, CONVEX, BARREN = 0, 1, 2, 3
+# Motions are no longer than this part of rho.
+TURNS = 0.5
+
+
+@kernel(inline=True)
+def segment_distance(d, f, g, h, k):
+    """The least distance of two segments: middles d apart, unit directions f and g, half lengths h and k."""
+    c = dot(f, g)
+    a = dot(d, f)
+    b = dot(d, g)
+    det = 1.0 - c * c
+    x = min(max((a - c * b) / det, -h), h) if det > 1e-15 else 0.0
+    y = c * x - b
+    if abs(y) > k:
+        y = min(max(y, -k), k)
+        x = min(max(a + c * y, -h), h)
+    e = add(d, blend(y, g, -x, f))
+    return math.sqrt(dot(e, e))
+
+
+@kernel(inline=True)
+def apart(pool, o, p, turn, shift, s, t):
+    """d = g(t) - f(s), tangents and curvature vectors of both, in the axes of f."""
+    pf, f, bend_f = spine_point(pool, o, s)
+    q, g, bend_g = spine_point(pool, p, t)
+    return sub(add(matvec(turn, q), shift), pf), f, bend_f, matvec(turn, g), matvec(turn, bend_g)
+
+
+@kernel(inline=True)
+def shape_of(hessian, kf, kg, rho, straight, is_open):
+    """Whether F is CONVEX or BARREN over a box, or UNKNOWN, by the ranges of F_ss, F_tt and |F_st|; for how long.
+
+    A motion by m changes them by kf m, kg m and m / rho. A free end may have a minimum where F'' is indefinite.
+    """
+    ss_low, ss_high, tt_low, tt_high, st_low, st_high = hessian
+    if straight:
+        # F is convex wherever two lines are.
+        return CONVEX, math.inf
+    longest = TURNS * rho
+    if ss_low > 0.0 and tt_low > 0.0:
+        det = ss_low * tt_low - st_high * st_high
+        if det > 0.0:
+            margin = det / (kf * tt_low + kg * ss_low + (2.0 * st_high + TURNS) / rho)
+            return CONVEX, min(margin, min(min(ss_low / (kf + 1e-300), tt_low / (kg + 1e-300)), longest))
+    if not is_open:
+        if ss_high < 0.0 or tt_high < 0.0:
+            return BARREN, min(max(-ss_high / (kf + 1e-300), -tt_high / (kg + 1e-300)), longest)
+        det = st_low * st_low - ss_high * tt_high
+        if det > 0.0:
+            # Entries that grow as they may: (ss + kf m) (tt + kg m) < (st - m / rho)^2.
+            return BARREN, min(det / (kf * tt_high + kg * ss_high + kf * kg * longest + 2.0 * st_low / rho), longest)
+    return UNKNOWN, 0.0
+
+
+@kernel(inner=True)
+def box_of(pool, o, p, turn, shift, box, open_ends, rho):
+    """What a box (s from, to, t from, to) of the pieces at o and p is.
+
+    `open_ends` are where F_s, and F_t, may have any value >= 0, and <= 0: whether the box is at a free end of f where
+    it starts, or ends, and so of g.
+
+    Returns
+    -------
+    The least distance of the spines over it; what it is; a motion after which that may no longer be so.
+    """
+    h = 0.5 * (box[1] - box[0])
+    k = 0.5 * (box[3] - box[2])
+    d, f, bend_f, g, bend_g = apart(pool, o, p, turn, shift, box[0] + h, box[2] + k)
+    kf = pool[o + BEND]
+    kg = pool[p + BEND]
+    turn_f = kf * h
+    turn_g = kg * k
+    least = segment_distance(d, f, g, h, k) - 0.5 * (turn_f * h + turn_g * k)
+    a = -dot(d, f)
+    b = dot(d, g)
+    c = abs(dot(f, g))
+    far = math.sqrt(dot(d, d)) + h + k
+    lean_f = abs(dot(g, bend_f))
+    lean_g = abs(dot(f, bend_g))
+    both = turn_f + turn_g
+    vary = kf * kf * min(far, abs(a) + 2.0 * h + k) * h + min(kf, lean_f + kf * both) * k
+    ss = 1.0 - dot(d, bend_f)
+    ss_low, ss_high = ss - vary, ss + vary
+    vary = kg * kg * min(far, abs(b) + h + 2.0 * k) * k + min(kg, lean_g + kg * both) * h
+    tt = 1.0 + dot(d, bend_g)
+    tt_low, tt_high = tt - vary, tt + vary
+    vary = lean_f * h + lean_g * k + 0.5 * both * both
+    st_low, st_high = max(c - vary, 0.0), min(c + vary, 1.0)
+    # Slopes: where a free end lets one of any value of a sign be a minimum's, only the other sign excludes.
+    slope = abs(a) - h * max(ss_high, -ss_low) - k * st_high
+    if (open_ends[0] and a > 0.0) or (open_ends[1] and a < 0.0):
+        slope = -1.0
+    other = abs(b) - k * max(tt_high, -tt_low) - h * st_high
+    if (open_ends[2] and b > 0.0) or (open_ends[3] and b < 0.0):
+        other = -1.0
+    slope = max(slope, other)
+    sway = 1.0 + far / rho
+    is_open = open_ends[0] or open_ends[1] or open_ends[2] or open_ends[3]
+    what, margin = shape_of(
+        (ss_low, ss_high, tt_low, tt_high, st_low, st_high), sway * kf, sway * kg, rho, kf == 0.0 and kg == 0.0, is_open
+    )
+    if slope > 0.0:
+        # What comes into it from beside it is known there; it bears none while F keeps its shape.
+        return least, EMPTY, max(slope / sway, margin)
+    return least, what, margin
