@@ -23,6 +23,7 @@ from assembly.proximity.watch_memory import (
     CALLED,
     CALLS,
     CUT_SHORT,
+    DOUBT,
     FIRST_REACH,
     LAST_REACH,
     LENGTHS,
@@ -36,6 +37,7 @@ from assembly.proximity.watch_memory import (
     PLACE,
     REACH,
     SMALLER,
+    SURE,
     TREE_F,
     TURN,
     memory_places,
@@ -114,12 +116,13 @@ def reach_now(table, pool, watch, memory, p, moving):
 
 
 @kernel(inner=True)
-def allow_ball(memory, at, ball, allowance):
+def allow_ball(memory, at, ball, allowance, sure):
     """Keep a ball on the body that moves and how far what is in it may go, in the memory of its pair.
 
-    Infinite: there is no ball.
+    Infinite: there is no ball. What is `sure` is how far, until a pose that stays is looked at.
     """
     memory[at + BALL_ALLOWANCE] = allowance
+    memory[at + SURE] = sure
     if allowance < math.inf:
         center, place, memory[at + BALL_RADIUS] = ball
         for k in range(3):
@@ -129,12 +132,13 @@ def allow_ball(memory, at, ball, allowance):
 
 @kernel(inner=True)
 def part_used(table, pool, watch, memory, p, q):
-    """Which part of its allowances pair p has used at poses q; infinite before its first look.
+    """Which part of its allowances pair p has used at poses q; infinite before its first look. Notes its DOUBT.
 
     A ball's points went no farther than its middle and 2 r |e - e'|: a turn by an angle a about an axis moves a point
     at a distance r from it by 2 r sin(a / 2), and |e - e'| is 2 sin(a / 4).
     """
     o = memory_places(table, watch)[0] + PAIR_MEMORY * p
+    memory[o + DOUBT] = 0.0
     if math.isnan(memory[o + TURN]):
         return math.inf
     _side, tree, e, turn, shift = mover(table, watch, p, q)
@@ -144,11 +148,12 @@ def part_used(table, pool, watch, memory, p, q):
     if not moved > 0.0:
         return 0.0
     part = moved / memory[o + ALLOWANCE]
-    if memory[o + BALL_ALLOWANCE] < memory[o + ALLOWANCE]:
+    if memory[o + BALL_ALLOWANCE] < memory[o + ALLOWANCE] or memory[o + SURE] < math.inf:
         moved = (
             moved_from(memory, o + BALL, memory, o + BALL_PLACE, turn, shift) + 2.0 * memory[o + BALL_RADIUS] * angle
         )
         part = max(part, moved / memory[o + BALL_ALLOWANCE])
+        memory[o + DOUBT] = moved / memory[o + SURE]
     return part
 
 

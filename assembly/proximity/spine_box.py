@@ -76,11 +76,26 @@ def shape_of(hessian, kf, kg, rho, straight, is_open):
     return UNKNOWN, 0.0
 
 
+@kernel(inline=True)
+def beyond(slope, hessian, error, rate, h, k):
+    """How long no point of slope zero is within h and k of the middle; not positive where one may be.
+
+    By F'' at the middle: x = -F''^-1 (F' + e), where e is no longer than `error` in either component, and a motion by m
+    adds m times `rate`.
+    """
+    ss, tt, st = hessian
+    det = abs(ss * tt - st * st)
+    ss, tt, off = abs(ss), abs(tt), abs(st)
+    x = abs(hessian[1] * slope[0] - st * slope[1]) - tt * error[0] - off * error[1] - det * h
+    y = abs(hessian[0] * slope[1] - st * slope[0]) - off * error[0] - ss * error[1] - det * k
+    return max(x / (tt * rate[0] + off * rate[1]), y / (off * rate[0] + ss * rate[1]))
+
+
 @kernel(inner=True)
-def box_of(pool, o, p, turn, shift, box, open_ends, rho):
+def box_of(pool, o, p, turn, shift, box, open_ends, reach, rho):
     """What a box (s from, to, t from, to) of the pieces at o and p is.
 
-    `open_ends` are where F_s, and F_t, may have any value >= 0, and <= 0: whether the box is at a free end of f where
+    One that is beyond the reach is EMPTY, for longer than that. `open_ends` are where F_s, and F_t, may have any value >= 0, and <= 0: whether the box is at a free end of f where
     it starts, or ends, and so of g.
 
     Returns
@@ -95,21 +110,23 @@ def box_of(pool, o, p, turn, shift, box, open_ends, rho):
     turn_f = kf * h
     turn_g = kg * k
     least = segment_distance(d, f, g, h, k) - 0.5 * (turn_f * h + turn_g * k)
+    if least > reach:
+        return least, EMPTY, math.inf
     a = -dot(d, f)
     b = dot(d, g)
-    c = abs(dot(f, g))
     far = math.sqrt(dot(d, d)) + h + k
     lean_f = abs(dot(g, bend_f))
     lean_g = abs(dot(f, bend_g))
     both = turn_f + turn_g
-    vary = kf * kf * min(far, abs(a) + 2.0 * h + k) * h + min(kf, lean_f + kf * both) * k
     ss = 1.0 - dot(d, bend_f)
-    ss_low, ss_high = ss - vary, ss + vary
-    vary = kg * kg * min(far, abs(b) + h + 2.0 * k) * k + min(kg, lean_g + kg * both) * h
     tt = 1.0 + dot(d, bend_g)
-    tt_low, tt_high = tt - vary, tt + vary
-    vary = lean_f * h + lean_g * k + 0.5 * both * both
-    st_low, st_high = max(c - vary, 0.0), min(c + vary, 1.0)
+    st = -dot(f, g)
+    vary_ss = kf * kf * min(far, abs(a) + 2.0 * h + k) * h + min(kf, lean_f + kf * both) * k
+    vary_tt = kg * kg * min(far, abs(b) + h + 2.0 * k) * k + min(kg, lean_g + kg * both) * h
+    vary_st = lean_f * h + lean_g * k + 0.5 * both * both
+    ss_low, ss_high = ss - vary_ss, ss + vary_ss
+    tt_low, tt_high = tt - vary_tt, tt + vary_tt
+    st_low, st_high = max(abs(st) - vary_st, 0.0), min(abs(st) + vary_st, 1.0)
     # Slopes: where a free end lets one of any value of a sign be a minimum's, only the other sign excludes.
     slope = abs(a) - h * max(ss_high, -ss_low) - k * st_high
     if (open_ends[0] and a > 0.0) or (open_ends[1] and a < 0.0):
@@ -123,7 +140,12 @@ def box_of(pool, o, p, turn, shift, box, open_ends, rho):
     what, margin = shape_of(
         (ss_low, ss_high, tt_low, tt_high, st_low, st_high), sway * kf, sway * kg, rho, kf == 0.0 and kg == 0.0, is_open
     )
+    slope /= sway
+    if not is_open:
+        first = (sway + sway * kf * h + k / rho, sway + sway * kg * k + h / rho)
+        error = (vary_ss * h + vary_st * k, vary_st * h + vary_tt * k)
+        slope = max(slope, beyond((a, b), (ss, tt, st), error, first, h, k))
     if slope > 0.0:
         # What comes into it from beside it is known there; it bears none while F keeps its shape.
-        return least, EMPTY, max(slope / sway, margin)
+        return least, EMPTY, max(slope, margin)
     return least, what, margin

@@ -62,7 +62,7 @@ def convex_minimum(pool, o, p, turn, shift, box, open_ends, s, t):
 
 @kernel(inner=True)
 def slope_at(pool, o, p, turn, shift, low, high, s, t):
-    """phi' and phi'' at s, and the foot, from t, within low and high; whether there is one."""
+    """phi' and phi'' at s, and the foot, from t, within low and high."""
     d, f, bend_f, g, bend_g = apart(pool, o, p, turn, shift, s, t)
     tt = 1.0 + dot(d, bend_g)
     for _ in range(FEET):
@@ -79,20 +79,19 @@ def slope_at(pool, o, p, turn, shift, low, high, s, t):
     st = dot(f, g)
     bend = 1.0 - dot(d, bend_f)
     free = low < t < high
-    return -dot(d, f), bend - st * st / tt if free and tt > 0.0 else bend, t, tt > 0.0
+    return -dot(d, f), bend - st * st / tt if free and tt > 0.0 else bend, t
 
 
 @kernel(inner=True)
 def valley_minima(pool, o, p, turn, shift, box, open_ends):
-    """Minima of phi over a box: how many (two at most), s and t of each; whether all feet are unique."""
+    """Minima of phi over a box: how many (two at most), s and t of each."""
     k = 0.5 * (box[3] - box[2])
     # Feet may go on beyond the box along the same piece, but not beyond a free end.
     low = box[2] if open_ends[2] else box[2] - k
     high = box[3] if open_ends[3] else box[3] + k
     middle = box[2] + k
-    a, bend_a, t_a, fine_a = slope_at(pool, o, p, turn, shift, low, high, box[0], middle)
-    b, bend_b, t_b, fine_b = slope_at(pool, o, p, turn, shift, low, high, box[1], middle)
-    fine = fine_a and fine_b
+    a, bend_a, t_a = slope_at(pool, o, p, turn, shift, low, high, box[0], middle)
+    b, bend_b, t_b = slope_at(pool, o, p, turn, shift, low, high, box[1], middle)
     count = 0
     first = (0.0, 0.0)
     other = (0.0, 0.0)
@@ -112,8 +111,7 @@ def valley_minima(pool, o, p, turn, shift, box, open_ends):
         lo, hi = left, right
         for _ in range(HALVINGS):
             s = 0.5 * (lo + hi)
-            x, bend, _t, good = slope_at(pool, o, p, turn, shift, low, high, s, middle)
-            fine = fine and good
+            x, bend, _t = slope_at(pool, o, p, turn, shift, low, high, s, middle)
             if (x <= 0.0) if a > 0.0 else (x >= 0.0):
                 crosses = True
                 if a > 0.0:
@@ -131,8 +129,7 @@ def valley_minima(pool, o, p, turn, shift, box, open_ends):
         s = 0.5 * (left + right)
         t = middle
         for _ in range(HALVINGS):
-            x, bend, t, good = slope_at(pool, o, p, turn, shift, low, high, s, t)
-            fine = fine and good
+            x, bend, t = slope_at(pool, o, p, turn, shift, low, high, s, t)
             if x <= 0.0:
                 left = s
             else:
@@ -144,7 +141,7 @@ def valley_minima(pool, o, p, turn, shift, box, open_ends):
             s = new
             if step <= 1e-15 or x == 0.0:
                 break
-        _x, _bend, t, _good = slope_at(pool, o, p, turn, shift, low, high, s, t)
+        _x, _bend, t = slope_at(pool, o, p, turn, shift, low, high, s, t)
         if count == 1:
             other = (s, t)
         else:
@@ -156,4 +153,4 @@ def valley_minima(pool, o, p, turn, shift, box, open_ends):
     if count > 0 and not box[2] - slack <= first[1] <= box[3] + slack:
         first = other
         count -= 1
-    return count, first, other, fine
+    return count, first, other

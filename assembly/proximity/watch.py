@@ -23,9 +23,12 @@ from assembly.proximity.corners import add_corners
 from assembly.proximity.facing import facing_pairs, near_enough
 from assembly.proximity.near_root import PASSED
 from assembly.proximity.overlap import crosses
+from assembly.proximity.patch_list import LIST_INTS
 from assembly.proximity.root_search import search_patches
 from assembly.proximity.roots import CORNER, GAP, LISTED, ORIGIN, ROOT, USELESS, is_alone
 from assembly.proximity.solid_contact import CONTACT_RECORD, PAIR_GAP, STAYS, TRACK
+from assembly.proximity.spine_curve import both_radii
+from assembly.proximity.spine_parts import near_parts, parts_beyond
 from assembly.proximity.spine_search import BOX, BOXES, search_spines
 from assembly.proximity.watch_memory import (
     ALLOWANCE,
@@ -34,6 +37,7 @@ from assembly.proximity.watch_memory import (
     CROSSED,
     CROWDED,
     CUT_SHORT,
+    DOUBT,
     EVENT_COUNT,
     FAR,
     FIRST,
@@ -41,6 +45,8 @@ from assembly.proximity.watch_memory import (
     HIGH,
     LAST_REACH,
     LENGTHS,
+    LIST_TABLE,
+    LISTS,
     LOOKS,
     LOW,
     NEAR,
@@ -69,7 +75,6 @@ from assembly.proximity.watch_memory import (
     TREE_F,
     TREE_G,
     TURN,
-    URGENT,
     any_listed,
     any_lost,
     known_roots,
@@ -83,13 +88,16 @@ from assembly.proximity.watch_memory import (
 AS_NEEDED, EVERYTHING, CAREFUL, IN_TURNS, DOUBTFUL = 0, 1, 2, 4, 8
 # A pair is looked at again when so much of its allowance is used; in turns, the one that used most of it at the first,
 # and any that cut a step since its last look at the third: what is left would cut the next one to nothing.
-USED, SPENT, BRIEF = 0.5, 0.85, 0.35
-# What moved by less than this part of its allowance, 1e-9 of the scene's size, is where it was for an urgent look.
+USED, SPENT, BRIEF = 0.5, 0.5, 0.35
+# What moved by less than this part of its allowance, 1e-9 of the scene's size, is where it was.
 STILL = 1e-8
 # Room: pairs of patches of a look.
 CANDIDATES, STACK = 8192, 1024
 # Folds nearer than this part of a first reach are looked at after every move.
 FLAT = 0.2
+# Lists of parts of spines that are near are for motions up to so many first reaches.
+SPINE_RINGS = 4.0
+NO_BALL = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0)
 # Ways of Newton's method that are remembered in a look.
 WAYS = 64
 # Whether a look tells if bodies cross where no contact says so. A contact that lost its root is a reason to ask in a
@@ -147,10 +155,10 @@ def search_by_patches(table, pool, watch, memory, p, scene, moving, reach, offse
     Returns
     -------
     How many roots there are; whether a listed one was lost; the reach; how far bodies may go for what is not listed;
-    how far what is in a ball may go, and that ball; whether a fold is beside a contact that is near; whether there is
+    how far what is in a ball may go, and that ball; how far, until a pose that stays is looked at; whether there is
     anything within reach.
     """
-    stack, candidates, distances, passed, work, _boxes, _marks = rooms
+    stack, candidates, distances, passed, work, _pairs, _boxes, _marks = rooms
     lengths = table[watch + LENGTHS]
     minimum = table[table[watch + PAIR_TABLE] + PAIR_RECORD * p + PAIR_MINIMUM]
     least, flank = pool[minimum], pool[minimum + 1]
@@ -174,35 +182,32 @@ def search_by_patches(table, pool, watch, memory, p, scene, moving, reach, offse
         # Nothing faces the other body within reach: the boxes tell how far that is so.
         trees = scene[3]
         free = max(free, least_distance(table, pool, trees[0], trees[1], scene[0], scene[1], math.inf, stack) - least)
-    return count, any_gone, free, fertile, ball, urgent, found > 0
+    return count, any_gone, free, fertile, ball, 0.0 if urgent else math.inf, found > 0
 
 
 @kernel(inner=True)
 def search_by_spines(table, pool, watch, memory, p, scene, moving, reach, offsets, tracked, rooms, roots):
     """The same for two round wires, by their spines."""
-    stack, _candidates, _distances, _passed, work, boxes, marks = rooms
+    stack, _candidates, _distances, _passed, work, pairs, boxes, marks = rooms
     lengths = table[watch + LENGTHS]
     minimum = table[table[watch + PAIR_TABLE] + PAIR_RECORD * p + PAIR_MINIMUM]
     least, flank = pool[minimum], pool[minimum + 1]
     memory[memory_places(table, watch)[0] + PAIR_MEMORY * p + REACH] = reach
     count, any_gone = known_roots(table, pool, watch, memory, p, scene, offsets, tracked, roots, work)
-    largest = pool[table[moving[1] + NODE_POOL] + RADIUS]
-    count, free, fertile, ball, folds, found = search_spines(
-        table,
-        pool,
-        scene,
-        moving,
-        largest,
-        (least, TAKE * reach, reach, flank),
-        pool[lengths + NEGLECT],
-        roots,
-        count,
-        work,
-        stack,
-        boxes,
-        marks,
-    )
-    return count, any_gone, free, fertile, ball, folds, found
+    radii = both_radii(table, pool, scene[5]) + least
+    ring = SPINE_RINGS * pool[lengths + FIRST_REACH]
+    at_list = table[watch + LIST_TABLE] + LIST_INTS * (p % table[watch + LISTS])
+    waiting = near_parts(table, pool, at_list, p, scene, moving, radii + reach, ring, stack, pairs, boxes)
+    if waiting <= 0:
+        beyond = parts_beyond(table, pool, scene, radii + reach, stack, pairs) - radii if waiting == 0 else 0.0
+        return count, any_gone, beyond, math.inf, NO_BALL, math.inf, waiting < 0
+    # No tangent turns by more than a motion over this.
+    rho = min(2.0 * (radii + reach), 0.99 * pool[table[moving[1] + NODE_POOL] + RADIUS])
+    count, free, fertile, ball, sure = search_spines(
+        table, pool, scene, moving, rho, (least, TAKE * reach, reach, flank), pool[lengths + NEGLECT], boxes, waiting,
+        marks, roots, count, work,
+    )  # fmt: skip
+    return count, any_gone, free, fertile, ball, sure, True
 
 
 @kernel(inner=True)
@@ -234,11 +239,11 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, rooms, roots, asks):
     reach = reach_now(table, pool, watch, memory, p, moving)
     wires = scene[5][0] >= 0
     if wires:
-        count, any_gone, free, fertile, ball, urgent, found = search_by_spines(
+        count, any_gone, free, fertile, ball, sure, found = search_by_spines(
             table, pool, watch, memory, p, scene, moving, reach, offsets, tracked, rooms, roots
         )
     else:
-        count, any_gone, free, fertile, ball, urgent, found = search_by_patches(
+        count, any_gone, free, fertile, ball, sure, found = search_by_patches(
             table, pool, watch, memory, p, scene, moving, reach, offsets, tracked, rooms, roots
         )
     if scene[2][0] >= 0:
@@ -258,9 +263,8 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, rooms, roots, asks):
             table, pool, watch, memory, p, scene, roots, count, least, offsets, rooms[0], rooms[1], tracked
         )
         memory[at + CROSSED] = 1.0 if crossed else 0.0
-    memory[at + URGENT] = 1.0 if urgent else 0.0
-    allow_ball(memory, at, ball, fertile)
     memory[at + ALLOWANCE] = max(min(rest, free), LEAST_ALLOWANCE)
+    allow_ball(memory, at, ball, fertile, max(sure, STILL * memory[at + ALLOWANCE]))
     listed = any_listed(table, watch, memory, p)
     memory[at + STATE] = float(TRACKING if listed else (NEAR if found else FAR))
     if wanting:
@@ -293,6 +297,7 @@ def look(table, pool, watch, memory, q, tracked, how):
     distances = np.empty(1)
     roots = np.empty((1, ROOT))
     passed = np.empty((1, PASSED))
+    pairs = stack
     boxes = roots
     marks = roots
     work = (roots, roots)
@@ -306,13 +311,14 @@ def look(table, pool, watch, memory, q, tracked, how):
             due = part > SPENT or (how & IN_TURNS != 0 and p == next_pair and part > USED)
             asked = memory[at + PAIR_MEMORY * p + CUT_SHORT]
             due = due or (how & IN_TURNS != 0 and part > BRIEF and asked > memory[at + PAIR_MEMORY * p + ALLOWANCE])
-            due = due or (how & CAREFUL != 0 and part > STILL and memory[at + PAIR_MEMORY * p + URGENT] == 1.0)
+            due = due or (how & CAREFUL != 0 and memory[at + PAIR_MEMORY * p + DOUBT] > 1.0)
         if not due and not any_lost(table, watch, memory, p, tracked):
             continue
         if not ready:
             ready = True
             stack = np.empty((STACK, 2), np.int64)
             roots = np.empty((ROOTS, ROOT))
+            pairs = np.empty((BOXES, 2), np.int64)
             boxes = np.empty((BOXES, BOX))
             marks = np.empty((ROOTS, 4))
             work = (np.empty((1, CONTACT_RECORD)), np.empty((1, TRACK)))
@@ -324,6 +330,6 @@ def look(table, pool, watch, memory, q, tracked, how):
         asks = WHERE_LOST if how & DOUBTFUL != 0 else NEVER
         if how == EVERYTHING or math.isnan(memory[at + PAIR_MEMORY * p + TURN]):
             asks = ALWAYS
-        rooms = (stack, candidates, distances, passed, work, boxes, marks)
+        rooms = (stack, candidates, distances, passed, work, pairs, boxes, marks)
         look_at_pair(table, pool, watch, memory, p, q, tracked, rooms, roots, asks)
     return np.int64(memory[EVENT_COUNT] - before)

@@ -57,12 +57,13 @@ EVENT_COUNT, LOOKS, BORN, TIME, CROWDED, CALLS, MEMORY_HEADER = 0, 1, 2, 3, 4, 5
 # Of a pair: how the smaller body was turned, seen from the other, at its last look (a quaternion, NaN before there was
 # one), and where the middle of its tree was; how far it may go from there, its reach, its state, calls at its last
 # look; a ball on it, where its middle was, and how far what is in it may go; which part of its allowances is used;
-# whether it is looked at after every move, because a contact may be born at a fold beside one that touches; whether the
-# bodies are in each other where no contact says so (NaN: its last look did not ask); whether a near root found no place
-# at the last look; how far a step was to go that was cut since.
+# how far what is in the ball may go until a pose that stays is looked at, because a contact may be born at a fold
+# beside one that touches; whether the bodies are in each other where no contact says so (NaN: its last look did not
+# ask); whether a near root found no place at the last look; how far a step was to go that was cut since; which part of
+# what poses that stay may go is used.
 TURN, PLACE, ALLOWANCE, REACH, STATE, CALLED = 0, 4, 7, 8, 9, 10
-BALL, BALL_RADIUS, BALL_PLACE, BALL_ALLOWANCE, PART, URGENT, CROSSED, WANTING, CUT_SHORT, PAIR_MEMORY = (
-    11, 14, 15, 18, 19, 20, 21, 22, 23, 24
+BALL, BALL_RADIUS, BALL_PLACE, BALL_ALLOWANCE, PART, SURE, CROSSED, WANTING, CUT_SHORT, DOUBT, PAIR_MEMORY = (
+    11, 14, 15, 18, 19, 20, 21, 22, 23, 24, 25
 )  # fmt: skip
 FAR, NEAR, TRACKING = 0, 1, 2
 # Of a place: its pair (-1: none), the number of its contact.

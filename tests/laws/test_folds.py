@@ -287,6 +287,6 @@ def test_pairs_are_looked_at_that_need_it(part, as_needed, in_turns, careful):
         assert clips.looked(how) == clips.count == 3
         clips.pairs[:, watch_memory.ALLOWANCE] = 1e-3
         clips.pairs[:, watch_memory.BALL_ALLOWANCE] = np.inf
-        clips.pairs[:, watch_memory.URGENT] = 1.0
+        clips.pairs[:, watch_memory.SURE] = 0.0
         clips.q[1, 2] += 1e-3 * part
         assert clips.looked(how) == count
