@@ -69,18 +69,19 @@ class Spine:
     length: Array
     turn: Array
 
-    def points(self, piece: int, at: Array) -> tuple[Array, Array, Array]:
-        """Points, tangents and where the other parameter starts, (m, 3) each, of a piece at lengths (m,) along it."""
+    def frames(self, piece: int, at: Array) -> tuple[Array, Array, Array]:
+        """Points, tangents and normals, (m, 3) each, of a piece at lengths (m,) along it."""
         angle = (self.curvature[piece] * at)[:, None]
         t, n, bend = self.tangent[piece], self.normal[piece], self.curvature[piece]
-        tangents = np.cos(angle) * t + np.sin(angle) * n
-        normals = np.cos(angle) * n - np.sin(angle) * t
+        way = at[:, None] * t
         if bend > 0.0:
-            points = self.start[piece] + (np.sin(angle) * t + 2.0 * np.sin(0.5 * angle) ** 2 * n) / bend
-        else:
-            points = self.start[piece] + at[:, None] * t
+            way = (np.sin(angle) * t + 2.0 * np.sin(0.5 * angle) ** 2 * n) / bend
+        return self.start[piece] + way, np.cos(angle) * t + np.sin(angle) * n, np.cos(angle) * n - np.sin(angle) * t
+
+    def begins(self, piece: int, tangents: Array, normals: Array) -> Array:
+        """Unit vectors (m, 3) to where the other parameter starts."""
         turn = self.turn[piece]
-        return points, tangents, np.cos(turn) * normals + np.sin(turn) * np.cross(tangents, normals)
+        return np.asarray(np.cos(turn) * normals + np.sin(turn) * np.cross(tangents, normals))
 
 
 @lru_cache(maxsize=256)
@@ -177,15 +178,16 @@ class _Candidate:
         x, y = _nodes(self.surface.degree[0]), _nodes(self.surface.degree[1])
         angle = spine.curvature[piece] * spine.length[piece]
         at = _angle(x, angle) / spine.curvature[piece] if angle > 0.0 else 0.5 * (1.0 + x) * spine.length[piece]
-        points, tangents, begins = spine.points(piece, at)
+        points, tangents, normals = spine.frames(piece, at)
+        begins = spine.begins(piece, tangents, normals)
         expected = points[:, None] + spine.radius * self._around(spine, tangents, begins, y)
         return self._is(expected, span, x, y)
 
     def _is_ball(self, spine: Spine, piece: int, span: int, side: float) -> bool:
         """Whether the surface over a span of u is a half ball at the end of a piece."""
         x, y = _nodes(self.surface.degree[0]), _nodes(self.surface.degree[1])
-        points, tangents, begins = spine.points(piece, np.array([0.0 if side < 0.0 else spine.length[piece]]))
-        ring = self._around(spine, tangents, begins, y)
+        points, tangents, normals = spine.frames(piece, np.array([0.0 if side < 0.0 else spine.length[piece]]))
+        ring = self._around(spine, tangents, spine.begins(piece, tangents, normals), y)
         # From the pole at the start to the ring, or from the ring to the pole at the end.
         angle = _angle(x, QUARTER)[:, None, None] - (QUARTER if side < 0.0 else 0.0)
         return self._is(points + spine.radius * (np.cos(angle) * ring + np.sin(angle) * tangents[0]), span, x, y)
@@ -210,7 +212,7 @@ class _Candidate:
         """Whether every piece begins where and as the one before ends."""
         count = len(spine.length)
         for k in range(count if spine.closed else count - 1):
-            points, tangents, _ = spine.points(k, spine.length[k : k + 1])
+            points, tangents, _ = spine.frames(k, spine.length[k : k + 1])
             after = (k + 1) % count
             if np.abs(points[0] - spine.start[after]).max() > self.within:
                 return False

@@ -1,4 +1,4 @@
-"""What is known of two spines over a box, lengths s and t along a piece of either.
+"""What is known of two spines over a box, lengths s and t along a part of either.
 
 Two wires touch where the distance of their spines has a minimum: with d = g(t) - f(s) and F = |d|^2 / 2,
 
@@ -18,7 +18,7 @@ import math
 
 from assembly._kernel import kernel
 from assembly.geometry.vec import add, blend, dot, matvec, sub
-from assembly.proximity.spine_curve import BEND, spine_point
+from assembly.proximity.spine_curve import PART_BEND, spine_point
 
 # What a box is: nothing is known, no slope zero in it, F convex over it, F'' indefinite over it.
 UNKNOWN, EMPTY, CONVEX, BARREN = 0, 1, 2, 3
@@ -93,10 +93,10 @@ def beyond(slope, hessian, error, rate, h, k):
 
 @kernel(inner=True)
 def box_of(pool, o, p, turn, shift, box, open_ends, reach, rho):
-    """What a box (s from, to, t from, to) of the pieces at o and p is.
+    """What a box (s from, to, t from, to) of the parts at o and p is.
 
-    One that is beyond the reach is EMPTY, for longer than that. `open_ends` are where F_s, and F_t, may have any value >= 0, and <= 0: whether the box is at a free end of f where
-    it starts, or ends, and so of g.
+    One that is beyond the reach is EMPTY, for longer than that. `open_ends` are where F_s, and F_t, may have any value
+    >= 0, and <= 0: whether the box is at a free end of f where it starts, or ends, and so of g.
 
     Returns
     -------
@@ -105,8 +105,8 @@ def box_of(pool, o, p, turn, shift, box, open_ends, reach, rho):
     h = 0.5 * (box[1] - box[0])
     k = 0.5 * (box[3] - box[2])
     d, f, bend_f, g, bend_g = apart(pool, o, p, turn, shift, box[0] + h, box[2] + k)
-    kf = pool[o + BEND]
-    kg = pool[p + BEND]
+    kf = pool[o + PART_BEND]
+    kg = pool[p + PART_BEND]
     turn_f = kf * h
     turn_g = kg * k
     least = segment_distance(d, f, g, h, k) - 0.5 * (turn_f * h + turn_g * k)

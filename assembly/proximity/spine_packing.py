@@ -36,37 +36,45 @@ def pack_spine(spine: Spine, scale: float, table_at: int = 0, pool_at: int = 0) 
     offset : int
         Of the spine's record in the table.
     """
-    count = len(spine.length)
     numbers = np.array([spine.radius / scale, scale * spine.curvature.max(), spine.sense])
-    pieces = np.concatenate([
-        spine.start / scale, spine.tangent, spine.normal, scale * spine.curvature[:, None],
-        spine.length[:, None] / scale, spine.turn[:, None],
+    counts = _counts(spine)
+    owner = np.repeat(np.arange(len(counts)), counts)
+    first = np.cumsum(counts) - counts
+    half = 0.5 * (spine.length / counts)[owner]
+    place = half * (1.0 + 2.0 * (np.arange(len(owner)) - first[owner]))
+    pieces = np.stack([scale * spine.curvature, spine.length / scale, spine.turn, first, counts], axis=1)
+    points, tangents, normals = (np.concatenate(rows) for rows in zip(*(
+        spine.frames(k, place[owner == k]) for k in range(len(counts))
+    ), strict=True))  # fmt: skip
+    parts = np.concatenate([
+        points / scale, tangents, normals,
+        np.stack([scale * spine.curvature[owner], half / scale, owner, place / scale], axis=1),
     ], axis=1)  # fmt: skip
-    parts = _parts(spine)
-    children, balls = _tree(spine, parts, scale)
+    ends = np.array([
+        spine.frames(int(k), middle + np.array([-reach, 0.0, reach]))[0]
+        for k, middle, reach in zip(owner, place, half, strict=True)
+    ])  # fmt: skip
+    children, balls = _tree(ends, scale)
     record = np.zeros(layout.SPINE, dtype=np.int64)
-    record[layout.PIECES], record[layout.CLOSED], record[layout.ALONG] = count, spine.closed, spine.along
-    doubles = (numbers, pieces, parts / [1.0, scale, scale], balls)
-    at = pool_at + np.cumsum([0, *(part.size for part in doubles)])
+    record[layout.PIECES], record[layout.PARTS] = len(counts), len(owner)
+    record[layout.CLOSED], record[layout.ALONG] = spine.closed, spine.along
+    doubles = (numbers, pieces, parts, balls)
+    at = pool_at + np.cumsum([0, *(block.size for block in doubles)])
     record[[layout.NUMBERS, layout.PIECE_POOL, layout.PART_POOL, layout.NODE_POOL]] = at[:4]
     record[layout.NODE_TABLE] = table_at + layout.SPINE
-    return np.append(record, children), np.concatenate([part.ravel() for part in doubles]), table_at
+    return np.append(record, children), np.concatenate([block.ravel() for block in doubles]), table_at
 
 
-def _parts(spine: Spine) -> Array:
-    """Parts of pieces, (m, 3): the piece, from and to."""
+def _counts(spine: Spine) -> NDArray[np.int64]:
+    """Into how many parts pieces are cut."""
     finest = _TURN / max(float(spine.curvature.max()), 1e-300)
-    rows = []
-    for k, (bend, length) in enumerate(zip(spine.curvature, spine.length, strict=True)):
-        count = bend * length / _TURN if bend > 0.0 else min(length / (_LINE * finest), _MOST)
-        at = np.linspace(0.0, length, max(int(np.ceil(count)), 1) + 1)
-        rows += [(k, low, high) for low, high in zip(at[:-1], at[1:], strict=True)]
-    return np.array(rows)
+    lines = np.minimum(spine.length / (_LINE * finest), _MOST)
+    counts = np.where(spine.curvature > 0.0, spine.curvature * spine.length / _TURN, lines)
+    return np.maximum(np.ceil(counts), 1).astype(np.int64)
 
 
-def _tree(spine: Spine, parts: Array, scale: float) -> tuple[Table, Array]:
-    """Children and balls of the nodes: halves of the parts, down to single ones."""
-    ends = np.array([spine.points(int(k), np.array([low, 0.5 * (low + high), high]))[0] for k, low, high in parts])
+def _tree(ends: Array, scale: float) -> tuple[Table, Array]:
+    """Children and balls of the nodes over parts (m, 3, 3), where they begin, their middles and ends; halved each."""
     middle = 0.5 * (ends[:, 0] + ends[:, 2])
     # No point of an arc of up to half a circle is farther from the middle of its chord than an end, or its own middle.
     reach = np.linalg.norm(ends - middle[:, None], axis=2).max(axis=1)

@@ -4,10 +4,24 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from assembly._kernel import kernel
 from assembly.geometry.vec import add, dot, matvec, sub
 from assembly.proximity.patch_list import COUNT, ENTRIES, can_be_listed, moved_since, reaches, write_list
-from assembly.proximity.spine_curve import BALL, BALL_RADIUS, NODE_POOL, NODE_TABLE, PART, PART_POOL, three
+from assembly.proximity.spine_box import segment_distance
+from assembly.proximity.spine_curve import (
+    BALL,
+    BALL_RADIUS,
+    HALF,
+    NODE_POOL,
+    NODE_TABLE,
+    PART,
+    PART_BEND,
+    PART_POOL,
+    TANGENT,
+    three,
+)
 
 
 @kernel(inline=True)
@@ -18,8 +32,27 @@ def balls_apart(pool, o, p, turn, shift):
 
 
 @kernel(inner=True)
+def parts_apart(pool, o, p, turn, shift):
+    """A lower bound of the distance of the parts at o of f and at p of g: that of their tangents in the middle."""
+    h = pool[o + HALF]
+    k = pool[p + HALF]
+    d = sub(add(matvec(turn, three(pool, p)), shift), three(pool, o))
+    least = segment_distance(d, three(pool, o + TANGENT), matvec(turn, three(pool, p + TANGENT)), h, k)
+    return least - 0.5 * (pool[o + PART_BEND] * h * h + pool[p + PART_BEND] * k * k)
+
+
+@kernel(inline=True)
+def whole_box(table, pool, spine, part, boxes, b, at):
+    """A side of box b: a whole part, from and to its ends."""
+    half = pool[table[spine + PART_POOL] + PART * part + HALF]
+    boxes[b, at] = float(part)
+    boxes[b, at + 1] = -half
+    boxes[b, at + 2] = half
+
+
+@kernel(inner=True)
 def descend(table, pool, spines, turn, shift, reach, stack, out):
-    """Leaves (k, 2) of two trees whose balls are within a reach of each other.
+    """Parts (k, 2) of two spines that may be within a reach of each other.
 
     Returns how many, or -1 where there is no room; and how far all others are beyond.
     """
@@ -44,10 +77,18 @@ def descend(table, pool, spines, turn, shift, reach, stack, out):
         child_f = table[table[f + NODE_TABLE] + i]
         child_g = table[table[g + NODE_TABLE] + j]
         if child_f < 0 and child_g < 0:
+            part_f = np.int64(-1 - child_f)
+            part_g = np.int64(-1 - child_g)
+            apart = parts_apart(
+                pool, table[f + PART_POOL] + PART * part_f, table[g + PART_POOL] + PART * part_g, turn, shift
+            )
+            if apart > reach:
+                beyond = min(beyond, apart)
+                continue
             if count == out.shape[0]:
                 return -1, 0.0
-            out[count, 0] = i
-            out[count, 1] = j
+            out[count, 0] = part_f
+            out[count, 1] = part_g
             count += 1
             continue
         if used + 2 > stack.shape[0]:
@@ -89,14 +130,11 @@ def near_parts(table, pool, at, p, scene, moving, reach, ring, stack, out, boxes
     count = 0
     for k in range(many):
         i, j = out[k, 0], out[k, 1]
-        if balls_apart(pool, table[f + NODE_POOL] + BALL * i, table[g + NODE_POOL] + BALL * j, turn, shift) > reach:
+        if parts_apart(pool, table[f + PART_POOL] + PART * i, table[g + PART_POOL] + PART * j, turn, shift) > reach:
             continue
         if count == boxes.shape[0]:
             return -1
-        from_f = table[f + PART_POOL] + PART * (-1 - table[table[f + NODE_TABLE] + i])
-        from_g = table[g + PART_POOL] + PART * (-1 - table[table[g + NODE_TABLE] + j])
-        for l in range(PART):
-            boxes[count, l] = pool[from_f + l]
-            boxes[count, PART + l] = pool[from_g + l]
+        whole_box(table, pool, f, i, boxes, count, 0)
+        whole_box(table, pool, g, j, boxes, count, 3)
         count += 1
     return count if many >= 0 else -1

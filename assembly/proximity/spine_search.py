@@ -1,6 +1,6 @@
 """The search of a look (`watch.py`) for contacts of two round wires, by their spines.
 
-Wires touch where the distance of their spines has a minimum, less their radii. Boxes of both, lengths along a piece of
+Wires touch where the distance of their spines has a minimum, less their radii. Boxes of both, lengths along a part of
 either, are halved until it is known of each how many minima it holds (`spine_box.py`); where that takes boxes that are
 all but points, feet tell (`spine_minima.py`). So no contact is missed, and it is known how far bodies may go until
 there may be others: what is excluded by a margin stays so for motions that are shorter.
@@ -19,11 +19,11 @@ from assembly.proximity.roots import GAP, NEW, NOTHING, ORIGIN, add_root, are_on
 from assembly.proximity.spine_box import BARREN, CONVEX, EMPTY, UNKNOWN, apart, box_of
 from assembly.proximity.spine_curve import (
     CLOSED,
-    LENGTH,
+    HALF,
     NUMBERS,
-    PIECE,
-    PIECE_POOL,
-    PIECES,
+    PART,
+    PART_POOL,
+    PARTS,
     SHARPEST,
     both_radii,
     spine_place,
@@ -32,7 +32,7 @@ from assembly.proximity.spine_curve import (
 )
 from assembly.proximity.spine_minima import convex_minimum, valley_minima
 
-# Room: boxes that wait, six doubles each (piece and lengths of f, then of g).
+# Room: boxes that wait, six doubles each (part and lengths of f, then of g).
 BOXES, BOX = 512, 6
 # Boxes over half of which no tangent turns by more than this are thin enough for feet to tell.
 THIN = 0.025
@@ -53,19 +53,19 @@ def open_ends(table, pool, f, g, box):
     free_g = table[g + CLOSED] == 0
     i = np.int64(box[0])
     j = np.int64(box[3])
-    last_f = pool[table[f + PIECE_POOL] + PIECE * i + LENGTH]
-    last_g = pool[table[g + PIECE_POOL] + PIECE * j + LENGTH]
+    half_f = pool[table[f + PART_POOL] + PART * i + HALF]
+    half_g = pool[table[g + PART_POOL] + PART * j + HALF]
     return (
-        free_f and i == 0 and box[1] <= 0.0,
-        free_f and i == table[f + PIECES] - 1 and box[2] >= last_f,
-        free_g and j == 0 and box[4] <= 0.0,
-        free_g and j == table[g + PIECES] - 1 and box[5] >= last_g,
+        free_f and i == 0 and box[1] <= -half_f,
+        free_f and i == table[f + PARTS] - 1 and box[2] >= half_f,
+        free_g and j == 0 and box[4] <= -half_g,
+        free_g and j == table[g + PARTS] - 1 and box[5] >= half_g,
     )
 
 
 @kernel(inner=True)
 def mark_known(table, pool, scene, roots, count, marks):
-    """Where on the spines known roots are that are at a minimum: piece and length of either; NaN for others."""
+    """Where on the spines known roots are that are at a minimum: part and length of either; NaN for others."""
     surfaces = scene[2]
     f, g = scene[5]
     for k in range(count):
@@ -75,8 +75,8 @@ def mark_known(table, pool, scene, roots, count, marks):
         marks[k, 1] = s
         marks[k, 2] = float(j)
         marks[k, 3] = t
-        o = table[f + PIECE_POOL] + PIECE * i
-        p = table[g + PIECE_POOL] + PIECE * j
+        o = table[f + PART_POOL] + PART * i
+        p = table[g + PART_POOL] + PART * j
         d, tf, _bend_f, tg, _bend_g = apart(pool, o, p, scene[0], scene[1], s, t)
         if not abs(dot(d, tf)) + abs(dot(d, tg)) <= AT_ROOT:
             # At a half ball, or on its way to a root: what is there is looked for.
@@ -99,12 +99,12 @@ def is_marked(boxes, b, marks, count):
 
 @kernel(inner=True)
 def add_minimum(table, pool, scene, i, j, s, t, neglect, roots, count, work):
-    """Add the contact at lengths s and t along pieces i and j, if it is none of the known ones. Returns how many."""
+    """Add the contact at lengths s and t along parts i and j, if it is none of the known ones. Returns how many."""
     if count == roots.shape[0]:
         return count
     f, g = scene[5]
-    o = table[f + PIECE_POOL] + PIECE * i
-    p = table[g + PIECE_POOL] + PIECE * j
+    o = table[f + PART_POOL] + PART * i
+    p = table[g + PART_POOL] + PART * j
     d, tf, _bend_f, tg, _bend_g = apart(pool, o, p, scene[0], scene[1], s, t)
     length = math.sqrt(dot(d, d))
     if length < MEETING:
@@ -164,8 +164,8 @@ def add_minima(table, pool, scene, box, ends, what, neglect, roots, count, work)
     f, g = scene[5]
     i = np.int64(box[0])
     j = np.int64(box[3])
-    o = table[f + PIECE_POOL] + PIECE * i
-    p = table[g + PIECE_POOL] + PIECE * j
+    o = table[f + PART_POOL] + PART * i
+    p = table[g + PART_POOL] + PART * j
     part = (box[1], box[2], box[4], box[5])
     if what == CONVEX:
         s, t = 0.5 * (box[1] + box[2]), 0.5 * (box[4] + box[5])
@@ -209,8 +209,8 @@ def search_spines(table, pool, scene, moving, rho, lengths, neglect, boxes, wait
     while waiting > 0:
         b = waiting - 1
         box = (boxes[b, 0], boxes[b, 1], boxes[b, 2], boxes[b, 3], boxes[b, 4], boxes[b, 5])
-        o = table[f + PIECE_POOL] + PIECE * np.int64(box[0])
-        p = table[g + PIECE_POOL] + PIECE * np.int64(box[3])
+        o = table[f + PART_POOL] + PART * np.int64(box[0])
+        p = table[g + PART_POOL] + PART * np.int64(box[3])
         part = (box[1], box[2], box[4], box[5])
         ends = open_ends(table, pool, f, g, box)
         low, what, margin = box_of(pool, o, p, scene[0], scene[1], part, ends, radii + reach, rho)
