@@ -38,6 +38,8 @@ BOXES, BOX = 512, 6
 THIN = 0.025
 # So many boxes are halved only because they allow little, down to so many radians.
 REFINED, FINE = 24, 0.1
+# What may go by more than this part of a reach is not worth a ball.
+MUCH = 0.6
 # Slopes of F below this say that a known contact is a minimum's.
 AT_ROOT = 1e-9
 # Newton's method on the surfaces ends at the minimum it began at, if the gap is the same but for this.
@@ -233,13 +235,13 @@ def search_spines(table, pool, scene, moving, rho, lengths, neglect, boxes, wait
         if low <= near and not hollow and not (what == CONVEX and is_marked(boxes, b, marks, known)):
             count = add_minima(table, pool, scene, box, ends, what, neglect, roots, count, work)
         waiting = b
+        if allowed >= MUCH * reach and allowed >= flank:
+            free = min(free, allowed)
+            continue
         if allowed < flank:
             # A contact may be born beside one that is near: so far it is excluded.
             sure = min(sure, allowed)
             allowed = flank
-        if allowed >= near:
-            free = min(free, allowed)
-            continue
         fertile = min(fertile, allowed)
         lo, hi = around_box(pool, p if side == 1 else o, box, side, lo, hi)
     if not fertile < math.inf:
