@@ -15,7 +15,7 @@ Table = NDArray[np.int64]
 _ROUNDING = 1e-15
 # Parts of pieces turn by no more than this; lines are cut to so many times the length of such a part of the
 # sharpest, and into no more than so many.
-_TURN, _LINE, _MOST = 0.4, 4.0, 64
+_TURN, _LINE, _MOST = 0.3, 2.0, 64
 
 
 def pack_spine(spine: Spine, scale: float, table_at: int = 0, pool_at: int = 0) -> tuple[Table, Array, int]:

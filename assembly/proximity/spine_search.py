@@ -37,7 +37,7 @@ BOXES, BOX = 512, 6
 # Boxes over half of which no tangent turns by more than this are thin enough for feet to tell.
 THIN = 0.025
 # So many boxes are halved only because they allow little, down to so many radians.
-REFINED, FINE = 24, 0.1
+REFINED, FINE = 16, 0.05
 # What may go by more than this part of a reach is not worth a ball.
 MUCH = 0.6
 # Slopes of F below this say that a known contact is a minimum's.
