@@ -91,7 +91,7 @@ def beyond(slope, hessian, error, rate, h, k):
     return max(x / (tt * rate[0] + off * rate[1]), y / (off * rate[0] + ss * rate[1]))
 
 
-@kernel(inner=True)
+@kernel(inline=True)
 def box_of(pool, o, p, turn, shift, box, open_ends, reach, rho):
     """What a box (s from, to, t from, to) of the parts at o and p is.
 

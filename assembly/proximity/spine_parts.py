@@ -31,7 +31,7 @@ def balls_apart(pool, o, p, turn, shift):
     return math.sqrt(dot(d, d)) - pool[o + BALL_RADIUS] - pool[p + BALL_RADIUS]
 
 
-@kernel(inner=True)
+@kernel(inline=True)
 def parts_apart(pool, o, p, turn, shift):
     """A lower bound of the distance of the parts at o of f and at p of g: that of their tangents in the middle."""
     h = pool[o + HALF]
