@@ -33,7 +33,7 @@ from assembly.proximity.spine_curve import (
 from assembly.proximity.spine_minima import convex_minimum, valley_minima
 
 # Room: boxes that wait, six doubles each (part and lengths of f, then of g).
-BOXES, BOX = 512, 6
+BOXES, BOX = 2048, 6
 # Boxes over half of which no tangent turns by more than this are thin enough for feet to tell.
 THIN = 0.025
 # So many boxes are halved only because they allow little, down to so many radians.

@@ -192,15 +192,23 @@ def search_by_spines(table, pool, watch, memory, p, scene, moving, reach, offset
     lengths = table[watch + LENGTHS]
     minimum = table[table[watch + PAIR_TABLE] + PAIR_RECORD * p + PAIR_MINIMUM]
     least, flank = pool[minimum], pool[minimum + 1]
-    memory[memory_places(table, watch)[0] + PAIR_MEMORY * p + REACH] = reach
-    count, any_gone = known_roots(table, pool, watch, memory, p, scene, offsets, tracked, roots, work)
     radii = both_radii(table, pool, scene[5]) + least
     ring = SPINE_RINGS * pool[lengths + FIRST_REACH]
     at_list = table[watch + LIST_TABLE] + LIST_INTS * (p % table[watch + LISTS])
     waiting = near_parts(table, pool, at_list, p, scene, moving, radii + reach, ring, stack, pairs, boxes)
-    if waiting <= 0:
-        beyond = parts_beyond(table, pool, scene, radii + reach, stack, pairs) - radii if waiting == 0 else 0.0
-        return count, any_gone, beyond, math.inf, NO_BALL, math.inf, waiting < 0
+    while waiting < 0 and reach > LEAST_ALLOWANCE:
+        # Out of room: what is nearer is looked at more often.
+        reach *= 0.5
+        waiting = near_parts(table, pool, at_list, p, scene, moving, radii + reach, ring, stack, pairs, boxes)
+    memory[memory_places(table, watch)[0] + PAIR_MEMORY * p + REACH] = reach
+    count, any_gone = known_roots(table, pool, watch, memory, p, scene, offsets, tracked, roots, work)
+    if waiting < 0:
+        # There is no room for what is as near as it should not be.
+        memory[CROWDED] = 1.0
+        return count, any_gone, 0.0, math.inf, NO_BALL, math.inf, True
+    if waiting == 0:
+        beyond = parts_beyond(table, pool, scene, radii + reach, stack, pairs) - radii
+        return count, any_gone, beyond, math.inf, NO_BALL, math.inf, False
     # No tangent turns by more than a motion over this.
     rho = min(2.0 * (radii + reach), 0.99 * pool[table[moving[1] + NODE_POOL] + RADIUS])
     count, free, fertile, ball, sure = search_spines(
