@@ -21,6 +21,12 @@ STEPS, FEET, HALVINGS = 30, 12, 60
 LEVEL = 1e-10
 
 
+@kernel(inline=True)
+def is_least(slope, at_ends):
+    """Whether a slope is that of a minimum: zero, or upward from a free end where it starts, or is reached."""
+    return abs(slope) <= LEVEL or (at_ends[0] and slope > 0.0) or (at_ends[1] and slope < 0.0)
+
+
 @kernel(inner=True)
 def convex_minimum(pool, o, p, turn, shift, box, open_ends, s, t):
     """The minimum of F over a box where it is convex, from (s, t): whether it is one of the curves; s, t.
@@ -46,16 +52,16 @@ def convex_minimum(pool, o, p, turn, shift, box, open_ends, s, t):
             i = 1.0 / det if det > 1e-14 else 0.0
             x = i * (st * b - tt * a) if i > 0.0 else 0.5 * (-a)
             y = i * (st * a - ss * b) if i > 0.0 else 0.5 * (-b)
-        x = min(max(s + x, box[0]), box[1]) - s
-        y = min(max(t + y, box[2]), box[3]) - t
-        s += x
-        t += y
-        size = abs(x) + abs(y)
+        s_new = min(max(s + x, box[0]), box[1])
+        t_new = min(max(t + y, box[2]), box[3])
+        size = abs(s_new - s) + abs(t_new - t)
+        s = s_new
+        t = t_new
         if size <= 1e-15 or (size < 1e-9 and size >= 0.5 * last):
-            out = (hold_s and abs(a) > LEVEL and not (open_ends[0] if a > 0.0 else open_ends[1])) or (
-                hold_t and abs(b) > LEVEL and not (open_ends[2] if b > 0.0 else open_ends[3])
-            )
-            return not out, s, t
+            d, f, _bend_f, g, _bend_g = apart(pool, o, p, turn, shift, s, t)
+            ends_f = (open_ends[0] and s <= box[0], open_ends[1] and s >= box[1])
+            ends_g = (open_ends[2] and t <= box[2], open_ends[3] and t >= box[3])
+            return is_least(-dot(d, f), ends_f) and is_least(dot(d, g), ends_g), s, t
         last = size
     return False, s, t
 
