@@ -86,9 +86,10 @@ from assembly.proximity.watch_memory import (
 # Looks: at pairs that used up their allowance, or at all that moved. The first may be careful, at urgent pairs too, and
 # in turns, earlier at one pair at a time, and ask whether bodies cross where a contact lost its root.
 AS_NEEDED, EVERYTHING, CAREFUL, IN_TURNS, DOUBTFUL = 0, 1, 2, 4, 8
-# A pair is looked at again when so much of its allowance is used; in turns, the one that used most of it at the first,
-# and any that cut a step since its last look at the third: what is left would cut the next one to nothing.
-USED, SPENT, BRIEF = 0.5, 0.5, 0.35
+# A pair is looked at again when so much of its allowance is used: the second, but the first of round wires, whose looks
+# take little; in turns, the one that used most of it at the first, and any that cut a step since its last look at the
+# third: what is left would cut the next one to nothing.
+USED, SPENT, BRIEF = 0.5, 0.85, 0.35
 # What moved by less than this part of its allowance, 1e-9 of the scene's size, is where it was.
 STILL = 1e-8
 # Room: pairs of patches of a look.
@@ -313,10 +314,11 @@ def look(table, pool, watch, memory, q, tracked, how):
     at = memory_places(table, watch)[0]
     for p in range(table[watch + PAIRS]):
         part = memory[at + PAIR_MEMORY * p + PART]
+        patches = table[table[watch + PAIR_TABLE] + PAIR_RECORD * p + SPINE_F] < 0
         if how == EVERYTHING:
             due = part > 0.0 or math.isnan(memory[at + PAIR_MEMORY * p + CROSSED])
         else:
-            due = part > SPENT or (how & IN_TURNS != 0 and p == next_pair and part > USED)
+            due = part > (SPENT if patches else USED) or (how & IN_TURNS != 0 and p == next_pair and part > USED)
             asked = memory[at + PAIR_MEMORY * p + CUT_SHORT]
             due = due or (how & IN_TURNS != 0 and part > BRIEF and asked > memory[at + PAIR_MEMORY * p + ALLOWANCE])
             due = due or (how & CAREFUL != 0 and memory[at + PAIR_MEMORY * p + DOUBT] > 1.0)
@@ -330,7 +332,7 @@ def look(table, pool, watch, memory, q, tracked, how):
             boxes = np.empty((BOXES, BOX))
             marks = np.empty((ROOTS, 4))
             work = (np.empty((1, CONTACT_RECORD)), np.empty((1, TRACK)))
-        if not with_patches and table[table[watch + PAIR_TABLE] + PAIR_RECORD * p + SPINE_F] < 0:
+        if patches and not with_patches:
             with_patches = True
             candidates = np.empty((CANDIDATES, 2), np.int64)
             distances = np.empty(CANDIDATES)

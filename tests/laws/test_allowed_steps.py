@@ -19,6 +19,7 @@ from assembly.proximity.shell import EDGE, FACE
 from assembly.proximity.solid_contact import TRACK
 from assembly.proximity.watch_memory import (
     ALLOWANCE,
+    BALL_ALLOWANCE,
     CUT_SHORT,
     PAIR_F,
     PAIR_G,
@@ -30,6 +31,7 @@ from assembly.proximity.watch_memory import (
     PAIR_SURFACE_G,
     PAIR_TABLE,
     PAIRS,
+    SURE,
     TREE_F,
     TREE_G,
     memory_places,
@@ -105,6 +107,9 @@ def test_a_pair_that_is_nearly_spent_and_hardly_moves_is_not_in_the_way():
     looked = Looked(np.random.default_rng(9))
     at = looked.table[looked.watch + PAIR_TABLE] + PAIR_RECORD * np.array(looked.pairs)
     bodies = looked.table[np.add.outer(at, [PAIR_F, PAIR_G])]
+    # Of balls, which have allowances of their own, there are none.
+    looked.column(BALL_ALLOWANCE)[:] = np.inf
+    looked.column(SURE)[:] = np.inf
     allowances = looked.column(ALLOWANCE).copy()
     # Of the pair with the least allowance nearly all is used by one body; others of that body have more.
     spent = int(np.argmin(allowances))

@@ -10,6 +10,7 @@ from assembly.constraints.layout import FREE_COLUMN, ROWS, WATCH
 from assembly.geometry.spline import SURFACE_RECORD
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity import roots, watch, watch_memory
+from assembly.proximity.allowances import allow_ball, mover
 from assembly.proximity.extremal import SINGULAR, solve_pair
 from assembly.proximity.folds import fold_beyond
 from assembly.proximity.free_pair import VARIABLES, VECTORS, free_rows
@@ -280,13 +281,25 @@ def test_the_last_look_asks_of_every_pair_whether_it_crosses():
     ("part", "as_needed", "in_turns", "careful"),
     [(0.9, 2, 2, 2), (0.8, 0, 1, 2), (0.4, 0, 0, 2), (1e-7, 0, 0, 2), (1e-9, 0, 0, 0)],
 )
-def test_pairs_are_looked_at_that_need_it(part, as_needed, in_turns, careful):
-    # The middle clip goes a part of what its pairs allow; both of them are urgent.
+@pytest.mark.parametrize("by_spines", [True, False])
+def test_pairs_are_looked_at_that_need_it(by_spines, part, as_needed, in_turns, careful):
+    # The middle clip goes a part of what its pairs allow; of neither it is sure how far it may. Looks of wires are
+    # cheap, and earlier.
+    if by_spines and part == 0.8:
+        as_needed = in_turns = 2
     for how, count in ((watch.AS_NEEDED, as_needed), (watch.IN_TURNS, in_turns), (watch.CAREFUL, careful)):
         clips = Clips()
+        table, watch_at = clips.packed.table, clips.packed.table[WATCH]
+        if not by_spines:
+            first = int(table[watch_at + watch_memory.PAIR_TABLE])
+            table[first + watch_memory.SPINE_F :: watch_memory.PAIR_RECORD][: clips.count] = -1
         assert clips.looked(how) == clips.count == 3
         clips.pairs[:, watch_memory.ALLOWANCE] = 1e-3
-        clips.pairs[:, watch_memory.BALL_ALLOWANCE] = np.inf
-        clips.pairs[:, watch_memory.SURE] = 0.0
+        for p in range(clips.count):
+            # A ball of no size: it goes where the body's origin does.
+            at = watch_memory.MEMORY_HEADER + watch_memory.PAIR_MEMORY * p
+            origin = (0.0, 0.0, 0.0)
+            place = mover(table, watch_at, p, clips.q)[4]
+            allow_ball(clips.memory, at, (origin, place, 0.0), np.inf, watch.STILL * 1e-3)
         clips.q[1, 2] += 1e-3 * part
         assert clips.looked(how) == count

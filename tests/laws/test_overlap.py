@@ -272,7 +272,8 @@ def test_a_body_wholly_inside_another_one_is_in_it(outer, inner):
         for place, inside in zip(places, (True, False), strict=True):
             q = np.array([(0.0, 0.0, 0.0, *UPRIGHT), (*place, *turn)])
             for told, deepest in (judge(shape, INNER[inner])(q), judge(INNER[inner], shape)(q[::-1])):
-                assert told == inside
+                # The gap of a contact of round wires says so, or the look.
+                assert (told or deepest < -0.1) == inside
                 assert inside or not deepest < 0.0
 
 

@@ -17,6 +17,8 @@ from benchmarks.wire_oracle import WireOracle
 SCENES = 50
 # Gaps hold to 1e-12 of the scene's size, which is a few lengths here; the oracle's are good to 1e-14.
 HOLDS = 1e-11
+# Stationary is what is so to 1e-10 of the size: a gap that carries a force may be open by as much.
+STATIONARY = 3e-10
 # Of taut scenes rounding decides which stall at a fold: of 50 some 48 are solved.
 MOST = 44
 
@@ -97,7 +99,8 @@ def test_the_gap_is_at_least_the_minimum(minimum):
     solution = scene.solve()
     assert solution.success
     # The pull is beyond reach: it ends where the rings are as near as they may.
-    assert oracle.deepest(solution.q) == pytest.approx(minimum, abs=HOLDS)
+    assert oracle.deepest(solution.q) == pytest.approx(minimum, abs=STATIONARY)
+    assert oracle.deepest(solution.q) >= minimum - HOLDS
     assert oracle.links(solution.q).tolist() == oracle.links(scene.q).tolist() != [0]
 
 
@@ -252,4 +255,5 @@ def test_beside_a_contact_of_the_same_bodies():
     scene.constrain(asm.Contact(scene.body("first"), scene.body("second"), "touch", unilateral=True))
     solution = scene.solve()
     assert solution.success
-    assert oracle.deepest(solution.q) == pytest.approx(0.0, abs=HOLDS)
+    assert oracle.deepest(solution.q) == pytest.approx(0.0, abs=STATIONARY)
+    assert oracle.deepest(solution.q) >= -HOLDS
