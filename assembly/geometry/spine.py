@@ -118,19 +118,17 @@ class _Candidate:
         rows = [self._piece(k) for k in range(first, first + spans)]
         if any(row is None for row in rows):
             return None
-        start, tangent, normal, curvature, length, radius = (
+        start, tangent, normal, curvature, length, radii = (
             np.array(column) for column in zip(*(row for row in rows if row is not None), strict=True)
         )
-        if np.ptp(radius) > self.within or radius.max() * curvature.max() > THICKEST:
+        if np.ptp(radii) > self.within or radii.max() * curvature.max() > THICKEST:
             return None
         begin = surface.evaluate(self.at_u[first : first + spans], self.at_v[0]) - start
         turn = np.arctan2((begin * np.cross(tangent, normal)).sum(axis=1), (begin * normal).sum(axis=1))
         ahead = surface.evaluate(self.at_u[first], self.at_v[0] + 0.1 * (self.at_v[1] - self.at_v[0])) - start[0]
         sense = 1.0 if np.cross(begin[0], ahead) @ tangent[0] > 0.0 else -1.0
-        radius = float(radius.mean())
-        spine = Spine(
-            self.along, not is_capped, sense, radius, start, tangent, normal, curvature, length, turn
-        )
+        radius = float(radii.mean())
+        spine = Spine(self.along, not is_capped, sense, radius, start, tangent, normal, curvature, length, turn)
         fits = all(self._fits(spine, k, first + k) for k in range(spans)) and self._is_smooth(spine)
         if fits and is_capped:
             fits = self._is_ball(spine, 0, 0, -1.0) and self._is_ball(spine, spans - 1, spans + 1, 1.0)

@@ -24,6 +24,8 @@ from assembly.proximity.spine_curve import PART_BEND, spine_point
 UNKNOWN, EMPTY, CONVEX, BARREN = 0, 1, 2, 3
 # Motions are no longer than this part of rho.
 TURNS = 0.5
+# Slopes, lengths and F'' are off by less; what is so near zero may be zero.
+ROUNDING = 1e-13
 
 
 @kernel(inline=True)
@@ -63,14 +65,14 @@ def shape_of(hessian, kf, kg, rho, straight, is_open):
     longest = TURNS * rho
     if ss_low > 0.0 and tt_low > 0.0:
         det = ss_low * tt_low - st_high * st_high
-        if det > 0.0:
+        if det > ROUNDING:
             margin = det / (kf * tt_low + kg * ss_low + (2.0 * st_high + TURNS) / rho)
             return CONVEX, min(margin, min(min(ss_low / (kf + 1e-300), tt_low / (kg + 1e-300)), longest))
     if not is_open:
         if ss_high < 0.0 or tt_high < 0.0:
             return BARREN, min(max(-ss_high / (kf + 1e-300), -tt_high / (kg + 1e-300)), longest)
         det = st_low * st_low - ss_high * tt_high
-        if det > 0.0:
+        if det > ROUNDING:
             # Entries that grow as they may: (ss + kf m) (tt + kg m) < (st - m / rho)^2.
             return BARREN, min(det / (kf * tt_high + kg * ss_high + kf * kg * longest + 2.0 * st_low / rho), longest)
     return UNKNOWN, 0.0
@@ -86,8 +88,8 @@ def beyond(slope, hessian, error, rate, h, k):
     ss, tt, st = hessian
     det = abs(ss * tt - st * st)
     ss, tt, off = abs(ss), abs(tt), abs(st)
-    x = abs(hessian[1] * slope[0] - st * slope[1]) - tt * error[0] - off * error[1] - det * h
-    y = abs(hessian[0] * slope[1] - st * slope[0]) - off * error[0] - ss * error[1] - det * k
+    x = abs(hessian[1] * slope[0] - st * slope[1]) - tt * error[0] - off * error[1] - det * h - ROUNDING
+    y = abs(hessian[0] * slope[1] - st * slope[0]) - off * error[0] - ss * error[1] - det * k - ROUNDING
     return max(x / (tt * rate[0] + off * rate[1]), y / (off * rate[0] + ss * rate[1]))
 
 
@@ -109,7 +111,7 @@ def box_of(pool, o, p, turn, shift, box, open_ends, reach, rho):
     kg = pool[p + PART_BEND]
     turn_f = kf * h
     turn_g = kg * k
-    least = segment_distance(d, f, g, h, k) - 0.5 * (turn_f * h + turn_g * k)
+    least = segment_distance(d, f, g, h, k) - 0.5 * (turn_f * h + turn_g * k) - ROUNDING
     if least > reach:
         return least, EMPTY, math.inf
     a = -dot(d, f)
@@ -128,10 +130,10 @@ def box_of(pool, o, p, turn, shift, box, open_ends, reach, rho):
     tt_low, tt_high = tt - vary_tt, tt + vary_tt
     st_low, st_high = max(abs(st) - vary_st, 0.0), min(abs(st) + vary_st, 1.0)
     # Slopes: where a free end lets one of any value of a sign be a minimum's, only the other sign excludes.
-    slope = abs(a) - h * max(ss_high, -ss_low) - k * st_high
+    slope = abs(a) - h * max(ss_high, -ss_low) - k * st_high - ROUNDING
     if (open_ends[0] and a > 0.0) or (open_ends[1] and a < 0.0):
         slope = -1.0
-    other = abs(b) - k * max(tt_high, -tt_low) - h * st_high
+    other = abs(b) - k * max(tt_high, -tt_low) - h * st_high - ROUNDING
     if (open_ends[2] and b > 0.0) or (open_ends[3] and b < 0.0):
         other = -1.0
     slope = max(slope, other)

@@ -143,7 +143,11 @@ def spine_place(table, pool, spine, surface, u, v):
         reach = 0.5 + 2.0 * math.atan(x * math.tan(0.25 * whole)) / whole
     count = np.int64(pool[piece + PART_COUNT])
     part = np.int64(pool[piece + FIRST_PART]) + min(np.int64(reach * count), count - 1)
-    return part, reach * length - pool[table[spine + PART_POOL] + PART * part + PLACE]
+    o = table[spine + PART_POOL] + PART * part
+    if abs(x) == 1.0:
+        # Ends of a piece, and half balls: exactly.
+        return part, x * pool[o + HALF]
+    return part, reach * length - pool[o + PLACE]
 
 
 @kernel

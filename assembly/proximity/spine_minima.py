@@ -19,6 +19,8 @@ from assembly.proximity.spine_box import apart
 STEPS, FEET, HALVINGS = 30, 12, 60
 # Slopes below this count as zero at the borders of a box: the next box has the same point.
 LEVEL = 1e-10
+# A valley with no more slope than this at both ends is level: rounding tells where it has minima.
+NOISE = 1e-14
 
 
 @kernel(inline=True)
@@ -90,7 +92,7 @@ def slope_at(pool, o, p, turn, shift, low, high, s, t):
 
 @kernel(inner=True)
 def valley_minima(pool, o, p, turn, shift, box, open_ends):
-    """Minima of phi over a box: how many (two at most), s and t of each."""
+    """Minima of phi over a box: how many (two at most), s and t of each; whether the valley is level."""
     k = 0.5 * (box[3] - box[2])
     # Feet may go on beyond the box along the same piece, but not beyond a free end.
     low = box[2] if open_ends[2] else box[2] - k
@@ -159,4 +161,4 @@ def valley_minima(pool, o, p, turn, shift, box, open_ends):
     if count > 0 and not box[2] - slack <= first[1] <= box[3] + slack:
         first = other
         count -= 1
-    return count, first, other
+    return count, first, other, max(abs(a), abs(b)) <= NOISE

@@ -9,7 +9,7 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly.geometry.vec import add, dot, matvec, sub
 from assembly.proximity.patch_list import COUNT, ENTRIES, can_be_listed, moved_since, reaches, write_list
-from assembly.proximity.spine_box import segment_distance
+from assembly.proximity.spine_box import ROUNDING, segment_distance
 from assembly.proximity.spine_curve import (
     BALL,
     BALL_RADIUS,
@@ -38,7 +38,7 @@ def parts_apart(pool, o, p, turn, shift):
     k = pool[p + HALF]
     d = sub(add(matvec(turn, three(pool, p)), shift), three(pool, o))
     least = segment_distance(d, three(pool, o + TANGENT), matvec(turn, three(pool, p + TANGENT)), h, k)
-    return least - 0.5 * (pool[o + PART_BEND] * h * h + pool[p + PART_BEND] * k * k)
+    return least - 0.5 * (pool[o + PART_BEND] * h * h + pool[p + PART_BEND] * k * k) - ROUNDING
 
 
 @kernel(inline=True)

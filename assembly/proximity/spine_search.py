@@ -22,6 +22,7 @@ from assembly.proximity.spine_curve import (
     HALF,
     NUMBERS,
     PART,
+    PART_BEND,
     PART_POOL,
     PARTS,
     SHARPEST,
@@ -40,6 +41,8 @@ THIN = 0.025
 REFINED, FINE = 16, 0.05
 # What may go by more than this part of a reach is not worth a ball.
 MUCH = 0.6
+# Of a level valley points are contacts that are farther from each other than so many radii.
+SPARSE = 0.5
 # Slopes of F below this say that a known contact is a minimum's.
 AT_ROOT = 1e-9
 # Newton's method on the surfaces ends at the minimum it began at, if the gap is the same but for this.
@@ -175,7 +178,10 @@ def add_minima(table, pool, scene, box, ends, what, neglect, roots, count, work)
         if found:
             count = add_minimum(table, pool, scene, i, j, s, t, neglect, roots, count, work)
     else:
-        many, first, other = valley_minima(pool, o, p, scene[0], scene[1], part, ends)
+        many, first, other, level = valley_minima(pool, o, p, scene[0], scene[1], part, ends)
+        if level:
+            # All along it is as good: points here and there stand for it.
+            neglect = max(neglect, SPARSE / max(pool[o + PART_BEND], pool[p + PART_BEND]))
         if many > 0:
             count = add_minimum(table, pool, scene, i, j, first[0], first[1], neglect, roots, count, work)
         if many > 1:

@@ -1,0 +1,286 @@
+"""Spines of round wires: found from surfaces alone, and what is told of a box of two of them, by samples."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import assembly as asm
+from assembly.geometry.face import Face
+from assembly.geometry.path import Path
+from assembly.geometry.spine import spine_of
+from assembly.proximity.spine_box import BARREN, CONVEX, EMPTY, apart, box_of
+from assembly.proximity.spine_curve import (
+    HALF,
+    PART,
+    PART_POOL,
+    PARTS,
+    parameters_of,
+    place_of,
+    point_of,
+    spine_point,
+)
+from assembly.proximity.spine_packing import pack_spine
+from benchmarks.center_lines import path_wire
+from benchmarks.motions import HOOK, SHAPES
+from benchmarks.watching import Watch
+from benchmarks.wire_oracle import WireOracle
+from tests.laws.test_manager import HERE
+
+BENT = Path((0, 0, 0), (0, 0, 1)).arc(0.5, 2.9, (1, 0, 0)).arc(0.3, 1.0, (0, 1, 0)).line(0.4).arc(2.0, 0.7, (1, 1, 0))
+WIRES = {name: surface for name, (_, surface, _) in SHAPES.items()} | {"bent": asm.shapes.pipe(BENT, 0.1)}
+VIEWS = {
+    "as it is": lambda s: Face(s),
+    "transposed": lambda s: Face(s.transposed(), reversed=True),
+    "along, reversed": lambda s: Face(s.reversed(0), reversed=True),
+    "around, reversed": lambda s: Face(s.reversed(1), reversed=True),
+    "raised": lambda s: Face(s.elevate((3, 4))),
+}
+
+
+def part_at(table, at, k):
+    """Where part k of the spine at `at` is in the pool."""
+    return int(table[at + PART_POOL]) + PART * k
+
+
+@pytest.mark.parametrize("view", VIEWS)
+@pytest.mark.parametrize("name", WIRES)
+def test_points_of_a_wire_are_around_its_spine(name, view):
+    rng = np.random.default_rng(1)
+    face = VIEWS[view](WIRES[name])
+    spine = spine_of(face)
+    assert spine is not None
+    record, pool = face.packed()
+    table, more, at = pack_spine(spine, 1.0, record.size, pool.size)
+    table, pool = np.append(record, table), np.append(pool, more)
+    (u0, u1), (v0, v1) = face.surface.domain
+    size = face.surface.size
+    beyond = 0
+    # Ends of the domain, its middles and anything between: poles, seams and joints are among these.
+    for u in np.concatenate([face.surface.breaks()[0], rng.uniform(u0, u1, 60)]):
+        for v in np.concatenate([face.surface.breaks()[1], rng.uniform(v0, v1, 8)]):
+            point = face.surface.evaluate(u, v)
+            part, s = place_of(table, pool, at, 0, u, v)
+            frame = np.empty(9)
+            point_of(table, pool, at, part, s, frame)
+            way = (point - frame[:3]) / spine.radius
+            assert np.linalg.norm(way) == pytest.approx(1.0, abs=1e-11 * size / spine.radius)
+            free = abs(way @ frame[3:6]) > 1e-9
+            beyond += free
+            # Only at a free end does a wire go beyond its spine.
+            ends = (0, table[at + PARTS] - 1)
+            assert not free or (not spine.closed and part in ends and abs(s) == pool[part_at(table, at, part) + HALF])
+            back = face.surface.evaluate(*parameters_of(table, pool, at, 0, part, s, *way))
+            assert np.abs(back - point).max() < 1e-11 * size
+    assert (beyond > 0) == (not spine.closed)
+
+
+@pytest.mark.parametrize("name", WIRES)
+def test_frames_of_a_spine_are_its_derivatives(name):
+    table, pool, at = pack_spine(spine_of(Face(WIRES[name])), 1.0)
+    for part in range(table[at + PARTS]):
+        o = part_at(table, at, part)
+        for s in np.linspace(-1.5, 1.5, 7) * pool[o + HALF]:
+            h = 1e-3 * pool[o + HALF]
+            p, t, c = (np.array(row) for row in spine_point(pool, o, s))
+            rows = [[np.array(row) for row in spine_point(pool, o, s + k * h)] for k in (-2, -1, 1, 2)]
+            slopes = [
+                (rows[0][k] - 8.0 * rows[1][k] + 8.0 * rows[2][k] - rows[3][k]) / (12.0 * h) for k in range(2)
+            ]
+            # Rounding of points of size one over steps, that are short for short parts.
+            assert np.linalg.norm(t) == pytest.approx(1.0, abs=1e-14)
+            np.testing.assert_allclose(slopes[0], t, atol=1e-14 * (1.0 + np.abs(p).max()) / h)
+            np.testing.assert_allclose(slopes[1], c, atol=1e-13 / h)
+
+
+def test_what_is_no_round_wire_has_no_spine():
+    torus = asm.shapes.torus(1.0, 0.2)
+    points = torus.control_points.copy()
+    points[2, 3] += 1e-9
+    dented = asm.NurbsSurface(points, torus.knots, torus.degree, torus.weights)
+    oval = asm.NurbsSurface(torus.control_points * [1.0, 1.1, 1.0], torus.knots, torus.degree, torus.weights)
+    weights = torus.weights.copy()
+    weights[:, 1] *= 1.001
+    uneven = asm.NurbsSurface(torus.control_points, torus.knots, torus.degree, weights)
+    others = [
+        *(dented, oval, uneven),
+        *(asm.shapes.sphere(1.0), asm.shapes.ellipsoid(1.0, 0.5, 0.5), asm.shapes.plane(1.0, 1.0)),
+        *(asm.shapes.cylinder(1.0, 2.0), asm.shapes.cone(1.0, 2.0), asm.shapes.pipe(HOOK, 0.2, caps=False)),
+    ]
+    assert [spine_of(Face(surface)) for surface in others] == [None] * len(others)
+    # The wall of a bore that runs around.
+    assert spine_of(Face(torus, reversed=True)) is None
+
+
+class Two:
+    """A box of two random spines in one table and pool, near each other."""
+
+    shift = np.zeros(3)
+
+    def __init__(self, rng):
+        spines = [spine_of(Face(WIRES[name])) for name in rng.choice(list(WIRES), 2)]
+        sizes = [float(np.ptp(spine.start, axis=0).max() + spine.length.max()) for spine in spines]
+        table, self.pool, self.f = pack_spine(spines[0], sizes[0])
+        more, pool, self.g = pack_spine(spines[1], sizes[1], table.size, self.pool.size)
+        self.table, self.pool = np.append(table, more), np.append(self.pool, pool)
+        self.o, self.p = (part_at(self.table, at, rng.integers(self.table[at + PARTS])) for at in (self.f, self.g))
+        halves = self.pool[self.o + HALF], self.pool[self.p + HALF]
+        ends = [np.sort(rng.uniform(-half, half, 2)) for half in halves]
+        self.box = tuple(x for end in ends for x in end * 10.0 ** rng.uniform(-1.5, 0.0))
+        self.turn = Rotation.random(random_state=int(rng.integers(1 << 30)))
+        if rng.random() < 0.5:
+            # Nearly along each other, where folds are.
+            middles = self.frames(0.5 * (self.box[0] + self.box[1]), 0.5 * (self.box[2] + self.box[3]))
+            axis = np.cross(middles[1][1], middles[0][1])
+            angle = np.arctan2(np.linalg.norm(axis), middles[1][1] @ middles[0][1])
+            self.turn = Rotation.from_rotvec(angle * axis / max(np.linalg.norm(axis), 1e-12)) * self.turn
+        (p, f, _), (q, g, _) = self.frames(rng.uniform(*self.box[:2]), rng.uniform(*self.box[2:]))
+        far = rng.normal(size=3)
+        if rng.random() < 0.7:
+            # F has no slope in the box.
+            axes = np.linalg.svd(np.array([f, g]))[2]
+            far = rng.normal() * axes[2] + (np.linalg.norm(np.cross(f, g)) < 1e-9) * rng.normal() * axes[1]
+        self.shift = p - q + 10.0 ** rng.uniform(-2.0, 0.0) * far
+        self.rho = rng.uniform(0.1, 2.0)
+
+    def frames(self, s, t):
+        """Point, tangent and curvature vector of both, in the axes of f."""
+        mine = [np.array(row) for row in spine_point(self.pool, self.o, s)]
+        other = [self.turn.apply(np.array(row)) for row in spine_point(self.pool, self.p, t)]
+        return mine, [other[0] + self.shift, *other[1:]]
+
+    def pose(self):
+        return tuple(self.turn.as_matrix().ravel().tolist()), tuple(self.shift.tolist())
+
+    def told(self, ends=(False, False, False, False)):
+        return box_of(self.pool, self.o, self.p, *self.pose(), self.box, ends, np.inf, self.rho)
+
+    def samples(self, count=9):
+        """Distances, slopes and second derivatives on a net over the box."""
+        rows = []
+        for s in np.linspace(*self.box[:2], count):
+            for t in np.linspace(*self.box[2:], count):
+                d, f, c, g, e = (np.array(row) for row in apart(self.pool, self.o, self.p, *self.pose(), s, t))
+                rows.append((np.linalg.norm(d), -d @ f, d @ g, 1.0 - d @ c, -f @ g, 1.0 + d @ e))
+        return np.array(rows).T
+
+    def move(self, rng, m):
+        """A motion of g seen from f: no tangent turns by more than m / rho, no point of the box's part goes farther."""
+        angle = rng.uniform(0.0, 1.0) * m / self.rho
+        axis = rng.normal(size=3)
+        step = Rotation.from_rotvec(angle * axis / np.linalg.norm(axis))
+        points = [self.frames(0.0, t)[1][0] for t in np.linspace(*self.box[2:], 5)]
+        middle = points[2]
+        reach = max(np.linalg.norm(point - middle) for point in points) * 2.0 * np.sin(0.5 * angle)
+        way = rng.normal(size=3)
+        way *= max(m - reach, 0.0) * rng.uniform(0.5, 1.0) / np.linalg.norm(way)
+        if reach > m:
+            step = Rotation.identity()
+        self.shift = step.apply(self.shift - middle) + middle + way
+        self.turn = step * self.turn
+
+
+def has_critical_point(two):
+    """Whether Newton's method finds a point of slope zero in the box, from nine places."""
+    low, high = np.array(two.box[::2]), np.array(two.box[1::2])
+    for x in np.stack(np.meshgrid(*np.linspace(low, high, 5).T), axis=-1).reshape(-1, 2):
+        for _ in range(12):
+            d, f, c, g, e = (np.array(row) for row in apart(two.pool, two.o, two.p, *two.pose(), *x))
+            slope, st = np.array([-d @ f, d @ g]), -f @ g
+            matrix = np.array([[1.0 - d @ c, st], [st, 1.0 + d @ e]])
+            step = np.linalg.lstsq(matrix, -slope, rcond=1e-12)[0]
+            x = np.clip(x + step, low - (high - low), high + (high - low))
+        if np.abs(slope).max() < 1e-13 and (x > low).all() and (x < high).all():
+            return True
+    return False
+
+
+def agrees(two, what):
+    """Whether samples bear out what a box is told to be."""
+    _, a, b, ss, st, tt = two.samples()
+    if what == EMPTY:
+        return not has_critical_point(two)
+    det = ss * tt - st * st
+    # Of two lines along each other the determinant is zero, to rounding.
+    slack = 1e-15
+    if what == CONVEX:
+        return bool((det > -slack).all() and (ss > 0.0).all() and (tt > 0.0).all())
+    if what == BARREN:
+        return bool(((det < slack) | (ss < 0.0) | (tt < 0.0)).all())
+    return True
+
+
+def test_what_is_told_of_boxes_holds_now_and_after_motions():
+    rng = np.random.default_rng(7)
+    told = np.zeros(4, dtype=int)
+    moved = 0
+    for _ in range(1500):
+        two = Two(rng)
+        least, what, margin = two.told()
+        distances = two.samples()[0]
+        assert least <= distances.min() + 1e-13
+        assert agrees(two, what)
+        told[what] += 1
+        if what and 0.0 < margin:
+            m = min(margin, 0.5 * two.rho)
+            turn, shift = two.turn, two.shift
+            for _ in range(2):
+                two.turn, two.shift = turn, shift
+                two.move(rng, m)
+                if what != EMPTY:
+                    # What comes into a box that is EMPTY by its shape alone is known beside it.
+                    assert agrees(two, what)
+                    moved += 1
+    assert (told > 50).all() and moved > 300
+
+
+@pytest.mark.parametrize(
+    ("f", "g", "place", "turn", "gap"),
+    [
+        # Rods side by side, end to end, across each other, end beside end, and an end over a side.
+        ("rod", "rod", (0.35, 0.0, 0.1), (0.0, 0.0, 0.0), 0.05),
+        ("rod", "rod", (0.0, 0.0, 2.35), (0.0, 0.0, 0.0), 0.05),
+        ("rod", "rod", (0.35, 0.0, 0.0), (0.5 * np.pi, 0.0, 0.0), 0.05),
+        ("rod", "rod", (0.21, 0.0, 2.28), (0.0, 0.0, 0.0), 0.05),
+        ("rod", "rod", (1.35, 0.0, 1.0), (0.0, 0.5 * np.pi, 0.0), 0.05),
+        # Spines that cross.
+        ("rod", "rod", (0.0, 0.0, 0.0), (0.5 * np.pi, 0.0, 0.0), -0.3),
+        # Rings about one axis, turned over or not, linked, and side by side.
+        ("torus", "torus", (0.0, 0.0, 0.3), (0.0, 0.0, 0.0), 0.06),
+        ("torus", "torus", (0.0, 0.0, 0.3), (np.pi, 0.0, 0.0), 0.06),
+        ("torus", "torus", (0.3, 0.0, 0.0), (0.5 * np.pi, 0.0, 0.0), 0.06),
+        ("torus", "torus", (2.3, 0.0, 0.0), (0.0, 0.0, 0.0), 0.06),
+    ],
+)
+def test_the_least_gap_of_wires_in_special_places_is_listed(f, g, place, turn, gap):
+    watch = Watch([SHAPES[f][1], SHAPES[g][1]])
+    q = np.array([HERE, [*place, *Rotation.from_rotvec(turn).as_quat(scalar_first=True)]])
+    assert watch.look(q).gap.min() == pytest.approx(gap, abs=1e-12)
+
+
+@pytest.mark.parametrize("names", [("hook", "hook"), ("bent", "ring"), ("torus", "hook"), ("wide torus", "wide torus")])
+def test_first_looks_find_all_minima(names):
+    # Wherever wires are, also through each other: every minimum that is near enough for a place, and nothing else.
+    wires = {name: wire for name, (wire, _, _) in SHAPES.items()} | {"bent": path_wire(BENT, 0.1)}
+    watch, oracle = Watch([WIRES[name] for name in names]), WireOracle([wires[name] for name in names])
+    rng = np.random.default_rng(3)
+    due = 0
+    for _ in range(150):
+        e = rng.normal(size=(2, 4))
+        q = np.column_stack([np.zeros((2, 3)), e / np.linalg.norm(e, axis=1, keepdims=True)])
+        q[1, :3] = rng.normal(size=3)
+        try:
+            extrema = oracle.extrema(q)
+        except ArithmeticError:
+            continue
+        watch.forget()
+        listed = watch.look(q)
+        minima = extrema.take((extrema.index == 0) & (extrema.curvature > 1e-6))
+        wanted = minima.take(minima.gap < listed.take[0] - 1e-6)
+        off = np.linalg.norm(wanted.points[:, None] - listed.points[None], axis=3).max(axis=2)
+        assert (off.min(axis=1, initial=np.inf) < 1e-7).all() if wanted.gap.size else True
+        found = np.linalg.norm(listed.points[:, None] - minima.points[None], axis=3).max(axis=2)
+        assert (found.min(axis=1, initial=np.inf) < 1e-7).all() if listed.gap.size else True
+        due += wanted.gap.size
+    assert due > 20
