@@ -156,11 +156,12 @@ class _Candidate:
             return None
         off = b - 0.5 * (a + c)
         rise = float(np.linalg.norm(off))
-        if rise <= STRAIGHT * length:
+        if rise <= max(STRAIGHT * length, self.within):
             tangent = chord / length
             across = self.surface.evaluate(low, self.at_v[0]) - a
             across = across - across @ tangent * tangent
-            return a, tangent, across / np.linalg.norm(across), 0.0, length, radius
+            wide = float(np.linalg.norm(across))
+            return (a, tangent, across / wide, 0.0, length, radius) if wide > 0.0 else None
         # An arc: its middle is above that of the chord.
         bend = 8.0 * rise / (length * length + 4.0 * rise * rise)
         half = 2.0 * np.arctan2(2.0 * rise, length)

@@ -46,8 +46,10 @@ from assembly.proximity.watch_memory import (
 
 # Where nothing may move a pair is looked at after every step.
 LEAST_ALLOWANCE = 1e-12
+# What moved by less than this part of its allowance, 1e-9 of the scene's size, is where it was.
+STILL = 1e-8
 # A reach is for so many moves as the last ones; of round wires, whose looks take a tenth of the time, for fewer.
-MOVES, MOVES_OF_WIRES = 12.0, 3.0
+MOVES, MOVES_OF_WIRES = 12.0, 6.0
 
 
 @kernel(inline=True)
@@ -121,7 +123,7 @@ def reach_now(table, pool, watch, memory, p, moving):
 def allow_ball(memory, at, ball, allowance, sure):
     """Keep a ball on the body that moves and how far what is in it may go, in the memory of its pair.
 
-    Infinite: there is no ball. What is `sure` is how far, until a pose that stays is looked at.
+    Infinite: there is no ball. What is `sure` is how far, until a pose that stays is looked at; 0 if any that moved is.
     """
     memory[at + BALL_ALLOWANCE] = allowance
     memory[at + SURE] = sure
@@ -150,12 +152,15 @@ def part_used(table, pool, watch, memory, p, q):
     if not moved > 0.0:
         return 0.0
     part = moved / memory[o + ALLOWANCE]
-    if memory[o + BALL_ALLOWANCE] < memory[o + ALLOWANCE] or memory[o + SURE] < math.inf:
+    if memory[o + BALL_ALLOWANCE] < memory[o + ALLOWANCE] or 0.0 < memory[o + SURE] < math.inf:
         moved = (
             moved_from(memory, o + BALL, memory, o + BALL_PLACE, turn, shift) + 2.0 * memory[o + BALL_RADIUS] * angle
         )
         part = max(part, moved / memory[o + BALL_ALLOWANCE])
-        memory[o + DOUBT] = moved / memory[o + SURE]
+        if memory[o + SURE] > 0.0:
+            memory[o + DOUBT] = moved / memory[o + SURE]
+    if memory[o + SURE] == 0.0:
+        memory[o + DOUBT] = part / STILL
     return part
 
 

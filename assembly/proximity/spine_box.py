@@ -17,8 +17,8 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly.geometry.vec import add, blend, dot, matvec, sub
-from assembly.proximity.spine_curve import PART_BEND, spine_point
+from assembly.geometry.vec import add, blend, dot, matvec, matvec_t, sub
+from assembly.proximity.spine_curve import BEYOND, HALF, JUMPS, PART_BEND, spine_point, three
 
 # What a box is: nothing is known, no slope zero in it, F convex over it, F'' indefinite over it.
 UNKNOWN, EMPTY, CONVEX, BARREN = 0, 1, 2, 3
@@ -90,7 +90,26 @@ def beyond(slope, hessian, error, rate, h, k):
     ss, tt, off = abs(ss), abs(tt), abs(st)
     x = abs(hessian[1] * slope[0] - st * slope[1]) - tt * error[0] - off * error[1] - det * h - ROUNDING
     y = abs(hessian[0] * slope[1] - st * slope[0]) - off * error[0] - ss * error[1] - det * k - ROUNDING
-    return max(x / (tt * rate[0] + off * rate[1]), y / (off * rate[0] + ss * rate[1]))
+    return max(x / (tt * rate[0] + off * rate[1] + 1e-300), y / (off * rate[0] + ss * rate[1] + 1e-300))
+
+
+@kernel(inline=True)
+def beyond_joints(pool, o, low, high, d, sign, slack, least, bend):
+    """The least of F_ss (sign -1) or F_tt (1) over a box and what is just beyond joints at its borders, by curvature
+    vectors that d in the axes of the part at o is multiplied by.
+
+    And the largest curvature there; -1 where no curvature jumps.
+    """
+    sharpest = -1.0
+    half = pool[o + HALF]
+    for side in range(2):
+        at_border = low <= -half if side == 0 else high >= half
+        if pool[o + JUMPS + side] == 1.0 and at_border:
+            vector = three(pool, o + BEYOND + 3 * side)
+            length = math.sqrt(dot(vector, vector))
+            least = min(least, 1.0 + sign * dot(d, vector) - length * slack)
+            sharpest = max(max(sharpest, length), bend)
+    return least, sharpest
 
 
 @kernel(inline=True)
@@ -123,8 +142,8 @@ def box_of(pool, o, p, turn, shift, box, open_ends, reach, rho):
     ss = 1.0 - dot(d, bend_f)
     tt = 1.0 + dot(d, bend_g)
     st = -dot(f, g)
-    vary_ss = kf * kf * min(far, abs(a) + 2.0 * h + k) * h + min(kf, lean_f + kf * both) * k
-    vary_tt = kg * kg * min(far, abs(b) + h + 2.0 * k) * k + min(kg, lean_g + kg * both) * h
+    vary_ss = kf * kf * min(far, abs(a) + (1.0 + kf * far) * h + k) * h + min(kf, lean_f + kf * both) * k
+    vary_tt = kg * kg * min(far, abs(b) + h + (1.0 + kg * far) * k) * k + min(kg, lean_g + kg * both) * h
     vary_st = lean_f * h + lean_g * k + 0.5 * both * both
     ss_low, ss_high = ss - vary_ss, ss + vary_ss
     tt_low, tt_high = tt - vary_tt, tt + vary_tt
@@ -142,6 +161,17 @@ def box_of(pool, o, p, turn, shift, box, open_ends, reach, rho):
     what, margin = shape_of(
         (ss_low, ss_high, tt_low, tt_high, st_low, st_high), sway * kf, sway * kg, rho, kf == 0.0 and kg == 0.0, is_open
     )
+    if what == CONVEX:
+        # Where the curvature jumps at the border of the box a minimum may be born, and run into it, if F is not convex
+        # beyond.
+        ss_low, bend_f = beyond_joints(pool, o, box[0], box[1], d, -1.0, h + k, ss_low, kf)
+        tt_low, bend_g = beyond_joints(pool, p, box[2], box[3], matvec_t(turn, d), 1.0, h + k, tt_low, kg)
+        if bend_f >= 0.0 or bend_g >= 0.0:
+            bend_f, bend_g = max(bend_f, kf), max(bend_g, kg)
+            over, least_margin = shape_of(
+                (ss_low, ss_high, tt_low, tt_high, st_low, st_high), sway * bend_f, sway * bend_g, rho, False, True
+            )
+            margin = min(margin, least_margin) if over == CONVEX else 0.0
     slope /= sway
     if not is_open:
         first = (sway + sway * kf * h + k / rho, sway + sway * kg * k + h / rho)

@@ -23,8 +23,9 @@ SPINE = 9
 RADIUS, SHARPEST, SENSE, NUMBER_COUNT = 0, 1, 2, 3
 # A piece: curvature, length, the angle from the normal to where the other parameter starts, its first part, how many.
 BEND, LENGTH, TURN, FIRST_PART, PART_COUNT, PIECE = 0, 1, 2, 3, 4, 5
-# A part, in its middle: point, tangent, normal; curvature, half its length, its piece, how far along that it is.
-POINT, TANGENT, NORMAL, PART_BEND, HALF, OWNER, PLACE, PART = 0, 3, 6, 9, 10, 11, 12, 13
+# A part, in its middle: point, tangent, normal; curvature, half its length, its piece, how far along that it is;
+# whether the curvature jumps where it starts, and where it ends; the curvature vectors beyond.
+POINT, TANGENT, NORMAL, PART_BEND, HALF, OWNER, PLACE, JUMPS, BEYOND, PART = 0, 3, 6, 9, 10, 11, 12, 13, 15, 21
 # A node: its first child, or -1 - part; middle and radius of a ball.
 BALL_RADIUS, BALL = 3, 4
 QUARTER = 0.5 * math.pi

@@ -17,16 +17,22 @@ from assembly.proximity.spine_box import apart
 
 # Steps of Newton's method, of feet, and until an interval cannot be halved any more.
 STEPS, FEET, HALVINGS = 30, 12, 60
-# Slopes below this count as zero at the borders of a box: the next box has the same point.
-LEVEL = 1e-10
+# Slopes of the distance below this count as zero at the borders of a box: the next box has the same point. Those of F
+# below the second are rounding.
+LEVEL, STILL = 1e-10, 1e-16
 # A valley with no more slope than this at both ends is level: rounding tells where it has minima.
 NOISE = 1e-14
 
 
 @kernel(inline=True)
-def is_least(slope, at_ends):
-    """Whether a slope is that of a minimum: zero, or upward from a free end where it starts, or is reached."""
-    return abs(slope) <= LEVEL or (at_ends[0] and slope > 0.0) or (at_ends[1] and slope < 0.0)
+def is_least(slope, far, at_ends):
+    """Whether a slope of F is that of a minimum: zero, or upward from a free end where it starts, or is reached.
+
+    F is the square of the distance, which is `far`: its own slope is as many times less.
+    """
+    return (
+        abs(slope) <= max(LEVEL * far, STILL) or (at_ends[0] and slope > 0.0) or (at_ends[1] and slope < 0.0)
+    )
 
 
 @kernel(inner=True)
@@ -45,6 +51,9 @@ def convex_minimum(pool, o, p, turn, shift, box, open_ends, s, t):
         st = -dot(f, g)
         hold_s = (s <= box[0] and a > 0.0) or (s >= box[1] and a < 0.0)
         hold_t = (t <= box[2] and b > 0.0) or (t >= box[3] and b < 0.0)
+        if (hold_s or abs(a) <= STILL) and (hold_t or abs(b) <= STILL):
+            # Along a valley that is all but level steps do not end.
+            break
         if hold_s or hold_t:
             x = 0.0 if hold_s else -a / ss
             y = 0.0 if hold_t else -b / tt
@@ -60,12 +69,13 @@ def convex_minimum(pool, o, p, turn, shift, box, open_ends, s, t):
         s = s_new
         t = t_new
         if size <= 1e-15 or (size < 1e-9 and size >= 0.5 * last):
-            d, f, _bend_f, g, _bend_g = apart(pool, o, p, turn, shift, s, t)
-            ends_f = (open_ends[0] and s <= box[0], open_ends[1] and s >= box[1])
-            ends_g = (open_ends[2] and t <= box[2], open_ends[3] and t >= box[3])
-            return is_least(-dot(d, f), ends_f) and is_least(dot(d, g), ends_g), s, t
+            break
         last = size
-    return False, s, t
+    d, f, _bend_f, g, _bend_g = apart(pool, o, p, turn, shift, s, t)
+    far = math.sqrt(dot(d, d))
+    ends_f = (open_ends[0] and s <= box[0], open_ends[1] and s >= box[1])
+    ends_g = (open_ends[2] and t <= box[2], open_ends[3] and t >= box[3])
+    return is_least(-dot(d, f), far, ends_f) and is_least(dot(d, g), far, ends_g), s, t
 
 
 @kernel(inner=True)

@@ -16,6 +16,8 @@ _ROUNDING = 1e-15
 # Parts of pieces turn by no more than this; lines are cut to so many times the length of such a part of the
 # sharpest, and into no more than so many.
 _TURN, _LINE, _MOST = 0.3, 2.0, 64
+# Curvatures differ that are off by more, over the largest.
+_JUMP = 1e-9
 
 
 def pack_spine(spine: Spine, scale: float, table_at: int = 0, pool_at: int = 0) -> tuple[Table, Array, int]:
@@ -49,6 +51,7 @@ def pack_spine(spine: Spine, scale: float, table_at: int = 0, pool_at: int = 0) 
     parts = np.concatenate([
         points / scale, tangents, normals,
         np.stack([scale * spine.curvature[owner], half / scale, owner, place / scale], axis=1),
+        *_beyond(spine, owner, scale),
     ], axis=1)  # fmt: skip
     ends = np.array([
         spine.frames(int(k), middle + np.array([-reach, 0.0, reach]))[0]
@@ -63,6 +66,22 @@ def pack_spine(spine: Spine, scale: float, table_at: int = 0, pool_at: int = 0) 
     record[[layout.NUMBERS, layout.PIECE_POOL, layout.PART_POOL, layout.NODE_POOL]] = at[:4]
     record[layout.NODE_TABLE] = table_at + layout.SPINE
     return np.append(record, children), np.concatenate([block.ravel() for block in doubles]), table_at
+
+
+def _beyond(spine: Spine, owner: NDArray[np.int64], scale: float) -> tuple[Array, Array]:
+    """Whether the curvature jumps where parts start and end, (m, 2), and the vectors beyond, (m, 6)."""
+    count = len(spine.length)
+    starts = spine.curvature[:, None] * spine.normal
+    ends = np.array([spine.frames(k, spine.length[k : k + 1])[2][0] for k in range(count)])
+    ends *= spine.curvature[:, None]
+    before, after = np.roll(ends, 1, axis=0), np.roll(starts, -1, axis=0)
+    jumps = np.stack([np.linalg.norm(before - starts, axis=1), np.linalg.norm(after - ends, axis=1)], axis=1)
+    kinks = jumps > _JUMP * spine.curvature.max()
+    if not spine.closed:
+        kinks[0, 0] = kinks[-1, 1] = False
+    change = owner[1:] != owner[:-1]
+    border = np.stack([np.append(True, change), np.append(change, True)], axis=1)
+    return (border & kinks[owner]).astype(float), scale * np.concatenate([before, after], axis=1)[owner]
 
 
 def _counts(spine: Spine) -> NDArray[np.int64]:

@@ -15,7 +15,7 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly.geometry.vec import add, cross, dot, matvec, matvec_t, scale, sub
 from assembly.proximity.extremal import pair_frame
-from assembly.proximity.roots import GAP, NEW, NOTHING, ORIGIN, add_root, are_one, write
+from assembly.proximity.roots import GAP, NEW, NOTHING, ORIGIN, SAME, USELESS, add_root, are_one, write
 from assembly.proximity.spine_box import BARREN, CONVEX, EMPTY, UNKNOWN, apart, box_of
 from assembly.proximity.spine_curve import (
     CLOSED,
@@ -43,7 +43,7 @@ REFINED, FINE = 16, 0.05
 MUCH = 0.6
 # Of a level valley points are contacts that are farther from each other than so many radii.
 SPARSE = 0.5
-# Slopes of F below this say that a known contact is a minimum's.
+# Slopes of the distance below this say that a known contact is a minimum's.
 AT_ROOT = 1e-9
 # Newton's method on the surfaces ends at the minimum it began at, if the gap is the same but for this.
 ASTRAY = 1e-9
@@ -83,8 +83,8 @@ def mark_known(table, pool, scene, roots, count, marks):
         o = table[f + PART_POOL] + PART * i
         p = table[g + PART_POOL] + PART * j
         d, tf, _bend_f, tg, _bend_g = apart(pool, o, p, scene[0], scene[1], s, t)
-        if not abs(dot(d, tf)) + abs(dot(d, tg)) <= AT_ROOT:
-            # At a half ball, or on its way to a root: what is there is looked for.
+        if roots[k, ORIGIN] == USELESS or not abs(dot(d, tf)) + abs(dot(d, tg)) <= AT_ROOT * math.sqrt(dot(d, d)):
+            # Of far sides, at a half ball, or on its way to a root: what is there is looked for.
             marks[k, 0] = math.nan
 
 
@@ -102,6 +102,18 @@ def is_marked(boxes, b, marks, count):
     return False
 
 
+@kernel(inline=True)
+def across_both(f, g):
+    """A unit vector across two tangents: of spines that cross any is as good."""
+    n = cross(f, g)
+    length = math.sqrt(dot(n, n))
+    if length < MEETING:
+        # They run along each other: across the first one.
+        n = cross(f, (1.0, 0.0, 0.0) if abs(f[0]) < 0.7 else (0.0, 1.0, 0.0))
+        length = math.sqrt(dot(n, n))
+    return scale(1.0 / length, n)
+
+
 @kernel(inner=True)
 def add_minimum(table, pool, scene, i, j, s, t, neglect, roots, count, work):
     """Add the contact at lengths s and t along parts i and j, if it is none of the known ones. Returns how many."""
@@ -112,13 +124,7 @@ def add_minimum(table, pool, scene, i, j, s, t, neglect, roots, count, work):
     p = table[g + PART_POOL] + PART * j
     d, tf, _bend_f, tg, _bend_g = apart(pool, o, p, scene[0], scene[1], s, t)
     length = math.sqrt(dot(d, d))
-    if length < MEETING:
-        # Any way across both is as good.
-        d = cross(tf, tg)
-        length = math.sqrt(dot(d, d))
-        if not length > 0.0:
-            return count
-    way = scale(1.0 / length, d)
+    way = scale(1.0 / length, d) if length >= MEETING else across_both(tf, tg)
     u_f, v_f = wire_parameters(table, pool, f, scene[2][0], i, s, way)
     u_g, v_g = wire_parameters(table, pool, g, scene[2][1], j, t, matvec_t(scene[0], scale(-1.0, way)))
     start = (u_f, v_f, u_g, v_g)
@@ -132,7 +138,8 @@ def add_minimum(table, pool, scene, i, j, s, t, neglect, roots, count, work):
             return before
         write(roots, before, start, 0, 0, frame[0], frame[10], frame[3], frame[4], 0.0)
         for k in range(before):
-            if are_one(table, pool, scene, roots, before, k, neglect):
+            radius = min(neglect, SAME) if roots[k, ORIGIN] == USELESS else neglect
+            if are_one(table, pool, scene, roots, before, k, radius):
                 return before
         count = before + 1
     if count > before:
@@ -240,6 +247,9 @@ def search_spines(table, pool, scene, moving, rho, lengths, neglect, boxes, wait
             continue
         if low <= near and not hollow and not (what == CONVEX and is_marked(boxes, b, marks, known)):
             count = add_minima(table, pool, scene, box, ends, what, neglect, roots, count, work)
+            if halve or count == roots.shape[0]:
+                # There may be one that is not known.
+                allowed = low
         waiting = b
         if allowed >= MUCH * reach and allowed >= flank:
             free = min(free, allowed)

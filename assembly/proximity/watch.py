@@ -17,7 +17,7 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly.kinematics.motion import relative_pose, rotation
-from assembly.proximity.allowances import LEAST_ALLOWANCE, allow_ball, largest_part, mover, reach_now
+from assembly.proximity.allowances import LEAST_ALLOWANCE, STILL, allow_ball, largest_part, mover, reach_now
 from assembly.proximity.bounding_tree import NODE_POOL, RADIUS, least_distance
 from assembly.proximity.corners import add_corners
 from assembly.proximity.facing import facing_pairs, near_enough
@@ -90,8 +90,6 @@ AS_NEEDED, EVERYTHING, CAREFUL, IN_TURNS, DOUBTFUL = 0, 1, 2, 4, 8
 # take little; in turns, the one that used most of it at the first, and any that cut a step since its last look at the
 # third: what is left would cut the next one to nothing.
 USED, SPENT, BRIEF = 0.5, 0.85, 0.35
-# What moved by less than this part of its allowance, 1e-9 of the scene's size, is where it was.
-STILL = 1e-8
 # Room: pairs of patches of a look.
 CANDIDATES, STACK = 8192, 1024
 # Folds nearer than this part of a first reach are looked at after every move.
@@ -174,16 +172,12 @@ def search_by_patches(table, pool, watch, memory, p, scene, moving, reach, offse
     count, free, fertile, ball = search_patches(
         table, pool, scene, moving, (flank, enough), span, offsets, neglect, facing, found, roots, count, work, passed
     )
-    low = nearest_fold(roots, count, least, reach)
-    urgent = fertile < math.inf and low <= FLAT * pool[lengths + FIRST_REACH]
-    if fertile < math.inf and not urgent:
-        fertile = min(fertile, low)
     free = min(free, reach)
     if found == 0:
         # Nothing faces the other body within reach: the boxes tell how far that is so.
         trees = scene[3]
         free = max(free, least_distance(table, pool, trees[0], trees[1], scene[0], scene[1], math.inf, stack) - least)
-    return count, any_gone, free, fertile, ball, 0.0 if urgent else math.inf, found > 0
+    return count, any_gone, free, fertile, ball, math.inf, found > 0
 
 
 @kernel(inner=True)
@@ -273,7 +267,13 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, rooms, roots, asks):
         )
         memory[at + CROSSED] = 1.0 if crossed else 0.0
     memory[at + ALLOWANCE] = max(min(rest, free), LEAST_ALLOWANCE)
-    allow_ball(memory, at, ball, fertile, max(sure, STILL * memory[at + ALLOWANCE]))
+    if wires:
+        sure = max(sure, STILL * memory[at + ALLOWANCE])
+    elif fertile < math.inf:
+        low = nearest_fold(roots, count, least, memory[at + REACH])
+        sure = 0.0 if low <= FLAT * pool[table[watch + LENGTHS] + FIRST_REACH] else math.inf
+        fertile = fertile if sure == 0.0 else min(fertile, low)
+    allow_ball(memory, at, ball, fertile, sure)
     listed = any_listed(table, watch, memory, p)
     memory[at + STATE] = float(TRACKING if listed else (NEAR if found else FAR))
     if wanting:

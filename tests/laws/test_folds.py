@@ -9,7 +9,7 @@ import assembly as asm
 from assembly.constraints.layout import FREE_COLUMN, ROWS, WATCH
 from assembly.geometry.spline import SURFACE_RECORD
 from assembly.kinematics.motion import relative_pose, rotation
-from assembly.proximity import roots, watch, watch_memory
+from assembly.proximity import allowances, roots, watch, watch_memory
 from assembly.proximity.allowances import allow_ball, mover
 from assembly.proximity.extremal import SINGULAR, solve_pair
 from assembly.proximity.folds import fold_beyond
@@ -300,6 +300,6 @@ def test_pairs_are_looked_at_that_need_it(by_spines, part, as_needed, in_turns, 
             at = watch_memory.MEMORY_HEADER + watch_memory.PAIR_MEMORY * p
             origin = (0.0, 0.0, 0.0)
             place = mover(table, watch_at, p, clips.q)[4]
-            allow_ball(clips.memory, at, (origin, place, 0.0), np.inf, watch.STILL * 1e-3)
+            allow_ball(clips.memory, at, (origin, place, 0.0), np.inf, allowances.STILL * 1e-3)
         clips.q[1, 2] += 1e-3 * part
         assert clips.looked(how) == count

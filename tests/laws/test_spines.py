@@ -10,6 +10,8 @@ import assembly as asm
 from assembly.geometry.face import Face
 from assembly.geometry.path import Path
 from assembly.geometry.spine import spine_of
+from assembly.proximity import watch_memory
+from assembly.proximity.allowances import part_used
 from assembly.proximity.spine_box import BARREN, CONVEX, EMPTY, apart, box_of
 from assembly.proximity.spine_curve import (
     HALF,
@@ -284,3 +286,70 @@ def test_first_looks_find_all_minima(names):
         assert (found.min(axis=1, initial=np.inf) < 1e-7).all() if listed.gap.size else True
         due += wanted.gap.size
     assert due > 20
+
+
+@pytest.mark.parametrize("tilt", [1e-9, 1e-7, 1e-6, 1e-5, 1e-4, 1e-2])
+def test_lines_that_are_all_but_parallel_have_a_contact(tilt):
+    # Along no axis, so that nothing is exact: Newton's steps along the valley do not shrink.
+    along = np.array([1.0, 2.0, 3.0]) / np.sqrt(14.0)
+    rod = asm.shapes.pipe(Path(tuple(-along), tuple(along)).line(2.0), 0.15)
+    watch, rng = Watch([rod, rod]), np.random.default_rng(0)
+    across = np.cross(along, [1.0, 0.0, 0.0])
+    across /= np.linalg.norm(across)
+    for k in range(100):
+        base, way = Rotation.random(random_state=k), Rotation.from_rotvec(rng.uniform(0.0, 6.0) * along).apply(across)
+        turn = Rotation.from_rotvec(tilt * way) * Rotation.from_rotvec(rng.uniform(0.0, 6.0) * along)
+        s, t = rng.uniform(-0.9, 0.9, 2)
+        place = s * along + 0.31 * way - t * turn.apply(along)
+        e, there = base.as_quat(scalar_first=True), (base * turn).as_quat(scalar_first=True)
+        watch.forget()
+        gaps = watch.look(np.array([[0.0, 0.0, 0.0, *e], [*base.apply(place), *there]])).gap
+        # Where they cross: a gap of 0.01. All along the valley it is as good, to the square of the tilt.
+        assert gaps.min() == pytest.approx(0.01, abs=1e-12 + 4.0 * tilt**2)
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.5])
+def test_rods_with_one_spine_do_not_stay_in_each_other(shift):
+    bodies = [asm.Body(name, WIRES["rod"], (0.0, 0.0, shift * k)) for k, name in enumerate("ab")]
+    scene = asm.Assembly(bodies)
+    scene.constrain(asm.Clearance())
+    solution = scene.solve()
+    wire = SHAPES["rod"][0]
+    assert not solution.success or WireOracle([wire, wire]).deepest(solution.q) > -1e-9
+
+
+def test_contacts_that_are_born_where_the_curvature_jumps_are_within_what_looks_allow():
+    # A rod beside a line that bends up, and then down: as it leans a minimum comes from the joint onto the line.
+    bent = Path((-1, 0, 0), (1, 0, 0)).line(1.0).arc(0.5, 0.06, (0, 0, 1)).arc(0.5, 0.5, (0, 0, -1)).line(0.3)
+    rod = Path((-0.6, 0, 0), (1, 0, 0)).line(1.2)
+    watch = Watch([asm.shapes.pipe(path, 0.1) for path in (bent, rod)])
+    oracle = WireOracle([path_wire(path, 0.1) for path in (bent, rod)])
+    rng = np.random.default_rng(0)
+    packed, born = watch._packed, 0
+    for _ in range(1500):
+        high = 0.2 + 10.0 ** rng.uniform(-3.6, -2.5)
+        turn = Rotation.from_rotvec((0.0, 0.0, np.arcsin(np.sqrt(rng.uniform(0.3, 0.7) * high / 0.5))))
+        q = np.array([HERE, [10.0 ** rng.uniform(-3.5, -1.8), 0.0, high, *turn.as_quat(scalar_first=True)]])
+        watch.forget()
+        listed = watch.look(q)
+        if listed.gap.min(initial=np.inf) < 0.0 or (np.abs(listed.points[:, 0, 0] + 0.4) < 0.4).any():
+            continue
+        for _ in range(3):
+            middle = np.array([rng.uniform(0.015, 0.06), 0.0, 0.2])
+            lean = Rotation.from_rotvec((0.0, -rng.uniform(0.0, 0.06), 0.0))
+            after = q.copy()
+            after[1, :3] = lean.apply(q[1, :3] - middle) + middle
+            after[1, 3:] = (lean * turn).as_quat(scalar_first=True)
+            scaled = after.copy()
+            scaled[:, :3] = (after[:, :3] - packed.reference) / packed.scale
+            try:
+                minima = oracle.minima(after, 0.0)
+            except ArithmeticError:
+                continue
+            if (np.abs(minima.points[:, 0, 0] + 0.4) < 0.4).any():
+                # It is in the rod already: the look did not allow as much, or not without another one.
+                part = part_used(packed.table, packed.pool, watch._at, watch.memory, 0, scaled)
+                doubt = watch.memory[watch_memory.MEMORY_HEADER + watch_memory.DOUBT]
+                assert max(part, doubt) >= 1.0
+                born += 1
+    assert born > 20
