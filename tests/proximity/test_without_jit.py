@@ -46,3 +46,39 @@ def test_plain_python_gives_the_same_pairs(run_python):
         for x, y in zip(a[1:], b[1:], strict=True):
             # Without fused multiply-add: other roundings, amplified by the solve.
             np.testing.assert_allclose(y, x, rtol=0.0, atol=1e-12 * (1.0 + np.abs(x).max()))
+
+
+LOOKS = """
+import json
+import numpy as np
+import assembly as asm
+from benchmarks.watching import Watch
+
+clip, ring = asm.shapes.paper_clip(), asm.shapes.torus(5.0, 0.5)
+here = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
+out = []
+for shapes, poses in (
+    ([clip, clip], [[0.3, 1.1, -20.0, 0.9, 0.2, 0.3, 0.1], [0.4, 1.2, 0.3, 1.0, 0.02, 0.0, 0.01]]),
+    ([ring, clip], [[4.0, 0.2, 3.0, 0.7, 0.1, -0.7, 0.2]]),
+    ([ring, ring], [[0.3, 0.1, 1.2, 1.0, 0.01, 0.05, 0.0], [4.2, 0.1, 0.3, 0.7, 0.7, 0.0, 0.1]]),
+):
+    watch = Watch(shapes)
+    for row in poses:
+        q = np.array([here, row])
+        q[1, 3:] /= np.linalg.norm(q[1, 3:])
+        watch.forget()
+        listed = watch.look(q)
+        order = np.argsort(listed.gap)
+        out.append([listed.gap[order].tolist(), listed.take.tolist()])
+print(json.dumps(out))
+"""
+
+
+def test_plain_python_lists_the_same_contacts_of_wires(run_python):
+    compiled, plain = (
+        json.loads(run_python(LOOKS, NUMBA_DISABLE_JIT=value).strip().splitlines()[-1]) for value in ("0", "1")
+    )
+    assert sum(len(gaps) for gaps, _ in compiled) > 5
+    for (gaps, take), (others, allowed) in zip(compiled, plain, strict=True):
+        np.testing.assert_allclose(others, gaps, rtol=0.0, atol=1e-11)
+        np.testing.assert_allclose(allowed, take, rtol=1e-9)
