@@ -33,7 +33,7 @@ Array = NDArray[np.float64]
 SAME, STRAIGHT = 1e-12, 1e-9
 # A wire's radius over that of an arc of its spine, at most; the longest arc of one span.
 THICKEST, LONGEST = 0.999, 3.0
-# An octant and a quarter of a circle.
+# A quarter of a circle.
 QUARTER = 0.5 * np.pi
 
 

@@ -20,7 +20,7 @@ from assembly.geometry.vec import add, blend, cross, dot, scale, sub
 PIECES, PARTS, PIECE_POOL, PART_POOL, NODE_TABLE, NODE_POOL, CLOSED, ALONG, NUMBERS = 0, 1, 2, 3, 4, 5, 6, 7, 8
 SPINE = 9
 # Its numbers: the wire's radius, the largest curvature, which way the other parameter turns.
-RADIUS, SHARPEST, SENSE, NUMBER_COUNT = 0, 1, 2, 3
+RADIUS, SHARPEST, SENSE = 0, 1, 2
 # A piece: curvature, length, the angle from the normal to where the other parameter starts, its first part, how many.
 BEND, LENGTH, TURN, FIRST_PART, PART_COUNT, PIECE = 0, 1, 2, 3, 4, 5
 # A part, in its middle: point, tangent, normal; curvature, half its length, its piece, how far along that it is;

@@ -153,7 +153,7 @@ def search_by_patches(table, pool, watch, memory, p, scene, moving, reach, offse
 
     Returns
     -------
-    How many roots there are; whether a listed one was lost; the reach; how far bodies may go for what is not listed;
+    How many roots there are; whether a listed one was lost; how far bodies may go for what is not listed;
     how far what is in a ball may go, and that ball; how far, until a pose that stays is looked at; whether there is
     anything within reach.
     """
