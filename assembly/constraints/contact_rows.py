@@ -34,13 +34,15 @@ from assembly.geometry.vec import dot, sub
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.extremal import CLOSE, CONVERGED, LEFT_PATCH, SINGULAR, solve_pair
 from assembly.proximity.free_pair import free_rows
-from assembly.proximity.solid_contact import CONTACT_RECORD, FOLD, PAIR_GAP, PROPER, STAYS, TRACK
+from assembly.proximity.solid_contact import CONTACT_RECORD, FOLD, IDLE, LEFT, PAIR_GAP, PROPER, STAYS, TRACK
 from assembly.proximity.start import global_start
-from assembly.proximity.velocity import GAP, RATES, gradient_row, store_record
+from assembly.proximity.velocity import GAP, RATES, RECORD, gradient_row, store_record
 
 # A clearance's contact of solids that are hardly in each other may be given up where its pair ends: then MAY_GO - k
 # stands for what it holds on to, k. One that ends where they touch, which rounding decides, is as good as open.
 MAY_GO, HARDLY, TOUCHING = -1.0, 1e-3, 1e-9
+# A clearance's row that is open by more than the second needs its pair again after motions of this part of its gap.
+UNSEEN, FAR = 0.5, 1e-5
 
 
 @kernel(inner=True)
@@ -156,7 +158,7 @@ def lost_guard(table, pool, r, start, point, past, goes):
     idle_row(r, gap, point)
     point[1][r, PAIR_GAP] = gap + pool[table[row + MINIMUM]]
     # Nothing moves it: its pair is not known.
-    for i in range(RATES, CONTACT_RECORD - 2):
+    for i in range(RATES, RECORD):
         point[2][r, i] = 0.0
     for i in range(FREE_COLUMN):
         point[4][r, i] = 0.0
@@ -222,8 +224,8 @@ def free_contact(table, pool, r, x, loose, point):
 
 
 @kernel(inner=True)
-def contact_row(table, pool, r, start, patience, loose, point):
-    """Row r, of contact r. Returns whether its pair was found.
+def row_of_pair(table, pool, r, start, patience, loose, point):
+    """Row r, of contact r, by its pair. Returns whether it was found.
 
     A tracked contact is carried from `start` to its extremal pair, by steps that turn no normal by more than
     `patience`. A free one (free[r] >= 0, its place among the free ones) is evaluated at `start` itself, and its four
@@ -232,10 +234,6 @@ def contact_row(table, pool, r, start, patience, loose, point):
     """
     q, tracked, records, residual, jacobian = point
     row = table[ROW_TABLE] + ROW * r
-    copy_tracked(start, r, tracked)
-    if table[row + BODY_F] < 0:
-        idle_row(r, 1.0, point)
-        return True
     if table[row + SHELL_F] >= 0:
         return solids_row(table, pool, r, start, patience, point)
     x = (start[r, 0], start[r, 1], start[r, 2], start[r, 3])
@@ -265,4 +263,28 @@ def contact_row(table, pool, r, start, patience, loose, point):
         free_contact(table, pool, r, x, loose, point)
     tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3] = x
     tracked[r, PAIR_GAP] = residual[r] + pool[table[row + MINIMUM]]
+    return True
+
+
+@kernel(inner=True)
+def contact_row(table, pool, r, start, patience, loose, point):
+    """Row r, of contact r, from `start` on. Returns whether its pair was found, or need not be.
+
+    A row of a clearance that stays open is as `carry` (`solve/rows.py`) left it.
+    """
+    _q, tracked, records, residual, _jacobian = point
+    row = table[ROW_TABLE] + ROW * r
+    copy_tracked(start, r, tracked)
+    if table[row + BODY_F] < 0:
+        idle_row(r, 1.0, point)
+        return True
+    if start[r, IDLE] == 1.0:
+        tracked[r, IDLE] = 0.0
+        residual[r] = start[r, PAIR_GAP] - pool[table[row + MINIMUM]]
+        return True
+    if not row_of_pair(table, pool, r, start, patience, loose, point):
+        return False
+    tracks = loose[0][r] < 0 and not math.isnan(tracked[r, 0])
+    open_far = is_guard(table, r) and residual[r] > FAR
+    records[r, LEFT] = UNSEEN * residual[r] if tracks and open_far else 0.0
     return True

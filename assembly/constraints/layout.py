@@ -5,7 +5,7 @@ every body (-1: fixed), then a record a row (contacts first, then trims), a join
 loop works on
 
     configuration  (n, 7)       poses, scaled, positions relative to a reference
-    tracked        (k, 10)      of every contact parameters, features, normal and gap of its pair
+    tracked        (k, 12)      of every contact parameters, features, normal and gap of its pair
                                 (`proximity/solid_contact.py`), then (first column) unwrapped angles of joints
     records        (k + j, R)   what the derivatives of gaps need (see `track_contact`), then frames of joints, then
                                 one of trims that are vectors
@@ -66,4 +66,4 @@ FREE_COLUMN, EXTRA_COLUMN = 12, 16
 # length scale, reference point (1 to 3), unit of the objective: what its scaled value counts in the user's units; zero.
 SCALE, REFERENCE, UNIT, ZERO, POOL_HEADER = 0, 1, 4, 5, 8
 # Figures that a solve leaves in its state, behind poses, tracked values, multipliers and residuals.
-RESULTS = 10
+RESULTS = 11

@@ -103,24 +103,28 @@ class _PairPacking:
         self._given: list[int] = []
         self._surfaces: dict[tuple[int, bool], int] = {}
         self._spines: dict[Face, int] = {}
-        # Where the tree of faces is, the radius of a ball around it, its smallest radius of curvature and how far its
-        # facets are off; bodies of a shape share it.
-        self._trees: dict[tuple[Face, ...], tuple[int, float, float, float]] = {}
+        # Where the tree of faces is, the radius of a ball around it, how far from the body's origin it reaches, its
+        # smallest radius of curvature and how far its facets are off; bodies of a shape share it.
+        self._trees: dict[tuple[Face, ...], tuple[int, float, float, float, float]] = {}
         for faces in dict.fromkeys(side_faces(body) for pair in pairs for body in pair):
             tree = FacetTree.of(faces)
             table, pool, at = pack_tree(tree, writer.scale, writer.table_at, writer.pool_at)
             writer.add(table, pool)
             seams = SEAMS * tree.topology.tolerance if tree.topology.edges else 0.0
             ball = float(tree.nodes.radius[0])
-            self._trees[faces] = at, ball, tree.least_radius / writer.scale, (tree.offset + seams) / writer.scale
+            far = float(np.linalg.norm(0.5 * (tree.nodes.low[0] + tree.nodes.high[0]))) + ball
+            offset = (tree.offset + seams) / writer.scale
+            self._trees[faces] = at, ball, far, tree.least_radius / writer.scale, offset
 
     def add(self, pair: Pair, least: float, places: Sequence[int]) -> None:
         """Pack a pair with its least gap and where its places begin and end."""
         writer = self._writer
         f, g = (side_faces(body) for body in pair)
-        (tree_f, ball_f, radius_f, offset_f), (tree_g, ball_g, radius_g, offset_g) = self._trees[f], self._trees[g]
+        tree_f, ball_f, far_f, radius_f, offset_f = self._trees[f]
+        tree_g, ball_g, far_g, radius_g, offset_g = self._trees[g]
         flank = max(FLANK * min(radius_f, radius_g), LEAST_FLANK)
-        _, minimum = writer.add(pool=[least / writer.scale, flank, offset_f, offset_g])
+        far = [far_f / writer.scale, far_g / writer.scale]
+        _, minimum = writer.add(pool=[least / writer.scale, flank, offset_f, offset_g, *far])
         given: list[int] = []
         spines = [-1, -1]
         if is_one_smooth(f) and is_one_smooth(g):

@@ -165,14 +165,21 @@ def part_used(table, pool, watch, memory, p, q):
 
 
 @kernel(inner=True)
+def used_most(table, watch, memory):
+    """The pair that had used the largest part of its allowances when that was last measured."""
+    at = memory_places(table, watch)[0] + PART
+    best = 0
+    for p in range(1, table[watch + PAIRS]):
+        if memory[at + PAIR_MEMORY * p] > memory[at + PAIR_MEMORY * best]:
+            best = p
+    return best
+
+
+@kernel(inner=True)
 def largest_part(table, pool, watch, memory, q):
     """The pair that used the largest part of its allowances at poses q, and that part."""
-    best = -1
-    largest = -1.0
+    at = memory_places(table, watch)[0] + PART
     for p in range(table[watch + PAIRS]):
-        part = part_used(table, pool, watch, memory, p, q)
-        memory[memory_places(table, watch)[0] + PAIR_MEMORY * p + PART] = part
-        if part > largest:
-            best = p
-            largest = part
-    return best, largest
+        memory[at + PAIR_MEMORY * p] = part_used(table, pool, watch, memory, p, q)
+    best = used_most(table, watch, memory)
+    return best, memory[at + PAIR_MEMORY * best]

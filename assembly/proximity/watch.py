@@ -17,7 +17,7 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly.kinematics.motion import relative_pose, rotation
-from assembly.proximity.allowances import LEAST_ALLOWANCE, STILL, allow_ball, largest_part, mover, reach_now
+from assembly.proximity.allowances import LEAST_ALLOWANCE, STILL, allow_ball, largest_part, mover, reach_now, used_most
 from assembly.proximity.bounding_tree import NODE_POOL, RADIUS, least_distance
 from assembly.proximity.corners import add_corners
 from assembly.proximity.facing import facing_pairs, near_enough
@@ -84,8 +84,9 @@ from assembly.proximity.watch_memory import (
 )
 
 # Looks: at pairs that used up their allowance, or at all that moved. The first may be careful, at urgent pairs too, and
-# in turns, earlier at one pair at a time, and ask whether bodies cross where a contact lost its root.
-AS_NEEDED, EVERYTHING, CAREFUL, IN_TURNS, DOUBTFUL = 0, 1, 2, 4, 8
+# in turns, earlier at one pair at a time, and ask whether bodies cross where a contact lost its root. MEASURED: which
+# parts of allowances are used at these poses is known.
+AS_NEEDED, EVERYTHING, CAREFUL, IN_TURNS, DOUBTFUL, MEASURED = 0, 1, 2, 4, 8, 16
 # A pair is looked at again when so much of its allowance is used: the second, but the first of round wires, whose looks
 # take little; in turns, the one that used most of it at the first, and any that cut a step since its last look at the
 # third: what is left would cut the next one to nothing.
@@ -267,6 +268,8 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, rooms, roots, asks):
         )
         memory[at + CROSSED] = 1.0 if crossed else 0.0
     memory[at + ALLOWANCE] = max(min(rest, free), LEAST_ALLOWANCE)
+    memory[at + PART] = 0.0
+    memory[at + DOUBT] = 0.0
     if wires:
         sure = max(sure, STILL * memory[at + ALLOWANCE])
     elif fertile < math.inf:
@@ -290,6 +293,57 @@ def any_crossed(table, watch, memory):
     return False
 
 
+@kernel(inline=True)
+def is_by_patches(table, watch, p):
+    """Whether pair p is looked at by patches, and not by the spines of two round wires."""
+    return table[table[watch + PAIR_TABLE] + PAIR_RECORD * p + SPINE_F] < 0
+
+
+@kernel(inner=True)
+def is_due(table, watch, memory, p, tracked, how, most):
+    """Whether pair p is to be looked at, now that it is known which parts of allowances are used; `most` used most."""
+    o = memory_places(table, watch)[0] + PAIR_MEMORY * p
+    part = memory[o + PART]
+    if how & ~MEASURED == EVERYTHING:
+        due = part > 0.0 or math.isnan(memory[o + CROSSED])
+    else:
+        due = part > (SPENT if is_by_patches(table, watch, p) else USED)
+        if how & IN_TURNS != 0:
+            due = due or (p == most and part > USED)
+            due = due or (part > BRIEF and memory[o + CUT_SHORT] > memory[o + ALLOWANCE])
+        due = due or (how & CAREFUL != 0 and memory[o + DOUBT] > 1.0)
+    return due or any_lost(table, watch, memory, p, tracked)
+
+
+@kernel(inner=True, allocates=True)
+def look_at_due(table, pool, watch, memory, q, tracked, how, first, most):
+    """Look at the pairs that are due, of which `first` is the first one."""
+    stack = np.empty((STACK, 2), np.int64)
+    roots = np.empty((ROOTS, ROOT))
+    pairs = np.empty((BOXES, 2), np.int64)
+    boxes = np.empty((BOXES, BOX))
+    marks = np.empty((ROOTS, 4))
+    work = (np.empty((1, CONTACT_RECORD)), np.empty((1, TRACK)))
+    with_patches = False
+    candidates = stack
+    distances = boxes[0]
+    passed = boxes
+    at = memory_places(table, watch)[0]
+    for p in range(first, table[watch + PAIRS]):
+        if p != first and not is_due(table, watch, memory, p, tracked, how, most):
+            continue
+        if is_by_patches(table, watch, p) and not with_patches:
+            with_patches = True
+            candidates = np.empty((CANDIDATES, 2), np.int64)
+            distances = np.empty(CANDIDATES)
+            passed = np.empty((WAYS, PASSED))
+        asks = WHERE_LOST if how & DOUBTFUL != 0 else NEVER
+        if how & ~MEASURED == EVERYTHING or math.isnan(memory[at + PAIR_MEMORY * p + TURN]):
+            asks = ALWAYS
+        rooms = (stack, candidates, distances, passed, work, pairs, boxes, marks)
+        look_at_pair(table, pool, watch, memory, p, q, tracked, rooms, roots, asks)
+
+
 @kernel
 def look(table, pool, watch, memory, q, tracked, how):
     """Look at the pairs of bodies that need it, or at all that moved, and list what is near.
@@ -299,47 +353,13 @@ def look(table, pool, watch, memory, q, tracked, how):
     """
     before = memory[EVENT_COUNT]
     memory[CALLS] += 1.0
-    ready = False
-    with_patches = False
-    stack = np.empty((1, 2), np.int64)
-    candidates = stack
-    distances = np.empty(1)
-    roots = np.empty((1, ROOT))
-    passed = np.empty((1, PASSED))
-    pairs = stack
-    boxes = roots
-    marks = roots
-    work = (roots, roots)
-    next_pair, _part = largest_part(table, pool, watch, memory, q)
-    at = memory_places(table, watch)[0]
+    most = -1
+    if how & MEASURED == 0:
+        most = largest_part(table, pool, watch, memory, q)[0]
+    else:
+        most = used_most(table, watch, memory)
     for p in range(table[watch + PAIRS]):
-        part = memory[at + PAIR_MEMORY * p + PART]
-        patches = table[table[watch + PAIR_TABLE] + PAIR_RECORD * p + SPINE_F] < 0
-        if how == EVERYTHING:
-            due = part > 0.0 or math.isnan(memory[at + PAIR_MEMORY * p + CROSSED])
-        else:
-            due = part > (SPENT if patches else USED) or (how & IN_TURNS != 0 and p == next_pair and part > USED)
-            asked = memory[at + PAIR_MEMORY * p + CUT_SHORT]
-            due = due or (how & IN_TURNS != 0 and part > BRIEF and asked > memory[at + PAIR_MEMORY * p + ALLOWANCE])
-            due = due or (how & CAREFUL != 0 and memory[at + PAIR_MEMORY * p + DOUBT] > 1.0)
-        if not due and not any_lost(table, watch, memory, p, tracked):
-            continue
-        if not ready:
-            ready = True
-            stack = np.empty((STACK, 2), np.int64)
-            roots = np.empty((ROOTS, ROOT))
-            pairs = np.empty((BOXES, 2), np.int64)
-            boxes = np.empty((BOXES, BOX))
-            marks = np.empty((ROOTS, 4))
-            work = (np.empty((1, CONTACT_RECORD)), np.empty((1, TRACK)))
-        if patches and not with_patches:
-            with_patches = True
-            candidates = np.empty((CANDIDATES, 2), np.int64)
-            distances = np.empty(CANDIDATES)
-            passed = np.empty((WAYS, PASSED))
-        asks = WHERE_LOST if how & DOUBTFUL != 0 else NEVER
-        if how == EVERYTHING or math.isnan(memory[at + PAIR_MEMORY * p + TURN]):
-            asks = ALWAYS
-        rooms = (stack, candidates, distances, passed, work, pairs, boxes, marks)
-        look_at_pair(table, pool, watch, memory, p, q, tracked, rooms, roots, asks)
+        if is_due(table, watch, memory, p, tracked, how, most):
+            look_at_due(table, pool, watch, memory, q, tracked, how, p, most)
+            break
     return np.int64(memory[EVENT_COUNT] - before)

@@ -46,7 +46,8 @@ PAIRS, PLACES, PAIR_TABLE, FIRST, TRACK_SOLIDS, LENGTHS, LISTS, LIST_TABLE, CORN
 # the largest.
 NEGLECT, FIRST_REACH, LAST_REACH, LENGTH_COUNT = 0, 1, 2, 3
 # A pair: bodies, trees, surfaces or else (-1) shells, where its least gap is in the pool (behind it how far it may
-# go between looks where contacts may be born, and how far facets of either are from their surfaces), its places from
+# go between looks where contacts may be born, how far facets of either are from their surfaces, and how far either
+# reaches from its origin), its places from
 # and to, rows of given contacts between the two (row, 1 if the bodies are the other way round), whether it is f (0) or
 # g (1) that is the smaller one, and the spines of two round wires (-1: others).
 PAIR_F, PAIR_G, TREE_F, TREE_G, PAIR_SURFACE_F, PAIR_SURFACE_G, PAIR_SHELL_F, PAIR_SHELL_G = 0, 1, 2, 3, 4, 5, 6, 7

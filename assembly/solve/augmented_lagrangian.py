@@ -37,7 +37,7 @@ from assembly.constraints.layout import (
 )
 from assembly.constraints.terms import objective
 from assembly.proximity.solid_contact import FOLD
-from assembly.proximity.watch import AS_NEEDED, CAREFUL, DOUBTFUL, EVERYTHING, IN_TURNS, any_crossed
+from assembly.proximity.watch import AS_NEEDED, CAREFUL, DOUBTFUL, EVERYTHING, IN_TURNS, MEASURED, any_crossed
 from assembly.solve.contacts import free_folds, is_of_surfaces
 from assembly.solve.ending import finish, return_to
 from assembly.solve.guards import look_again, numbers_of, place_guards
@@ -56,6 +56,7 @@ from assembly.solve.settings import (
     CULPRIT,
     DUAL,
     FEASIBILITY,
+    FIRST_SHIFT,
     FREE_BELOW,
     FREE_TRIMS,
     GATHER,
@@ -134,12 +135,14 @@ def solve_program(table, pool, settings, state, history, tips):
     # What rounding of the user's coordinates, and of angles over many turns, alone can violate.
     feasible = max(settings[FEASIBILITY], 4e-16 * reach)
     limit = int(settings[ITERATIONS])
+    tick = settings[TICK] == 1.0
     mu = settings[PENALTY]
     floor, slow_steps = settings[PENALTY_FLOOR], 0
     way = np.empty(WAY)
     way[SOFTNESS] = 1.0
     begin_way(way)
-    shift = 0.0
+    # The first step of a tick needs about what that of the last one did; half of it is tried first.
+    shift = 2.0 * results[FIRST_SHIFT] if tick else 0.0
     radius = settings[RADIUS]
     violation = math.inf
     dual = math.inf
@@ -161,7 +164,6 @@ def solve_program(table, pool, settings, state, history, tips):
     iteration = 0
     alpha = 0.0
     free_trims = settings[FREE_TRIMS] == 1.0
-    tick = settings[TICK] == 1.0
     any_pose = settings[ANY_POSE] == 1.0
     # Whether what fails is led back onto its rows at the end.
     settles = not tick and (watched or any_pose)
@@ -185,10 +187,13 @@ def solve_program(table, pool, settings, state, history, tips):
     begun = 0
     # Whether other contacts are near than rows are placed for.
     changed = watched and settings[GATHER] == 1.0 and results[SCATTER] == 1.0
+    # Whether it is known which parts of allowances are used here.
+    measured = True
     while True:
         may_begin = watched and not tick and holds and begun < BEGINNINGS and iteration + LEFT <= limit
         if status == STALLED and may_begin:
             begin_again(table, pool, held, loose, here, y, better_y)
+            measured = False
             begun += 1
             iteration += 1
             status = ended = RUNNING
@@ -202,6 +207,7 @@ def solve_program(table, pool, settings, state, history, tips):
         if watched and not changed:
             holds_now = off_rows(table, loose, one_sided, here, tick) <= (feasible if tick else TOUCHING)
             how = (CAREFUL if holds_now else AS_NEEDED) | (AS_NEEDED if tick else IN_TURNS | DOUBTFUL)
+            how |= MEASURED if measured else AS_NEEDED
             changed = look_again(table, pool, memory, here, how, free, loose[4])
         if changed:
             place_guards(table, memory, here, y, better_y, free, False)
@@ -303,6 +309,7 @@ def solve_program(table, pool, settings, state, history, tips):
                 status = STALLED
                 continue
             return_to(table, pool, held, numbers, loose, rows, here, y, better_y, tick)
+            measured = False
             # Rows of tangency have other pairs now.
             rows = m
             changed = True
@@ -310,7 +317,8 @@ def solve_program(table, pool, settings, state, history, tips):
             continue
         if ended != RUNNING or (tick and iteration >= limit):
             # Its time is over: the shortest way back onto the rows.
-            if step_back(program, here, trial, rows, weights, mu, violation, 0.1 * feasible, system, tick, way):
+            measured = step_back(program, here, trial, rows, weights, mu, violation, 0.1 * feasible, system, tick, way)
+            if measured:
                 here, trial = trial, here
                 for r in range(rows):
                     better_y[r] = y[r]
@@ -346,9 +354,14 @@ def solve_program(table, pool, settings, state, history, tips):
         if used < 0.0:
             status = STALLED
             continue
+        if iteration == 0:
+            results[FIRST_SHIFT] = shift
         last_violation = violation
         last_dual = dual
-        cut, slope, steepest = cut_step(program, here, trial, rows, y, mu, reach, longest, turn, foreseen, lines)
+        measured = False
+        cut, slope, steepest, may_go = cut_step(
+            program, here, trial, rows, y, mu, reach, longest, turn, foreseen, lines
+        )
         if restoring:
             ends = steepest <= 1e-9 * violation or longest < 1e-12
             slows = iteration >= check_at and violation > 0.99 * check_violation
@@ -381,8 +394,24 @@ def solve_program(table, pool, settings, state, history, tips):
         room_left = 2.0 * longest if cuts > 0 else math.inf
         base = 0.0 if restoring else value
         accepted, alpha, lost = search(
-            program, tips, here, trial, rows, y, base, value, restoring, not tick, mu, slope, longest, weights, system
+            program,
+            tips,
+            here,
+            trial,
+            rows,
+            y,
+            base,
+            value,
+            restoring,
+            not tick,
+            may_go,
+            mu,
+            slope,
+            longest,
+            weights,
+            system,
         )
+        measured = accepted
         if not accepted:
             if lost < 0:
                 # Perhaps a fold is near enough to matter; else nothing moves any more.

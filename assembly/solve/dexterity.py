@@ -337,7 +337,7 @@ def add_dexterities(table, pool, shape, rows, loose, room, here, order, gradient
                 other[i] = 0.0
             step[j] = STEP
             move(table, here[0], step, 1.0, beside[0])
-            carry(table, pool, shape[0], loose, here, step, 1.0)
+            carry(table, pool, shape[0], loose, here, beside, step, 1.0)
             step[j] = 0.0
             if evaluate(table, pool, loose[4], math.inf, loose, room, beside) >= 0:
                 continue

@@ -178,11 +178,14 @@ def go_back(table, memory, numbers):
 
 @kernel(inner=True)
 def allowed_share(table, pool, memory, here, trial, step, share):
-    """How much of a step the watch allows, at most `share`; its poses go into the trial point."""
+    """How much of a step the watch allows, at most `share`, and whether it is all of that.
+
+    The poses at the end of that share go into the trial point, and which parts of allowances are used there is known.
+    """
     move(table, here[0], step, share, trial[0])
     _pair, end = largest_part(table, pool, table[WATCH], memory, trial[0])
     if end <= 1.0:
-        return share
+        return share, True
     watch = table[WATCH]
     at = memory_places(table, watch)[0]
     allowed = 1.0
@@ -193,7 +196,7 @@ def allowed_share(table, pool, memory, here, trial, step, share):
         begin = part_used(table, pool, watch, memory, p, here[0]) if end > 1.0 else end
         if end > begin:
             allowed = min(allowed, max(0.95 - begin, 0.05) / (end - begin))
-    return share * allowed
+    return share * allowed, False
 
 
 @kernel(inner=True)

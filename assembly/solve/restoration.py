@@ -37,7 +37,7 @@ def way_back(program, here, trial, rows, weights, mu, softness, share, enough, s
         shape, table[ROWS], rows, here[3], here[4], mu, active, softness, enough, lagrangian, matrix, n, forces, step
     )
     move(table, here[0], step, share, trial[0])
-    carry(table, pool, bases, loose, here, step, share)
+    carry(table, pool, bases, loose, here, trial, step, share)
     if table[WATCH] >= 0 and is_too_far(table, pool, loose[5], trial):
         return softness, math.inf
     if evaluate(table, pool, loose[4], BEND, loose, room, trial) >= 0:

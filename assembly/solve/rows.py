@@ -6,11 +6,13 @@ coordinates, then twists of further bodies.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from assembly._kernel import kernel
 from assembly.constraints.blocks import choose_storage
-from assembly.constraints.contact_rows import copy_tracked
+from assembly.constraints.contact_rows import copy_tracked, is_guard
 from assembly.constraints.layout import (
     ANGLE,
     BLOCK_LENGTH,
@@ -25,6 +27,7 @@ from assembly.constraints.layout import (
     FREE_COLUMN,
     JOINT_ROW,
     KIND,
+    MINIMUM,
     MOVING,
     ONE_SIDED,
     PARAMETERS,
@@ -53,7 +56,7 @@ from assembly.constraints.sparsity import close_envelope, place_folds
 from assembly.constraints.terms import TAPE_TERM, TERM, TERM_KIND, TERM_TABLE, TERM_TAPE
 from assembly.kinematics.motion import retract
 from assembly.proximity.extremal import into_domain
-from assembly.proximity.solid_contact import PAIR_GAP
+from assembly.proximity.solid_contact import CONTACT_RECORD, IDLE, LEFT, PAIR_GAP
 from assembly.proximity.velocity import RATES, ZED
 
 
@@ -304,12 +307,44 @@ def move(table, q, d, alpha, out):
             )
 
 
+@kernel(inline=True)
+def longest_way(d, at, alpha, far):
+    """How far a body's points go along alpha d, which are not farther than `far` from its origin."""
+    if at < 0:
+        return 0.0
+    shift = math.sqrt(d[at] * d[at] + d[at + 1] * d[at + 1] + d[at + 2] * d[at + 2])
+    turn = math.sqrt(d[at + 3] * d[at + 3] + d[at + 4] * d[at + 4] + d[at + 5] * d[at + 5])
+    return alpha * (shift + far * turn)
+
+
 @kernel(inner=True)
-def carry(table, pool, bases, loose, here, d, alpha):
+def stays_open(table, pool, bases, k, here, trial, d, alpha):
+    """Whether row k, of a clearance, is open all along alpha d for certain; if so, what is known of it goes on.
+
+    No gap changes by more than points of the two bodies go, those of each seen from where they were.
+    """
+    left = here[2][k, LEFT]
+    if not left > 0.0 or bases[k, 2] >= 0:
+        return False
+    minimum = table[table[ROW_TABLE] + ROW * k + MINIMUM]
+    left -= longest_way(d, bases[k, 0], alpha, pool[minimum + 4]) + longest_way(d, bases[k, 1], alpha, pool[minimum + 5])
+    if not left > 0.0:
+        return False
+    for i in range(CONTACT_RECORD):
+        trial[2][k, i] = here[2][k, i]
+    for i in range(FREE_COLUMN):
+        trial[4][k, i] = here[4][k, i]
+    trial[2][k, LEFT] = left
+    return True
+
+
+@kernel(inner=True)
+def carry(table, pool, bases, loose, here, trial, d, alpha):
     """Contact coordinates along alpha d: by the contact velocity, or, for a free pair, by its own unknowns.
 
     Gaps follow to first order, angles start from where they are: a step turns no body by more than a radian. The guess
-    goes into `loose`.
+    goes into `loose`. Rows of clearances that stay open for certain are marked there as IDLE, and their derivatives go
+    on to the trial point as they are.
     """
     _q, tracked, records, _residual, jacobian = here
     lengths = loose[1]
@@ -339,6 +374,9 @@ def carry(table, pool, bases, loose, here, d, alpha):
                 for i in range(4):
                     out[k, i] += records[k, RATES + 4 * i + j] * s
         keep_inside(table, pool, row, k, out)
+        if is_guard(table, k) and stays_open(table, pool, bases, k, here, trial, d, alpha):
+            out[k, IDLE] = 1.0
+            out[k, PAIR_GAP] = max(out[k, PAIR_GAP], pool[table[row + MINIMUM]] + trial[2][k, LEFT])
 
 
 @kernel(inner=True)

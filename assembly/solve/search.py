@@ -76,12 +76,15 @@ def goal(table, pool, shape, rows, loose, room, tips, point, order, gradient, he
 
 
 @kernel(inner=True)
-def search(program, tips, here, trial, rows, y, base, value, restoring, lets_go, mu, slope, longest, weights, system):
+def search(
+    program, tips, here, trial, rows, y, base, value, restoring, lets_go, may_go_all, mu, slope, longest, weights, system
+):
     """Try alpha times the step, alpha from 1 down, until the augmented Lagrangian falls enough.
 
     The trial point is left in `trial`. Returns whether one was accepted, alpha, and the contact lost by the last trial
     or -1. `base` is the objective's part of the merit here, `longest` the largest component of the step; `lets_go` says
-    whether a contact that ends where solids are in each other may be given up.
+    whether a contact that ends where solids are in each other may be given up, `may_go_all` whether it is known that bodies
+    may go all the way.
     """
     table, pool, shape, loose, room = program
     active, forces, _foreseen = weights
@@ -102,8 +105,9 @@ def search(program, tips, here, trial, rows, y, base, value, restoring, lets_go,
     lost = -1
     while alpha * longest > 1e-9 * SHORTEST or alpha == 1.0:
         move(table, here[0], step, alpha, trial[0])
-        carry(table, pool, bases, loose, here, step, alpha)
-        if table[WATCH] >= 0 and is_too_far(table, pool, loose[5], trial):
+        carry(table, pool, bases, loose, here, trial, step, alpha)
+        known = may_go_all and alpha == 1.0 and bends == 0
+        if table[WATCH] >= 0 and not known and is_too_far(table, pool, loose[5], trial):
             # Bent, it would go farther than is known to be free.
             bends = 2
             alpha *= 0.5

@@ -16,8 +16,9 @@ FEASIBILITY, STATIONARITY, ITERATIONS, PENALTY, PENALTY_FLOOR, RADIUS, GATHER, F
 LAST_LOOK, TICK, BUDGET, SECOND_ORDER, RECALL, ANY_POSE, SETTINGS = 8, 9, 10, 11, 12, 13, 14
 # Results at the end of the state.
 STATUS, COUNT, OBJECTIVE, VIOLATION, DUAL, CULPRIT, IMPROPER, SCATTER = 0, 1, 2, 3, 4, 5, 6, 7
-# Of a tick: whether it ended at a pose that held before; whether its end is a minimum (0: not tested, 1, or -1: no).
-HELD, CURVED = 8, 9
+# Of a tick: whether it ended at a pose that held before; whether its end is a minimum (0: not tested, 1, or -1: no); by
+# how much the Hessian of its first step was shifted, which tells the next tick where to begin.
+HELD, CURVED, FIRST_SHIFT = 8, 9, 10
 HISTORY = 7  # figures an iteration: objective, feasibility, stationarity, mu, regularization, step length, radius
 # A pair this near to a fold (det H over |H|^2) gets its coordinates as unknowns.
 FREE_BELOW = 0.02

@@ -84,14 +84,16 @@ def aim(program, here, rows, y, mu, shift, radius, cuts, dual, restoring, is_fre
 def cut_step(program, here, trial, rows, y, mu, radius, longest, turn, foreseen, lines):
     """Shorten the step to the radius, a radian, and as far as bodies may go between looks.
 
-    Returns the share that is left, the merit's slope along it, and the largest component of the descent.
+    Returns the share that is left, the merit's slope along it, the largest component of the descent, and whether it is
+    known that bodies may go so far.
     """
     table, pool, shape, loose, _room = program
     descent, step, straight = lines
     cut = min(1.0, radius / longest) if longest > 0.0 else 1.0
     cut = min(cut, 1.0 / turn) if turn > 0.0 else cut
+    may_go = True
     if table[WATCH] >= 0:
-        cut = allowed_share(table, pool, loose[5], here, trial, step, cut)
+        cut, may_go = allowed_share(table, pool, loose[5], here, trial, step, cut)
     slope = 0.0
     steepest = 0.0
     for i in range(descent.size):
@@ -103,7 +105,7 @@ def cut_step(program, here, trial, rows, y, mu, radius, longest, turn, foreseen,
         if foreseen[r] == 1.0:
             # What the row adds to the descent is not in the merit before it binds.
             slope -= (y[r] + here[3][r] / mu) * times(shape[0], here[4], r, step)
-    return cut, slope, steepest
+    return cut, slope, steepest, may_go
 
 
 @kernel(inner=True)
@@ -132,5 +134,5 @@ def leave_saddle(program, here, trial, number, system):
     for i in range(n):
         step[i] = KICK * math.sin(number + 1 + i) if i < 6 * table[MOVING] else 0.0
     move(table, here[0], step, 1.0, trial[0])
-    carry(table, pool, shape[0], loose, here, step, 1.0)
+    carry(table, pool, shape[0], loose, here, trial, step, 1.0)
     return evaluate(table, pool, loose[4], math.inf, loose, room, trial) < 0
