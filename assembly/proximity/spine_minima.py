@@ -1,6 +1,7 @@
 """Minima of the distance of two spines: of a box where F is convex, and of a thin one (`spine_box.py`).
 
-Where F may have two minima beside each other, one spine is followed by feet on the other one: at t(s) with F_t = 0,
+Where F may have two minima beside each other, one spine is followed by feet on the other one: at t(s) with F_t = 0 and
+F_tt > 0,
 
     phi(s) = F(s, t(s)),   phi' = F_s,   phi'' = F_ss - F_st^2 / F_tt,
 
@@ -22,6 +23,10 @@ STEPS, FEET, HALVINGS = 30, 12, 60
 LEVEL, STILL = 1e-10, 1e-16
 # A valley with no more slope than this at both ends is level: rounding tells where it has minima.
 NOISE = 1e-14
+# A foot is one where the last step toward it is shorter than this.
+SHORT = 1e-12
+# Room for the minima of a thin box: both ends, and two between any of them and two kinks.
+MINIMA = 8
 
 
 @kernel(inline=True)
@@ -30,9 +35,7 @@ def is_least(slope, far, at_ends):
 
     F is the square of the distance, which is `far`: its own slope is as many times less.
     """
-    return (
-        abs(slope) <= max(LEVEL * far, STILL) or (at_ends[0] and slope > 0.0) or (at_ends[1] and slope < 0.0)
-    )
+    return abs(slope) <= max(LEVEL * far, STILL) or (at_ends[0] and slope > 0.0) or (at_ends[1] and slope < 0.0)
 
 
 @kernel(inner=True)
@@ -78,97 +81,198 @@ def convex_minimum(pool, o, p, turn, shift, box, open_ends, s, t):
     return is_least(-dot(d, f), far, ends_f) and is_least(dot(d, g), far, ends_g), s, t
 
 
-@kernel(inner=True)
-def slope_at(pool, o, p, turn, shift, low, high, s, t):
-    """phi' and phi'' at s, and the foot, from t, within low and high."""
+@kernel(inline=True)
+def slopes_of(pool, o, p, turn, shift, side, x, y):
+    """F_x, F_y, F_xx, F_yy, F_xy; on `side` 0 these are x along f and y along g, on side 1 the other way round."""
+    s, t = (x, y) if side == 0 else (y, x)
     d, f, bend_f, g, bend_g = apart(pool, o, p, turn, shift, s, t)
-    tt = 1.0 + dot(d, bend_g)
-    for _ in range(FEET):
-        b = dot(d, g)
-        if not tt > 0.0:
-            break
-        t_new = min(max(t - b / tt, low), high)
-        step = abs(t_new - t)
-        t = t_new
-        d, f, bend_f, g, bend_g = apart(pool, o, p, turn, shift, s, t)
-        tt = 1.0 + dot(d, bend_g)
-        if step <= 1e-15:
-            break
-    st = dot(f, g)
-    bend = 1.0 - dot(d, bend_f)
-    free = low < t < high
-    return -dot(d, f), bend - st * st / tt if free and tt > 0.0 else bend, t
+    along = (-dot(d, f), 1.0 - dot(d, bend_f))
+    across = (dot(d, g), 1.0 + dot(d, bend_g))
+    if side == 1:
+        along, across = across, along
+    return along[0], across[0], along[1], across[1], -dot(f, g)
 
 
 @kernel(inner=True)
-def valley_minima(pool, o, p, turn, shift, box, open_ends):
-    """Minima of phi over a box: how many (two at most), s and t of each; whether the valley is level."""
-    k = 0.5 * (box[3] - box[2])
+def foot_at(pool, o, p, turn, shift, side, held, x, y):
+    """The foot of x on the other spine, from y, or y itself if it is `held`: phi', phi'', the foot, whether it is one.
+
+    There is none where F is not convex along the other spine.
+    """
+    a, b, xx, yy, xy = slopes_of(pool, o, p, turn, shift, side, x, y)
+    if held:
+        return a, xx, y, True
+    step = math.inf
+    for _ in range(FEET):
+        if not yy > 0.0:
+            return a, xx, y, False
+        step = -b / yy
+        y += step
+        a, b, xx, yy, xy = slopes_of(pool, o, p, turn, shift, side, x, y)
+        if abs(step) <= 1e-15:
+            break
+    found = yy > 0.0 and abs(step) <= SHORT
+    return a, xx - xy * xy / yy if found else xx, y, found
+
+
+@kernel(inner=True)
+def held_at(pool, o, p, turn, shift, side, own, x):
+    """Which end of the other spine's piece is nearest to x: -1 or 1; 0 if it is a point between."""
+    if slopes_of(pool, o, p, turn, shift, side, x, own[0])[1] >= 0.0:
+        return -1
+    return 1 if slopes_of(pool, o, p, turn, shift, side, x, own[1])[1] <= 0.0 else 0
+
+
+@kernel(inline=True)
+def within(left, right, x):
+    """x where it is inside of an interval, else the interval's middle."""
+    return x if left < x < right else 0.5 * (left + right)
+
+
+@kernel(inner=True)
+def kink_at(pool, o, p, turn, shift, side, end, left, right):
+    """Where between two places the foot comes to an end of the other spine's piece: F_y = 0 there."""
+    rises = slopes_of(pool, o, p, turn, shift, side, right, end)[1] > 0.0
+    x = 0.5 * (left + right)
+    for _ in range(HALVINGS):
+        _a, b, _xx, _yy, xy = slopes_of(pool, o, p, turn, shift, side, x, end)
+        if abs(b) <= 1e-15 * abs(xy):
+            break
+        if (b > 0.0) == rises:
+            right = x
+        else:
+            left = x
+        x = within(left, right, x - b / xy if xy != 0.0 else left)
+        if right - left <= 1e-15:
+            break
+    return x
+
+
+@kernel(inline=True)
+def turns_of(width, a, b, bend_a, bend_b):
+    """Where the cubic with these values and slopes at both ends turns, in parts of the width: two of 0 to 1, in order.
+
+    One that does not turn, or only beyond the ends, has them at an end.
+    """
+    da, db = width * bend_a, width * bend_b
+    # c(x) = a + da x + second x^2 + third x^3.
+    second = 3.0 * (b - a) - 2.0 * da - db
+    third = 2.0 * (a - b) + da + db
+    square = second * second - 3.0 * third * da
+    if not square > 0.0:
+        return 0.0, 1.0
+    # The roots of da + 2 second x + 3 third x^2, without cancellation.
+    q = -(second + math.copysign(math.sqrt(square), second))
+    one = min(max(q / (3.0 * third), 0.0), 1.0) if third != 0.0 else 1.0
+    two = min(max(da / q, 0.0), 1.0) if q != 0.0 else 0.0
+    return min(one, two), max(one, two)
+
+
+@kernel(inner=True)
+def rise_of(pool, o, p, turn, shift, side, held, left, right, y):
+    """Where phi' rises through zero between two places, the foot there and whether it is one."""
+    x = 0.5 * (left + right)
+    for _ in range(HALVINGS):
+        slope, bend, y, _found = foot_at(pool, o, p, turn, shift, side, held, x, y)
+        if abs(slope) <= 1e-15 * bend:
+            break
+        if slope <= 0.0:
+            left = x
+        else:
+            right = x
+        x = within(left, right, x - slope / bend if bend > 0.0 else left)
+        if right - left <= 1e-15:
+            break
+    _slope, _bend, y, found = foot_at(pool, o, p, turn, shift, side, held, x, y)
+    return x, y, found
+
+
+@kernel(inner=True)
+def piece_minima(pool, o, p, turn, shift, side, held, left, right, y, ends, places, count):
+    """Minima of phi between two places all of whose feet are `held` at y, or are none of them, found from y on.
+
+    `ends`: whether the followed spine has a free end at either place. Returns how many `places` there are, the larger
+    slope at both ends, and whether there are feet.
+    """
+    a, bend_a, y_a, found_a = foot_at(pool, o, p, turn, shift, side, held, left, y)
+    b, bend_b, y_b, found_b = foot_at(pool, o, p, turn, shift, side, held, right, y)
+    certain = found_a and found_b
+    width = right - left
+    low, high = turns_of(width, a, b, bend_a, bend_b)
+    if ends[0] and a > 0.0 and found_a:
+        places[count, side], places[count, 1 - side] = left, y_a
+        count += 1
+    x, slope = left, a
+    for step in range(3):
+        part = low if step == 0 else (high if step == 1 else 1.0)
+        new, rises = right, b
+        if part < 1.0:
+            new = left + part * width
+            rises = foot_at(pool, o, p, turn, shift, side, held, new, y)[0]
+        if new > x and slope <= 0.0 <= rises:
+            there, foot, found = rise_of(pool, o, p, turn, shift, side, held, x, new, y)
+            certain = certain and found
+            if found:
+                places[count, side], places[count, 1 - side] = there, foot
+                count += 1
+        x, slope = new, rises
+    if ends[1] and b < 0.0 and found_b:
+        places[count, side], places[count, 1 - side] = right, y_b
+        count += 1
+    return count, max(abs(a), abs(b)), certain
+
+
+@kernel(inner=True)
+def valley_minima(pool, o, p, turn, shift, box, open_ends, places):
+    """Minima of phi over a thin box: s and t of each into `places`, (MINIMA, 2).
+
+    That spine is followed across which F is curved the most. Where feet come to a free end phi' has a kink. Between
+    kinks it may go through zero and back where it turns: over a thin box that is where the cubic does that has its
+    values and slopes at both ends.
+
+    Returns
+    -------
+    How many there are; whether the valley is level; whether these are all for certain.
+    """
+    _a, _b, ss, tt, _st = slopes_of(pool, o, p, turn, shift, 0, 0.5 * (box[0] + box[1]), 0.5 * (box[2] + box[3]))
+    side = 0 if tt >= ss else 1
+    left, right, other_left, other_right = box if side == 0 else (box[2], box[3], box[0], box[1])
+    ends = open_ends if side == 0 else (open_ends[2], open_ends[3], open_ends[0], open_ends[1])
+    k = 0.5 * (other_right - other_left)
     # Feet may go on beyond the box along the same piece, but not beyond a free end.
-    low = box[2] if open_ends[2] else box[2] - k
-    high = box[3] if open_ends[3] else box[3] + k
-    middle = box[2] + k
-    a, bend_a, t_a = slope_at(pool, o, p, turn, shift, low, high, box[0], middle)
-    b, bend_b, t_b = slope_at(pool, o, p, turn, shift, low, high, box[1], middle)
+    own = (other_left if ends[2] else other_left - k, other_right if ends[3] else other_right + k)
+    begin = held_at(pool, o, p, turn, shift, side, own, left)
+    end = held_at(pool, o, p, turn, shift, side, own, right)
     count = 0
-    first = (0.0, 0.0)
-    other = (0.0, 0.0)
-    if open_ends[0] and a > 0.0:
-        first = (box[0], t_a)
-        count = 1
-    if open_ends[1] and b < 0.0:
-        if count == 1:
-            other = (box[1], t_b)
-        else:
-            first = (box[1], t_b)
-        count += 1
-    left, right = box[0], box[1]
-    crosses = a <= 0.0 <= b
-    if not crosses and (a > 0.0) == (b > 0.0) and bend_a * bend_b < 0.0 and (bend_a < 0.0) == (a > 0.0):
-        # phi' turns around in between: there it may be beyond zero.
-        lo, hi = left, right
-        for _ in range(HALVINGS):
-            s = 0.5 * (lo + hi)
-            x, bend, _t = slope_at(pool, o, p, turn, shift, low, high, s, middle)
-            if (x <= 0.0) if a > 0.0 else (x >= 0.0):
-                crosses = True
-                if a > 0.0:
-                    left = s
-                else:
-                    right = s
-                break
-            if (bend < 0.0) == (bend_a < 0.0):
-                lo = s
-            else:
-                hi = s
-            if hi - lo <= 1e-12:
-                break
-    if crosses and count < 2:
-        s = 0.5 * (left + right)
-        t = middle
-        for _ in range(HALVINGS):
-            x, bend, t = slope_at(pool, o, p, turn, shift, low, high, s, t)
-            if x <= 0.0:
-                left = s
-            else:
-                right = s
-            new = s - x / bend if bend > 0.0 else 0.5 * (left + right)
-            if not left < new < right:
-                new = 0.5 * (left + right)
-            step = abs(new - s)
-            s = new
-            if step <= 1e-15 or x == 0.0:
-                break
-        _x, _bend, t = slope_at(pool, o, p, turn, shift, low, high, s, t)
-        if count == 1:
-            other = (s, t)
-        else:
-            first = (s, t)
-        count += 1
+    steepest = 0.0
+    certain = True
+    x = left
+    state = begin
+    way = 1 if end > begin else -1
+    while True:
+        new = right
+        if state != end:
+            # From the one end of the piece inward, or outward to the other one.
+            at = own[0] if min(state, state + way) < 0 else own[1]
+            new = kink_at(pool, o, p, turn, shift, side, at, x, right)
+        free = (state == 0) or (ends[2] if state < 0 else ends[3])
+        if free:
+            y = 0.5 * (own[0] + own[1]) if state == 0 else (own[0] if state < 0 else own[1])
+            here = (ends[0] and x == left, ends[1] and state == end)
+            count, slope, found = piece_minima(
+                pool, o, p, turn, shift, side, state != 0, x, new, y, here, places, count
+            )
+            steepest = max(steepest, slope)
+            certain = certain and found
+        if state == end:
+            break
+        x = new
+        state += way
+    # What is beyond the box another one has.
     slack = 1e-6 * k
-    if count > 1 and not box[2] - slack <= other[1] <= box[3] + slack:
-        count = 1
-    if count > 0 and not box[2] - slack <= first[1] <= box[3] + slack:
-        first = other
-        count -= 1
-    return count, first, other, max(abs(a), abs(b)) <= NOISE
+    kept = 0
+    for m in range(count):
+        if other_left - slack <= places[m, 1 - side] <= other_right + slack:
+            places[kept, 0], places[kept, 1] = places[m, 0], places[m, 1]
+            kept += 1
+    return kept, steepest <= NOISE, certain

@@ -171,37 +171,37 @@ def halves(boxes, b):
 
 
 @kernel(inner=True)
-def add_minima(table, pool, scene, box, ends, what, neglect, roots, count, work):
-    """Add the minima that a box has. Returns how many roots there are."""
+def add_minima(table, pool, scene, box, ends, what, neglect, places, roots, count, work):
+    """Add the minima that a box has. Returns how many roots there are, and whether these are all for certain."""
     f, g = scene[5]
     i = np.int64(box[0])
     j = np.int64(box[3])
     o = table[f + PART_POOL] + PART * i
     p = table[g + PART_POOL] + PART * j
     part = (box[1], box[2], box[4], box[5])
+    certain = True
     if what == CONVEX:
         s, t = 0.5 * (box[1] + box[2]), 0.5 * (box[4] + box[5])
         found, s, t = convex_minimum(pool, o, p, scene[0], scene[1], part, ends, s, t)
         if found:
             count = add_minimum(table, pool, scene, i, j, s, t, neglect, roots, count, work)
     else:
-        many, first, other, level = valley_minima(pool, o, p, scene[0], scene[1], part, ends)
+        many, level, certain = valley_minima(pool, o, p, scene[0], scene[1], part, ends, places)
         if level:
             # All along it is as good: points here and there stand for it.
             neglect = max(neglect, SPARSE / max(pool[o + PART_BEND], pool[p + PART_BEND]))
-        if many > 0:
-            count = add_minimum(table, pool, scene, i, j, first[0], first[1], neglect, roots, count, work)
-        if many > 1:
-            count = add_minimum(table, pool, scene, i, j, other[0], other[1], neglect, roots, count, work)
-    return count
+        for m in range(many):
+            count = add_minimum(table, pool, scene, i, j, places[m, 0], places[m, 1], neglect, roots, count, work)
+    return count, certain
 
 
 @kernel(inner=True)
-def search_spines(table, pool, scene, moving, rho, lengths, neglect, boxes, waiting, marks, roots, count, work):
+def search_spines(table, pool, scene, moving, rho, lengths, neglect, boxes, waiting, rooms, roots, count, work):
     """Look for all contacts of two wires with gaps up to `near`; known ones are the first `count` roots.
 
     The `lengths` are the least gap asked for, how near is near, the reach, and the flank: how far bodies may go at a
-    fold. `moving` is the body that moves. There are `waiting` boxes; within the reach nothing is outside of them.
+    fold. `moving` is the body that moves. There are `waiting` boxes; within the reach nothing is outside of them. The
+    `rooms` are for marks of known roots, and for the minima of a box.
 
     Returns
     -------
@@ -214,6 +214,7 @@ def search_spines(table, pool, scene, moving, rho, lengths, neglect, boxes, wait
     radii = both_radii(table, pool, scene[5]) + least
     sharpest = max(pool[table[f + NUMBERS] + SHARPEST], pool[table[g + NUMBERS] + SHARPEST])
     known = count
+    marks, places = rooms
     mark_known(table, pool, scene, roots, known, marks)
     free = reach
     fertile = math.inf
@@ -246,8 +247,8 @@ def search_spines(table, pool, scene, moving, rho, lengths, neglect, boxes, wait
             waiting += 1
             continue
         if low <= near and not hollow and not (what == CONVEX and is_marked(boxes, b, marks, known)):
-            count = add_minima(table, pool, scene, box, ends, what, neglect, roots, count, work)
-            if halve or count == roots.shape[0]:
+            count, certain = add_minima(table, pool, scene, box, ends, what, neglect, places, roots, count, work)
+            if halve or count == roots.shape[0] or not certain:
                 # There may be one that is not known.
                 allowed = low
         waiting = b

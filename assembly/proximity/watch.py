@@ -28,6 +28,7 @@ from assembly.proximity.root_search import search_patches
 from assembly.proximity.roots import CORNER, GAP, LISTED, ORIGIN, ROOT, USELESS, is_alone
 from assembly.proximity.solid_contact import CONTACT_RECORD, PAIR_GAP, STAYS, TRACK
 from assembly.proximity.spine_curve import both_radii
+from assembly.proximity.spine_minima import MINIMA
 from assembly.proximity.spine_parts import near_parts, parts_beyond
 from assembly.proximity.spine_search import BOX, BOXES, search_spines
 from assembly.proximity.watch_memory import (
@@ -322,7 +323,7 @@ def look_at_due(table, pool, watch, memory, q, tracked, how, first, most):
     roots = np.empty((ROOTS, ROOT))
     pairs = np.empty((BOXES, 2), np.int64)
     boxes = np.empty((BOXES, BOX))
-    marks = np.empty((ROOTS, 4))
+    marks = (np.empty((ROOTS, 4)), np.empty((MINIMA, 2)))
     work = (np.empty((1, CONTACT_RECORD)), np.empty((1, TRACK)))
     with_patches = False
     candidates = stack

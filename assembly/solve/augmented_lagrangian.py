@@ -393,23 +393,9 @@ def solve_program(table, pool, settings, state, history, tips):
         cuts = cuts + 1 if watched and cut < 0.5 and violation <= TOUCHING else 0
         room_left = 2.0 * longest if cuts > 0 else math.inf
         base = 0.0 if restoring else value
+        leave = (not tick, may_go)
         accepted, alpha, lost = search(
-            program,
-            tips,
-            here,
-            trial,
-            rows,
-            y,
-            base,
-            value,
-            restoring,
-            not tick,
-            may_go,
-            mu,
-            slope,
-            longest,
-            weights,
-            system,
+            program, tips, here, trial, rows, y, base, value, restoring, leave, mu, slope, longest, weights, system
         )
         measured = accepted
         if not accepted:

@@ -327,7 +327,8 @@ def stays_open(table, pool, bases, k, here, trial, d, alpha):
     if not left > 0.0 or bases[k, 2] >= 0:
         return False
     minimum = table[table[ROW_TABLE] + ROW * k + MINIMUM]
-    left -= longest_way(d, bases[k, 0], alpha, pool[minimum + 4]) + longest_way(d, bases[k, 1], alpha, pool[minimum + 5])
+    left -= longest_way(d, bases[k, 0], alpha, pool[minimum + 4])
+    left -= longest_way(d, bases[k, 1], alpha, pool[minimum + 5])
     if not left > 0.0:
         return False
     for i in range(CONTACT_RECORD):

@@ -76,18 +76,17 @@ def goal(table, pool, shape, rows, loose, room, tips, point, order, gradient, he
 
 
 @kernel(inner=True)
-def search(
-    program, tips, here, trial, rows, y, base, value, restoring, lets_go, may_go_all, mu, slope, longest, weights, system
-):
+def search(program, tips, here, trial, rows, y, base, value, restoring, leave, mu, slope, longest, weights, system):
     """Try alpha times the step, alpha from 1 down, until the augmented Lagrangian falls enough.
 
     The trial point is left in `trial`. Returns whether one was accepted, alpha, and the contact lost by the last trial
-    or -1. `base` is the objective's part of the merit here, `longest` the largest component of the step; `lets_go` says
-    whether a contact that ends where solids are in each other may be given up, `may_go_all` whether it is known that bodies
-    may go all the way.
+    or -1. `base` is the objective's part of the merit here, `longest` the largest component of the step. The `leave`
+    says whether a contact that ends where solids are in each other may be given up, and whether bodies may go all the
+    way for certain.
     """
     table, pool, shape, loose, room = program
     active, forces, _foreseen = weights
+    lets_go, may_go_all = leave
     gradient, (descent, step, straight), lagrangian, matrix = system
     bases, one_sided, order, _of_rows = shape
     n = descent.size

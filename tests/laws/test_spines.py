@@ -87,9 +87,7 @@ def test_frames_of_a_spine_are_its_derivatives(name):
             h = 1e-3 * pool[o + HALF]
             p, t, c = (np.array(row) for row in spine_point(pool, o, s))
             rows = [[np.array(row) for row in spine_point(pool, o, s + k * h)] for k in (-2, -1, 1, 2)]
-            slopes = [
-                (rows[0][k] - 8.0 * rows[1][k] + 8.0 * rows[2][k] - rows[3][k]) / (12.0 * h) for k in range(2)
-            ]
+            slopes = [(rows[0][k] - 8.0 * rows[1][k] + 8.0 * rows[2][k] - rows[3][k]) / (12.0 * h) for k in range(2)]
             # Rounding of points of size one over steps, that are short for short parts.
             assert np.linalg.norm(t) == pytest.approx(1.0, abs=1e-14)
             np.testing.assert_allclose(slopes[0], t, atol=1e-14 * (1.0 + np.abs(p).max()) / h)
