@@ -91,8 +91,9 @@ def test_steps_end_within_what_looks_allow():
             begin, end = looked.parts(before), looked.parts(looked.moved(before, step, 1.0))
             if begin.max() > 0.9:
                 continue
-            share = looked.allowed(before, step, 1.0)
+            share, all_of_it = looked.allowed(before, step, 1.0)
             cut = end.max() > 1.0
+            assert all_of_it == (not cut)
             assert share == 1.0 if not cut else 0.0 < share < 1.0
             # Norms of what moves are below their chords; of turns by some tenths of a radian hardly above.
             assert looked.parts(looked.moved(before, step, share)).max() <= (0.98 if cut else 1.0)
@@ -124,12 +125,12 @@ def test_a_pair_that_is_nearly_spent_and_hardly_moves_is_not_in_the_way():
     assert begin[spent] > 0.98 and 0.98 < end[spent] < 1.0
     # As if each pair were alone; together the spent one would leave them a twentieth.
     asked = [(0.95 - b) / (e - b) for b, e in zip(begin, end, strict=True) if e > 1.0]
-    assert looked.allowed(q, step, 1.0) == pytest.approx(min(asked), rel=1e-9)
+    assert looked.allowed(q, step, 1.0)[0] == pytest.approx(min(asked), rel=1e-9)
     assert min(asked) > 1.5 * 0.05 / (end.max() - begin.max())
     # One that goes on is allowed a twentieth.
     step[:] = 0.0
     step[6 * bodies[spent, 1] + 2] = allowances[spent]
-    assert looked.allowed(q, step, 1.0) == pytest.approx(0.05, rel=1e-9)
+    assert looked.allowed(q, step, 1.0)[0] == pytest.approx(0.05, rel=1e-9)
 
 
 def test_a_point_that_stays_on_an_edge_is_no_root():

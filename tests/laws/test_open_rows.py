@@ -1,0 +1,129 @@
+"""Rows of clearances that stay open for certain along a step, and so are not evaluated at its end."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import assembly as asm
+from assembly.constraints import layout
+from assembly.constraints.program import evaluate
+from assembly.proximity import watch
+from assembly.proximity.free_pair import VARIABLES, VECTORS
+from assembly.proximity.solid_contact import CONTACT_RECORD, IDLE, LEFT, PAIR_GAP, TRACK
+from assembly.proximity.watch_memory import PAIR_MEMORY, REACH, memory_places
+from assembly.solve.guards import place_guards
+from assembly.solve.rows import arrange, carry, move, record_of_blocks, shape_of
+
+SHAPES = {
+    "rings": lambda: asm.shapes.torus(1.0, 0.1),
+    "boxes": lambda: asm.shapes.box(0.8, 0.7, 0.6),
+    "eggs": lambda: asm.shapes.ellipsoid(0.7, 0.5, 0.4),
+}
+
+
+class Near:
+    """Three bodies near each other whose origins are not in their middles, one of them fixed, with a clearance."""
+
+    def __init__(self, rng, shape, minimum):
+        bodies = []
+        for k in range(3):
+            turn = Rotation.random(rng=rng).as_quat(scalar_first=True)
+            bodies.append(asm.Body(f"body {k}", shape, 0.3 * rng.normal(size=3) + [1.6 * k, 0, 0], turn, fixed=k == 1))
+        scene = asm.Assembly(bodies)
+        scene.constrain(asm.Clearance(minimum=minimum))
+        self.packed = packed = scene.packed()
+        self.table, self.pool = table, pool = packed.table, packed.pool
+        self.n = 6 * int(table[layout.MOVING])
+        rows = int(table[layout.ROWS])
+        self.shape = shape_of(table, rows, self.n, record_of_blocks(table))
+        self.free = np.full(rows, -1, dtype=np.int64)
+        room = np.empty((VECTORS, 3, VARIABLES)), np.empty((VARIABLES, VARIABLES))
+        self.memory = packed._memory.copy()
+        self.loose = self.free, np.empty((rows, 4)), *room, np.zeros((rows, TRACK)), self.memory
+        at = table[layout.TAPE_ROOM]
+        self.room = tuple(np.empty(size) for size in table[at : at + 3])
+        q = scene.q.copy()
+        q[:, :3] = (q[:, :3] - packed.reference) / packed.scale
+        self.here = self.point(q)
+        self.here[1][:] = np.nan
+        # What is listed is to be farther away, too.
+        pairs, places, _ = memory_places(table, table[layout.WATCH])
+        self.memory[pairs:places].reshape(-1, PAIR_MEMORY)[:, REACH] = 1.0
+        watch.look(table, pool, table[layout.WATCH], self.memory, q, self.here[1], watch.EVERYTHING)
+        place_guards(table, self.memory, self.here, np.zeros(rows), np.zeros(rows), self.free, True)
+        arrange(table, self.free, self.shape, rows, self.n)
+        self.rows = rows
+        self.exactly(self.here)
+
+    def point(self, q):
+        """Room for a point at these poses."""
+        rows = int(self.table[layout.ROWS])
+        records = np.full((rows, CONTACT_RECORD), np.nan)
+        return q.copy(), np.zeros((rows, TRACK)), records, np.zeros(rows), np.full((rows, 16), np.nan)
+
+    def exactly(self, point):
+        """Every row by its pair."""
+        start = point[1].copy()
+        return evaluate(self.table, self.pool, start, np.inf, self.loose, self.room, point) < 0
+
+    def step(self, d):
+        """The point that a step leads to, as the loop evaluates it, and which rows it took as open."""
+        trial = self.point(self.here[0])
+        move(self.table, self.here[0], d, 1.0, trial[0])
+        carry(self.table, self.pool, self.shape[0], self.loose, self.here, trial, d, 1.0)
+        idle = self.loose[4][:, IDLE] == 1.0
+        found = evaluate(self.table, self.pool, self.loose[4], np.inf, self.loose, self.room, trial) < 0
+        return trial, idle, found
+
+
+@pytest.mark.parametrize("minimum", [0.0, 0.02])
+@pytest.mark.parametrize("name", SHAPES)
+def test_rows_that_are_not_evaluated_are_open_and_nearly_what_they_would_be(name, minimum):
+    rng = np.random.default_rng(4)
+    skipped = evaluated = 0
+    for _ in range(8):
+        near = Near(rng, SHAPES[name](), minimum)
+        size = 10.0 ** rng.uniform(-4.0, -1.5)
+        # Several steps in a row: what is left of a gap goes on from each to the next one.
+        gone = 0.0
+        for _ in range(6):
+            d = size * rng.normal(size=near.n) / np.sqrt(near.n)
+            trial, idle, found = near.step(d)
+            if not found:
+                break
+            gone += np.abs(d).sum()
+            exact = near.point(trial[0])
+            exact[1][:] = trial[1]
+            if not near.exactly(exact) or (np.isnan(exact[1][:, 0]) != np.isnan(near.here[1][:, 0])).any():
+                # A pair that a step as long as that leads elsewhere: no row says anything of it.
+                break
+            for r in np.flatnonzero(idle):
+                # No less than is left; and what a step makes of a gap to first order.
+                assert exact[3][r] >= trial[2][r, LEFT] > 0.0
+                assert trial[3][r] >= trial[2][r, LEFT]
+                assert abs(exact[3][r] - trial[3][r]) < 60.0 * gone**2
+                assert trial[1][r, IDLE] == 0.0 and trial[1][
+                    r, PAIR_GAP
+                ] - minimum / near.packed.scale == pytest.approx(trial[3][r], abs=1e-15)
+            skipped += int(idle.sum())
+            evaluated += int((~idle & ~np.isnan(trial[1][:, 0])).sum())
+            near.here = trial
+    assert skipped > 20 and evaluated > 10
+
+
+def test_rows_that_may_close_are_evaluated():
+    rng = np.random.default_rng(6)
+    near = Near(rng, SHAPES["rings"](), 0.0)
+    left = np.nanmax(near.here[2][:, LEFT])
+    assert left > 0.0
+    far = near.pool[near.table[near.table[layout.ROW_TABLE] + layout.MINIMUM :: layout.ROW][0] + 4]
+    for body in range(near.n // 6):
+        for k in range(6):
+            d = np.zeros(near.n)
+            # As far as may close the widest of these gaps: by a shift, or by a turn of what is farthest from the origin.
+            d[6 * body + k] = 1.001 * left / (1.0 if k < 3 else far)
+            _, idle, _ = near.step(d)
+            moved = near.shape[0][: near.rows, :2] == 6 * body
+            assert not (idle & moved.any(axis=1)).any()
