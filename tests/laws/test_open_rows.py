@@ -83,9 +83,9 @@ class Near:
 def test_rows_that_are_not_evaluated_are_open_and_nearly_what_they_would_be(name, minimum):
     rng = np.random.default_rng(4)
     skipped = evaluated = 0
-    for _ in range(8):
+    for _ in range(11):
         near = Near(rng, SHAPES[name](), minimum)
-        size = 10.0 ** rng.uniform(-4.0, -1.5)
+        size = 10.0 ** rng.uniform(-3.0, -0.7)
         # Several steps in a row: what is left of a gap goes on from each to the next one.
         gone = 0.0
         for _ in range(6):
@@ -122,7 +122,7 @@ def test_rows_that_may_close_are_evaluated():
     for body in range(near.n // 6):
         for k in range(6):
             d = np.zeros(near.n)
-            # As far as may close the widest of these gaps: by a shift, or by a turn of what is farthest from the origin.
+            # As far as may close the widest of these gaps: by a shift, or a turn of what is farthest away.
             d[6 * body + k] = 1.001 * left / (1.0 if k < 3 else far)
             _, idle, _ = near.step(d)
             moved = near.shape[0][: near.rows, :2] == 6 * body
