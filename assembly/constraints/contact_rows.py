@@ -266,7 +266,7 @@ def row_of_pair(table, pool, r, start, patience, loose, point):
     return True
 
 
-@kernel(inner=True)
+@kernel(inline=True)
 def contact_row(table, pool, r, start, patience, loose, point):
     """Row r, of contact r, from `start` on. Returns whether its pair was found, or need not be.
 

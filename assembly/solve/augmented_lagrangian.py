@@ -22,6 +22,7 @@ import math
 import numpy as np
 
 from assembly._address import call_address
+from assembly._carve import carve
 from assembly._kernel import kernel
 from assembly.constraints.contact_rows import TOUCHING
 from assembly.constraints.layout import (
@@ -45,7 +46,7 @@ from assembly.solve.multipliers import choose_multipliers, forget_objective, lea
 from assembly.solve.report import is_clear, keep, log
 from assembly.solve.restoration import LEAST_SHARE, SHARE, SOFTNESS, WAY, begin_way, step_back
 from assembly.solve.retreat import BEGINNINGS, LEFT, LONGER, SHORTER, begin_again, has_sunk
-from assembly.solve.room import held_room, pairs_room, points, results_of, tape_room, unknowns
+from assembly.solve.room import carve_pairs, carve_points, carve_tapes, carve_unknowns, results_of, room_needed
 from assembly.solve.rows import arrange, record_of_blocks, shape_of, turned, violation_of
 from assembly.solve.search import SHORTEST, goal, search
 from assembly.solve.settings import (
@@ -104,6 +105,13 @@ def solve_program(table, pool, settings, state, history, tips):
 
     `tips` is None where no term of the objective is a dexterity.
     """
+    doubles, integers = room_needed(table)
+    return run(table, pool, settings, state, history, tips, np.empty(doubles), np.empty(integers, np.int64))
+
+
+@kernel(inner=True, allocates=True)
+def run(table, pool, settings, state, history, tips, doubles, integers):
+    """The same, with what it works in."""
     pairs = table[CONTACTS]
     m = table[ROWS]
     results = results_of(table, state)
@@ -114,21 +122,25 @@ def solve_program(table, pool, settings, state, history, tips):
     rows = m
     most = m + 4 * pairs
     n = 6 * table[MOVING]
-    here, trial, by_row, guess = points(table, most)
+    # The last pose that held is none yet.
+    here, trial, by_row, guess, held, at = carve_points(table, most, doubles, 0)
     y, better_y, active, forces, foreseen = by_row[2], by_row[3], by_row[4], by_row[5], by_row[6]
     weights = (active, forces, foreseen)
     reach = read_state(table, pool, state, here, trial, y, better_y)
     # Where rows stand: variables, sides, and where matrices of variables and of rows have entries.
-    shape = shape_of(table, most, n + 4 * pairs, record_of_blocks(table))
+    shape = shape_of(table, most, n + 4 * pairs, record_of_blocks(table), integers, doubles)
     bases, one_sided, order, _of_rows = shape
-    loose = pairs_room(table, guess, memory)
+    loose, at = carve_pairs(table, guess, memory, doubles, at, integers)
     free = loose[0]
+    numbers = carve(integers, pairs, (table[GUARDS],))
     arrange(table, free, shape, rows, n)
-    room = tape_room(table)
+    room, at = carve_tapes(table, doubles, at)
     # What stays as it is for the whole solve.
     program = (table, pool, shape, loose, room)
-    gram = np.empty((most + 1, most))
-    system = unknowns(n, order)
+    gram = carve(doubles, at, (most + 1, most))
+    at += (most + 1) * most
+    way = carve(doubles, at, (WAY,))
+    system = carve_unknowns(n, order, doubles, at + WAY)
     gradient, lines, lagrangian, _factor = system
 
     reach = max(reach, turned(table, pool, here[1]))
@@ -138,7 +150,6 @@ def solve_program(table, pool, settings, state, history, tips):
     tick = settings[TICK] == 1.0
     mu = settings[PENALTY]
     floor, slow_steps = settings[PENALTY_FLOOR], 0
-    way = np.empty(WAY)
     way[SOFTNESS] = 1.0
     begin_way(way)
     # The first step of a tick needs about what that of the last one did; half of it is tried first.
@@ -169,10 +180,7 @@ def solve_program(table, pool, settings, state, history, tips):
     settles = not tick and (watched or any_pose)
     lingers = 0
     begin = call_address(table[CLOCK_AT], ()) if settings[BUDGET] > 0.0 else 0
-    # The last pose that held, its tracked values and multipliers; none yet.
-    held = held_room(table, most)
     holds = False
-    numbers = np.empty(table[GUARDS], np.int64)
     status, lost, folded = set_out(program, settings, state, here, by_row, n)
     if status == CONTACT_LOST:
         value = objective(table, pool, here[0], 0, room, order, gradient, lagrangian)

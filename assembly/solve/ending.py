@@ -55,7 +55,7 @@ def return_to(table, pool, held, numbers, loose, rows, here, y, better_y, tick):
         place_guards(table, memory, here, y, better_y, free, False)
 
 
-@kernel(inner=True, allocates=True)
+@kernel(inline=True, allocates=True)
 def finish(program, settings, state, tips, here, trial, by_row, at_end, held, numbers, system, gram):
     """Write the end into the state; returns the status, and objective, violation, dual of the pose as it is returned.
 

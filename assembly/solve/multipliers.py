@@ -249,7 +249,7 @@ def pushing_multipliers(shape, rows, residual, jacobian, active, exchanges, roun
             y[r] = min(y[r], 0.0)
 
 
-@kernel(inner=True)
+@kernel(inline=True)
 def choose_multipliers(
     shape, rows, here, shortened, vectors, holds, good, active, gradient, scratch, gram, y, better_y
 ):

@@ -37,7 +37,7 @@ def is_simple(table):
     return table[ROWS] == table[CONTACTS] and table[TRACKED] == table[CONTACTS] and table[JOINTS] == 0
 
 
-@kernel(inner=True)
+@kernel(inline=True)
 def recall(table, state, at, point):
     """Take over the rows that were left at these poses, with these contacts. Whether there were."""
     if state[at] != 1.0 or not is_simple(table):
@@ -62,7 +62,7 @@ def recall(table, state, at, point):
     return True
 
 
-@kernel(inner=True)
+@kernel(inline=True)
 def leave(table, state, at, point, good):
     """Leave the rows of a point whose poses are in the state, if they are `good`."""
     state[at] = 0.0

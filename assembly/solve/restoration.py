@@ -21,7 +21,7 @@ SHORTENED, ASTRAY, LEAST_SHARE = 0.25, 10.0, 1e-4
 SOFTNESS, SHARE, LOWEST, LED_OFF, WAY = 0, 1, 2, 3, 4
 
 
-@kernel(inner=True)
+@kernel(inline=True)
 def way_back(program, here, trial, rows, weights, mu, softness, share, enough, system, tick):
     """A share of the least step that leaves little of the gaps, into the trial point.
 
@@ -53,7 +53,7 @@ def begin_way(way):
     way[LED_OFF] = 0.0
 
 
-@kernel(inner=True)
+@kernel(inline=True)
 def step_back(program, here, trial, rows, weights, mu, violation, enough, system, tick, way):
     """A step on the way back, into the trial point; whether it is to be taken. If not, the next one is shorter."""
     if violation < way[LOWEST]:

@@ -1,17 +1,21 @@
-"""Room that a solve works in. One block of memory a kind, because each costs its allocation."""
+"""Room that a solve works in: arrays in two blocks of memory, of doubles and of integers (`_carve.py`)."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from assembly._carve import carve
 from assembly._kernel import kernel
 from assembly.constraints.blocks import BLOCKS, FACTORED, is_blocked
 from assembly.constraints.layout import (
+    BLOCK_RECORD,
     BODIES,
     CONTACTS,
     EXTRA,
     EXTRA_COLUMN,
+    GUARDS,
     JOINTS,
+    MOVING,
     ROWS,
     TAPE_ROOM,
     TRACKED,
@@ -19,6 +23,8 @@ from assembly.constraints.layout import (
 )
 from assembly.proximity.free_pair import VARIABLES, VECTORS
 from assembly.proximity.solid_contact import CONTACT_RECORD, TRACK
+from assembly.solve.restoration import WAY
+from assembly.solve.rows import size_of_shape
 
 # What a row has a number of, behind its residuals here and at the trial point: its multiplier, a better one, whether it
 # counts, what it pushes with, whether a step would break it.
@@ -31,55 +37,105 @@ def results_of(table, state):
     return state[7 * table[BODIES] + TRACK * table[TRACKED] + 2 * table[ROWS] :]
 
 
-@kernel(inline=True, allocates=True)
-def points(table, most):
-    """Two points of the search, room by row, and tracked values more, for a guess.
+@kernel(inline=True)
+def room_needed(table):
+    """How many doubles and integers a solve works in: what is carved below, and by `shape_of`."""
+    pairs, bodies, tracks, tapes = table[CONTACTS], table[BODIES], table[TRACKED], table[TAPE_ROOM]
+    most, n = table[ROWS] + 4 * pairs, 6 * table[MOVING]
+    integers, doubles = size_of_shape(table, most, n + 4 * pairs)
+    # Poses, tracked values, records, Jacobians, what a row has one of.
+    doubles += 21 * bodies + 4 * TRACK * tracks + 2 * record_count(table) * CONTACT_RECORD
+    doubles += 2 * most * (EXTRA_COLUMN + 6 * table[EXTRA]) + (BY_ROW + 1) * most
+    # Of pairs; of tapes; multipliers of least squares; the way back.
+    doubles += 4 * pairs + (3 * VECTORS + VARIABLES) * VARIABLES
+    doubles += table[tapes] + table[tapes + 1] + table[tapes + 2] + (most + 1) * most + WAY
+    # Of unknowns, while no pair is at a fold.
+    blocks = table[BLOCK_RECORD]
+    doubles += 4 * n + (36 * (table[blocks + BLOCKS] + table[blocks + FACTORED]) if blocks > 0 else 2 * n * n)
+    return doubles, integers + pairs + table[GUARDS]
 
-    A point: poses, tracked values, records, residual, Jacobian. `most` rows at most.
+
+@kernel(inline=True)
+def record_count(table):
+    """How many records a point has."""
+    return table[CONTACTS] + table[JOINTS] + table[VECTOR_TRIMS]
+
+
+@kernel(inline=True, allocates=True)
+def carve_points(table, most, doubles, at):
+    """Two points of the search, room by row, tracked values more, for a guess, a third point to keep; where it ends.
+
+    A point: poses, tracked values, records, residual, Jacobian. `most` rows at most. The third one is a pose, its
+    tracked values and its multipliers.
     """
-    poses = np.empty((2, table[BODIES], 7))
-    tracked = np.empty((3, table[TRACKED], TRACK))
-    records = np.empty((2, table[CONTACTS] + table[JOINTS] + table[VECTOR_TRIMS], CONTACT_RECORD))
-    by_row = np.zeros((BY_ROW, most))
-    jacobians = np.empty((2, most, EXTRA_COLUMN + 6 * table[EXTRA]))
+    bodies, tracks, columns = table[BODIES], table[TRACKED], EXTRA_COLUMN + 6 * table[EXTRA]
+    poses = carve(doubles, at, (3, bodies, 7))
+    at += 21 * bodies
+    tracked = carve(doubles, at, (4, tracks, TRACK))
+    at += 4 * tracks * TRACK
+    records = carve(doubles, at, (2, record_count(table), CONTACT_RECORD))
+    at += 2 * record_count(table) * CONTACT_RECORD
+    jacobians = carve(doubles, at, (2, most, columns))
+    at += 2 * most * columns
+    by_row = carve(doubles, at, (BY_ROW + 1, most))
+    at += (BY_ROW + 1) * most
+    for k in range(BY_ROW):
+        for r in range(most):
+            by_row[k, r] = 0.0
     here = (poses[0], tracked[0], records[0], by_row[0], jacobians[0])
     trial = (poses[1], tracked[1], records[1], by_row[1], jacobians[1])
-    return here, trial, by_row, tracked[2]
+    return here, trial, by_row, tracked[2], (poses[2], tracked[3], by_row[BY_ROW]), at
 
 
 @kernel(inline=True, allocates=True)
-def pairs_room(table, guess, memory):
+def carve_pairs(table, guess, memory, doubles, at, integers):
     """What pairs need: which are free, the lengths of their coordinates, room for their derivatives; a guess of all.
 
-    With what a watch of clearances remembers. No pair is free yet.
+    With what a watch of clearances remembers. No pair is free yet. And where it ends.
     """
     pairs = table[CONTACTS]
-    vectors = np.empty((VECTORS if pairs > 0 else 0, 3, VARIABLES))
-    values = np.empty((VARIABLES if pairs > 0 else 0, VARIABLES))
-    return np.full(pairs, np.int64(-1)), np.empty((pairs, 4)), vectors, values, guess, memory
+    free = carve(integers, 0, (pairs,))
+    for k in range(pairs):
+        free[k] = -1
+    lengths = carve(doubles, at, (pairs, 4))
+    at += 4 * pairs
+    vectors = carve(doubles, at, (VECTORS, 3, VARIABLES))
+    at += 3 * VECTORS * VARIABLES
+    values = carve(doubles, at, (VARIABLES, VARIABLES))
+    return (free, lengths, vectors, values, guess, memory), at + VARIABLES * VARIABLES
 
 
 @kernel(inline=True, allocates=True)
-def tape_room(table):
-    """What the instructions of expressions work in."""
+def carve_tapes(table, doubles, at):
+    """What the instructions of expressions work in, and where it ends."""
     o = table[TAPE_ROOM]
-    return np.empty(table[o]), np.empty(table[o + 1]), np.empty(table[o + 2])
+    inputs = carve(doubles, at, (table[o],))
+    outputs = carve(doubles, at + table[o], (table[o + 1],))
+    work = carve(doubles, at + table[o] + table[o + 1], (table[o + 2],))
+    return (inputs, outputs, work), at + table[o] + table[o + 1] + table[o + 2]
+
+
+@kernel(inline=True)
+def sides_of(n, order):
+    """Rows and columns of the Hessian's array and of its factor's, for n unknowns."""
+    if is_blocked(order):
+        return (6 * order[3][BLOCKS], 6), (1, 36 * order[3][FACTORED])
+    return (n, n), (n, n)
 
 
 @kernel(inline=True, allocates=True)
-def held_room(table, most):
-    """A pose, its tracked values and its multipliers."""
-    return np.empty((table[BODIES], 7)), np.empty((table[TRACKED], TRACK)), np.empty(most)
+def carve_unknowns(n, order, doubles, at):
+    """Room for n unknowns: gradient, (right side or scratch, step, step before it was bent), Hessian, its factor."""
+    hessian, factor = sides_of(n, order)
+    vectors = carve(doubles, at, (4, n))
+    end = at + 4 * n + hessian[0] * hessian[1]
+    matrices = carve(doubles, at + 4 * n, hessian), carve(doubles, end, factor)
+    return vectors[0], (vectors[1], vectors[2], vectors[3]), matrices[0], matrices[1]
 
 
 @kernel(inline=True, allocates=True)
 def unknowns(n, order):
-    """Room for n unknowns: gradient, (right side or scratch, step, step before it was bent), Hessian, its factor."""
+    """The same of its own: where pairs at folds bring more unknowns."""
+    hessian, factor = sides_of(n, order)
     vectors = np.empty((4, n))
-    if is_blocked(order):
-        hessian = np.empty((6 * order[3][BLOCKS], 6))
-        factor = np.empty((1, 36 * order[3][FACTORED]))
-    else:
-        matrices = np.empty((2, n, n))
-        hessian, factor = matrices[0], matrices[1]
-    return vectors[0], (vectors[1], vectors[2], vectors[3]), hessian, factor
+    return vectors[0], (vectors[1], vectors[2], vectors[3]), np.empty(hessian), np.empty(factor)

@@ -51,7 +51,7 @@ from assembly.constraints.terms import objective
 from assembly.proximity.free_pair import VARIABLES, VECTORS
 from assembly.proximity.solid_contact import CONTACT_RECORD, TRACK
 from assembly.solve.contacts import free_folds, start_contacts
-from assembly.solve.rows import arrange, shape_of
+from assembly.solve.rows import arrange, shape_of, size_of_shape
 from assembly.solve.search import goal
 from assembly.solve.settings import FREE_BELOW
 
@@ -192,7 +192,8 @@ def gradient_at(table, pool, state, free, gradient, tips):
     lost, count, point, loose, room = point_at(table, pool, state, free)
     rows = table[ROWS] + 4 * count
     n = 6 * table[MOVING] + 4 * count
-    shape = shape_of(table, rows, n, table[:0])
+    integers, doubles = size_of_shape(table, rows, n)
+    shape = shape_of(table, rows, n, table[:0], np.empty(integers, np.int64), np.empty(doubles))
     arrange(table, free, shape, rows, n)
     slopes = np.empty(n)
     curves = np.empty((n, n))

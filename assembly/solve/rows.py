@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
+from assembly._carve import carve
 from assembly._kernel import kernel
 from assembly.constraints.blocks import choose_storage
 from assembly.constraints.contact_rows import copy_tracked, is_guard
@@ -165,11 +164,15 @@ def place_unknowns(table, bases, rows, n, order):
     place_folds(n, order)
 
 
-@kernel(inner=True, allocates=True)
-def order_rows(bases, rows, n, sequence, last_row):
-    """Rows in the order of their first bodies, and how far those of J J^T reach then (see `linear.factorize`)."""
+@kernel(inner=True)
+def order_rows(bases, rows, n, sequence, last_row, latest):
+    """Rows in the order of their first bodies, and how far those of J J^T reach then (see `linear.factorize`).
+
+    `latest` is room for n + 1 numbers.
+    """
     # Rows meet in J J^T where they share a variable. First how many begin at each, then where the next one goes.
-    latest = np.zeros(n + 1, np.int64)
+    for i in range(n + 1):
+        latest[i] = 0
     for r in range(rows):
         latest[body_span(bases, r, n)[0]] += 1
     total = 0
@@ -197,19 +200,31 @@ def arrange(table, free, shape, rows, n):
     bases, one_sided, order, (sequence, last_row) = shape
     place_rows(table, free, bases, one_sided)
     place_unknowns(table, bases, rows, n, order)
-    order_rows(bases, rows, n, sequence, last_row)
+    order_rows(bases, rows, n, sequence, last_row, order[0][3])
+
+
+@kernel(inline=True)
+def size_of_shape(table, most, n):
+    """How many integers and doubles `shape_of` carves at most."""
+    integers = (6 + table[EXTRA]) * most + 2 * (table[CONTACTS] + 1) + 4 * (n + 1)
+    return integers, 13 * max(n, 36)
 
 
 @kernel(inline=True, allocates=True)
-def shape_of(table, most, n, blocks):
+def shape_of(table, most, n, blocks, integers, doubles):
     """Room for what `arrange` finds, for so many rows and unknowns: (bases, one_sided, order, order of rows).
 
-    `blocks` is the scene's record of them, `record_of_blocks`, or an empty one for a dense Hessian.
+    `blocks` is the scene's record of them, `record_of_blocks`, or an empty one for a dense Hessian. The room is that of
+    the ends of two blocks of memory.
     """
-    of_rows = np.empty((3, most), np.int64)
-    folds = np.empty((table[CONTACTS] + 1, 2), np.int64)
-    order = (np.empty((3, n), np.int64), folds, np.empty((13, max(n, 36)) if blocks.size > 0 else (1, n)), blocks)
-    return np.empty((most, 3 + table[EXTRA]), np.int64), of_rows[0], order, (of_rows[1], of_rows[2])
+    end, tail = size_of_shape(table, most, n)
+    at = integers.size - end
+    of_rows = carve(integers, at, (3, most))
+    folds = carve(integers, at + 3 * most, (table[CONTACTS] + 1, 2))
+    places = carve(integers, at + 3 * most + 2 * (table[CONTACTS] + 1), (4, n + 1))
+    bases = carve(integers, integers.size - (3 + table[EXTRA]) * most, (most, 3 + table[EXTRA]))
+    scratch = carve(doubles, doubles.size - tail, (13 if blocks.size > 0 else 1, max(n, 36)))
+    return bases, of_rows[0], (places, folds, scratch, blocks), (of_rows[1], of_rows[2])
 
 
 @kernel(inner=True)

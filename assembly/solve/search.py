@@ -75,7 +75,7 @@ def goal(table, pool, shape, rows, loose, room, tips, point, order, gradient, he
     return value
 
 
-@kernel(inner=True)
+@kernel(inline=True)
 def search(program, tips, here, trial, rows, y, base, value, restoring, leave, mu, slope, longest, weights, system):
     """Try alpha times the step, alpha from 1 down, until the augmented Lagrangian falls enough.
 

@@ -43,7 +43,7 @@ from assembly.solve.settings import (
 )
 
 
-@kernel(inner=True)
+@kernel(inline=True)
 def read_state(table, pool, state, here, trial, y, better_y):
     """Poses, tracked values and multipliers of a state, scaled; returns how far out the user's coordinates are."""
     size = pool[SCALE]
@@ -73,7 +73,7 @@ def read_state(table, pool, state, here, trial, y, better_y):
     return reach
 
 
-@kernel(inner=True)
+@kernel(inline=True)
 def find_contacts(program, state, recalled, here, by_row, n, free_trims):
     """Find the contacts of the start and evaluate its rows, unless the last tick left them at `recalled`.
 
@@ -126,7 +126,7 @@ def put_together(program, here, by_row):
     return evaluate(table, pool, here[1], math.inf, loose, room, here)
 
 
-@kernel(inner=True, allocates=True)
+@kernel(inline=True, allocates=True)
 def set_out(program, settings, state, here, by_row, n):
     """Find contacts, evaluate rows, gather what is scattered where the settings ask for it.
 

@@ -25,7 +25,7 @@ OFTEN = 25
 SADDLE, KICK = 1e-5, 1e-3
 
 
-@kernel(inner=True)
+@kernel(inline=True)
 def aim(program, here, rows, y, mu, shift, radius, cuts, dual, restoring, is_fresh, weights, system):
     """The step of the augmented Lagrangian at a point, into the system's lines; by the last factor unless `is_fresh`.
 
@@ -80,7 +80,7 @@ def aim(program, here, rows, y, mu, shift, radius, cuts, dual, restoring, is_fre
     return shift, used, longest, turn
 
 
-@kernel(inner=True)
+@kernel(inline=True)
 def cut_step(program, here, trial, rows, y, mu, radius, longest, turn, foreseen, lines):
     """Shorten the step to the radius, a radian, and as far as bodies may go between looks.
 
@@ -108,7 +108,7 @@ def cut_step(program, here, trial, rows, y, mu, radius, longest, turn, foreseen,
     return cut, slope, steepest, may_go
 
 
-@kernel(inner=True)
+@kernel(inline=True)
 def propose(shape, here, rows, y, mu, active, straight, alpha, better_y):
     """The multipliers of first order after a share alpha of the straight step."""
     bases, one_sided, _order, _of_rows = shape

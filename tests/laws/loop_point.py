@@ -12,8 +12,14 @@ from assembly.constraints.blocks import BLOCKS, COLUMN, COUNT, FIRST, PLACE, is_
 from assembly.proximity.free_pair import VARIABLES, VECTORS
 from assembly.proximity.solid_contact import CONTACT_RECORD, TRACK
 from assembly.solve.contacts import start_contacts
-from assembly.solve.rows import arrange, record_of_blocks, shape_of
+from assembly.solve.rows import arrange, record_of_blocks, shape_of, size_of_shape
 from assembly.solve.search import goal
+
+
+def room_of_shape(table, rows, n, blocks):
+    """Room for where rows and unknowns stand."""
+    integers, doubles = size_of_shape(table, rows, n)
+    return shape_of(table, rows, n, blocks, np.zeros(integers, dtype=np.int64), np.zeros(doubles))
 
 
 class LoopPoint:
@@ -35,7 +41,7 @@ class LoopPoint:
             np.empty(self.rows),
             np.zeros((self.rows, layout.EXTRA_COLUMN + 6 * int(table[layout.EXTRA]))),
         )
-        self.shape = shape_of(table, self.rows, self.n, record_of_blocks(table) if blocks else table[:0])
+        self.shape = room_of_shape(table, self.rows, self.n, record_of_blocks(table) if blocks else table[:0])
         free = np.full(pairs, -1, dtype=np.int64)
         room = (np.empty((VECTORS, 3, VARIABLES)), np.empty((VARIABLES, VARIABLES)))
         self.loose = (free, np.empty((pairs, 4)), *room, np.empty((tracks, TRACK)))

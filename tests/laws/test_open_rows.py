@@ -14,7 +14,8 @@ from assembly.proximity.free_pair import VARIABLES, VECTORS
 from assembly.proximity.solid_contact import CONTACT_RECORD, IDLE, LEFT, PAIR_GAP, TRACK
 from assembly.proximity.watch_memory import PAIR_MEMORY, REACH, memory_places
 from assembly.solve.guards import place_guards
-from assembly.solve.rows import arrange, carry, move, record_of_blocks, shape_of
+from assembly.solve.rows import arrange, carry, move, record_of_blocks
+from tests.laws.loop_point import room_of_shape
 
 SHAPES = {
     "rings": lambda: asm.shapes.torus(1.0, 0.1),
@@ -37,7 +38,7 @@ class Near:
         self.table, self.pool = table, pool = packed.table, packed.pool
         self.n = 6 * int(table[layout.MOVING])
         rows = int(table[layout.ROWS])
-        self.shape = shape_of(table, rows, self.n, record_of_blocks(table))
+        self.shape = room_of_shape(table, rows, self.n, record_of_blocks(table))
         self.free = np.full(rows, -1, dtype=np.int64)
         room = np.empty((VECTORS, 3, VARIABLES)), np.empty((VARIABLES, VARIABLES))
         self.memory = packed._memory.copy()

@@ -10,7 +10,8 @@ from assembly.constraints import layout
 from assembly.constraints.sparsity import clear_upper, place_folds
 from assembly.solve.linear import factorize_shifted, forward_step, solve_step
 from assembly.solve.multipliers import curve_rows, toward_rows
-from assembly.solve.rows import arrange, shape_of
+from assembly.solve.rows import arrange
+from tests.laws.loop_point import room_of_shape
 
 
 def random_system(rng, bodies, pairs):
@@ -99,7 +100,7 @@ def test_rows_of_a_chain_meet_only_their_neighbors():
     table = scene.packed().table
     count = int(table[layout.CONTACTS])
     rows, n = int(table[layout.ROWS]) + 4 * count, 6 * int(table[layout.MOVING]) + 4 * count
-    shape = shape_of(table, rows, n, table[:0])
+    shape = room_of_shape(table, rows, n, table[:0])
     arrange(table, np.arange(count), shape, rows, n)
     bases, _sides, order, (sequence, last_row) = shape
     assert sorted(sequence) == list(range(rows))

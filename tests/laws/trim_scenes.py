@@ -12,8 +12,8 @@ from assembly.geometry.curve import NurbsCurve
 from assembly.geometry.face import Face
 from assembly.proximity.free_pair import coordinate_lengths
 from assembly.proximity.solid_contact import TRACK
-from assembly.solve.rows import arrange, shape_of
-from tests.laws.loop_point import LoopPoint
+from assembly.solve.rows import arrange
+from tests.laws.loop_point import LoopPoint, room_of_shape
 from tests.laws.scenes import dome, placed
 
 LOOPS = ("circle", "polygon", "spline")
@@ -155,7 +155,7 @@ class FreePoint:
             coordinate_lengths(self.table, self.pool, *surfaces, tuple(case.x), lengths, 0)
         self.lengths = lengths
         self.loose = (np.zeros(1, dtype=np.int64), lengths, *base.loose[2:])
-        self.shape = shape_of(self.table, self.rows, self.n, self.table[:0])
+        self.shape = room_of_shape(self.table, self.rows, self.n, self.table[:0])
         arrange(self.table, self.loose[0], self.shape, self.rows, self.n)
         self.room = base.room
         start = case.tracked(x)

@@ -1,0 +1,58 @@
+"""Arrays in a block of memory that somebody else holds.
+
+An array of its own costs a kernel some hundred nanoseconds: to allocate it, to count references to it wherever it goes,
+to free it. A tick of some microseconds works in thirty. Those that are carved from one block cost nothing; the block
+has to be an argument of the kernel that carves, so that it outlives them. `_kernel.py` stamps its cache with this file.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from numba import types
+from numba.core import cgutils, config
+from numba.extending import intrinsic, overload
+from numba.np.arrayobj import make_array, populate_array
+
+__all__ = ["carve"]
+
+
+def carve(block: Any, at: int, shape: tuple[int, ...]) -> Any:
+    """The array of this shape that begins at a place of a block, (n,)."""
+    return block[at : at + math.prod(shape)].reshape(shape)
+
+
+if not config.DISABLE_JIT:
+
+    @intrinsic
+    def _carved(_typing: Any, block: Any, at: Any, shape: Any) -> Any:
+        carved = types.Array(block.dtype, len(shape), "C")
+
+        def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+            source = make_array(signature.args[0])(context, builder, values[0])
+            array = make_array(carved)(context, builder)
+            size = context.get_abi_sizeof(context.get_data_type(carved.dtype))
+            sides = cgutils.unpack_tuple(builder, values[2])
+            strides = [context.get_constant(types.intp, size)]
+            for side in sides[:0:-1]:
+                strides.insert(0, builder.mul(strides[0], side))
+            populate_array(
+                array,
+                data=builder.gep(source.data, [values[1]]),
+                shape=sides,
+                strides=strides,
+                itemsize=context.get_constant(types.intp, size),
+                # Nobody counts references to it.
+                meminfo=None,
+            )
+            return array._getvalue()
+
+        return carved(block, types.intp, types.UniTuple(types.intp, len(shape))), generate
+
+    def _carve_it(block: Any, at: Any, shape: Any) -> Any:
+        return _carved(block, at, shape)
+
+    @overload(carve)
+    def _carve(block: Any, at: Any, shape: Any) -> Any:  # the same signature as the one above, as Numba asks
+        return _carve_it
