@@ -148,7 +148,7 @@ def add_gap_terms(records, row, jacobian, r, factor, weight, out, f, g):
         p1 = 0.0
         p2 = 0.0
         p3 = 0.0
-        for k in range(4):
+        for k in range(4 if factor != 0.0 else 0):
             s = factor * records[row, ZED + 12 * k + i]
             p0 += s * records[row, FORM + 4 * k]
             p1 += s * records[row, FORM + 4 * k + 1]

@@ -121,7 +121,9 @@ class Step:
         """The pose as a solution."""
         tracker = self._tracker
         status = Status.SOLVED if self.status is TrackStatus.FOLLOWED else Status.ITERATION_LIMIT
-        return Solution(tracker._scene, tracker._packed, self._state, status, self.seconds, np.empty((0, HISTORY)))
+        # A solution writes what it tracks; the tracker goes back to the state of its last step.
+        state = self._state.copy()
+        return Solution(tracker._scene, tracker._packed, state, status, self.seconds, np.empty((0, HISTORY)))
 
     def __repr__(self) -> str:
         return f"Step({self.status.name}, feasibility={self.feasibility:.1e}, {1e6 * self.seconds:.0f} us)"

@@ -211,8 +211,7 @@ class Tracker:
         if row is None:
             status = TrackStatus.CHANGED if changed else TrackStatus.BAD_TARGET
             return Step(self, self._pose.copy(), status, self._where(), (), perf_counter() - begin)
-        before, view = self._before, self._view
-        before[:] = self._pose
+        view = self._view
         code = solve_program(*self._arguments)
         at = packed.results_at
         status = _STATUSES.get(code, TrackStatus.APPROACHING)
@@ -221,7 +220,7 @@ class Tracker:
             # Where a contact came up that the rows of the last tick did not know, there is nowhere to go back to.
             if code == CONTACT_LOST or self._history[0, 1] * packed.scale <= self._tolerance:
                 status = TrackStatus.HELD
-                self._pose[:] = before
+                self._pose[:] = self._before
         elif view[at + HELD] == 1.0:
             status = TrackStatus.HELD
         # After a step too far the next ones are shorter, until they do better.
@@ -234,7 +233,9 @@ class Tracker:
         if packed.guards and view[packed.memory_at + EVENT_COUNT] != self._seen:
             events = events_of(self._pose[packed.memory_at :], self._names, packed.scale, int(self._seen))
             self._seen = view[packed.memory_at + EVENT_COUNT]
-        return Step(self, self._pose.copy(), status, row, events, perf_counter() - begin)
+        # What steps keep nobody writes to.
+        self._before = self._pose.copy()
+        return Step(self, self._before, status, row, events, perf_counter() - begin)
 
     def _has_changed(self) -> bool:
         """Whether a constraint of the scene, and not of another one, gained or lost a row."""
@@ -253,10 +254,13 @@ class Tracker:
         """The target as an array, after the loop was told; None for what is none."""
         hand, packed = self._hand, self._packed
         try:
-            row = np.array(target.q if isinstance(target, Pose) else target)
-            if row.dtype.kind not in "iuf" or isinstance(target, np.ma.MaskedArray):
-                return None
-            row = np.asarray(row, dtype=np.float64)
+            if type(target) is np.ndarray and target.dtype == np.float64:
+                row = target.copy()
+            else:
+                row = np.array(target.q if isinstance(target, Pose) else target)
+                if row.dtype.kind not in "iuf" or isinstance(target, np.ma.MaskedArray):
+                    return None
+                row = np.asarray(row, dtype=np.float64)
             if isinstance(hand, PointDistance):
                 if row.shape != (3,):
                     return None
