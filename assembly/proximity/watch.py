@@ -86,8 +86,8 @@ from assembly.proximity.watch_memory import (
 
 # Looks: at pairs that used up their allowance, or at all that moved. The first may be careful, at urgent pairs too, and
 # in turns, earlier at one pair at a time, and ask whether bodies cross where a contact lost its root. MEASURED: which
-# parts of allowances are used at these poses is known.
-AS_NEEDED, EVERYTHING, CAREFUL, IN_TURNS, DOUBTFUL, MEASURED = 0, 1, 2, 4, 8, 16
+# parts of allowances are used is known. SPARING: only at those that used up all of it, as no pose does that is allowed.
+AS_NEEDED, EVERYTHING, CAREFUL, IN_TURNS, DOUBTFUL, MEASURED, SPARING = 0, 1, 2, 4, 8, 16, 32
 # A pair is looked at again when so much of its allowance is used: the second, but the first of round wires, whose looks
 # take little; in turns, the one that used most of it at the first, and any that cut a step since its last look at the
 # third: what is left would cut the next one to nothing.
@@ -308,7 +308,8 @@ def is_due(table, watch, memory, p, tracked, how, most):
     if how & ~MEASURED == EVERYTHING:
         due = part > 0.0 or math.isnan(memory[o + CROSSED])
     else:
-        due = part > (SPENT if is_by_patches(table, watch, p) else USED)
+        much = SPENT if is_by_patches(table, watch, p) else USED
+        due = part > (1.0 if how & SPARING != 0 else much)
         if how & IN_TURNS != 0:
             due = due or (p == most and part > USED)
             due = due or (part > BRIEF and memory[o + CUT_SHORT] > memory[o + ALLOWANCE])

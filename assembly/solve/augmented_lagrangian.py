@@ -38,10 +38,19 @@ from assembly.constraints.layout import (
 )
 from assembly.constraints.terms import objective
 from assembly.proximity.solid_contact import FOLD
-from assembly.proximity.watch import AS_NEEDED, CAREFUL, DOUBTFUL, EVERYTHING, IN_TURNS, MEASURED, any_crossed
+from assembly.proximity.watch import (
+    AS_NEEDED,
+    CAREFUL,
+    DOUBTFUL,
+    EVERYTHING,
+    IN_TURNS,
+    MEASURED,
+    SPARING,
+    any_crossed,
+)
 from assembly.solve.contacts import free_folds, is_of_surfaces
 from assembly.solve.ending import finish, return_to
-from assembly.solve.guards import look_again, numbers_of, place_guards
+from assembly.solve.guards import allowed_share, look_again, numbers_of, place_guards
 from assembly.solve.multipliers import choose_multipliers, forget_objective, least_multipliers, weigh_rows
 from assembly.solve.report import is_clear, keep, log
 from assembly.solve.restoration import LEAST_SHARE, SHARE, SOFTNESS, WAY, begin_way, step_back
@@ -80,7 +89,7 @@ from assembly.solve.settings import (
     VIOLATION,
 )
 from assembly.solve.start import read_state, rearrange, set_out
-from assembly.solve.step import aim, cut_step, leave_saddle, propose
+from assembly.solve.step import aim, cut_step, leave_saddle, propose, short_share
 from assembly.solve.tangency import off_rows
 
 # Every so many steps the largest violation must have halved, or the loop sees whether the rows can hold; so many times.
@@ -150,7 +159,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
     tick = settings[TICK] == 1.0
     mu = settings[PENALTY]
     floor, slow_steps = settings[PENALTY_FLOOR], 0
-    way[SOFTNESS] = 1.0
+    way[SOFTNESS] = 1e-2
     begin_way(way)
     # The first step of a tick needs about what that of the last one did; half of it is tried first.
     shift = 2.0 * results[FIRST_SHIFT] if tick else 0.0
@@ -190,7 +199,8 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
     # How a solve with clearances ended whose bodies are only pushed apart any more, and until when.
     ended = RUNNING
     settled_by = 0
-    # When a last look found other contacts than rows stood for.
+    # When a tick looked because a step was to go too far; when a last look found other contacts than rows stood for.
+    asked_at = -1
     looked_at = -1
     begun = 0
     # Whether other contacts are near than rows are placed for.
@@ -214,7 +224,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             break
         if watched and not changed:
             holds_now = off_rows(table, loose, one_sided, here, tick) <= (feasible if tick else TOUCHING)
-            how = (CAREFUL if holds_now else AS_NEEDED) | (AS_NEEDED if tick else IN_TURNS | DOUBTFUL)
+            how = (CAREFUL if holds_now else AS_NEEDED) | (SPARING if tick else IN_TURNS | DOUBTFUL)
             how |= MEASURED if measured else AS_NEEDED
             changed = look_again(table, pool, memory, here, how, free, loose[4])
         if changed:
@@ -367,9 +377,18 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         last_violation = violation
         last_dual = dual
         measured = False
-        cut, slope, steepest, may_go = cut_step(
-            program, here, trial, rows, y, mu, reach, longest, turn, foreseen, lines
-        )
+        cut, may_go = short_share(reach, longest, turn), True
+        if watched:
+            most_of_it = cut
+            cut, may_go = allowed_share(table, pool, memory, here, trial, lines[1], most_of_it)
+            if tick and not may_go and asked_at != iteration:
+                # A tick looks where a step would go farther than is known to be free: at pairs that would use much.
+                asked_at = iteration
+                changed = look_again(table, pool, memory, here, AS_NEEDED | MEASURED, free, loose[4])
+                if changed:
+                    continue
+                cut, may_go = allowed_share(table, pool, memory, here, trial, lines[1], most_of_it)
+        slope, steepest = cut_step(shape, here, rows, y, mu, cut, foreseen, lines)
         if restoring:
             ends = steepest <= 1e-9 * violation or longest < 1e-12
             slows = iteration >= check_at and violation > 0.99 * check_violation

@@ -22,7 +22,7 @@ from assembly.constraints.layout import (
 from assembly.constraints.program import evaluate
 from assembly.constraints.terms import recenter
 from assembly.proximity.solid_contact import FOLD, TRACK
-from assembly.proximity.watch import AS_NEEDED
+from assembly.proximity.watch import AS_NEEDED, SPARING
 from assembly.solve.contacts import free_folds, is_of_surfaces, start_contacts
 from assembly.solve.gather import gather, scattered
 from assembly.solve.guards import forget_guards, look_around, place_guards
@@ -74,7 +74,7 @@ def read_state(table, pool, state, here, trial, y, better_y):
 
 
 @kernel(inline=True)
-def find_contacts(program, state, recalled, here, by_row, n, free_trims):
+def find_contacts(program, state, recalled, here, by_row, n, free_trims, sparing):
     """Find the contacts of the start and evaluate its rows, unless the last tick left them at `recalled`.
 
     Returns the contact that has no pair, or -1, and whether that was told by evaluating the rows: which are not
@@ -89,7 +89,7 @@ def find_contacts(program, state, recalled, here, by_row, n, free_trims):
         place_guards(table, memory, here, y, better_y, free, True)
     lost = start_contacts(table, pool, here[0], here[1], free, lengths)
     if watched and lost < 0:
-        came = look_around(table, pool, memory, here, AS_NEEDED)
+        came = look_around(table, pool, memory, here, SPARING if sparing else AS_NEEDED)
         place_guards(table, memory, here, y, better_y, free, False)
     count = free_folds(table, pool, here[2], here[1], active, free, lengths, -1.0, -1, free_trims)
     if lost >= 0 or count > 0:
@@ -138,9 +138,10 @@ def set_out(program, settings, state, here, by_row, n):
     results[HELD] = 0.0
     results[CURVED] = 0.0
     free_trims = settings[FREE_TRIMS] == 1.0
-    lost, evaluated = find_contacts(program, state, int(settings[RECALL]), here, by_row, n, free_trims)
+    tick = settings[TICK] == 1.0
+    lost, evaluated = find_contacts(program, state, int(settings[RECALL]), here, by_row, n, free_trims, tick)
     # A tick begins where the last one ended: there a pair that Newton's method loses is at a fold.
-    folded = lost >= 0 and evaluated and settings[TICK] == 1.0 and is_of_surfaces(table, lost)
+    folded = lost >= 0 and evaluated and tick and is_of_surfaces(table, lost)
     status = CONTACT_LOST if lost >= 0 and not folded else RUNNING
     results[SCATTER] = 1.0 if status == RUNNING and scattered(table, here[3], shape[1]) else 0.0
     if settings[GATHER] == 1.0 and results[SCATTER] == 1.0:

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly.constraints.layout import CONTACTS, MOVING, WATCH
+from assembly.constraints.layout import CONTACTS, MOVING
 from assembly.constraints.program import evaluate
 from assembly.constraints.row_terms import add_row_terms
-from assembly.solve.guards import allowed_share
 from assembly.solve.linear import factorize_shifted
 from assembly.solve.multipliers import curve_rows, foresee, leave_out, weigh_rows
 from assembly.solve.rows import add_transposed, carry, move, times
@@ -81,19 +80,16 @@ def aim(program, here, rows, y, mu, shift, radius, cuts, dual, restoring, is_fre
 
 
 @kernel(inline=True)
-def cut_step(program, here, trial, rows, y, mu, radius, longest, turn, foreseen, lines):
-    """Shorten the step to the radius, a radian, and as far as bodies may go between looks.
+def short_share(radius, longest, turn):
+    """How much of a step is within the radius, and turns no body by more than a radian."""
+    share = min(1.0, radius / longest) if longest > 0.0 else 1.0
+    return min(share, 1.0 / turn) if turn > 0.0 else share
 
-    Returns the share that is left, the merit's slope along it, the largest component of the descent, and whether it is
-    known that bodies may go so far.
-    """
-    table, pool, shape, loose, _room = program
+
+@kernel(inline=True)
+def cut_step(shape, here, rows, y, mu, cut, foreseen, lines):
+    """Shorten the step to a share. Returns the merit's slope along it, and the largest component of the descent."""
     descent, step, straight = lines
-    cut = min(1.0, radius / longest) if longest > 0.0 else 1.0
-    cut = min(cut, 1.0 / turn) if turn > 0.0 else cut
-    may_go = True
-    if table[WATCH] >= 0:
-        cut, may_go = allowed_share(table, pool, loose[5], here, trial, step, cut)
     slope = 0.0
     steepest = 0.0
     for i in range(descent.size):
@@ -105,7 +101,7 @@ def cut_step(program, here, trial, rows, y, mu, radius, longest, turn, foreseen,
         if foreseen[r] == 1.0:
             # What the row adds to the descent is not in the merit before it binds.
             slope -= (y[r] + here[3][r] / mu) * times(shape[0], here[4], r, step)
-    return cut, slope, steepest, may_go
+    return slope, steepest
 
 
 @kernel(inline=True)
