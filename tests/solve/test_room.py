@@ -1,0 +1,76 @@
+"""The room of a solve: what is carved from its two blocks of memory fits, and nothing is there twice."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import assembly as asm
+from assembly._carve import carve
+from assembly.constraints import layout
+from assembly.solve.restoration import WAY
+from assembly.solve.room import carve_pairs, carve_points, carve_tapes, carve_unknowns, room_needed
+from assembly.solve.rows import arrange, record_of_blocks, shape_of
+
+
+def contacts():
+    bodies = [asm.Body(f"ring {k}", asm.shapes.torus(2.0, 0.5), (2.0 * k, 0.0, 0.0), fixed=k == 0) for k in range(4)]
+    scene = asm.Assembly(bodies)
+    scene.constrain(asm.Contact(bodies[0], bodies[1]), asm.Clearance())
+    return scene
+
+
+def joints():
+    bodies = [asm.Body(f"rod {k}", position=(k, 0.0, 0.0), fixed=k == 0) for k in range(5)]
+    scene = asm.Assembly(bodies)
+    scene.constrain(*(asm.Distance(a.point(0, 0, 0), b.point(0, 0, 0), 1.0) for a, b in pairwise(bodies)))
+    scene.minimize(asm.PointDistance(bodies[-1].point(0, 0, 0), (1.0, 2.0, 3.0)))
+    return scene
+
+
+def expressions():
+    bodies = [asm.Body(f"body {k}", position=(k, 0.0, 0.0)) for k in range(3)]
+    scene = asm.Assembly(bodies)
+    poses = [ca.SX.sym(name, 7) for name in "abc"]
+    a, b, c = (pose[:3] for pose in poses)
+    scene.constrain(asm.Expression(ca.Function("row", poses, [ca.dot(a - b, b - c)]), bodies))
+    return scene
+
+
+def many():
+    bodies = [asm.Body(f"link {k}", position=(k, 0.0, 0.0), fixed=k == 0) for k in range(80)]
+    scene = asm.Assembly(bodies)
+    scene.constrain(*(asm.Spherical(a.point(0.5, 0, 0), b.point(-0.5, 0, 0)) for a, b in pairwise(bodies)))
+    return scene
+
+
+@pytest.mark.parametrize("scene", [contacts, joints, expressions, many])
+def test_nothing_stands_in_one_place(scene):
+    table = scene().packed().table
+    sizes = room_needed(table)
+    doubles, integers = np.zeros(sizes[0]), np.zeros(sizes[1], dtype=np.int64)
+    pairs = int(table[layout.CONTACTS])
+    most, n = int(table[layout.ROWS]) + 4 * pairs, 6 * int(table[layout.MOVING])
+    here, trial, by_row, guess, held, at = carve_points(table, most, doubles, 0)
+    shape = shape_of(table, most, n + 4 * pairs, record_of_blocks(table), integers, doubles)
+    loose, at = carve_pairs(table, guess, np.empty(0), doubles, at, integers)
+    numbers = carve(integers, pairs, (int(table[layout.GUARDS]),))
+    arrange(table, loose[0], shape, int(table[layout.ROWS]), n)
+    tapes, at = carve_tapes(table, doubles, at)
+    gram = carve(doubles, at, (most + 1, most))
+    at += gram.size
+    way = carve(doubles, at, (WAY,))
+    gradient, lines, hessian, factor = carve_unknowns(n, shape[2], doubles, at + WAY)
+    doubles[:], integers[:] = 0.0, 0
+    # What a point has of every row is in `by_row`.
+    of_points = [*here[:3], here[4], *trial[:3], trial[4], by_row, guess, *held[:2]]
+    used = [*of_points, *loose[1:4], *tapes, gram, way, gradient, *lines, hessian, factor, shape[2][2]]
+    for array in used:
+        array += 1.0
+    for array in (shape[0], shape[1], *shape[2][:2], *shape[3], loose[0], numbers):
+        array += 1
+    assert doubles.max() == 1.0 and integers.max() == 1
+    assert doubles.sum() == sum(array.size for array in used)
