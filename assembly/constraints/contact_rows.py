@@ -34,7 +34,7 @@ from assembly.geometry.vec import dot, sub
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.extremal import CLOSE, CONVERGED, LEFT_PATCH, SINGULAR, solve_pair
 from assembly.proximity.free_pair import free_rows
-from assembly.proximity.solid_contact import CONTACT_RECORD, FOLD, IDLE, LEFT, PAIR_GAP, PROPER, STAYS, TRACK
+from assembly.proximity.solid_contact import CONTACT_RECORD, FOLD, IDLE, PAIR_GAP, PROPER, SLACK, STAYS, TRACK
 from assembly.proximity.start import global_start
 from assembly.proximity.velocity import GAP, RATES, RECORD, gradient_row, store_record
 
@@ -286,5 +286,5 @@ def contact_row(table, pool, r, start, patience, loose, point):
         return False
     tracks = loose[0][r] < 0 and not math.isnan(tracked[r, 0])
     open_far = is_guard(table, r) and residual[r] > FAR
-    records[r, LEFT] = UNSEEN * residual[r] if tracks and open_far else 0.0
+    records[r, SLACK] = UNSEEN * residual[r] if tracks and open_far else 0.0
     return True

@@ -27,7 +27,7 @@ from assembly.proximity.velocity import RECORD
 FEATURE_F, FEATURE_G, PAIR_NORMAL, PAIR_GAP, STAYS, IDLE, TRACK = 4, 5, 6, 9, 10, 11, 12
 # Behind a record: whether surfaces do not cross at the pair, how far it is from a fold, and how far the bodies may move
 # until a row that is open needs its pair again.
-PROPER, FOLD, LEFT, CONTACT_RECORD = RECORD, RECORD + 1, RECORD + 2, RECORD + 3
+PROPER, FOLD, SLACK, CONTACT_RECORD = RECORD, RECORD + 1, RECORD + 2, RECORD + 3
 
 
 @kernel(inline=True)

@@ -55,7 +55,7 @@ from assembly.constraints.sparsity import close_envelope, place_folds
 from assembly.constraints.terms import TAPE_TERM, TERM, TERM_KIND, TERM_TABLE, TERM_TAPE
 from assembly.kinematics.motion import retract
 from assembly.proximity.extremal import into_domain
-from assembly.proximity.solid_contact import CONTACT_RECORD, IDLE, LEFT, PAIR_GAP
+from assembly.proximity.solid_contact import CONTACT_RECORD, IDLE, PAIR_GAP, SLACK
 from assembly.proximity.velocity import RATES, ZED
 
 
@@ -338,7 +338,7 @@ def stays_open(table, pool, bases, k, here, trial, d, alpha):
 
     No gap changes by more than points of the two bodies go, those of each seen from where they were.
     """
-    left = here[2][k, LEFT]
+    left = here[2][k, SLACK]
     if not left > 0.0 or bases[k, 2] >= 0:
         return False
     minimum = table[table[ROW_TABLE] + ROW * k + MINIMUM]
@@ -350,7 +350,7 @@ def stays_open(table, pool, bases, k, here, trial, d, alpha):
         trial[2][k, i] = here[2][k, i]
     for i in range(FREE_COLUMN):
         trial[4][k, i] = here[4][k, i]
-    trial[2][k, LEFT] = left
+    trial[2][k, SLACK] = left
     return True
 
 
@@ -392,7 +392,7 @@ def carry(table, pool, bases, loose, here, trial, d, alpha):
         keep_inside(table, pool, row, k, out)
         if is_guard(table, k) and stays_open(table, pool, bases, k, here, trial, d, alpha):
             out[k, IDLE] = 1.0
-            out[k, PAIR_GAP] = max(out[k, PAIR_GAP], pool[table[row + MINIMUM]] + trial[2][k, LEFT])
+            out[k, PAIR_GAP] = max(out[k, PAIR_GAP], pool[table[row + MINIMUM]] + trial[2][k, SLACK])
 
 
 @kernel(inner=True)

@@ -11,7 +11,7 @@ from assembly.constraints import layout
 from assembly.constraints.program import evaluate
 from assembly.proximity import watch
 from assembly.proximity.free_pair import VARIABLES, VECTORS
-from assembly.proximity.solid_contact import CONTACT_RECORD, IDLE, LEFT, PAIR_GAP, TRACK
+from assembly.proximity.solid_contact import CONTACT_RECORD, IDLE, PAIR_GAP, SLACK, TRACK
 from assembly.proximity.watch_memory import PAIR_MEMORY, REACH, memory_places
 from assembly.solve.guards import place_guards
 from assembly.solve.rows import arrange, carry, move, record_of_blocks
@@ -102,8 +102,8 @@ def test_rows_that_are_not_evaluated_are_open_and_nearly_what_they_would_be(name
                 break
             for r in np.flatnonzero(idle):
                 # No less than is left; and what a step makes of a gap to first order.
-                assert exact[3][r] >= trial[2][r, LEFT] > 0.0
-                assert trial[3][r] >= trial[2][r, LEFT]
+                assert exact[3][r] >= trial[2][r, SLACK] > 0.0
+                assert trial[3][r] >= trial[2][r, SLACK]
                 assert abs(exact[3][r] - trial[3][r]) < 60.0 * gone**2
                 assert trial[1][r, IDLE] == 0.0 and trial[1][
                     r, PAIR_GAP
@@ -117,7 +117,7 @@ def test_rows_that_are_not_evaluated_are_open_and_nearly_what_they_would_be(name
 def test_rows_that_may_close_are_evaluated():
     rng = np.random.default_rng(6)
     near = Near(rng, SHAPES["rings"](), 0.0)
-    left = np.nanmax(near.here[2][:, LEFT])
+    left = np.nanmax(near.here[2][:, SLACK])
     assert left > 0.0
     far = near.pool[near.table[near.table[layout.ROW_TABLE] + layout.MINIMUM :: layout.ROW][0] + 4]
     for body in range(near.n // 6):
