@@ -285,6 +285,7 @@ def contact_row(table, pool, r, start, patience, loose, point):
     if not row_of_pair(table, pool, r, start, patience, loose, point):
         return False
     tracks = loose[0][r] < 0 and not math.isnan(tracked[r, 0])
-    open_far = is_guard(table, r) and residual[r] > FAR
+    # Features of solids switch as they move: their rows are followed.
+    open_far = is_guard(table, r) and table[row + SHELL_F] < 0 and residual[r] > FAR
     records[r, SLACK] = UNSEEN * residual[r] if tracks and open_far else 0.0
     return True

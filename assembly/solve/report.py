@@ -84,8 +84,8 @@ def bring_back(held, rows, here, y):
 def judge(table, pool, state, loose, room, shape, rows, here, trial, bound, lax):
     """The pose as it is returned, rounded to the user's coordinates, evaluated afresh into `trial`.
 
-    Residuals found are copied to `here`. Returns whether every row holds within the bound, and the largest violation,
-    tangency counted by gaps if `lax`.
+    Residuals and pairs found are copied to `here`. Returns whether every row holds within the bound, and the largest
+    violation, tangency counted by gaps if `lax`.
     """
     q = trial[0]
     for b in range(table[BODIES]):
@@ -98,6 +98,9 @@ def judge(table, pool, state, loose, room, shape, rows, here, trial, bound, lax)
         return False, math.inf
     for r in range(rows):
         here[3][r] = trial[3][r]
+    for k in range(table[CONTACTS]):
+        for i in range(TRACK):
+            here[1][k, i] = trial[1][k, i]
     violation = off_rows(table, loose, shape[1], trial, lax)
     holds = free_pairs_hold(table, pool, q, here[1], loose[0], 1e-9)
     return holds and violation <= bound, violation

@@ -19,7 +19,6 @@ from tests.laws.loop_point import room_of_shape
 
 SHAPES = {
     "rings": lambda: asm.shapes.torus(1.0, 0.1),
-    "boxes": lambda: asm.shapes.box(0.8, 0.7, 0.6),
     "eggs": lambda: asm.shapes.ellipsoid(0.7, 0.5, 0.4),
 }
 
