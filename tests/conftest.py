@@ -31,8 +31,7 @@ def run_python() -> Callable[..., str]:
         environment = {name: value for name, value in wanted.items() if value is not None}
         done = subprocess.run([sys.executable, "-c", code], env=environment, cwd=path, capture_output=True, text=True)
         assert done.returncode == 0, done.stderr
-        # What is printed comes last, whatever the library had to say.
-        return done.stderr + done.stdout
+        return done.stdout + done.stderr
 
     return run
 

@@ -41,8 +41,9 @@ from assembly.proximity.velocity import GAP, RATES, RECORD, gradient_row, store_
 # A clearance's contact of solids that are hardly in each other may be given up where its pair ends: then MAY_GO - k
 # stands for what it holds on to, k. One that ends where they touch, which rounding decides, is as good as open.
 MAY_GO, HARDLY, TOUCHING = -1.0, 1e-3, 1e-9
-# A clearance's row that is open by more than the second needs its pair again after motions of this part of its gap.
-UNSEEN, FAR = 0.5, 1e-5
+# A clearance's row that is open by more than the last needs its pair again after motions of this part of its gap, or of
+# this part of how far bodies may go where contacts may be born: from farther away Newton's method may find another one.
+UNSEEN, ASTRAY, FAR = 0.5, 0.25, 1e-5
 
 
 @kernel(inner=True)
@@ -287,5 +288,8 @@ def contact_row(table, pool, r, start, patience, loose, point):
     tracks = loose[0][r] < 0 and not math.isnan(tracked[r, 0])
     # Features of solids switch as they move: their rows are followed.
     open_far = is_guard(table, r) and table[row + SHELL_F] < 0 and residual[r] > FAR
-    records[r, SLACK] = UNSEEN * residual[r] if tracks and open_far else 0.0
+    records[r, SLACK] = 0.0
+    if tracks and open_far:
+        # How far they may go is behind the least gap.
+        records[r, SLACK] = min(UNSEEN * residual[r], ASTRAY * pool[table[row + MINIMUM] + 1])
     return True

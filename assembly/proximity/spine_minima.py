@@ -25,8 +25,8 @@ LEVEL, STILL = 1e-10, 1e-16
 NOISE = 1e-14
 # A foot is one where the last step toward it is shorter than this.
 SHORT = 1e-12
-# Room for the minima of a thin box: both ends, and two between any of them and two kinks.
-MINIMA = 8
+# Room for the minima of a thin box: both ends, and three in each of the pieces between these and two kinks.
+MINIMA = 11
 
 
 @kernel(inline=True)
@@ -38,11 +38,19 @@ def is_least(slope, far, at_ends):
     return abs(slope) <= max(LEVEL * far, STILL) or (at_ends[0] and slope > 0.0) or (at_ends[1] and slope < 0.0)
 
 
+@kernel(inline=True)
+def is_held(slope, x, low, high, far):
+    """Whether a slope of F leads nowhere: it is zero, or leads out of an interval."""
+    return abs(slope) <= max(LEVEL * far, STILL) or (x <= low and slope > 0.0) or (x >= high and slope < 0.0)
+
+
 @kernel(inner=True)
 def convex_minimum(pool, o, p, turn, shift, box, open_ends, s, t):
-    """The minimum of F over a box where it is convex, from (s, t): whether it is one of the curves; s, t.
+    """The minimum of F over a box where it is convex, from (s, t): whether it is one of the curves; s, t; whether it is
+    the minimum over the box.
 
-    It is none where the box alone ends it.
+    It is none of the curves where the box alone ends it. Along a valley that is all but level steps may end before its
+    bottom.
     """
     last = math.inf
     for _ in range(STEPS):
@@ -78,7 +86,9 @@ def convex_minimum(pool, o, p, turn, shift, box, open_ends, s, t):
     far = math.sqrt(dot(d, d))
     ends_f = (open_ends[0] and s <= box[0], open_ends[1] and s >= box[1])
     ends_g = (open_ends[2] and t <= box[2], open_ends[3] and t >= box[3])
-    return is_least(-dot(d, f), far, ends_f) and is_least(dot(d, g), far, ends_g), s, t
+    a, b = -dot(d, f), dot(d, g)
+    ends = is_held(a, s, box[0], box[1], far) and is_held(b, t, box[2], box[3], far)
+    return is_least(a, far, ends_f) and is_least(b, far, ends_g), s, t, ends
 
 
 @kernel(inline=True)

@@ -180,12 +180,13 @@ def add_minima(table, pool, scene, box, ends, what, neglect, places, roots, coun
     p = table[g + PART_POOL] + PART * j
     part = (box[1], box[2], box[4], box[5])
     certain = True
+    settled = False
     if what == CONVEX:
         s, t = 0.5 * (box[1] + box[2]), 0.5 * (box[4] + box[5])
-        found, s, t = convex_minimum(pool, o, p, scene[0], scene[1], part, ends, s, t)
+        found, s, t, settled = convex_minimum(pool, o, p, scene[0], scene[1], part, ends, s, t)
         if found:
             count = add_minimum(table, pool, scene, i, j, s, t, neglect, roots, count, work)
-    else:
+    if not settled:
         many, level, certain = valley_minima(pool, o, p, scene[0], scene[1], part, ends, places)
         if level:
             # All along it is as good: points here and there stand for it.

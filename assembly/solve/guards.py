@@ -26,7 +26,7 @@ from assembly.constraints.layout import (
 from assembly.geometry.spline import surface_point
 from assembly.geometry.vec import dot, sub
 from assembly.proximity.allowances import largest_part, part_used
-from assembly.proximity.solid_contact import FOLD, TRACK
+from assembly.proximity.solid_contact import FOLD, SLACK, TRACK
 from assembly.proximity.watch_memory import (
     ALLOWANCE,
     CUT_SHORT,
@@ -93,6 +93,7 @@ def place_guards(table, memory, here, y, better_y, free, begins):
         free[r] = -1
         # Nothing is known of it yet.
         here[2][r, FOLD] = 1.0
+        here[2][r, SLACK] = 0.0
         here[3][r] = 1.0
         if p < 0:
             table[row + BODY_F] = -1

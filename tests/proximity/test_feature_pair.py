@@ -434,7 +434,7 @@ print(json.dumps(out))
 
 
 def run_program(run_python, program, plain):
-    return json.loads(run_python(program, NUMBA_DISABLE_JIT=plain).strip().splitlines()[-1])
+    return json.loads(run_python(program, NUMBA_DISABLE_JIT=plain).strip().splitlines()[0])
 
 
 def test_plain_python_gives_the_same_pairs(run_python):

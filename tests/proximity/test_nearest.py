@@ -162,7 +162,7 @@ print(json.dumps(rows))
 
 def test_plain_python_finds_the_same(run_python):
     compiled, plain = (
-        json.loads(run_python(PROGRAM, NUMBA_DISABLE_JIT=value).strip().splitlines()[-1]) for value in ("0", "1")
+        json.loads(run_python(PROGRAM, NUMBA_DISABLE_JIT=value).strip().splitlines()[0]) for value in ("0", "1")
     )
     for one, other in zip(compiled, plain, strict=True):
         assert one[:2] == other[:2]
