@@ -43,7 +43,7 @@ from assembly.proximity.velocity import GAP, RATES, RECORD, gradient_row, store_
 MAY_GO, HARDLY, TOUCHING = -1.0, 1e-3, 1e-9
 # A clearance's row that is open by more than the last needs its pair again after motions of this part of its gap, or of
 # this part of how far bodies may go where contacts may be born: from farther away Newton's method may find another one.
-UNSEEN, ASTRAY, FAR = 0.5, 0.25, 1e-5
+UNSEEN, ASTRAY, FAR = 0.5, 0.15, 1e-5
 
 
 @kernel(inner=True)

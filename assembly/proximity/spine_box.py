@@ -26,6 +26,8 @@ UNKNOWN, EMPTY, CONVEX, BARREN = 0, 1, 2, 3
 TURNS = 0.5
 # Slopes, lengths and F'' are off by less; what is so near zero may be zero.
 ROUNDING = 1e-13
+# Contacts of lines more parallel than this, in radians, stay where they are as the lines turn.
+PARALLEL = 1e-5
 
 
 @kernel(inline=True)
@@ -60,8 +62,10 @@ def shape_of(hessian, kf, kg, rho, straight, is_open):
     """
     ss_low, ss_high, tt_low, tt_high, st_low, st_high = hessian
     if straight:
-        # F is convex wherever two lines are.
-        return CONVEX, math.inf
+        # F is convex wherever two lines are. Where these are all but parallel a motion takes its minimum anywhere, and
+        # a contact does not follow there.
+        sine = math.sqrt(max(1.0 - st_high * st_high, 0.0))
+        return CONVEX, max(sine - PARALLEL, 0.0) * rho
     longest = TURNS * rho
     if ss_low > 0.0 and tt_low > 0.0:
         det = ss_low * tt_low - st_high * st_high

@@ -83,7 +83,7 @@ class Near:
 def test_rows_that_are_not_evaluated_are_open_and_nearly_what_they_would_be(name, minimum):
     rng = np.random.default_rng(4)
     skipped = evaluated = 0
-    for _ in range(11):
+    for _ in range(14):
         near = Near(rng, SHAPES[name](), minimum)
         size = 10.0 ** rng.uniform(-3.0, -0.7)
         # Several steps in a row: what is left of a gap goes on from each to the next one.

@@ -306,6 +306,35 @@ def test_lines_that_are_all_but_parallel_have_a_contact(tilt):
         assert gaps.min() == pytest.approx(0.01, abs=1e-12 + 4.0 * tilt**2)
 
 
+@pytest.mark.parametrize("along", [0.0, 1e-9, 1e-3, 0.3])
+@pytest.mark.parametrize("tilt", [0.0, 1e-12, 1e-10, 3e-10, 1e-9, 3e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4])
+def test_lines_that_lean_toward_each_other_have_a_contact_at_an_end(tilt, along):
+    # The valley falls all the way: steps of Newton's method end before its bottom, once without a word.
+    watch, oracle = Watch([WIRES["rod"]] * 2), WireOracle([SHAPES["rod"][0]] * 2)
+    turn = Rotation.from_rotvec([tilt, 0.0, 0.0]).as_quat(scalar_first=True)
+    q = np.array([HERE, [1e-9, 0.35, along, *turn]])
+    gaps = watch.look(q).gap
+    # Of less than rounding, over the length, any place is as good.
+    assert gaps.min() == pytest.approx(oracle.deepest(q), abs=1e-12 + (tilt if tilt < 1e-10 else 0.0))
+
+
+def test_rods_that_lean_toward_each_other_do_not_pass_through_each_other():
+    rod, oracle = WIRES["rod"], WireOracle([SHAPES["rod"][0]] * 2)
+    for tilt in (1e-9, 1e-6, 1e-3):
+        turn = Rotation.from_rotvec([tilt, 0.0, 0.0]).as_quat(scalar_first=True)
+        bodies = [asm.Body("fixed", rod, fixed=True), asm.Body("drawn", rod, (1e-9, 0.35, 1e-9), turn)]
+        scene = asm.Assembly(bodies)
+        scene.constrain(asm.Clearance())
+        tracker = scene.tracker(follow=bodies[1])
+        for k in range(30):
+            step = tracker.step(np.array([1e-9, 0.35 - 0.01 * k, 1e-9, *turn]))
+            # Lines within 1e-7 rad are as near all along: their contact stays where it is, and an end may dip by that.
+            assert oracle.deepest(step.q) > -3e-7
+        scene.minimize(asm.PointDistance(bodies[1].point(0, 0, 0), (0.0, 0.2, 0.0)))
+        solution = scene.solve()
+        assert solution.success and oracle.deepest(solution.q) > -1e-12
+
+
 @pytest.mark.parametrize("shift", [0.0, 0.5])
 def test_rods_with_one_spine_do_not_stay_in_each_other(shift):
     bodies = [asm.Body(name, WIRES["rod"], (0.0, 0.0, shift * k)) for k, name in enumerate("ab")]
