@@ -110,7 +110,7 @@ def test_rows_that_are_not_evaluated_are_open_and_nearly_what_they_would_be(name
             skipped += int(idle.sum())
             evaluated += int((~idle & ~np.isnan(trial[1][:, 0])).sum())
             near.here = trial
-    assert skipped > 20 and evaluated > 10
+    assert skipped > 15 and evaluated > 10
 
 
 def test_rows_that_may_close_are_evaluated():
