@@ -271,7 +271,7 @@ def row_of_pair(table, pool, r, start, patience, loose, point):
 def contact_row(table, pool, r, start, patience, loose, point):
     """Row r, of contact r, from `start` on. Returns whether its pair was found, or need not be.
 
-    A row of a clearance that stays open is as `carry` (`solve/rows.py`) left it.
+    A row of a clearance that stays open is as `solve/carry.py` left it.
     """
     _q, tracked, records, residual, _jacobian = point
     row = table[ROW_TABLE] + ROW * r

@@ -3,7 +3,7 @@
 Of every contact a solve keeps `TRACK` numbers: the coordinates of the pair (4), the two features, the normal in the
 axes of body f, which tells on which side of each other two edges are where they touch, the gap, what the pair
 stays with: a corner over a face, which need not be the closest one (`corners.py`), has its features for good; and, of
-the end of a step, whether its row stays open there for certain (`solve/rows.py`).
+the end of a step, whether its row stays open there for certain (`solve/carry.py`).
 
 The kernels here are large, and few scenes need them: loops call them by address (`_address.call_address`).
 """

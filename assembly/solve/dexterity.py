@@ -37,8 +37,9 @@ from assembly.constraints.row_terms import add_row_terms
 from assembly.constraints.terms import DEXTERITY, TERM, TERM_BODY, TERM_KIND, TERM_PARAMETERS, TERM_TAPE, load
 from assembly.geometry.vec import add, cross, matvec, scale
 from assembly.kinematics.motion import rotation
+from assembly.solve.carry import carry
 from assembly.solve.rates import rate_system, settle
-from assembly.solve.rows import carry, move, slot, times
+from assembly.solve.rows import move, slot, times
 from assembly.solve.singular_values import measure_jacobian
 
 # The record of a term in the table: measure, task, number of inputs; then for each: kind, component, joint, angle,

@@ -8,9 +8,10 @@ from assembly._kernel import kernel
 from assembly.constraints.layout import ROWS, WATCH
 from assembly.constraints.program import evaluate
 from assembly.proximity.extremal import BEND
+from assembly.solve.carry import carry
 from assembly.solve.guards import is_too_far
 from assembly.solve.multipliers import toward_rows
-from assembly.solve.rows import carry, move
+from assembly.solve.rows import move
 from assembly.solve.tangency import off_rows
 
 # A step is shortened by this where it leads farther off; a tick's may lead off by this once, if the next one leads

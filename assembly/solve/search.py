@@ -13,10 +13,11 @@ from assembly.constraints.program import evaluate
 from assembly.constraints.terms import objective
 from assembly.proximity.extremal import BEND
 from assembly.proximity.solid_contact import STAYS
+from assembly.solve.carry import carry
 from assembly.solve.dexterity import add_dexterities
 from assembly.solve.guards import is_too_far
 from assembly.solve.linear import factorize_shifted, forward_step, solve_step
-from assembly.solve.rows import add_transposed, carry, merit, move
+from assembly.solve.rows import add_transposed, merit, move
 
 # A step shorter than this decides nothing.
 SHORTEST = 1e-6

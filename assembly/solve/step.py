@@ -8,9 +8,10 @@ from assembly._kernel import kernel
 from assembly.constraints.layout import CONTACTS, MOVING
 from assembly.constraints.program import evaluate
 from assembly.constraints.row_terms import add_row_terms
+from assembly.solve.carry import carry
 from assembly.solve.linear import factorize_shifted
 from assembly.solve.multipliers import curve_rows, foresee, leave_out, weigh_rows
-from assembly.solve.rows import add_transposed, carry, move, times
+from assembly.solve.rows import add_transposed, move, times
 from assembly.solve.search import damped_step
 
 # A step is computed so many times more for one-sided rows that it would break. Where they change places for ever, it

@@ -13,8 +13,9 @@ from assembly.proximity import watch
 from assembly.proximity.free_pair import VARIABLES, VECTORS
 from assembly.proximity.solid_contact import CONTACT_RECORD, IDLE, PAIR_GAP, SLACK, TRACK
 from assembly.proximity.watch_memory import PAIR_MEMORY, REACH, memory_places
+from assembly.solve.carry import carry
 from assembly.solve.guards import place_guards
-from assembly.solve.rows import arrange, carry, move, record_of_blocks
+from assembly.solve.rows import arrange, move, record_of_blocks
 from tests.laws.loop_point import room_of_shape
 
 SHAPES = {
