@@ -66,4 +66,4 @@ FREE_COLUMN, EXTRA_COLUMN = 12, 16
 # length scale, reference point (1 to 3), unit of the objective: what its scaled value counts in the user's units; zero.
 SCALE, REFERENCE, UNIT, ZERO, POOL_HEADER = 0, 1, 4, 5, 8
 # Figures that a solve leaves in its state, behind poses, tracked values, multipliers and residuals.
-RESULTS = 11
+RESULTS = 12

@@ -15,6 +15,7 @@ import math
 
 import numpy as np
 
+from assembly._address import call_address
 from assembly._kernel import kernel
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.allowances import LEAST_ALLOWANCE, STILL, allow_ball, largest_part, mover, reach_now, used_most
@@ -34,10 +35,12 @@ from assembly.proximity.spine_search import BOX, BOXES, search_spines
 from assembly.proximity.watch_memory import (
     ALLOWANCE,
     CALLS,
+    CLOCK,
     CORNERS,
     CROSSED,
     CROWDED,
     CUT_SHORT,
+    DEADLINE,
     DOUBT,
     EVENT_COUNT,
     FAR,
@@ -334,6 +337,10 @@ def look_at_due(table, pool, watch, memory, q, tracked, how, first, most):
     for p in range(first, table[watch + PAIRS]):
         if p != first and not is_due(table, watch, memory, p, tracked, how, most):
             continue
+        if p != first and table[watch + CLOCK] != 0 and call_address(table[watch + CLOCK], ()) > memory[DEADLINE]:
+            # Who set it is told, and goes on in another call.
+            memory[DEADLINE] = -1.0
+            break
         if is_by_patches(table, watch, p) and not with_patches:
             with_patches = True
             candidates = np.empty((CANDIDATES, 2), np.int64)

@@ -38,9 +38,9 @@ from assembly.proximity.spine_curve import both_radii
 
 # The record of a watch: counts; where pairs begin; the row of `tracked` that is the first place; address of
 # `track_solids`; where its lengths are in the pool; how many lists there are, where they begin; whether corners are
-# listed (`corners.py`).
-PAIRS, PLACES, PAIR_TABLE, FIRST, TRACK_SOLIDS, LENGTHS, LISTS, LIST_TABLE, CORNERS, WATCH_RECORD = (
-    0, 1, 2, 3, 4, 5, 6, 7, 8, 9
+# listed (`corners.py`); address of what tells the time, 0 where looks have as much as they need.
+PAIRS, PLACES, PAIR_TABLE, FIRST, TRACK_SOLIDS, LENGTHS, LISTS, LIST_TABLE, CORNERS, CLOCK, WATCH_RECORD = (
+    0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10
 )  # fmt: skip
 # Its lengths: roots nearer to each other than the first, and along the surfaces, are one; the reach of a first look;
 # the largest.
@@ -53,8 +53,9 @@ NEGLECT, FIRST_REACH, LAST_REACH, LENGTH_COUNT = 0, 1, 2, 3
 PAIR_F, PAIR_G, TREE_F, TREE_G, PAIR_SURFACE_F, PAIR_SURFACE_G, PAIR_SHELL_F, PAIR_SHELL_G = 0, 1, 2, 3, 4, 5, 6, 7
 PAIR_MINIMUM, LOW, HIGH, GIVEN, GIVEN_COUNT, SMALLER, SPINE_F, SPINE_G, PAIR_RECORD = 8, 9, 10, 11, 12, 13, 14, 15, 16
 # Memory. Header: events, looks and contacts so far, the time of the caller, whether a near root ever found no place,
-# calls so far.
-EVENT_COUNT, LOOKS, BORN, TIME, CROWDED, CALLS, MEMORY_HEADER = 0, 1, 2, 3, 4, 5, 6
+# calls so far; of a tick with a budget, when a look is to end after the pair that it is at, and how many looks there
+# were before it.
+EVENT_COUNT, LOOKS, BORN, TIME, CROWDED, CALLS, DEADLINE, EARLIER, MEMORY_HEADER = 0, 1, 2, 3, 4, 5, 6, 7, 8
 # Of a pair: how the smaller body was turned, seen from the other, at its last look (a quaternion, NaN before there was
 # one), and where the middle of its tree was; how far it may go from there, its reach, its state, calls at its last
 # look; a ball on it, where its middle was, and how far what is in it may go; which part of its allowances is used;

@@ -21,12 +21,10 @@ import math
 
 import numpy as np
 
-from assembly._address import call_address
 from assembly._carve import carve
 from assembly._kernel import kernel
 from assembly.constraints.contact_rows import TOUCHING
 from assembly.constraints.layout import (
-    CLOCK_AT,
     CONTACTS,
     GUARDS,
     MOVING,
@@ -48,6 +46,7 @@ from assembly.proximity.watch import (
     SPARING,
     any_crossed,
 )
+from assembly.solve.budget import HALF, begin_tick, is_cut, is_spent, may_end, set_deadline
 from assembly.solve.contacts import free_folds, is_of_surfaces
 from assembly.solve.ending import finish, return_to
 from assembly.solve.guards import allowed_share, look_again, numbers_of, place_guards
@@ -60,7 +59,8 @@ from assembly.solve.rows import arrange, record_of_blocks, shape_of, turned, vio
 from assembly.solve.search import SHORTEST, goal, search
 from assembly.solve.settings import (
     ANY_POSE,
-    BUDGET,
+    CARRIED,
+    CARRIES,
     CONTACT_LOST,
     COUNT,
     CULPRIT,
@@ -155,8 +155,12 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
     reach = max(reach, turned(table, pool, here[1]))
     # What rounding of the user's coordinates, and of angles over many turns, alone can violate.
     feasible = max(settings[FEASIBILITY], 4e-16 * reach)
-    limit = int(settings[ITERATIONS])
     tick = settings[TICK] == 1.0
+    # A tick goes on with the last one, if that one's time was spent.
+    begin, done, looks = begin_tick(table, settings, results, memory)
+    clock = (begin, looks)
+    limit = int(settings[ITERATIONS]) - done
+    longest_tick = EXTRA_TIME * int(settings[ITERATIONS]) - done
     mu = settings[PENALTY]
     floor, slow_steps = settings[PENALTY_FLOOR], 0
     way[SOFTNESS] = 1e-2
@@ -188,7 +192,6 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
     # Whether what fails is led back onto its rows at the end.
     settles = not tick and (watched or any_pose)
     lingers = 0
-    begin = call_address(table[CLOCK_AT], ()) if settings[BUDGET] > 0.0 else 0
     holds = False
     status, lost, folded = set_out(program, settings, state, here, by_row, n)
     if status == CONTACT_LOST:
@@ -222,11 +225,15 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             lost, below, changed = np.int64(-1), FREE_BELOW, True
         if status != RUNNING:
             break
-        if watched and not changed:
+        if iteration > 0:
+            set_deadline(table, settings, memory, begin)
+        late = may_end(table, settings, memory, clock, iteration, 1.0)
+        if watched and not changed and not late:
             holds_now = off_rows(table, loose, one_sided, here, tick) <= (feasible if tick else TOUCHING)
             how = (CAREFUL if holds_now else AS_NEEDED) | (SPARING if tick else IN_TURNS | DOUBTFUL)
             how |= MEASURED if measured else AS_NEEDED
             changed = look_again(table, pool, memory, here, how, free, loose[4])
+            late = is_cut(table, memory)
         if changed:
             place_guards(table, memory, here, y, better_y, free, False)
         weigh_rows(rows, one_sided, here[3], y, mu, forces, active)
@@ -271,6 +278,10 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         log(history, iteration, (value, violation, dual, mu, shift, alpha, radius))
         if status != RUNNING:
             break
+        if late:
+            # Not all that is near has been looked at.
+            status, violation = OUT_OF_TIME, math.inf
+            break
         if not math.isfinite(violation) or not math.isfinite(value) or not math.isfinite(dual):
             # Only where the start is so: a step to such a place is not taken.
             status = STALLED
@@ -303,7 +314,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             keep(here, y, rows, held)
             if watched:
                 numbers_of(table, numbers)
-        if iteration >= limit and (not tick or violation <= feasible or iteration >= EXTRA_TIME * limit):
+        if iteration >= limit and (not tick or violation <= feasible or iteration >= longest_tick):
             if watched and not tick and ended == RUNNING:
                 ended = ITERATION_LIMIT
                 settled_by = iteration + SETTLING
@@ -318,7 +329,8 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         if ended != RUNNING and (violation <= feasible or iteration >= settled_by):
             status = ended
             continue
-        if settings[BUDGET] > 0.0 and iteration > 0 and call_address(table[CLOCK_AT], ()) - begin > settings[BUDGET]:
+        # What holds is not left for what there is hardly time to end.
+        if iteration > 0 and is_spent(table, settings, begin, HALF if violation <= feasible else 1.0):
             status = OUT_OF_TIME
             break
         if retreats:
@@ -383,9 +395,13 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             cut, may_go = allowed_share(table, pool, memory, here, trial, lines[1], most_of_it)
             if tick and not may_go and asked_at != iteration:
                 # A tick looks where a step would go farther than is known to be free: at pairs that would use much.
+                if may_end(table, settings, memory, clock, iteration, HALF):
+                    status = OUT_OF_TIME
+                    violation = violation if iteration > 0 else math.inf
+                    break
                 asked_at = iteration
                 changed = look_again(table, pool, memory, here, AS_NEEDED | MEASURED, free, loose[4])
-                if changed:
+                if changed or is_cut(table, memory):
                     continue
                 cut, may_go = allowed_share(table, pool, memory, here, trial, lines[1], most_of_it)
         slope, steepest = cut_step(shape, here, rows, y, mu, cut, foreseen, lines)
@@ -468,6 +484,8 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
 
     if folded and status == CONTACT_LOST:
         violation = math.inf
+    if settings[CARRIES] == 1.0 and status == OUT_OF_TIME and not violation <= feasible:
+        results[CARRIED] = float(1 + done + iteration)
     at_end = (status, value, violation, dual, feasible, rows, holds)
     status, value, violation, dual = finish(
         program, settings, state, tips, here, trial, by_row, at_end, held, numbers, system, gram

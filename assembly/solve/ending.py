@@ -18,6 +18,7 @@ from assembly.solve.room import results_of
 from assembly.solve.search import goal
 from assembly.solve.settings import (
     ANY_POSE,
+    CARRIED,
     CONTACT_LOST,
     CURVED,
     HELD,
@@ -73,7 +74,7 @@ def finish(program, settings, state, tips, here, trial, by_row, at_end, held, nu
     crosses = tells and tells_crossing(table, pool, loose, room, here, y, better_y)
     fails = status == STALLED or status == ITERATION_LIMIT or status == INFEASIBLE
     is_wish = settings[ANY_POSE] == 1.0 and (fails or status == SOLVED) and not crosses
-    if holds and ((tick and not violation <= feasible) or crosses):
+    if holds and ((tick and not violation <= feasible and results[CARRIED] == 0.0) or crosses):
         return_to(table, pool, held, numbers, loose, rows, here, y, better_y, tick)
         results[HELD] = 1.0
     write_pose(table, pool, here[0], state)
@@ -93,7 +94,7 @@ def finish(program, settings, state, tips, here, trial, by_row, at_end, held, nu
         elif status == SOLVED and not good:
             status = STALLED
     results[IMPROPER] = write_rows(table, here, y, loose, tick, pool[SCALE], state)
-    if settings[SECOND_ORDER] == 1.0 and results[HELD] == 0.0 and status != CONTACT_LOST:
+    if settings[SECOND_ORDER] == 1.0 and results[HELD] + results[CARRIED] == 0.0 and status != CONTACT_LOST:
         goal(table, pool, shape, rows, loose, room, tips, here, 1, gradient, lagrangian)
         weigh_rows(rows, shape[1], here[3], y, settings[PENALTY_FLOOR], forces, active)
         add_row_terms(table, pool, loose, room, shape, here, y, active, lagrangian)

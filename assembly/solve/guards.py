@@ -25,8 +25,9 @@ from assembly.constraints.layout import (
 )
 from assembly.geometry.spline import surface_point
 from assembly.geometry.vec import dot, sub
-from assembly.proximity.allowances import largest_part, part_used
+from assembly.proximity.allowances import STILL, largest_part, part_used
 from assembly.proximity.solid_contact import FOLD, SLACK, TRACK
+from assembly.proximity.watch import USED
 from assembly.proximity.watch_memory import (
     ALLOWANCE,
     CUT_SHORT,
@@ -44,6 +45,7 @@ from assembly.proximity.watch_memory import (
     PART,
     PLACE_MEMORY,
     PLACE_NUMBER,
+    REACH,
     TURN,
     memory_places,
 )
@@ -181,7 +183,8 @@ def go_back(table, memory, numbers):
 def allowed_share(table, pool, memory, here, trial, step, share):
     """How much of a step the watch allows, at most `share`, and whether it is all of that.
 
-    The poses at the end of that share go into the trial point, and which parts of allowances are used there is known.
+    The poses at the end of the share go into the trial point. Of what it would use of allowances there it is then known
+    of which pairs more is known by another look.
     """
     move(table, here[0], step, share, trial[0])
     _pair, end = largest_part(table, pool, table[WATCH], memory, trial[0])
@@ -192,11 +195,16 @@ def allowed_share(table, pool, memory, here, trial, step, share):
     allowed = 1.0
     for p in range(table[watch + PAIRS]):
         # Of every pair by itself: one that is nearly spent, but hardly moves, is not in the way.
-        end = memory[at + PAIR_MEMORY * p + PART]
-        memory[at + PAIR_MEMORY * p + CUT_SHORT] = end * memory[at + PAIR_MEMORY * p + ALLOWANCE]
-        begin = part_used(table, pool, watch, memory, p, here[0]) if end > 1.0 else end
-        if end > begin:
+        o = at + PAIR_MEMORY * p
+        end = memory[o + PART]
+        memory[o + CUT_SHORT] = end * memory[o + ALLOWANCE]
+        begin = part_used(table, pool, watch, memory, p, here[0]) if end > USED else end
+        if end > max(begin, 1.0):
             allowed = min(allowed, max(0.95 - begin, 0.05) / (end - begin))
+        flank = pool[table[table[watch + PAIR_TABLE] + PAIR_RECORD * p + PAIR_MINIMUM] + 1]
+        if begin <= STILL and memory[o + REACH] >= min(memory[o + CUT_SHORT], flank):
+            # It was looked at right here, as far as another look would.
+            memory[o + PART] = begin
     return share * allowed, False
 
 

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.proximity.events import Event
+from assembly.proximity.events import Event, events_of
+from assembly.proximity.watch_memory import EVENT_COUNT
 from assembly.solve.settings import COUNT, CURVED, DUAL, HISTORY, OBJECTIVE, VIOLATION
 from assembly.solve.solution import Solution, Status
 
@@ -63,14 +64,14 @@ class Step:
         state: Array,
         status: TrackStatus,
         target: Array,
-        events: tuple[Event, ...],
+        seen: float,
         seconds: float,
     ) -> None:
         self._tracker = tracker
         self._state = state
         self._target = target
         self.status = status
-        self.events = events
+        self._seen = seen
         self.seconds = seconds
 
     @cached_property
@@ -105,6 +106,14 @@ class Step:
     def is_minimum(self) -> bool | None:
         """Whether the reduced Hessian is positive definite; None where it was not asked for."""
         return {0.0: None, 1.0: True}.get(self._result(CURVED), False)
+
+    @cached_property
+    def events(self) -> tuple[Event, ...]:
+        """What became of contacts since the step before, in the memory of its state."""
+        tracker, packed = self._tracker, self._tracker._packed
+        if not packed.guards or self._state[packed.memory_at + EVENT_COUNT] == self._seen:
+            return ()
+        return events_of(self._state[packed.memory_at :], tracker._names, packed.scale, int(self._seen))
 
     @cached_property
     def wrench(self) -> Array:

@@ -18,14 +18,15 @@ from assembly.constraints.packing import structure_of
 from assembly.errors import InputError, integer, number, positive
 from assembly.kinematics.body import Body, Frame, Point
 from assembly.kinematics.pose import Pose, axes_quaternion, rotation_matrix
-from assembly.proximity.events import Event, events_of
 from assembly.proximity.solid_contact import STAYS, TRACK
-from assembly.proximity.watch_memory import CORNERS, EVENT_COUNT
+from assembly.proximity.watch_memory import CLOCK, CORNERS, EVENT_COUNT
 from assembly.solve.augmented_lagrangian import solve_program
 from assembly.solve.options import Options
 from assembly.solve.recall import recall_size
 from assembly.solve.settings import (
     BUDGET,
+    CARRIED,
+    CARRIES,
     CONTACT_LOST,
     FEASIBILITY,
     HELD,
@@ -168,7 +169,9 @@ class Tracker:
         self._state = np.concatenate([first._state, np.zeros(recalled)])
         if packed.guards:
             # A tick has no last look: rows follow extrema, from edges onto faces as well, which corners do not.
-            packed.table[packed.table[WATCH] + CORNERS] = 0
+            watch = packed.table[WATCH]
+            packed.table[watch + CORNERS] = 0
+            packed.table[watch + CLOCK] = packed.table[CLOCK_AT]
             self._state[packed.contacts_at : packed.angles_at].reshape(-1, TRACK)[:, STAYS] = 0.0
         self._settings[RECALL] = self._size
         self._pose = self._state[: self._size]
@@ -184,6 +187,7 @@ class Tracker:
         self._at = next(at for target, at in packed._targets if target is self._hand)
         # Whatever else may change between ticks is written by the scene itself.
         self._others = bool(packed._sources) or len(packed._targets) + len(packed._turns) > 1
+        self._settings[CARRIES] = float(budget is not None and not self._others)
         self._tolerance = 1.25 * limit * packed.scale
 
     @property
@@ -194,7 +198,7 @@ class Tracker:
     @property
     def q(self) -> Array:
         """Where the bodies stand now, (n, 7)."""
-        return self._state[: self._packed.contacts_at].reshape(-1, 7).copy()
+        return self._before[: self._packed.contacts_at].reshape(-1, 7).copy()
 
     def step(self, target: ArrayLike | Pose) -> Step:
         """Follow the hand for a tick. Never raises: see `Step.status`.
@@ -210,15 +214,18 @@ class Tracker:
         row = None if changed else self._aimed(target)
         if row is None:
             status = TrackStatus.CHANGED if changed else TrackStatus.BAD_TARGET
-            return Step(self, self._pose.copy(), status, self._where(), (), perf_counter() - begin)
-        view = self._view
+            return Step(self, self._before, status, self._where(), self._seen, perf_counter() - begin)
+        view, at = self._view, packed.results_at
+        carried = view[at + CARRIED] > 0.0
         code = solve_program(*self._arguments)
-        at = packed.results_at
+        if view[at + CARRIED] > 0.0:
+            # The next tick goes on from a pose that does not hold yet.
+            return Step(self, self._before, TrackStatus.LATE, row, self._seen, perf_counter() - begin)
         status = _STATUSES.get(code, TrackStatus.APPROACHING)
         if not view[at + VIOLATION] <= self._tolerance:
             status = TrackStatus.VIOLATED
             # Where a contact came up that the rows of the last tick did not know, there is nowhere to go back to.
-            if code == CONTACT_LOST or self._history[0, 1] * packed.scale <= self._tolerance:
+            if carried or code == CONTACT_LOST or self._history[0, 1] * packed.scale <= self._tolerance:
                 status = TrackStatus.HELD
                 self._pose[:] = self._before
         elif view[at + HELD] == 1.0:
@@ -229,13 +236,12 @@ class Tracker:
             self._knobs[RADIUS] = max(0.25 * radius, SHORTEST_RADIUS)
         elif radius < self._radius:
             self._knobs[RADIUS] = min(4.0 * radius, self._radius)
-        events: tuple[Event, ...] = ()
-        if packed.guards and view[packed.memory_at + EVENT_COUNT] != self._seen:
-            events = events_of(self._pose[packed.memory_at :], self._names, packed.scale, int(self._seen))
+        seen = self._seen
+        if packed.guards:
             self._seen = view[packed.memory_at + EVENT_COUNT]
         # What steps keep nobody writes to.
         self._before = self._pose.copy()
-        return Step(self, self._before, status, row, events, perf_counter() - begin)
+        return Step(self, self._before, status, row, seen, perf_counter() - begin)
 
     def _has_changed(self) -> bool:
         """Whether a constraint of the scene, and not of another one, gained or lost a row."""
