@@ -79,7 +79,8 @@ class Tracker:
     stiffness : float
         Force over distance.
     budget : float, optional
-        Seconds that the compiled loop of a tick may take; without one it takes what it needs.
+        Seconds after which the compiled loop of a tick begins nothing more; what is not done then the next tick goes on
+        with. Without one it takes what it needs.
     iterations : int
         Steps of a tick after which it ends, if the constraints hold; it takes up to four times as many until they do.
     tolerance : float
