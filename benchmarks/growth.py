@@ -23,13 +23,15 @@ from benchmarks.scenes import dome_pairs
 from benchmarks.timing import compare
 
 ABOUT = """\
-Exponents are of the power of N that fits the medians. Nets: warm pairs of rational bicubic domes of N x N control
-points, as in a solve, so many that their tables stay in the cache, or do not, from one percent of the patch away: of a
-fine net that is some spans, which takes more steps. Contacts: a chain of tori, each to touch
-the one before, from poses next to touching; a step is a call over the steps it took. Bodies: cubes standing on one
-another, a tree of ball joints, and a square grid of balls held at distances, moved off and solved again. Facets: two
-paper clips, linked and touching; all pairs of patches that may hold a contact within a quarter of the wire's radius,
-from call to call bodies move by a fiftieth of it."""
+Exponents are of the power of N that fits the medians. Nets: warm pairs of rational bicubic domes, as in a solve, so
+many that their tables stay in the cache, or do not, from one percent of the patch away; two surfaces over nets of N x N
+control points, and rough ones: each net has its own, whose third derivatives jump at every knot, and takes more steps
+where one percent is some spans. Contacts: a chain of tori, each to touch the one before, from poses next to touching; a
+step is a call over the steps it took. Bodies: cubes standing on one another, a tree of ball joints, and a square grid
+of balls held at distances, moved off and solved again: of a grid even the best order of elimination leaves N log N
+entries, and takes N^1.5 to find them. Facets: two paper clips, linked and touching; all pairs of patches that may hold
+a contact within a quarter of the wire's radius, from call to call bodies move by a fiftieth of it. A descent goes
+through as many pairs on every level where patches are smaller than what is near; the first levels have fewer."""
 
 Array = NDArray[np.float64]
 Times = list[tuple[float, float]]
@@ -105,17 +107,24 @@ def nudged(scene: asm.Assembly) -> Callable[[], asm.Solution]:
 
 def _nets(quick: bool) -> tuple[list[dict[str, Any]], dict[str, Any]]:
     sizes = (4, 8, 32) if quick else (4, 8, 16, 32, 64, 128, 200)
-    solvers = {n: Solver(dome_pairs(16, net=n), 0.01, CLOSE) for n in sizes}
+    few, many = sizes[0], sizes[-1]
+    solvers = {n: Solver(dome_pairs(16, net=n, of=few), 0.01, CLOSE) for n in sizes}
+    solvers |= {-n: Solver(dome_pairs(16, net=n), 0.01, CLOSE) for n in (few, many)}
     rows = compare({str(n): solver for n, solver in solvers.items()}, repeats=5 if quick else 25)
-    times: Times = [(n, row["seconds"] / solvers[n].count) for n, row in zip(sizes, rows, strict=True)]
-    steps = [solvers[n](1) / len(solvers[n].sizes) for n in sizes]
-    ratio = times[-1][1] / times[0][1]
+    seconds = {n: row["seconds"] / solvers[n].count for n, row in zip(solvers, rows, strict=True)}
+    steps = {n: solver(1) / len(solver.sizes) for n, solver in solvers.items()}
+    times: Times = [(n, seconds[n]) for n in sizes]
+    smooth, rough = seconds[many] / seconds[few], seconds[-many] / seconds[-few]
+    what = f"pairs, nets of {many}^2 over {few}^2"
     figures = [
-        figure(f"pairs, nets of {sizes[-1]}^2 over {sizes[0]}^2", "ratio", ratio, reach=1.3),
-        figure("the same, a step of Newton's method", "ratio", ratio * steps[0] / steps[-1], reach=1.3),
-        figure("pairs, exponent in N of nets of N^2", "ratio", exponent(*zip(*times, strict=True)), reach=0.1),
+        figure(f"{what}, the same surface", "ratio", smooth, reach=1.3),
+        figure("pairs, exponent in N, the same surface", "ratio", exponent(*zip(*times, strict=True)), reach=0.1),
+        figure(f"{what}, rough ones", "ratio", rough),
+        figure(
+            f"{what}, rough ones, a step of Newton's method", "ratio", rough * steps[-few] / steps[-many], reach=1.3
+        ),
     ]
-    return figures, curve("A warm pair, nets of N x N points", "N", "seconds", {"a pair": times})
+    return figures, curve("A warm pair, a surface over N x N points", "N", "seconds", {"a pair": times})
 
 
 def _scenes(
@@ -146,20 +155,20 @@ def _facets(quick: bool) -> tuple[list[dict[str, Any]], dict[str, Any]]:
     poses = list(walk(CLIPS, 100 if quick else 400, 0.02 * CLIP_RADIUS, 15.0))
     clip = (Face(asm.shapes.paper_clip(length=33.0, width=8.0, wire_radius=CLIP_RADIUS)),)
     times: Times = []
+    counts = []
     for n in sizes:
         found = FacetTree.of(clip, count=n // 2)
         descents = Descents([found, found], 8_000_000)
         rows = [compare({"": partial(descents.pairs, q, 0.25 * CLIP_RADIUS)}, repeats=3, duration=1e-5) for q in poses]
         times.append((n, statistics.median(row[0]["seconds"] for row in rows)))
+        counts.append(statistics.median(descents.pairs(q, 0.25 * CLIP_RADIUS) for q in poses))
+    few, many = f"{sizes[0]:,}", f"{sizes[-1]:,}"
+    # As logarithms grow.
+    reach = float(np.log(sizes[-1]) / np.log(sizes[0]))
     figures = [
-        figure(f"clips of {sizes[-1]:,} facets each: who is near whom", "seconds", times[-1][1]),
-        # As logarithms grow.
-        figure(
-            f"clips of {sizes[-1]:,} facets over clips of {sizes[0]:,}",
-            "ratio",
-            times[-1][1] / times[0][1],
-            reach=float(np.log(sizes[-1]) / np.log(sizes[0])),
-        ),
+        figure(f"clips of {many} facets each: who is near whom", "seconds", times[-1][1]),
+        figure(f"who is near whom, {many} facets over {few}", "ratio", times[-1][1] / times[0][1], reach=reach),
+        figure(f"who is near whom, {many} facets over {few}: pairs found", "ratio", counts[-1] / counts[0]),
     ]
     return figures, curve("Two clips of N facets: who is near whom", "N", "seconds", {"a look": times})
 

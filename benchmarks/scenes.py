@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import assembly as asm
 from assembly.constraints.objectives import PointDistance
+from assembly.geometry.bezier import insert
 from assembly.geometry.spline import BREAKS_U, BREAKS_V, CELLS, COEFFICIENTS
 
 __all__ = [
@@ -43,6 +44,20 @@ def bicubic(seed: int, flip: float = 1.0, net: int = 8) -> asm.NurbsSurface:
     knots = np.concatenate([np.zeros(3), np.linspace(0.0, 1.0, net - 2), np.ones(3)])
     weights = 1.0 + rough * rng.uniform(-0.05, 0.05, x.shape)
     return asm.NurbsSurface(np.stack([x, y, z], 2), (knots, knots), (3, 3), weights)
+
+
+def refined(surface: asm.NurbsSurface, net: int) -> asm.NurbsSurface:
+    """The same surface over a net of `net`^2 points: knots are put in at even distances."""
+    points = np.concatenate([surface.control_points * surface.weights[..., None], surface.weights[..., None]], axis=2)
+    knots = []
+    for axis in range(2):
+        points, along = np.moveaxis(points, axis, 0), surface.knots[axis]
+        more = net - len(points) + 1
+        for k in range(1, more):
+            points, along = insert(points, along, surface.degree[axis], k / more, 1)
+        points = np.moveaxis(points, 0, axis)
+        knots.append(along)
+    return asm.NurbsSurface(points[..., :3] / points[..., 3:], knots, surface.degree, points[..., 3])
 
 
 @dataclass(frozen=True)
@@ -107,10 +122,12 @@ def random_pose(rng: np.random.Generator) -> Array:
     return np.concatenate([rng.uniform(-1.0, 1.0, 3), e / np.linalg.norm(e)])
 
 
-def dome_pairs(count: int, seed: int = 1, net: int = 8) -> Pairs:
-    """Pairs of two bicubic domes at gap 0.1, well inside both patches."""
+def dome_pairs(count: int, seed: int = 1, net: int = 8, of: int | None = None) -> Pairs:
+    """Pairs of two bicubic domes at gap 0.1, well inside both patches; `of` another net, refined, if that is given."""
     rng = np.random.default_rng(seed)
-    f, g = bicubic(2, net=net), bicubic(3, net=net)
+    f, g = (bicubic(k, net=of or net) for k in (2, 3))
+    if of is not None:
+        f, g = refined(f, net), refined(g, net)
     q, parameters = np.empty((count, 2, 7)), rng.uniform(0.25, 0.75, (count, 4))
     for i in range(count):
         q[i, 0] = random_pose(rng)
