@@ -21,12 +21,10 @@ import math
 
 import numpy as np
 
-from assembly._carve import carve
 from assembly._kernel import kernel
 from assembly.constraints.contact_rows import TOUCHING
 from assembly.constraints.layout import (
     CONTACTS,
-    GUARDS,
     MOVING,
     RESULTS,
     ROWS,
@@ -52,10 +50,10 @@ from assembly.solve.ending import finish, return_to
 from assembly.solve.guards import allowed_share, look_again, numbers_of, place_guards
 from assembly.solve.multipliers import choose_multipliers, forget_objective, least_multipliers, weigh_rows
 from assembly.solve.report import is_clear, keep, log
-from assembly.solve.restoration import LEAST_SHARE, SHARE, SOFTNESS, WAY, begin_way, step_back
+from assembly.solve.restoration import LEAST_SHARE, SHARE, SOFTNESS, begin_way, step_back
 from assembly.solve.retreat import BEGINNINGS, LEFT, LONGER, SHORTER, begin_again, has_sunk
-from assembly.solve.room import carve_pairs, carve_points, carve_tapes, carve_unknowns, results_of, room_needed
-from assembly.solve.rows import arrange, record_of_blocks, shape_of, turned, violation_of
+from assembly.solve.room import carve_all, results_of, room_needed
+from assembly.solve.rows import turned, violation_of
 from assembly.solve.search import SHORTEST, goal, search
 from assembly.solve.settings import (
     ANY_POSE,
@@ -129,27 +127,17 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
     watched = table[WATCH] >= 0
     # Rows and variables grow by four for every free pair.
     rows = m
-    most = m + 4 * pairs
     n = 6 * table[MOVING]
     # The last pose that held is none yet.
-    here, trial, by_row, guess, held, at = carve_points(table, most, doubles, 0)
+    points, by_row, shape, loose, numbers, room, gram, way, system = carve_all(table, memory, doubles, integers)
+    here, trial, held = points
     y, better_y, active, forces, foreseen = by_row[2], by_row[3], by_row[4], by_row[5], by_row[6]
     weights = (active, forces, foreseen)
     reach = read_state(table, pool, state, here, trial, y, better_y)
-    # Where rows stand: variables, sides, and where matrices of variables and of rows have entries.
-    shape = shape_of(table, most, n + 4 * pairs, record_of_blocks(table), integers, doubles)
     bases, one_sided, order, _of_rows = shape
-    loose, at = carve_pairs(table, guess, memory, doubles, at, integers)
     free = loose[0]
-    numbers = carve(integers, pairs, (table[GUARDS],))
-    arrange(table, free, shape, rows, n)
-    room, at = carve_tapes(table, doubles, at)
     # What stays as it is for the whole solve.
     program = (table, pool, shape, loose, room)
-    gram = carve(doubles, at, (most + 1, most))
-    at += (most + 1) * most
-    way = carve(doubles, at, (WAY,))
-    system = carve_unknowns(n, order, doubles, at + WAY)
     gradient, lines, lagrangian, _factor = system
 
     reach = max(reach, turned(table, pool, here[1]))

@@ -65,15 +65,20 @@ def place_panel(lagrangian, blocks, i, shift, panels, o, count, seats):
         panels[o + 7 * r] += shift
 
 
-@kernel(inner=True)
-def subtract_blocks(panels, at, factor, source, count, turned):
-    """The blocks from `at` on -= the transposed block at `factor` times those from `source` on, so many.
-
-    Columns of six as four lanes twice, which share two. The transposed block goes to `turned` first.
-    """
+@kernel(inline=True)
+def turn_block(panels, factor, turned):
+    """The transposed block at `factor` into `turned`."""
     for r in range(6):
         for c in range(6):
             turned[6 * r + c] = panels[factor + 6 * c + r]
+
+
+@kernel(inner=True)
+def subtract_blocks(panels, at, turned, source, count):
+    """The blocks from `at` on -= the block that is `turned` times those from `source` on, so many.
+
+    Columns of six as four lanes twice, which share two.
+    """
     a0, b0 = load_lanes(turned, 0), load_lanes(turned, 2)
     a1, b1 = load_lanes(turned, 6), load_lanes(turned, 8)
     a2, b2 = load_lanes(turned, 12), load_lanes(turned, 14)
@@ -146,14 +151,14 @@ def factorize_blocks(lagrangian, blocks, shift, panels, seats, turned):
             k = blocks[blocks[MEETING_ROW] + e]
             p = blocks[blocks[PANEL] + k] + blocks[blocks[MEETING_AT] + e]
             end = blocks[blocks[PANEL] + k + 1]
-            factor = 36 * p
+            turn_block(panels, 36 * p, turned)
             while p < end:
                 # As many blocks at once as are neighbors in both.
                 at = seats[blocks[blocks[ACROSS] + p]]
                 run = 1
                 while p + run < end and seats[blocks[blocks[ACROSS] + p + run]] == at + 36 * run:
                     run += 1
-                subtract_blocks(panels, at, factor, 36 * p, run, turned)
+                subtract_blocks(panels, at, turned, 36 * p, run)
                 p += run
         if not finish_panel(panels, o, count):
             return False

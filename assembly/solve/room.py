@@ -24,7 +24,7 @@ from assembly.constraints.layout import (
 from assembly.proximity.free_pair import VARIABLES, VECTORS
 from assembly.proximity.solid_contact import CONTACT_RECORD, TRACK
 from assembly.solve.restoration import WAY
-from assembly.solve.rows import size_of_shape
+from assembly.solve.rows import arrange, record_of_blocks, shape_of, size_of_shape
 
 # What a row has a number of, behind its residuals here and at the trial point: its multiplier, a better one, whether it
 # counts, what it pushes with, whether a step would break it.
@@ -131,6 +131,28 @@ def carve_unknowns(n, order, doubles, at):
     end = at + 4 * n + hessian[0] * hessian[1]
     matrices = carve(doubles, at + 4 * n, hessian), carve(doubles, end, factor)
     return vectors[0], (vectors[1], vectors[2], vectors[3]), matrices[0], matrices[1]
+
+
+@kernel(inline=True, allocates=True)
+def carve_all(table, memory, doubles, integers):
+    """All that a solve works in, as `room_needed` counts it; rows and unknowns are those without free pairs.
+
+    Points (here, trial, held), room by row, the shape of what is sparse, what pairs need, numbers of contacts, tapes,
+    room for least squares, what is known of a way back, room for unknowns.
+    """
+    pairs = table[CONTACTS]
+    most, n = table[ROWS] + 4 * pairs, 6 * table[MOVING]
+    here, trial, by_row, guess, held, at = carve_points(table, most, doubles, 0)
+    shape = shape_of(table, most, n + 4 * pairs, record_of_blocks(table), integers, doubles)
+    loose, at = carve_pairs(table, guess, memory, doubles, at, integers)
+    numbers = carve(integers, pairs, (table[GUARDS],))
+    arrange(table, loose[0], shape, table[ROWS], n)
+    tapes, at = carve_tapes(table, doubles, at)
+    gram = carve(doubles, at, (most + 1, most))
+    at += (most + 1) * most
+    way = carve(doubles, at, (WAY,))
+    system = carve_unknowns(n, shape[2], doubles, at + WAY)
+    return (here, trial, held), by_row, shape, loose, numbers, tapes, gram, way, system
 
 
 @kernel(inline=True, allocates=True)

@@ -9,11 +9,7 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly._carve import carve
-from assembly.constraints import layout
-from assembly.solve.restoration import WAY
-from assembly.solve.room import carve_pairs, carve_points, carve_tapes, carve_unknowns, room_needed
-from assembly.solve.rows import arrange, record_of_blocks, shape_of
+from assembly.solve.room import carve_all, room_needed
 
 
 def contacts():
@@ -52,21 +48,12 @@ def test_nothing_stands_in_one_place(scene):
     table = scene().packed().table
     sizes = room_needed(table)
     doubles, integers = np.zeros(sizes[0]), np.zeros(sizes[1], dtype=np.int64)
-    pairs = int(table[layout.CONTACTS])
-    most, n = int(table[layout.ROWS]) + 4 * pairs, 6 * int(table[layout.MOVING])
-    here, trial, by_row, guess, held, at = carve_points(table, most, doubles, 0)
-    shape = shape_of(table, most, n + 4 * pairs, record_of_blocks(table), integers, doubles)
-    loose, at = carve_pairs(table, guess, np.empty(0), doubles, at, integers)
-    numbers = carve(integers, pairs, (int(table[layout.GUARDS]),))
-    arrange(table, loose[0], shape, int(table[layout.ROWS]), n)
-    tapes, at = carve_tapes(table, doubles, at)
-    gram = carve(doubles, at, (most + 1, most))
-    at += gram.size
-    way = carve(doubles, at, (WAY,))
-    gradient, lines, hessian, factor = carve_unknowns(n, shape[2], doubles, at + WAY)
+    points, by_row, shape, loose, numbers, tapes, gram, way, unknowns = carve_all(table, np.empty(0), doubles, integers)
+    here, trial, held = points
+    gradient, lines, hessian, factor = unknowns
     doubles[:], integers[:] = 0.0, 0
     # What a point has of every row is in `by_row`.
-    of_points = [*here[:3], here[4], *trial[:3], trial[4], by_row, guess, *held[:2]]
+    of_points = [*here[:3], here[4], *trial[:3], trial[4], by_row, loose[4], *held[:2]]
     used = [*of_points, *loose[1:4], *tapes, gram, way, gradient, *lines, hessian, factor, shape[2][2]]
     for array in used:
         array += 1.0
