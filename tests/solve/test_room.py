@@ -10,6 +10,8 @@ import pytest
 
 import assembly as asm
 from assembly.solve.room import carve_all, room_needed
+from benchmarks.running import example
+from tests.laws.trim_scenes import trim_scene
 
 
 def contacts():
@@ -43,7 +45,15 @@ def many():
     return scene
 
 
-@pytest.mark.parametrize("scene", [contacts, joints, expressions, many])
+def trims():
+    return trim_scene(1, "torus", "circle", "a", "cartesian").scene
+
+
+def dexterity():
+    return example("dexterity_sweep").five_bar()[0]
+
+
+@pytest.mark.parametrize("scene", [contacts, joints, expressions, many, trims, dexterity])
 def test_nothing_stands_in_one_place(scene):
     table = scene().packed().table
     sizes = room_needed(table)
