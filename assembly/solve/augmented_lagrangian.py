@@ -102,6 +102,9 @@ SETTLING = 30
 LINGERS = 40
 # A tick that does not hold after its iterations has so many times more of them.
 EXTRA_TIME = 4
+# A scene that asks for nothing but that constraints hold, and whose rows gain nothing where they are off by less than
+# this, is restored until they hold.
+CLOSE = 1e-6
 # So often at most a solve leaves a saddle of its violations.
 KICKS = 3
 
@@ -310,7 +313,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
                 status = ITERATION_LIMIT
                 break
         # A least move may be at a kink, where steps go to and fro.
-        lingers += 1 if any_pose and (lingers > 0 or violation <= TOUCHING) else 0
+        lingers += 1 if any_pose and not restoring and (lingers > 0 or violation <= TOUCHING) else 0
         if settles and ended == RUNNING and lingers > LINGERS:
             ended = STALLED
             settled_by = iteration + SETTLING
@@ -347,7 +350,12 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             alpha = 1.0
             iteration += 1
             continue
-        if restoring and violation <= max(0.1 * entered, feasible):
+        # At a pose where rows depend on each other a wish only leads away again.
+        is_singular = any_pose and entered < CLOSE
+        if restoring and violation <= (feasible if is_singular else max(0.1 * entered, feasible)):
+            if is_singular and not watched:
+                status = STALLED
+                continue
             restoring = False
             mu = 1e-4
             check_at, check_violation = iteration + PATIENCE, violation
@@ -367,8 +375,9 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         is_fresh = not (kept and gain * violation <= feasible and gain * dual <= settings[STATIONARITY])
         reach = min(radius, leash)
         shift, used, longest, turn = aim(
-            program, here, rows, y, mu, shift, min(reach, room_left), cuts, dual, restoring, is_fresh, weights, system
-        )
+            program, here, rows, y, mu, shift, min(reach, room_left), cuts, violation if restoring else dual, restoring,
+            is_fresh, weights, system,
+        )  # fmt: skip
         if used < 0.0:
             status = STALLED
             continue

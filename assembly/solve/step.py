@@ -14,6 +14,8 @@ from assembly.solve.multipliers import curve_rows, foresee, leave_out, weigh_row
 from assembly.solve.rows import add_transposed, move, times
 from assembly.solve.search import damped_step
 
+# The least shift of the Hessian; of violations alone, so much of the largest one, down to rounding.
+LEAST_SHIFT, SHIFT, TINIEST_SHIFT = 1e-8, 1e-2, 1e-13
 # A step is computed so many times more for one-sided rows that it would break. Where they change places for ever, it
 # is the one without them: half of an exchange may lead uphill.
 FORESEEN = 12
@@ -26,12 +28,12 @@ SADDLE, KICK = 1e-5, 1e-3
 
 
 @kernel(inline=True)
-def aim(program, here, rows, y, mu, shift, radius, cuts, dual, restoring, is_fresh, weights, system):
+def aim(program, here, rows, y, mu, shift, radius, cuts, off, restoring, is_fresh, weights, system):
     """The step of the augmented Lagrangian at a point, into the system's lines; by the last factor unless `is_fresh`.
 
-    `weights` gets which rows count, what they push with, and which do because the step would break them. Returns the
-    shift of the matrix and that of the factor the step is by, negative where there is none; the step's largest
-    component and turn.
+    `off` is how far the point is from a solution: its dual residual, or its violation. `weights` gets which rows count,
+    what they push with, and which do because the step would break them. Returns the shift of the matrix and that of the
+    factor the step is by, negative where there is none; the step's largest component and turn.
     """
     table, pool, shape, loose, room = program
     active, forces, foreseen = weights
@@ -49,8 +51,10 @@ def aim(program, here, rows, y, mu, shift, radius, cuts, dual, restoring, is_fre
     if is_fresh:
         curve_rows(rows, residual, y, active, restoring, forces)
         add_row_terms(table, pool, loose, room, shape, here, forces, active, lagrangian)
-        # What the inertia needs falls with the distance to the solution.
-        shift = factorize_shifted(lagrangian, n, order, max(min(0.25 * shift, dual), 1e-8), matrix)
+        # What the inertia needs falls with the distance to the solution. Where rows alone count and depend on each
+        # other there, their slopes' squares do, too.
+        least = max(min(SHIFT * off, LEAST_SHIFT), TINIEST_SHIFT) if restoring else LEAST_SHIFT
+        shift = factorize_shifted(lagrangian, n, order, max(min(0.25 * shift, off), least), matrix)
         if shift < 0.0:
             return shift, shift, 0.0, 0.0
     damps = table[CONTACTS] == 0 or cuts >= OFTEN
@@ -71,7 +75,7 @@ def aim(program, here, rows, y, mu, shift, radius, cuts, dual, restoring, is_fre
             is_fresh = True
             curve_rows(rows, residual, y, active, restoring, forces)
             add_row_terms(table, pool, loose, room, shape, here, forces, active, lagrangian)
-        shift = factorize_shifted(lagrangian, n, order, max(shift, 1e-8), matrix)
+        shift = factorize_shifted(lagrangian, n, order, max(shift, LEAST_SHIFT), matrix)
         used = shift
         if shift >= 0.0:
             used, longest, turn = damped_step(
@@ -126,7 +130,7 @@ def leave_saddle(program, here, trial, number, system):
     table, pool, shape, loose, room = program
     _gradient, (_descent, step, _straight), lagrangian, matrix = system
     n = step.size
-    if not factorize_shifted(lagrangian, n, shape[2], 1e-8, matrix) > SADDLE:
+    if not factorize_shifted(lagrangian, n, shape[2], LEAST_SHIFT, matrix) > SADDLE:
         return False
     for i in range(n):
         step[i] = KICK * math.sin(number + 1 + i) if i < 6 * table[MOVING] else 0.0

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import assembly as asm
+from tests.solve.mechanisms import parallelograms
 from tests.stress.honest import check
 
 
@@ -50,6 +51,29 @@ def test_an_arm_too_short(over):
     if over >= 1e-6:
         assert status is asm.Status.INFEASIBLE
         assert "rod" in solution.conflicting
+
+
+@pytest.mark.parametrize("cells", range(1, 9))
+@pytest.mark.parametrize("seed", range(3))
+def test_squares_that_are_folded_all_but_flat(cells, seed):
+    """From poses 2 percent off flat ones: rows depend on each other where they end, which is not far from flat."""
+    scene = parallelograms(cells)
+    rng = np.random.default_rng(seed)
+    q = scene.q
+    size = scene.packed().scale
+    for k in range(1, len(q)):
+        off = asm.Pose.from_axis_angle(rng.normal(size=3), 0.02, 0.02 * size * rng.uniform(-1.0, 1.0, 3))
+        q[k] = (asm.Pose(q[k, :3], q[k, 3:]) @ off).q
+    solution = scene.solve(q)
+    assert check(scene, solution) is asm.Status.SOLVED
+    poses = {body: asm.Pose(row[:3], row[3:]) for body, row in zip(scene.bodies, solution.q, strict=True)}
+    for hinge in scene.constraints:
+        (a, one), (b, other) = ((poses[frame.body], frame) for frame in (hinge.frame_a, hinge.frame_b))
+        # Rows hold to 1e-12 of the size.
+        assert np.abs(a.apply(one.origin) - b.apply(other.origin)).max() < 2e-12 * size
+        axes = [pose.matrix[:3, :3] @ frame.axes[:, 2] for pose, frame in ((a, one), (b, other))]
+        assert np.linalg.norm(np.cross(*axes)) < 2e-12
+        assert np.dot(*axes) > 0.9
 
 
 @pytest.mark.parametrize("angle", [1.0, 1e-2, 1e-4, 1e-6, 1e-8, 0.0])
