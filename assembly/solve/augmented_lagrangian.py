@@ -313,7 +313,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
                 status = ITERATION_LIMIT
                 break
         # A least move may be at a kink, where steps go to and fro.
-        lingers += 1 if any_pose and not restoring and (lingers > 0 or violation <= TOUCHING) else 0
+        lingers += 1 if any_pose and not (restoring and not watched) and (lingers > 0 or violation <= TOUCHING) else 0
         if settles and ended == RUNNING and lingers > LINGERS:
             ended = STALLED
             settled_by = iteration + SETTLING
@@ -351,9 +351,9 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             iteration += 1
             continue
         # At a pose where rows depend on each other a wish only leads away again.
-        is_singular = any_pose and entered < CLOSE
+        is_singular = any_pose and not watched and entered < CLOSE
         if restoring and violation <= (feasible if is_singular else max(0.1 * entered, feasible)):
-            if is_singular and not watched:
+            if is_singular:
                 status = STALLED
                 continue
             restoring = False
@@ -375,8 +375,8 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         is_fresh = not (kept and gain * violation <= feasible and gain * dual <= settings[STATIONARITY])
         reach = min(radius, leash)
         shift, used, longest, turn = aim(
-            program, here, rows, y, mu, shift, min(reach, room_left), cuts, violation if restoring else dual, restoring,
-            is_fresh, weights, system,
+            program, here, rows, y, mu, shift, min(reach, room_left), cuts, dual, violation, restoring, is_fresh,
+            weights, system,
         )  # fmt: skip
         if used < 0.0:
             status = STALLED

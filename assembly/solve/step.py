@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly.constraints.layout import CONTACTS, MOVING
+from assembly.constraints.layout import CONTACTS, MOVING, WATCH
 from assembly.constraints.program import evaluate
 from assembly.constraints.row_terms import add_row_terms
 from assembly.solve.carry import carry
@@ -28,12 +28,12 @@ SADDLE, KICK = 1e-5, 1e-3
 
 
 @kernel(inline=True)
-def aim(program, here, rows, y, mu, shift, radius, cuts, off, restoring, is_fresh, weights, system):
+def aim(program, here, rows, y, mu, shift, radius, cuts, dual, violation, restoring, is_fresh, weights, system):
     """The step of the augmented Lagrangian at a point, into the system's lines; by the last factor unless `is_fresh`.
 
-    `off` is how far the point is from a solution: its dual residual, or its violation. `weights` gets which rows count,
-    what they push with, and which do because the step would break them. Returns the shift of the matrix and that of the
-    factor the step is by, negative where there is none; the step's largest component and turn.
+    `weights` gets which rows count, what they push with, and which do because the step would break them. Returns the
+    shift of the matrix and that of the factor the step is by, negative where there is none; the step's largest
+    component and turn.
     """
     table, pool, shape, loose, room = program
     active, forces, foreseen = weights
@@ -52,8 +52,10 @@ def aim(program, here, rows, y, mu, shift, radius, cuts, off, restoring, is_fres
         curve_rows(rows, residual, y, active, restoring, forces)
         add_row_terms(table, pool, loose, room, shape, here, forces, active, lagrangian)
         # What the inertia needs falls with the distance to the solution. Where rows alone count and depend on each
-        # other there, their slopes' squares do, too.
-        least = max(min(SHIFT * off, LEAST_SHIFT), TINIEST_SHIFT) if restoring else LEAST_SHIFT
+        # other there, the squares of their slopes do, too; contacts of a clearance come and go instead.
+        least, off = LEAST_SHIFT, dual
+        if restoring and table[WATCH] < 0:
+            least, off = max(min(SHIFT * violation, least), TINIEST_SHIFT), violation
         shift = factorize_shifted(lagrangian, n, order, max(min(0.25 * shift, off), least), matrix)
         if shift < 0.0:
             return shift, shift, 0.0, 0.0
