@@ -151,7 +151,9 @@ def boxes(quick: bool) -> list[dict[str, Any]]:
 
 def _held(scene: asm.Assembly, solution: asm.Solution) -> bool:
     """Whether it is solved and rows, lengths over the scene's size and angles, hold to 1e-12."""
-    return solution.success and solution.feasibility <= 1e-12 * scene.packed().scale
+    # A pose from before the last iteration is told in the user's units alone, angles among lengths.
+    last = solution.history[-1, 1] <= 1e-12 or solution.feasibility <= 1e-12 * scene.packed().scale
+    return solution.success and bool(last)
 
 
 def _closes(scene: asm.Assembly) -> bool:

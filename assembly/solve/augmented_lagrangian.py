@@ -77,6 +77,7 @@ from assembly.solve.settings import (
     PENALTY,
     PENALTY_FLOOR,
     RADIUS,
+    ROUNDING,
     RUNNING,
     SCATTER,
     SOLVED,
@@ -87,7 +88,7 @@ from assembly.solve.settings import (
     VIOLATION,
 )
 from assembly.solve.start import read_state, rearrange, set_out
-from assembly.solve.step import aim, cut_step, leave_saddle, propose, short_share
+from assembly.solve.step import CLOSE, aim, cut_step, leave_saddle, propose, short_share
 from assembly.solve.tangency import off_rows
 
 # Every so many steps the largest violation must have halved, or the loop sees whether the rows can hold; so many times.
@@ -102,9 +103,6 @@ SETTLING = 30
 LINGERS = 40
 # A tick that does not hold after its iterations has so many times more of them.
 EXTRA_TIME = 4
-# A scene that asks for nothing but that constraints hold, and whose rows gain nothing where they are off by less than
-# this, is restored until they hold.
-CLOSE = 1e-6
 # So often at most a solve leaves a saddle of its violations.
 KICKS = 3
 
@@ -145,7 +143,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
 
     reach = max(reach, turned(table, pool, here[1]))
     # What rounding of the user's coordinates, and of angles over many turns, alone can violate.
-    feasible = max(settings[FEASIBILITY], 4e-16 * reach)
+    feasible = max(settings[FEASIBILITY], ROUNDING * reach)
     tick = settings[TICK] == 1.0
     # A tick goes on with the last one, if that one's time was spent.
     begin, done, looks = begin_tick(table, settings, results, memory)
@@ -218,9 +216,12 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             break
         if iteration > 0:
             set_deadline(table, settings, memory, begin)
-        late = may_end(table, settings, memory, clock, iteration, 1.0)
-        if watched and not changed and not late:
+        late = is_cut(table, memory)
+        holds_now = False
+        if watched and not changed:
             holds_now = off_rows(table, loose, one_sided, here, tick) <= (feasible if tick else TOUCHING)
+            late = not holds_now and may_end(table, settings, memory, clock, iteration, 1.0)
+        if watched and not changed and not late:
             how = (CAREFUL if holds_now else AS_NEEDED) | (SPARING if tick else IN_TURNS | DOUBTFUL)
             how |= MEASURED if measured else AS_NEEDED
             changed = look_again(table, pool, memory, here, how, free, loose[4])
@@ -320,8 +321,9 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         if ended != RUNNING and (violation <= feasible or iteration >= settled_by):
             status = ended
             continue
-        # What holds is not left for what there is hardly time to end.
-        if iteration > 0 and is_spent(table, settings, begin, HALF if violation <= feasible else 1.0):
+        # What holds is not left for what there is hardly time to end, and ends what an earlier call began.
+        part = 1.0 if violation > feasible else (0.0 if done > 0 else HALF)
+        if iteration + done > 0 and (iteration > 0 or part < 1.0) and is_spent(table, settings, begin, part):
             status = OUT_OF_TIME
             break
         if retreats:
@@ -350,7 +352,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             alpha = 1.0
             iteration += 1
             continue
-        # At a pose where rows depend on each other a wish only leads away again.
+        # At a pose where rows depend on each other a wish only leads away: then they are restored until they hold.
         is_singular = any_pose and not watched and entered < CLOSE
         if restoring and violation <= (feasible if is_singular else max(0.1 * entered, feasible)):
             if is_singular:

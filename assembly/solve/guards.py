@@ -31,6 +31,7 @@ from assembly.proximity.watch import USED
 from assembly.proximity.watch_memory import (
     ALLOWANCE,
     CUT_SHORT,
+    LAST_REACH,
     LENGTHS,
     NEGLECT,
     PAIR_F,
@@ -202,7 +203,8 @@ def allowed_share(table, pool, memory, here, trial, step, share):
         if end > max(begin, 1.0):
             allowed = min(allowed, max(0.95 - begin, 0.05) / (end - begin))
         flank = pool[table[table[watch + PAIR_TABLE] + PAIR_RECORD * p + PAIR_MINIMUM] + 1]
-        if begin <= STILL and memory[o + REACH] >= min(memory[o + CUT_SHORT], flank):
+        most = min(flank, pool[table[watch + LENGTHS] + LAST_REACH])
+        if begin <= STILL and memory[o + REACH] >= min(memory[o + CUT_SHORT], most):
             # It was looked at right here, as far as another look would.
             memory[o + PART] = begin
     return share * allowed, False

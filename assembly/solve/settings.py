@@ -22,5 +22,7 @@ STATUS, COUNT, OBJECTIVE, VIOLATION, DUAL, CULPRIT, IMPROPER, SCATTER = 0, 1, 2,
 # it has done, if the next one is to go on with it (0: it ended).
 HELD, CURVED, FIRST_SHIFT, CARRIED = 8, 9, 10, 11
 HISTORY = 7  # figures an iteration: objective, feasibility, stationarity, mu, regularization, step length, radius
+# Rounding of poses far from the origin, in parts of that.
+ROUNDING = 4e-16
 # A pair this near to a fold (det H over |H|^2) gets its coordinates as unknowns.
 FREE_BELOW = 0.02

@@ -14,8 +14,10 @@ from assembly.solve.multipliers import curve_rows, foresee, leave_out, weigh_row
 from assembly.solve.rows import add_transposed, move, times
 from assembly.solve.search import damped_step
 
-# The least shift of the Hessian; of violations alone, so much of the largest one, down to rounding.
+# The least shift of the Hessian; of violations alone, so much of the largest one, down to rounding. That is where rows
+# gain nothing although they are off by less than CLOSE.
 LEAST_SHIFT, SHIFT, TINIEST_SHIFT = 1e-8, 1e-2, 1e-13
+CLOSE = 1e-6
 # A step is computed so many times more for one-sided rows that it would break. Where they change places for ever, it
 # is the one without them: half of an exchange may lead uphill.
 FORESEEN = 12
@@ -54,7 +56,7 @@ def aim(program, here, rows, y, mu, shift, radius, cuts, dual, violation, restor
         # What the inertia needs falls with the distance to the solution. Where rows alone count and depend on each
         # other there, the squares of their slopes do, too; contacts of a clearance come and go instead.
         least, off = LEAST_SHIFT, dual
-        if restoring and table[WATCH] < 0:
+        if restoring and violation < CLOSE and table[WATCH] < 0:
             least, off = max(min(SHIFT * violation, least), TINIEST_SHIFT), violation
         shift = factorize_shifted(lagrangian, n, order, max(min(0.25 * shift, off), least), matrix)
         if shift < 0.0:

@@ -37,6 +37,8 @@ class TrackStatus(Enum):
 class Step:
     """What a tick did. Tables are computed when they are read.
 
+    One that is LATE at the pose of the step before has that one's figures as well: violation, iterations, objective.
+
     Attributes
     ----------
     q : (n, 7)

@@ -36,6 +36,7 @@ from assembly.solve.settings import (
     OUT_OF_TIME,
     RADIUS,
     RECALL,
+    ROUNDING,
     SECOND_ORDER,
     SOLVED,
     STATIONARITY,
@@ -84,7 +85,8 @@ class Tracker:
     iterations : int
         Steps of a tick after which it ends, if the constraints hold; it takes up to four times as many until they do.
     tolerance : float
-        Largest violation that counts as held, in parts of the scene's size.
+        Largest violation that counts as held, in parts of the scene's size; far from the origin, what rounding of
+        coordinates alone violates.
     second_order : bool
         Whether every tick is tested for a minimum.
 
@@ -188,8 +190,11 @@ class Tracker:
         self._at = next(at for target, at in packed._targets if target is self._hand)
         # Whatever else may change between ticks is written by the scene itself.
         self._others = bool(packed._sources) or len(packed._targets) + len(packed._turns) > 1
-        self._settings[CARRIES] = float(budget is not None and not self._others)
-        self._tolerance = 1.25 * limit * packed.scale
+        # Other values of constraints may ask for another pose than the one that a tick goes on from, or goes back to.
+        self._settings[CARRIES] = float(budget is not None and not packed._sources)
+        # The loop holds rows to this, or to what rounding of coordinates alone can violate.
+        far = float(np.abs(poses[:, :3]).max()) / packed.scale
+        self._tolerance = 1.25 * max(limit, ROUNDING * far) * packed.scale
 
     @property
     def scene(self) -> Assembly:
@@ -220,8 +225,10 @@ class Tracker:
         carried = view[at + CARRIED] > 0.0
         code = solve_program(*self._arguments)
         if view[at + CARRIED] > 0.0:
-            # The next tick goes on from a pose that does not hold yet.
-            return Step(self, self._before, TrackStatus.LATE, row, self._seen, perf_counter() - begin)
+            # The next tick goes on from a pose that does not hold yet; here the last one stands.
+            stands = self._before[at + VIOLATION] <= self._tolerance
+            status = TrackStatus.LATE if stands else TrackStatus.VIOLATED
+            return Step(self, self._before, status, row, self._seen, perf_counter() - begin)
         status = _STATUSES.get(code, TrackStatus.APPROACHING)
         if not view[at + VIOLATION] <= self._tolerance:
             status = TrackStatus.VIOLATED

@@ -8,9 +8,22 @@ import numpy as np
 import pytest
 
 import assembly as asm
+from assembly._kernel import kernel
+from assembly.constraints.layout import RESULTS, WATCH
+from assembly.kinematics.body import Point
 from assembly.proximity.events import EventKind
-from assembly.solve.budget import HALF
-from assembly.solve.settings import CARRIED
+from assembly.proximity.watch_memory import (
+    DEADLINE,
+    DOUBT,
+    EARLIER,
+    LOOKS,
+    MEMORY_HEADER,
+    PAIR_MEMORY,
+    PAIRS,
+)
+from assembly.solve.augmented_lagrangian import EXTRA_TIME
+from assembly.solve.budget import HALF, LOOKS_ALONE, begin_tick
+from assembly.solve.settings import CARRIED, CARRIES, SETTINGS
 from assembly.tracking.tick import TrackStatus
 from benchmarks.hands import WIRE, paper_clips
 from benchmarks.running import example
@@ -42,6 +55,13 @@ def ball_on_ball(**options):
     scene = asm.Assembly([a, b])
     scene.constrain(asm.Contact(a, b))
     return scene.tracker(b.point(0, 0, 0), **options)
+
+
+def doubts(tracker):
+    """How far pairs are beyond where contacts may have been born beside others since they were looked at."""
+    packed = tracker._packed
+    at = packed.memory_at + MEMORY_HEADER
+    return tracker._state[at : at + PAIR_MEMORY * packed.table[packed.table[WATCH] + PAIRS]][DOUBT::PAIR_MEMORY]
 
 
 def settled(tracker, target, ticks):
@@ -101,17 +121,6 @@ def test_time_is_spent_at_every_place(chain):
     assert {0, 1, 2, 3, 4} <= set(steps), steps
 
 
-def test_a_tick_that_goes_on_counts_its_steps(chain):
-    """However little time there is, a tick takes no more steps than one that has time: then it is HELD."""
-    tracker, begin = dragged(chain, budget=NO_TIME, iterations=1)
-    most = 0
-    for k in range(300):
-        step = tracker.step(begin + np.array([9.0 * np.sin(0.9 * k), -9.0 * np.cos(1.1 * k), -15.0]))
-        most = max(most, int(tracker._state[tracker._packed.results_at + CARRIED]) - 1)
-        assert step.feasibility <= 1e-9 * WIRE
-    assert 1 <= most <= 4
-
-
 def test_events_of_ticks_that_go_on_are_told_once(chain):
     tracker, begin = dragged(chain, budget=NO_TIME)
     told, late = [], 0
@@ -130,18 +139,102 @@ def test_events_of_ticks_that_go_on_are_told_once(chain):
 
 
 def test_a_tick_that_fails_goes_back_to_what_held(chain):
-    """Far jumps of the hand, too few steps: the pose that is returned is the last one that held, to the last bit."""
-    tracker, begin = dragged(chain, budget=NO_TIME, iterations=1)
-    statuses = Counter()
-    rng = np.random.default_rng(5)
-    for _ in range(600):
+    """Far jumps: what is HELD is the last pose that held, to the last bit, after as many steps as with time.
+
+    And nothing is returned beside whose contacts others may have been born that nobody looked for.
+    """
+    iterations, statuses, most = 3, Counter(), 0
+    for seed in range(3):
+        tracker, begin = dragged(chain, budget=NO_TIME, iterations=iterations)
+        rng, hand = np.random.default_rng(seed), begin
+        for _ in range(1200):
+            if rng.random() < 0.05:
+                hand = begin + rng.normal(scale=25.0, size=3)
+            before = tracker.q
+            step = tracker.step(hand)
+            statuses[step.status] += 1
+            carried = tracker._state[tracker._packed.results_at + CARRIED]
+            most = max(most, int(carried) - 1)
+            assert step.status is not TrackStatus.VIOLATED and step.feasibility <= 1e-9 * WIRE
+            if step.status is TrackStatus.HELD or carried > 0.0:
+                assert np.array_equal(step.q, before)
+            else:
+                assert (doubts(tracker) <= 1.0).all()
+    assert statuses[TrackStatus.HELD] > 0
+    # A tick ends after four times its steps; the last of them is not carried any more.
+    assert most == EXTRA_TIME * iterations
+
+
+@pytest.mark.parametrize("held", ["frame", "body", "with another objective"])
+def test_every_hand_goes_on(chain, held):
+    """Its orientation or another objective has a target, too; that constraints ask for nothing else is what counts."""
+    ends = []
+    for time in (None, NO_TIME):
+        scene = chain.paper_clips()
+        blue = scene.body("blue")
+        if held == "with another objective":
+            other = scene.body("green")
+            scene.minimize(asm.PointDistance(other.point(0.0, 0.0, 0.0), other.pose.position, 0.1))
+        follow = {"frame": blue.frame(chain.END), "body": blue}.get(held, blue.point(*chain.END))
+        tracker = scene.tracker(follow=follow, budget=time)
+        pose = asm.Pose(tracker.q[2, :3], tracker.q[2, 3:])
+        if held == "body":
+            begin = pose
+        else:
+            begin = pose @ asm.Pose(chain.END)
+        to = np.array([0.4, 0.3, -0.9])
+        target = begin.position + to if isinstance(follow, Point) else asm.Pose(begin.position + to, begin.quaternion)
+        for _ in range(1500):
+            step = tracker.step(target)
+            assert step.status is not TrackStatus.HELD
+            if step.status is TrackStatus.FOLLOWED:
+                break
+        assert step.status is TrackStatus.FOLLOWED
+        ends.append(step.objective)
+    assert ends[1] == pytest.approx(ends[0], rel=0.02, abs=1e-9)
+
+
+@pytest.mark.parametrize("offset", [1e3, 1e5, 1e7])
+@pytest.mark.parametrize("tolerance", [1e-12, 1e-14])
+def test_far_from_the_origin(offset, tolerance):
+    """What is carried is rounded to the user's coordinates; that is no violation, nor is it for the tracker."""
+    ball = asm.shapes.sphere(1.0)
+    a, b = asm.Body("a", ball, (offset, 0.0, 0.0), fixed=True), asm.Body("b", ball, (offset, 0.0, 2.0))
+    scene = asm.Assembly([a, b])
+    scene.constrain(asm.Contact(a, b))
+    tracker = scene.tracker(b.point(0, 0, 0), budget=NO_TIME, tolerance=tolerance)
+    target, new = np.array([offset + 1.0, 0.5, 2.5]), 0
+    for _ in range(200):
         before = tracker.q
-        step = tracker.step(begin + rng.normal(scale=12.0, size=3))
-        statuses[step.status] += 1
-        assert step.status is not TrackStatus.VIOLATED
-        if step.status is TrackStatus.HELD:
-            assert np.array_equal(step.q, before)
-    assert statuses[TrackStatus.LATE] > 0
+        step = tracker.step(target)
+        assert step.status in (TrackStatus.LATE, TrackStatus.APPROACHING, TrackStatus.FOLLOWED)
+        new += not np.array_equal(before, step.q)
+        assert step.feasibility <= 1e-15 * offset + 2e-11
+    nearest = 2.0 * (target - (offset, 0.0, 0.0)) / np.linalg.norm(target - (offset, 0.0, 0.0))
+    # To the stationarity of a tick, and to what rounding of the gap is along the ball, where steps end as it holds.
+    assert np.abs(step.q[1, :3] - (offset, 0.0, 0.0) - nearest).max() < 1e-8 + 1e-13 * offset
+    assert new >= 2
+
+
+@kernel
+def begun(table, settings, results, memory):
+    return begin_tick(table, settings, results, memory)
+
+
+def test_looks_alone_do_not_go_on_for_ever():
+    """However many pairs are due time and again: after four looks at each a step comes first."""
+    watch, pairs = 100, 3
+    table, settings, results = np.zeros(200, np.int64), np.zeros(SETTINGS), np.zeros(RESULTS)
+    table[WATCH], table[watch + PAIRS], settings[CARRIES] = watch, pairs, 1.0
+    memory = np.zeros(MEMORY_HEADER)
+    memory[LOOKS] = 7.0
+    assert begun(table, settings, results, memory) == (0, 0, 7.0) and memory[EARLIER] == 7.0
+    for looks, steps in ((4 * pairs - 1, 0), (4 * pairs, 0), (4 * pairs + 5, 2)):
+        results[CARRIED], memory[LOOKS] = 1.0 + steps, 7.0 + looks
+        _, done, before = begun(table, settings, results, memory)
+        assert done == steps and memory[EARLIER] == 7.0 and results[CARRIED] == 0.0
+        assert before == (7.0 + looks if looks < LOOKS_ALONE * pairs else np.inf)
+        assert (memory[DEADLINE] < np.inf) == (looks < LOOKS_ALONE * pairs)
 
 
 def test_driven_values_that_change_end_what_is_not_done():
