@@ -233,8 +233,10 @@ class Tracker:
         if not view[at + VIOLATION] <= self._tolerance:
             status = TrackStatus.VIOLATED
             # Where a contact came up that the rows of the last tick did not know, there is nowhere to go back to.
-            if carried or code == CONTACT_LOST or self._history[0, 1] * packed.scale <= self._tolerance:
-                status = TrackStatus.HELD
+            stands = self._before[at + VIOLATION] <= self._tolerance
+            begun = carried or self._history[0, 1] * packed.scale <= self._tolerance
+            if code == CONTACT_LOST or (begun and stands):
+                status = TrackStatus.HELD if stands else TrackStatus.VIOLATED
                 self._pose[:] = self._before
         elif view[at + HELD] == 1.0:
             status = TrackStatus.HELD
