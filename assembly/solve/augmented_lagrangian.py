@@ -366,6 +366,8 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             least = TOUCHING if check_violation <= feasible else feasible
             if violation > max(least, 0.5 * check_violation) and restorations < RESTORATIONS:
                 restoring = True
+                # What the penalty's matrix needed says nothing of this one.
+                shift = 0.0
                 restorations += 1
                 entered = violation
             check_at, check_violation = iteration + PATIENCE, violation
