@@ -268,12 +268,33 @@ class _OncePerSignature(dict[Any, Any]):
         super().__setitem__(key[:-1], value)
 
 
+@functools.cache
+def _trust_indices() -> None:
+    """Have kernels of this package take an index into an array as it stands; it is never negative.
+
+    Numba lets one count from the end. To look whether it does takes inner loops as long as their work, and a tenth of
+    what there is to compile. With `NUMBA_BOUNDSCHECK=1` a negative index is an error, as is one past the end.
+    """
+    from numba.np import arrayobj
+
+    counting = arrayobj.fix_integer_index
+    ours = f"_ZN{len(_PACKAGE.name)}{_PACKAGE.name}"
+
+    def as_it_stands(context: Any, builder: Any, kind: Any, index: Any, size: Any) -> Any:
+        if builder.function.name.startswith(ours):
+            return context.cast(builder, index, kind, types.intp)
+        return counting(context, builder, kind, index, size)
+
+    arrayobj.fix_integer_index = as_it_stands
+
+
 # Functions that kernels may call, and how they are compiled, of which Numba has not been told.
 _WAITING: list[tuple[Callable[..., Any], dict[str, Any]]] = []
 
 
 def _make_callable() -> None:
     """Tell Numba of all functions that kernels may call: when it is to compile one, and not before."""
+    _trust_indices()
     while _WAITING:
         _callable_from_kernels(*_WAITING[-1])
         del _WAITING[-1]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import statistics
+from collections.abc import Sequence
 from time import perf_counter
 from typing import Any
 
@@ -12,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 import assembly as asm
 from benchmarks import linkages
+from benchmarks.drake_boxes import Drake
 from benchmarks.figures import figure
 from benchmarks.mechanisms import CADQUERY, cadquery_boxes
 from benchmarks.pictures import curve
@@ -21,12 +23,14 @@ Eight unit cubes from scattered poses, face on face. An error is the largest dis
 should meet, measured from the poses alone; a line's point is the median of it and of a call over all starts at one
 tolerance, from 1e-3 to 1e-14. Gathering the cubes solves this scene to rounding before the loop has a step to make,
 whatever the tolerance; "pulled" starts from cubes that are nearly in place, where nothing is gathered. CadQuery
-(constraints as summed squares) has no tolerance to set: a point. Pink and Drake are not run: a free-standing stack is
-not a task of theirs."""
+(constraints as summed squares) has no tolerance to set: a point. Drake's inverse kinematics is solved by SNOPT, whose
+feasibility tolerances are set; its times are those of `Solve` alone. It is counted as solved where SNOPT says so and
+faces are within 1e-6."""
 
 Array = NDArray[np.float64]
 TOLERANCES = [10.0**-k for k in range(3, 15)]
 COUNT = 8
+DRAKE = "Drake SNOPT"
 
 
 def apart(q: Array) -> float:
@@ -43,6 +47,21 @@ def pulled(scene: asm.Assembly, seed: int) -> Array:
     return q
 
 
+def drake(starts: Sequence[Array], tolerances: Sequence[float]) -> list[tuple[int, float, float]] | None:
+    """At each tolerance: how many Drake solves, the median error and the median time; None without Drake."""
+    stack = Drake.of(COUNT)
+    if stack is None:
+        return None
+    stack.solve(starts[0], tolerances[0])
+    rows = []
+    for tolerance in tolerances:
+        ends = [stack.solve(start, tolerance) for start in starts]
+        errors = [apart(q) for _, _, q in ends]
+        solved = sum(said and error <= 1e-6 for (said, _, _), error in zip(ends, errors, strict=True))
+        rows.append((solved, statistics.median(errors), statistics.median(seconds for _, seconds, _ in ends)))
+    return rows
+
+
 def run(quick: bool) -> dict[str, Any]:
     """Lines, and figures at the tightest tolerance."""
     seeds = 2 if quick else 10
@@ -53,7 +72,7 @@ def run(quick: bool) -> dict[str, Any]:
         "ours, pulled": [pulled(scene, k) for k, scene in enumerate(scenes)],
     }
     lines: dict[str, list[tuple[float, float]] | None] = {}
-    solved = 0
+    solved, scattered = 0, 0
     for name, rows in starts.items():
         line = []
         for tolerance in tolerances:
@@ -65,6 +84,7 @@ def run(quick: bool) -> dict[str, Any]:
                     solution = scene.solve(q0, tolerance=min(tolerance, 1e-2), stationarity=min(tolerance, 1e-2))
                     waits.append(perf_counter() - begin)
                 solved += solution.success
+                scattered += solution.success and q0 is None and tolerance == tolerances[-1]
                 errors.append(apart(solution.q))
                 seconds.append(statistics.median(waits))
             line.append((statistics.median(errors), statistics.median(seconds)))
@@ -74,8 +94,11 @@ def run(quick: bool) -> dict[str, Any]:
     if theirs is not None:
         lines[CADQUERY] = [(statistics.median(d for _, d in theirs), statistics.median(s for s, _ in theirs))]
     peer = lines[CADQUERY]
+    far = drake([scene.q for scene in scenes], tolerances[-1:])
+    near = drake([q for q in starts["ours, pulled"] if q is not None], tolerances)
+    lines[DRAKE + ", pulled"] = None if near is None else [(error, time) for _, error, time in near]
     of = len(starts) * len(tolerances) * seeds
-    worst, last = (line[-1] for name, line in lines.items() if line is not None and name != CADQUERY)
+    worst, last = (line[-1] for name, line in lines.items() if line is not None and name in starts)
     return {
         "about": ABOUT,
         "figures": [
@@ -93,7 +116,27 @@ def run(quick: bool) -> dict[str, Any]:
                 worst[1],
                 peers={CADQUERY: None if peer is None else peer[0][1]},
             ),
-            figure("eight cubes, pulled, at 1e-14: a call", "seconds", last[1]),
+            figure(
+                "eight cubes, scattered, at 1e-14: solved",
+                "count",
+                scattered,
+                of=seeds,
+                reach=seeds,
+                peers={DRAKE: None if far is None else far[0][0]},
+            ),
+            figure(
+                "eight cubes, pulled, at 1e-14: error",
+                "error",
+                last[0],
+                reach=1e-12,
+                peers={DRAKE: None if near is None else near[-1][1]},
+            ),
+            figure(
+                "eight cubes, pulled, at 1e-14: a call",
+                "seconds",
+                last[1],
+                peers={DRAKE: None if near is None else near[-1][2]},
+            ),
         ],
         "curves": [curve("Eight cubes on one another", "median distance of faces that meet", "seconds a call", lines)],
     }

@@ -130,6 +130,14 @@ def test_a_file_holds_kernels_or_objects(path):
             assert any(ast.unparse(d).startswith("kernel") for d in node.decorator_list), f"{node.name} is no kernel"
 
 
+@pytest.mark.parametrize("path", KERNEL_FILES, ids=lambda p: p.relative_to(PACKAGE).as_posix())
+def test_kernels_do_not_count_from_the_end(path):
+    # Their indices are taken as they stand; those that are computed, NUMBA_BOUNDSCHECK=1 looks at.
+    places = [node.slice for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Subscript)]
+    parts = [part for place in places for part in (place.elts if isinstance(place, ast.Tuple) else [place])]
+    assert [ast.unparse(part) for part in parts if ast.unparse(part).startswith("-")] == []
+
+
 def test_type_checking_leaves_out_the_kernel_files_only():
     configuration = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["mypy"]["overrides"]
     left_out = next(o["module"] for o in configuration if o.get("ignore_errors"))

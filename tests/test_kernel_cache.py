@@ -40,6 +40,11 @@ def power(exponent):
     return raised
 """,
 }
+AT = """
+@kernel
+def at(values, index):
+    return values[index]
+"""
 # Prints the answer, how often it was found on disk and compiled, and where the cache is.
 CALL = """
 from small.caller import outer
@@ -142,6 +147,26 @@ def test_settings_that_change_the_code_have_their_own_folder(package):
     checked = package.call(NUMBA_BOUNDSCHECK="1")
     assert checked[:3] == (8.0, 0, 1)
     assert checked[3] != plain[3]
+
+
+def test_an_index_is_taken_as_it_stands_in_the_package_alone(package):
+    package.edit("callee.py", "from small._kernel import kernel", "from small._kernel import kernel\n" + AT)
+    code = """
+import numpy as np
+from numba import njit
+from small.callee import at
+@njit
+def elsewhere(values, index):
+    return values[index]
+values = np.array([1.0, 2.0, 3.0])
+print(at(values, 2), elsewhere(values, -1), sep="|", end="|")
+try:
+    at(values, -1)
+except IndexError:
+    print("IndexError")
+"""
+    # Without the check, what an index of -1 reads is not defined.
+    assert package.run(code, NUMBA_BOUNDSCHECK="1").startswith("3.0|3.0|IndexError\n")
 
 
 def flip_a_bit(entry: bytes) -> bytes:
