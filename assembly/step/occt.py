@@ -106,11 +106,11 @@ def settings(values: Mapping[str, int]) -> Iterator[None]:
             table.SetIVal_s(key, value)
 
 
-def parts(shape: Any, kind: Any) -> list[Any]:
-    """The parts of a kind (`TopAbs_FACE` ...) of a shape, in the order in which they stand in it."""
+def parts(shape: Any, kind: Any, outside: Any = None) -> list[Any]:
+    """The parts of a kind (`TopAbs_FACE` ...) of a shape that are in none of another, in the order of the shape."""
     o = occt()
     found = []
-    explorer = o.TopExp_Explorer(shape, kind)
+    explorer = o.TopExp_Explorer(shape, kind, o.TopAbs_SHAPE if outside is None else outside)
     while explorer.More():
         found.append(explorer.Current())
         explorer.Next()

@@ -276,8 +276,12 @@ def profile(curve: Any, low: float, high: float, *, cut: bool) -> tuple[Spline, 
         if isinstance(copy, (o.Geom_BSplineCurve, o.Geom2d_BSplineCurve)):
             first, last = copy.FirstParameter(), copy.LastParameter()
             near = 1e-12 * (last - first)
+            clamped = min(copy.Multiplicity(1), copy.Multiplicity(copy.NbKnots())) > copy.Degree()
             if cut and (low > first + near or high < last - near):
                 copy.Segment(low, high)
+            elif cut and not clamped:
+                # Periodic curves among others, whose ends are no control points.
+                copy.Segment(first, last)
             elif copy.IsPeriodic():
                 copy.SetNotPeriodic()
         elif cut and (low > 1e-12 or high < 1.0 - 1e-12):

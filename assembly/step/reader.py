@@ -191,14 +191,8 @@ def _shapes(part: Part) -> Iterator[Any]:
     """Solids of a part, and then its shells and faces that are in no solid."""
     o = occt()
     yield from parts(part.shape, o.TopAbs_SOLID)
-    explorer = o.TopExp_Explorer(part.shape, o.TopAbs_SHELL, o.TopAbs_SOLID)
-    while explorer.More():
-        yield explorer.Current()
-        explorer.Next()
-    explorer = o.TopExp_Explorer(part.shape, o.TopAbs_FACE, o.TopAbs_SHELL)
-    while explorer.More():
-        yield explorer.Current()
-        explorer.Next()
+    yield from parts(part.shape, o.TopAbs_SHELL, o.TopAbs_SOLID)
+    yield from parts(part.shape, o.TopAbs_FACE, o.TopAbs_SHELL)
 
 
 def _read(shape: Any, part: Part, scale: float) -> _Shape:
@@ -247,7 +241,8 @@ def read_step(path: str | PathLike[str], *, unit: str = "mm", strict: bool = Tru
     A part that the file's assembly uses several times becomes as many bodies, which share their faces. Geometry stays
     in the part's own coordinates; the body's pose is the placement that the assembly gives it. Names are those of
     the parts, and "nut" is followed by "nut 2"; faces have the names that the file gives them, or "face 1", "face 2"
-    in its order. `body.color` and `face.color` are the file's, or None.
+    in its order (around voids always: OCCT does not read those names). `body.color` and `face.color` are the file's, or
+    None.
 
     Planes, cylinders, cones, spheres, tori, swept surfaces and splines are exact rational surfaces, and so are their
     trims, up to curves around an axis that have no rational form (helices, intersections): those are followed to

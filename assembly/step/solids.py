@@ -1,7 +1,8 @@
 """Faces as shapes of OCCT: trimmed faces, sewn to shells and solids.
 
-Surfaces become B-splines, planes planes. Boundary curves keep their curves in (u, v). In space a curve along a
-parameter is taken from the surface and a curve in a plane is mapped with it, both exactly; any other is interpolated.
+Surfaces become B-splines, flat rectangles planes. Boundary curves keep their curves in (u, v); a plane's parameters are
+made lengths before. In space a curve along a parameter is taken from the surface and a curve in a plane is mapped with
+it, both exactly; any other is interpolated.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from assembly.geometry.curve import NurbsCurve
 from assembly.geometry.curve_parts import sampled
 from assembly.geometry.face import Face
+from assembly.geometry.loop import Loop
 from assembly.geometry.region_cuts import cut_open
 from assembly.geometry.region_pieces import POLE, SEAM, Piece
 from assembly.geometry.surface import NurbsSurface
@@ -29,6 +31,8 @@ Array = NDArray[np.float64]
 FOLLOWED = 1e-10
 # Tolerances of edges and of sewing, the latter over the size of the body.
 EDGE_TOLERANCE, SEWING = 1e-7, (1e-8, 1e-7, 1e-6, 1e-5, 1e-4)
+# Rounding of the axes of planes, which are orthonormal.
+ORTHONORMAL = 1e-13
 
 
 def _points(rows: Array) -> Any:
@@ -66,27 +70,28 @@ def spline_curve(points: Array, weights: Array, knots: Array, degree: int) -> An
     return kind(_points(points), _reals(weights), *_knots(knots), degree)
 
 
-def _is_plane(surface: NurbsSurface) -> bool:
-    """Whether S = origin + u x + v y with x and y orthonormal."""
+def _plane_axes(surface: NurbsSurface) -> Array | None:
+    """x and y, (2, 3), of a surface origin + u x + v y where they are orthogonal; None of any other surface."""
     if surface.degree != (1, 1) or surface.control_points.shape != (2, 2, 3) or np.ptp(surface.weights) > 0.0:
-        return False
+        return None
     net = surface.control_points
-    (u0, u1), (v0, v1) = surface.domain
-    x, y = (net[1, 0] - net[0, 0]) / (u1 - u0), (net[0, 1] - net[0, 0]) / (v1 - v0)
+    sides = np.array([net[1, 0] - net[0, 0], net[0, 1] - net[0, 0]])
     twist = np.abs(net[1, 1] - net[1, 0] - net[0, 1] + net[0, 0]).max()
-    axes = np.array([x, y])
-    return bool(twist <= 1e-13 * surface.size and np.abs(axes @ axes.T - np.eye(2)).max() <= 1e-13)
+    lengths = np.linalg.norm(sides, axis=1)
+    if twist > ORTHONORMAL * surface.size or abs(sides[0] @ sides[1]) > ORTHONORMAL * lengths.prod():
+        return None
+    return sides / np.ptp(surface.domain, axis=1)[:, None] if lengths.all() else None
 
 
 def occt_surface(surface: NurbsSurface) -> Any:
     """The same surface, with the same parameters."""
     o = occt()
     net = surface.control_points
-    (u0, u1), (v0, v1) = surface.domain
-    if _is_plane(surface):
-        x, y = (net[1, 0] - net[0, 0]) / (u1 - u0), (net[0, 1] - net[0, 0]) / (v1 - v0)
-        origin, normal = net[0, 0] - u0 * x - v0 * y, np.cross(x, y)
-        axes = (o.gp_Pnt(*origin.tolist()), o.gp_Dir(*normal.tolist()), o.gp_Dir(*x.tolist()))
+    xy = _plane_axes(surface)
+    if xy is not None and np.abs(np.linalg.norm(xy, axis=1) - 1.0).max() <= ORTHONORMAL:
+        (u0, _), (v0, _) = surface.domain
+        origin, normal = net[0, 0] - u0 * xy[0] - v0 * xy[1], np.cross(*xy)
+        axes = (o.gp_Pnt(*origin.tolist()), o.gp_Dir(*normal.tolist()), o.gp_Dir(*xy[0].tolist()))
         return o.Geom_Plane(o.gp_Ax3(*axes))
     for row, degree in zip(surface.knots, surface.degree, strict=True):
         if row[0] != row[degree] or row[-1] != row[-degree - 1]:
@@ -112,7 +117,7 @@ class _FaceBuilder:
         self.surface, self.chains = cut_open(face)
         self.build = o.BRep_Builder()
         self.geometry = occt_surface(self.surface)
-        self.plane = isinstance(self.geometry, o.Geom_Plane)
+        self.axes = _plane_axes(self.surface) if isinstance(self.geometry, o.Geom_Plane) else None
         self.made = o.TopoDS_Face()
         self.build.MakeFace(self.made, self.geometry, EDGE_TOLERANCE)
         self.corners: list[tuple[Array, Any]] = []
@@ -156,11 +161,9 @@ class _FaceBuilder:
     def _curve(self, curve: NurbsCurve) -> tuple[Any, Any, float, float, bool]:
         flat = spline_curve(curve.control_points, curve.weights, curve.knots, curve.degree)
         low, high = curve.domain
-        if self.plane:
-            (u0, u1), (v0, v1) = self.surface.domain
-            net = self.surface.control_points
-            x, y = (net[1, 0] - net[0, 0]) / (u1 - u0), (net[0, 1] - net[0, 0]) / (v1 - v0)
-            points = net[0, 0] + (curve.control_points - [u0, v0]) @ np.array([x, y])
+        if self.axes is not None:
+            (u0, _), (v0, _) = self.surface.domain
+            points = self.surface.control_points[0, 0] + (curve.control_points - [u0, v0]) @ self.axes
             return flat, spline_curve(points, curve.weights, curve.knots, curve.degree), low, high, False
         breaks = [curve.breaks()]
         at = sampled(breaks[0], 17)
@@ -255,7 +258,7 @@ def sewn(faces: Sequence[Face], scale: float) -> Sewn:
         Millimeters in our unit of length.
     """
     o = occt()
-    made = [_FaceBuilder(_scaled(face, scale)).result() for face in faces]
+    made = [_FaceBuilder(_in_millimeters(face, scale)).result() for face in faces]
     size = scale * max(face.surface.size for face in faces)
     for part in SEWING:
         sewing = o.BRepBuilderAPI_Sewing(max(part * size, EDGE_TOLERANCE))
@@ -266,33 +269,56 @@ def sewn(faces: Sequence[Face], scale: float) -> Sewn:
             break
     shape = sewing.SewedShape()
     closed = sewing.NbFreeEdges() == 0
+    # A face alone is a shell, too: a body's name and color are then not those of its face.
+    bare = parts(shape, o.TopAbs_FACE, o.TopAbs_SHELL)
+    shells = parts(shape, o.TopAbs_SHELL) + [_shell_of(face, closed) for face in bare]
     if closed:
         solid = o.BRepBuilderAPI_MakeSolid()
-        shells = parts(shape, o.TopAbs_SHELL) or [_shell_of(shape)]
         for shell in shells:
             solid.Add(o.as_shell(shell))
         shape = solid.Solid()
         # With the outside where the faces say, which a sewing may have turned as a whole.
         o.BRepLib.OrientClosedSolid_s(shape)
+    elif len(shells) == 1:
+        shape = shells[0]
+    else:
+        build, shape = o.BRep_Builder(), o.TopoDS_Compound()
+        build.MakeCompound(shape)
+        for shell in shells:
+            build.Add(shape, shell)
     images = [sewing.Modified(face) if sewing.IsModified(face) else face for face in made]
     return Sewn(shape, images, closed)
 
 
-def _shell_of(face: Any) -> Any:
-    """A shell of one closed face."""
+def _shell_of(face: Any, closed: bool) -> Any:
+    """A shell of one face."""
     o = occt()
     build, shell = o.BRep_Builder(), o.TopoDS_Shell()
     build.MakeShell(shell)
-    for part in parts(face, o.TopAbs_FACE):
-        build.Add(shell, part)
-    shell.Closed(True)
+    build.Add(shell, face)
+    shell.Closed(closed)
     return shell
 
 
-def _scaled(face: Face, scale: float) -> Face:
-    """The face in millimeters, with the same parameters."""
-    if scale == 1.0:
+def _in_millimeters(face: Face, scale: float) -> Face:
+    """The face in millimeters, with the same parameters, but that those of a plane become lengths, as OCCT's are."""
+    surface = face.surface if scale == 1.0 else face.surface.transformed(scale=scale)
+    axes = _plane_axes(surface)
+    factors = np.ones(2) if axes is None else np.linalg.norm(axes, axis=1)
+    if np.abs(factors - 1.0).max() > ORTHONORMAL:
+        knots = [factor * row for factor, row in zip(factors, surface.knots, strict=True)]
+        surface = NurbsSurface(surface.control_points, knots, surface.degree, surface.weights)
+        outer = None if face.outer is None else _stretched(face.outer, factors)
+        holes = [_stretched(hole, factors) for hole in face.holes]
+        return Face(surface, outer, holes, name=face.name, reversed=face.reversed)
+    if surface is face.surface:
         return face
-    surface = face.surface
-    grown = NurbsSurface(scale * surface.control_points, surface.knots, surface.degree, surface.weights)
-    return Face(grown, face.outer, face.holes, name=face.name, reversed=face.reversed)
+    return Face(surface, face.outer, face.holes, name=face.name, reversed=face.reversed)
+
+
+def _stretched(loop: Loop, factors: Array) -> list[NurbsCurve]:
+    """The curves of a loop, their u and v multiplied."""
+    return [
+        NurbsCurve(curve.control_points * factors, curve.knots, curve.degree, curve.weights, name=curve.name)
+        for curve in loop.curves
+    ]

@@ -97,9 +97,10 @@ def write_step(
 
     The file has one assembly. Bodies that share their faces are instances of one part where their names follow from
     its name ("nut", "nut 2"), so that `read_step` gives the same bodies again: names, poses, colors, names and colors
-    of faces. Faces that close are written as a solid, others as shells. Planes are written as planes and all other
-    surfaces as B-splines, both exactly; of the edges, lines in (u, v) and curves in planes are exact and others are
-    followed to 1e-10 of the surface's size.
+    of faces. Faces that close are written as a solid, others as shells; a body in several pieces is read as several.
+    Flat rectangular surfaces are written as planes, whatever their parameters, and all others as B-splines, both
+    exactly; of the edges, lines in (u, v) and curves in planes are exact and others are followed to 1e-10 of the
+    surface's size.
 
     Parameters
     ----------

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from importlib import import_module
-from math import pi
+from math import cos, pi, sin
 from types import SimpleNamespace
 
 import pytest
@@ -122,11 +122,11 @@ def filleted(shape, radius, which):
     return made.Shape()
 
 
-def spline(*points):
+def spline(*points, periodic=False):
     given = O.Fitted(1, len(points))
     for k, each in enumerate(points, 1):
         given.SetValue(k, point(*each))
-    fit = O.GeomAPI_Interpolate(given, False, 1e-9)
+    fit = O.GeomAPI_Interpolate(given, periodic, 1e-9)
     fit.Perform()
     return fit.Curve()
 
@@ -171,6 +171,12 @@ def pushed(face, by=(0.3, 4.0, 0.1)):
 
 def ellipse():
     return sheet(edge(O.gp_Elips(axis((3, 0, 0), (0, 1, 0)), 1.0, 0.5)))
+
+
+def oval():
+    """A periodic spline."""
+    angles = [pi * k / 6.0 for k in range(12)]
+    return spline(*((2.0 * cos(angle), 1.5 * sin(angle), 0) for angle in angles), periodic=True)
 
 
 def bow(kind):

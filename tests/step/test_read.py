@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import tempfile
+from itertools import pairwise
 from math import pi
 
 import numpy as np
@@ -14,7 +15,7 @@ from assembly.step import StepError, StepWarning, reader
 from assembly.step.faces import read_face
 from assembly.step.occt import quiet, settings
 from assembly.step.profiles import Unreadable
-from tests.step.models import MODELS, O, box, cylinder, faces, joined, pushed, swollen, vase
+from tests.step.models import MODELS, O, box, cylinder, edge, faces, joined, oval, pushed, sheet, swollen, vase
 
 
 class File:
@@ -156,6 +157,26 @@ def test_what_goes_through_a_file_is_what_was_there(tmp_path, name):
     assert sorted(side.face.area() for side in body.faces) == pytest.approx(
         sorted(face.area() for face in direct), rel=1e-8
     )
+
+
+def test_periodic_splines_bound_faces(tmp_path):
+    curve = oval()
+    assert curve.IsPeriodic()
+    # By Green's theorem, with a rule that is exact on a cubic's spans.
+    area, point, slope = 0.0, O.gp_Pnt(), O.gp_Vec()
+    for a, b in pairwise(curve.Knot(k) for k in range(1, curve.NbKnots() + 1)):
+        for node, weight in zip(*np.polynomial.legendre.leggauss(3), strict=True):
+            curve.D1(0.5 * (a + b) + 0.5 * (b - a) * node, point, slope)
+            area += 0.25 * (b - a) * weight * (point.X() * slope.Y() - point.Y() * slope.X())
+    solid = pushed(sheet(edge(curve)), (0.3, 0.1, 4.0))
+    for k, shape in enumerate((solid, O.BRepBuilderAPI_NurbsConvert(solid).Shape())):
+        file = File()
+        file.part(shape, "oval")
+        (body,) = asm.read_step(file.write(tmp_path / f"{k}.step"))
+        _, bottom, top = body.faces
+        # Files have twelve digits of a coordinate.
+        assert [bottom.face.area(), top.face.area()] == pytest.approx([area, area], rel=1e-12)
+        assert sum(side.face.volume_integral() for side in body.faces) == pytest.approx(4.0 * area, rel=1e-12)
 
 
 def test_a_face_that_cannot_be_read_is_named(tmp_path, monkeypatch):

@@ -12,6 +12,7 @@ from assembly.geometry.bezier import full_knots
 from assembly.step import StepError, StepWarning
 from assembly.step.faces import read_face
 from assembly.step.occt import parts
+from assembly.step.reader import UNITS
 from assembly.step.solids import sewn
 from tests.step.models import MODELS, O, areas, faces, off, volumes
 
@@ -179,6 +180,38 @@ def test_face_names_and_colors_are_kept(tmp_path):
         )
 
 
+@pytest.mark.parametrize("own", [None, (0.4, 0.5, 0.6)])
+@pytest.mark.parametrize("color", [None, (0.1, 0.2, 0.3)])
+@pytest.mark.parametrize("name", ["plane", "sphere"])
+def test_a_body_and_its_only_face_have_colors_of_their_own(tmp_path, name, color, own):
+    surface = asm.shapes.plane(2.0, 3.0) if name == "plane" else asm.shapes.sphere(1.0)
+    # What closes is turned with the material inside, and other faces stay as they are.
+    face = asm.Face(surface, name="side", color=own, reversed=name == "plane")
+    body = asm.Body("part", face, color=color)
+    (back,) = again(tmp_path / "part.step", body)
+    assert (back.name, back.color) == ("part", color)
+    assert [(side.name, side.face.color) for side in back.faces] == [("side", own)]
+    assert back.faces[0].face.reversed == face.reversed
+
+
+def test_pieces_of_a_body_have_its_color(tmp_path):
+    low = asm.shapes.plane(2.0, 3.0)
+    high = low.transformed(translation=(0.0, 0.0, 5.0))
+    body = asm.Body("pair", [asm.Face(low), asm.Face(high, color=(0.4, 0.5, 0.6))], color=(0.1, 0.2, 0.3))
+    back = again(tmp_path / "pair.step", body)
+    assert [(piece.name, piece.color) for piece in back] == [("pair", body.color), ("pair 2", body.color)]
+    assert [piece.faces[0].face.color for piece in back] == [None, (0.4, 0.5, 0.6)]
+
+
+def test_a_ball_with_a_void_is_a_solid(tmp_path):
+    sides = [asm.Face(asm.shapes.sphere(2.0)), asm.Face(asm.shapes.sphere(1.0), reversed=True)]
+    for order in (sides, sides[::-1]):
+        made = sewn(order, 1.0)
+        assert made.closed and O.BRepCheck_Analyzer(made.shape).IsValid()
+        (back,) = again(tmp_path / "ball.step", asm.Body("ball", order))
+        assert measures(back) == pytest.approx((20.0 * pi, 28.0 * pi / 3.0), rel=1e-12)
+
+
 def test_units(tmp_path):
     body = asm.Body("ball", asm.shapes.sphere(0.002), position=(0.1, 0.0, 0.0))
     asm.write_step(tmp_path / "ball.step", body, unit="m")
@@ -187,6 +220,55 @@ def test_units(tmp_path):
     assert measures(back)[0] == pytest.approx(16.0 * pi, rel=1e-12)
     (metric,) = asm.read_step(tmp_path / "ball.step", unit="m")
     assert measures(metric)[0] == pytest.approx(16e-6 * pi, rel=1e-12)
+
+
+SOLIDS = {
+    # Faces, and how many of them are rectangles.
+    "plate with a hole": (lambda: asm.shapes.plate(4.0, 4.0, 1.0, holes=[(0.0, 0.0, 1.0)]), 6),
+    "cylinder": (lambda: asm.shapes.solid_cylinder(1.0, 3.0), 2),
+    "cam": (lambda: asm.shapes.cam(2.0 + 0.5 * np.cos(np.arange(24.0) * pi / 12.0), 1.0, 0.5), 2),
+}
+POSE = asm.Pose.from_axis_angle((1.0, 2.0, -1.0), 1.1, (1.0 / 3.0, 2.0, -1.0))
+
+
+def reshaped(face, change):
+    """The face with another surface of the same parameters."""
+    return asm.Face(change(face.surface), face.outer, face.holes, name=face.name, reversed=face.reversed)
+
+
+def check_again(path, body, planes, unit):
+    """A body comes back with its pose, areas, volumes and names, and its rectangles were written as planes."""
+    (back,) = again(path, body, unit=unit)
+    assert path.read_text().count("= PLANE(") == planes
+    assert {side.name for side in back.faces} == {side.name for side in body.faces}
+    # Files have twelve digits of a coordinate or more, which round by 5e-13.
+    np.testing.assert_allclose(back.pose.matrix, body.pose.matrix, rtol=0, atol=1e-12)
+    assert measures(back) == pytest.approx(measures(body), rel=1e-12)
+
+
+@pytest.mark.parametrize("unit", UNITS)
+@pytest.mark.parametrize("name", SOLIDS)
+def test_solids_in_every_unit(tmp_path, name, unit):
+    make, planes = SOLIDS[name]
+    check_again(tmp_path / "part.step", asm.Body(name, make(), POSE.position, POSE.quaternion), planes, unit)
+
+
+@pytest.mark.parametrize("factor", [0.5, 2.0, 25.4])
+@pytest.mark.parametrize("name", SOLIDS)
+def test_parameters_need_not_be_lengths(tmp_path, name, factor):
+    make, planes = SOLIDS[name]
+    sides = [reshaped(face, lambda surface: surface.transformed(scale=factor)) for face in make()]
+    for unit in ("mm", "in"):
+        check_again(tmp_path / "part.step", asm.Body(name, sides, POSE.position, POSE.quaternion), planes, unit)
+
+
+@pytest.mark.parametrize("name", SOLIDS)
+def test_flat_faces_may_be_splines(tmp_path, name):
+    make, _ = SOLIDS[name]
+    # Round holes in them come back as periodic splines.
+    sides = [reshaped(face, lambda surface: surface.elevate((3, 3))) for face in make()]
+    for unit in ("mm", "in"):
+        check_again(tmp_path / "part.step", asm.Body(name, sides, POSE.position, POSE.quaternion), 0, unit)
 
 
 def test_open_shapes_are_shells(tmp_path):
