@@ -17,7 +17,7 @@ from assembly.constraints.expression import Expression
 from assembly.constraints.objectives import Objective
 from assembly.constraints.packing import Packed, lone_surfaces, pack, structure_of
 from assembly.constraints.trim_contact import TrimContact
-from assembly.errors import InputError, vector
+from assembly.errors import InputError, items, vector
 from assembly.kinematics.body import Body, Frame, Point
 from assembly.kinematics.pose import Pose, pose_rows
 from assembly.proximity.pairs import inside
@@ -65,7 +65,7 @@ class Assembly:
         self._crowding = 1  # how many times as many places as clearances ask for
         self._scene: Scene | None = None
         self._stood: tuple[list[Pose], Array] = [], np.empty((0, 7))
-        for body in bodies:
+        for body in items("bodies", bodies, "bodies, at least one"):
             self.add(body)
 
     @property

@@ -16,9 +16,11 @@ from numpy.typing import ArrayLike, NDArray
 __all__ = [
     "AssemblyError",
     "InputError",
+    "KnownSettings",
     "checked_color",
     "extent",
     "integer",
+    "items",
     "number",
     "positive",
     "real_array",
@@ -32,6 +34,20 @@ class AssemblyError(Exception):
 
 class InputError(AssemblyError, ValueError):
     """An argument that cannot be used; the text says which, what came and what was expected."""
+
+
+class KnownSettings:
+    """Has no attributes but those its classes say: one that is misspelled, or another class's, is no setting."""
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        classes = type(self).__mro__
+        if name[0] != "_" and not any(name in one.__dict__ or name in one.__annotations__ for one in classes[:-1]):
+            said = {key: what for one in classes[-2::-1] for key, what in one.__dict__.items()}
+            # A property that only reads has no setter.
+            known = sorted(k for k, p in said.items() if hasattr(p, "__set__") and getattr(p, "fset", p) is not None)
+            settable = ", ".join(repr(k) for k in known if k[0] != "_")
+            raise AttributeError(f"{type(self).__name__} has no {name!r}; expected {settable or 'no change at all'}")
+        super().__setattr__(name, value)
 
 
 def _shown(value: Any) -> str:
@@ -113,6 +129,14 @@ def extent(name: str, value: Any) -> float:
     if not 1e-100 <= result <= 1e100:
         raise InputError(f"{name} is {result:g}; expected a length from 1e-100 to 1e+100")
     return result
+
+
+def items(name: str, value: Any, expected: str) -> tuple[Any, ...]:
+    """The members of what can be gone through."""
+    try:
+        return tuple(value)
+    except TypeError:
+        raise TypeError(f"{name} is {_shown(value)}; expected {expected}") from None
 
 
 def integer(name: str, value: Any, low: int, high: int) -> int:

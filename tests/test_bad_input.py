@@ -372,3 +372,59 @@ def test_weights_and_references_cannot_be_changed(name):
         setattr(asm.Posture(), name, 2.0)
     with pytest.raises(ValueError, match="read-only"):
         asm.Posture(q_of([0, 0, 0, 1, 0, 0, 0])).reference[0] = 1.0
+
+
+@pytest.mark.parametrize(
+    ("make", "name", "settable"),
+    [
+        (lambda: asm.Revolute(*pair()), "angle_limits", "'angle', 'limits'"),
+        (lambda: asm.Distance(*pair(), 1.0), "distance", "'limits', 'value'"),
+        (lambda: asm.PointDistance(pair()[1].point(0, 0, 0), (0, 0, 0)), "targets", "'target'"),
+        (lambda: contact(), "minimum", "no change at all"),
+        (lambda: pair()[1], "position", "'color', 'pose'"),
+    ],
+    ids=["joint", "value", "objective", "contact", "body"],
+)
+def test_settings_of_another_name_are_refused(make, name, settable):
+    one = make()
+    with pytest.raises(AttributeError, match=f"{type(one).__name__} has no '{name}'; expected {settable}"):
+        setattr(one, name, (1.0, 2.0))
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: asm.Assembly(5), "bodies is 5; expected bodies, at least one"),
+        (lambda: asm.Assembly(pair()[0]), "bodies is Body.*; expected bodies, at least one"),
+        (lambda: asm.Clearance(pair()[0]), "bodies is Body.*; expected two bodies or more"),
+        (lambda: asm.Loop(3), "loop is 3; expected one NurbsCurve or several"),
+    ],
+)
+def test_what_cannot_be_gone_through_is_named(call, message):
+    with pytest.raises(TypeError, match=message):
+        call()
+
+
+@pytest.mark.parametrize("weights", [[1e-320, 1e-320], [1e300, 1.0], [1.0, 1e308]])
+def test_weights_whose_products_overflow_or_vanish(weights):
+    with pytest.raises(InputError, match=r"weights\[[01]\] is .*; expected weights from 1e-100 to 1e\+100"):
+        asm.NurbsCurve([(0, 0), (1, 1)], [0, 0, 1, 1], 1, weights)
+
+
+@pytest.mark.parametrize("value", ["0.5", ["0.1", "0.2"], True, 10**400])
+def test_parameters_are_numbers(value):
+    with pytest.raises(InputError, match="expected real numbers"):
+        asm.NurbsCurve([(0, 0), (1, 1)], [0, 0, 1, 1], 1).evaluate(value)
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
+def test_messages_do_not_depend_on_the_unit_of_length(unit):
+    ground, crank = asm.Body("g", fixed=True), asm.Body("c", position=(unit, 0.0, 0.0))
+    scene = asm.Assembly([ground, crank])
+    axes = [body.frame((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)) for body in (ground, crank)]
+    # Two angles of the same axes that contradict each other by 2e-4 rad.
+    scene.constrain(*(asm.Angle(*axes, 1.0 + 2e-4 * k, f"angle {k}") for k in range(2)))
+    scene.constrain(asm.Distance(ground.point(0, 0, 0), crank.point(0, 0, 0), unit))
+    solution = scene.solve()
+    assert "violated: 'angle 0' (0.0001), 'angle 1' (0.0001); conflicting: 'angle 0', 'angle 1'" in solution.message
+    assert "conflicting: 'angle 0', 'angle 1'" in str(scene.mobility(solution))

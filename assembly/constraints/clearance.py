@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from assembly.constraints.constraint import Constraint
-from assembly.errors import InputError, number
+from assembly.errors import InputError, items, number
 from assembly.kinematics.body import Body
 
 __all__ = ["Clearance"]
@@ -66,7 +66,7 @@ class Clearance(Constraint):
         neglect: float = 1e-6,
         places: int | None = None,
     ) -> None:
-        chosen = None if bodies is None else tuple(bodies)
+        chosen = None if bodies is None else items("bodies", bodies, "two bodies or more, or None for all")
         if chosen is not None:
             for k, body in enumerate(chosen):
                 if not isinstance(body, Body):

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from assembly.constraints.primitives import ANGLE, COINCIDENT, DISTANCE, SLIDE
-from assembly.errors import InputError, number
+from assembly.errors import InputError, KnownSettings, number
 from assembly.kinematics.body import Body, Frame
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ def words(cls: type) -> str:
     return re.sub(r"(?<=[a-z])(?=[A-Z])", "-", cls.__name__).lower()
 
 
-class Constraint:
+class Constraint(KnownSettings):
     """Something that must hold between bodies; see its subclasses.
 
     Parameters

@@ -41,6 +41,8 @@ from assembly.proximity.velocity import GAP, RATES, RECORD, gradient_row, store_
 # A clearance's contact of solids that are hardly in each other may be given up where its pair ends: then MAY_GO - k
 # stands for what it holds on to, k. One that ends where they touch, which rounding decides, is as good as open.
 MAY_GO, HARDLY, TOUCHING = -1.0, 1e-3, 1e-9
+# Where solids are in each other by no more, the next look lists what is to part them.
+SLIGHTLY = 1e-5
 # A clearance's row that is open by more than the last needs its pair again after motions of this part of its gap, or of
 # this part of how far bodies may go where contacts may be born: from farther away Newton's method may find another one.
 UNSEEN, ASTRAY, FAR = 0.5, 0.15, 1e-5
@@ -83,14 +85,47 @@ def restart_contact(table, pool, row, q, records, k):
 
 
 @kernel(inner=True)
-def search_row(table, pool, row, q, tracked, r):
-    """The closest features of the solids of a row wherever they are, into tracked[r]. Whether there are any."""
+def went(before, after, body):
+    """How far a point of a body went at most, in sizes of the scene, which no body is larger than."""
+    shift = 0.0
+    same = 0.0
+    other = 0.0
+    for i in range(3):
+        shift += (after[body, i] - before[body, i]) ** 2
+    for i in range(3, 7):
+        same += (after[body, i] - before[body, i]) ** 2
+        other += (after[body, i] + before[body, i]) ** 2
+    return math.sqrt(shift) + 2.0 * math.sqrt(min(same, other))
+
+
+@kernel(inner=True)
+def ends_unseen(table, before, after):
+    """Whether a clearance's contact of solids ends along a step that goes farther than it is open.
+
+    What takes its place, where features meet, is not listed yet, and was no nearer: over such a step it could pass
+    through, and be found at the far side, or nowhere.
+    """
+    for r in range(table[FIRST_GUARD], table[FIRST_GUARD] + table[GUARDS]):
+        if math.isnan(after[1][r, 0]) and not math.isnan(before[1][r, 0]) and is_of_solids(table, r):
+            row = table[ROW_TABLE] + ROW * r
+            far = went(before[0], after[0], table[row + BODY_F]) + went(before[0], after[0], table[row + BODY_G])
+            if far > max(before[3][r], SLIGHTLY):
+                return True
+    return False
+
+
+@kernel(inner=True)
+def search_row(table, pool, row, q, tracked, r, crossing):
+    """The closest features of the solids of a row wherever they are, into tracked[r]. Whether there are any.
+
+    Solids that are in each other have some if `crossing`, which takes a thousand times as long.
+    """
     shell_f = table[row + SHELL_F]
     shell_g = table[row + SHELL_G]
     i = table[row + BODY_F]
     j = table[row + BODY_G]
     nearest = table[NEAREST_AT]
-    deepest = table[DEEPEST_AT]
+    deepest = table[DEEPEST_AT] if crossing else 0
     found = call_address(table[SEARCH_AT], (table, pool, shell_f, shell_g, i, j, q, nearest, deepest, tracked, r))
     return found == 1
 
@@ -112,9 +147,15 @@ def is_guard(table, r):
 
 
 @kernel(inline=True)
+def is_of_solids(table, r):
+    """Whether row r is a contact of solids, or has no contact."""
+    return table[table[ROW_TABLE] + ROW * r + SHELL_F] >= 0
+
+
+@kernel(inline=True)
 def may_go(table, r, residual):
     """Whether row r is a clearance's of solids that are hardly in each other: there, its pair may end."""
-    return is_guard(table, r) and table[table[ROW_TABLE] + ROW * r + SHELL_F] >= 0 and residual[r] > -HARDLY
+    return is_guard(table, r) and is_of_solids(table, r) and residual[r] > -HARDLY
 
 
 @kernel(inner=True)
@@ -171,8 +212,9 @@ def lost_guard(table, pool, r, start, point, past, goes):
 def solids_row(table, pool, r, start, patience, point):
     """Row r, of a contact of solids. Returns whether its pair was found.
 
-    Where the pair that is tracked is lost, the closest one there is takes over, if the row is one-sided or a step may
-    end anywhere: the loop shortens steps as long as it can. A clearance has a watch for that.
+    Where the pair that is tracked is lost, or an edge is farthest there, the closest one there is takes over, if the
+    row is one-sided or a step may end anywhere: the loop shortens steps as long as it can. A clearance has a watch for
+    that.
     """
     q, tracked, records, residual, jacobian = point
     row = table[ROW_TABLE] + ROW * r
@@ -181,22 +223,26 @@ def solids_row(table, pool, r, start, patience, point):
         start[r, STAYS] = MAY_GO - start[r, STAYS]
         tracked[r, STAYS] = start[r, STAYS]
     status = track_row(table, pool, row, q, start, patience, records, tracked, r)
-    found = status == CONVERGED or status == SINGULAR
+    found = (status == CONVERGED or status == SINGULAR) and (records[r, PROPER] == 1.0 or is_guard(table, r))
     if not found:
         if is_guard(table, r):
             past = start[r, STAYS] > 0.0 and status == LEFT_PATCH
             return lost_guard(table, pool, r, start, point, past, goes)
         # Near touching a search takes long, and steps are short.
         far = abs(start[r, PAIR_GAP]) > HARDLY
-        found = far or table[row + ONE_SIDED] == 1 or patience == math.inf
-        if found and search_row(table, pool, row, q, tracked, r):
-            status = track_row(table, pool, row, q, tracked, math.inf, records, tracked, r)
-        found = status == CONVERGED or status == SINGULAR
-    if found:
-        residual[r] = records[r, GAP] - pool[table[row + MINIMUM]]
-        tracked[r, PAIR_GAP] = records[r, GAP]
-        gradient_row(records, r, jacobian, r)
-    return found
+        if not (far or table[row + ONE_SIDED] == 1 or patience == math.inf):
+            return False
+        # Past an edge's nearest point solids may be deep in each other: a step that leads there is too long.
+        lost = status != CONVERGED and status != SINGULAR
+        if not search_row(table, pool, row, q, tracked, r, lost or patience == math.inf):
+            return False
+        status = track_row(table, pool, row, q, tracked, math.inf, records, tracked, r)
+        if status != CONVERGED and status != SINGULAR:
+            return False
+    residual[r] = records[r, GAP] - pool[table[row + MINIMUM]]
+    tracked[r, PAIR_GAP] = records[r, GAP]
+    gradient_row(records, r, jacobian, r)
+    return True
 
 
 @kernel(inner=True)

@@ -52,7 +52,7 @@ class TipTask:
         if not isinstance(tip, (Point, Frame)):
             raise TypeError(f"tip is {tip!r}; expected a point, a frame or a body")
         chosen = ("position" if isinstance(tip, Point) else "pose") if task is None else task
-        if chosen not in TASKS:
+        if not isinstance(chosen, str) or chosen not in TASKS:
             raise InputError(f"task is {task!r}; expected one of {', '.join(map(repr, TASKS))}")
         if isinstance(inputs, (Joint, Freedom)) or not isinstance(inputs, Sequence) or not inputs:
             raise InputError(f"inputs is {inputs!r}; expected joints or freedoms, at least one")
@@ -137,7 +137,7 @@ class Dexterity(Objective):
         weight: float = 1.0,
     ) -> None:
         self._tip_task = TipTask(tip, inputs, task, length)
-        if measure not in MEASURES:
+        if not isinstance(measure, str) or measure not in MEASURES:
             raise InputError(f"measure is {measure!r}; expected one of {', '.join(map(repr, MEASURES))}")
         if (measure == "force_transmission") != (direction is not None):
             raise InputError(

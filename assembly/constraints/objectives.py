@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.errors import positive, vector
+from assembly.errors import KnownSettings, extent, positive, vector
 from assembly.kinematics.body import Body, Frame, Point
 from assembly.kinematics.pose import Pose, axes_quaternion, multiply, pose_rows
 
@@ -14,7 +14,7 @@ __all__ = ["FrameDistance", "Objective", "PointDistance", "Posture"]
 Array = NDArray[np.float64]
 
 
-class Objective:
+class Objective(KnownSettings):
     """A term of the objective; see its subclasses."""
 
     def __init__(self, bodies: tuple[Body, ...], weight: float) -> None:
@@ -127,7 +127,7 @@ class FrameDistance(Objective):
             raise TypeError(f"frame is {frame!r}; expected a frame of a body, body.frame(...), or a body")
         super().__init__((frame.body,), weight)
         self._frame = frame
-        self._length = 0.5 * frame.body.size or 1.0 if length is None else positive("length", length)
+        self._length = 0.5 * frame.body.size or 1.0 if length is None else extent("length", length)
         # Of the rotation that takes the world's axes to those of the frame on the body, turned back.
         w, x, y, z = axes_quaternion(frame.axes)
         self._back = np.array([w, -x, -y, -z])
@@ -154,7 +154,12 @@ class FrameDistance(Objective):
             raise TypeError(f"target is {value!r}; expected a Pose")
         self._pose = value
         self._target = value.position
-        self.body_quaternion = multiply(value.quaternion, self._back)
+        self._body_quaternion = multiply(value.quaternion, self._back)
+
+    @property
+    def body_quaternion(self) -> Array:
+        """The quaternion of the body whose frame is at the target."""
+        return self._body_quaternion
 
     def __repr__(self) -> str:
         return f"FrameDistance({self._frame!r}, target={self._pose!r}, length={self._length:g}, weight={self.weight:g})"

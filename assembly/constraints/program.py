@@ -21,6 +21,7 @@ from assembly.constraints.layout import (
     JOINT_TABLE,
     JOINTS,
     KIND,
+    ONE_SIDED,
     PARAMETERS,
     REFERENCE,
     ROW,
@@ -98,7 +99,7 @@ def place_tape(table, pool, tape, q, room):
 
 @kernel(inner=True)
 def tape_rows(table, pool, tape, q, room, residual, jacobian):
-    """All rows of a tape; a value or a slope that is not finite is an infinite violation."""
+    """All rows of a tape; a value or a slope that is not finite is an infinite violation, of one side too."""
     inputs, outputs, work = room
     place_tape(table, pool, tape, q, inputs)
     run_tape(table, pool, table[tape + TAPE_FIRST], inputs, work, outputs)
@@ -108,9 +109,8 @@ def tape_rows(table, pool, tape, q, room, residual, jacobian):
     size = pool[SCALE]
     for v in range(m):
         r = table[tape + TAPE_ROW_AT] + v
-        residual[r] = outputs[v] * each
-        if not math.isfinite(outputs[v]):
-            residual[r] = math.inf
+        nowhere = -math.inf if table[table[ROW_TABLE] + ROW * r + ONE_SIDED] == 1 else math.inf
+        residual[r] = outputs[v] * each if math.isfinite(outputs[v]) else nowhere
         for b in range(count):
             at = m + 6 * (count * v + b)
             column = 6 * b if b < 2 else EXTRA_COLUMN + 6 * (b - 2)
@@ -118,7 +118,7 @@ def tape_rows(table, pool, tape, q, room, residual, jacobian):
                 jacobian[r, column + i] = outputs[at + i] * each * size
                 jacobian[r, column + 3 + i] = outputs[at + 3 + i] * each
                 if not (math.isfinite(outputs[at + i]) and math.isfinite(outputs[at + 3 + i])):
-                    residual[r] = math.inf
+                    residual[r] = nowhere
 
 
 @kernel(inner=True)

@@ -31,9 +31,12 @@ COINCIDENT = 1e-12
 def checked_weights(value: ArrayLike | None, shape: tuple[int, ...]) -> Array:
     """Positive weights of the given shape, read-only; ones where none are given."""
     weights = np.ones(shape) if value is None else real_array("weights", value, shape)
-    if (weights <= 0.0).any():
-        where = tuple(int(k) for k in np.argwhere(weights <= 0.0)[0])
-        raise InputError(f"weights[{', '.join(map(str, where))}] is {weights[where]:g}; expected positive weights")
+    # Sums of products with points and with each other are to be finite, and not nothing.
+    outside = ~((weights >= 1e-100) & (weights <= 1e100))
+    if outside.any():
+        where = tuple(int(k) for k in np.argwhere(outside)[0])
+        wanted = "positive weights" if weights[where] <= 0.0 else "weights from 1e-100 to 1e+100"
+        raise InputError(f"weights[{', '.join(map(str, where))}] is {weights[where]:g}; expected {wanted}")
     weights.flags.writeable = False
     return weights
 
@@ -48,7 +51,10 @@ def checked_name(name: str | None) -> str | None:
 def parameters(name: str, value: ArrayLike) -> Array:
     """Parameters as doubles of any shape; not yet checked against the domain."""
     try:
-        return np.asarray(value, dtype=np.float64)
+        came = np.asarray(value)
+        if came.dtype.kind not in "iuf":
+            raise TypeError
+        return came.astype(np.float64, copy=False)
     except (TypeError, ValueError):
         raise InputError(f"{name} is {value!r}; expected real numbers") from None
 

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.errors import InputError, number
+from assembly.errors import InputError, items, number
 from assembly.geometry.curve import NurbsCurve
 from assembly.geometry.curve_packing import signed_area
 from assembly.geometry.trim_table import build
@@ -118,7 +118,7 @@ class Loop:
         period: Sequence[float] | None,
         name: str,
     ) -> None:
-        parts = [curves] if isinstance(curves, NurbsCurve) else list(curves)
+        parts = [curves] if isinstance(curves, NurbsCurve) else items(name, curves, "one NurbsCurve or several")
         if not parts:
             raise InputError(f"{name} is empty; expected at least one curve")
         for k, curve in enumerate(parts):

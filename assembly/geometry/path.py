@@ -202,7 +202,7 @@ class Path:
         across -= across @ tangent * tangent
         across /= np.linalg.norm(across)
         # An exact quarter turn must not split for its rounding.
-        count = ceil(angle / (0.5 * pi) - 1e-9)
+        count = max(1, ceil(angle / (0.5 * pi) - 1e-9))
         step = angle / count
         start, pieces = self.end, []
         for _ in range(count):

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.errors import InputError, checked_color, vector
+from assembly.errors import InputError, KnownSettings, checked_color, vector
 from assembly.geometry.face import Face
 from assembly.geometry.surface import NurbsSurface
 from assembly.kinematics.pose import Pose, direction
@@ -57,7 +57,7 @@ class BodyFace:
         return f"{self.body.name}.face({self.name!r})"
 
 
-class Body:
+class Body(KnownSettings):
     """A rigid body. Its pose may be set anew; its name, its faces and whether it is fixed are for life.
 
     Parameters

@@ -7,11 +7,11 @@ A piece lies in the hull of its Bezier points, so that with a unit n any
 proves. A few points of a curve come first, in the plane against a polygon inside the obstacle: x is inside where it is
 left of every edge of a closed polygon of its vertices, whatever their order. Then boxes and fixed directions, which
 tell most of the others apart, then a direction by GJK; what nothing parts is halved by de Casteljau's algorithm, and
-ends of halves are points of the curve: one within the clearance is an answer too. A piece shorter than the tolerance
-stays undecided, which counts as near.
+ends of halves are points of the curve: one within the clearance is an answer too. A piece shorter than the tolerance,
+or than its rounding, of which halves are no shorter, stays undecided, which counts as near.
 
-Halving is n sums, each off by half a unit: 40 depths of it are off by 20 n units 2^-52 of the largest number, of both
-X and w where there are weights, which (64 n + 64) pays for.
+Halving is n sums, each off by half a unit: 50 depths of it, by which no piece is longer than its rounding, are off by
+25 n units 2^-52 of the largest number, of both X and w where there are weights, which (64 n + 64) pays for.
 
 Hulls are a tuple: where the vertices of each begin and how many, the vertices, boxes, directions, the supports along
 them, polygons inside.
@@ -31,6 +31,7 @@ from assembly.proximity.gjk import INSIDE, OVERLAP, ROOM, WEIGHTS, gjk, support_
 
 # Of a pair: proven apart, a point within the clearance, open at the tolerance.
 APART, NEAR, OPEN = 0, 1, 2
+# Pieces that wait at once.
 DEPTH = 40
 # Points of a curve that are looked at first, and pieces that are parted by fixed directions alone.
 _LOOKS, _PIECES = 15, 4
@@ -214,7 +215,8 @@ def piece_is_near(full, stack, degree, rational, points, hulls, j, clearance, to
         for i in range(1, degree + 1):
             d = (points[3 * i] - points[0], points[3 * i + 1] - points[1], points[3 * i + 2] - points[2])
             extent = max(extent, dot(d, d))
-        if extent <= tolerance * tolerance or top + 1 >= DEPTH:
+        shortest = max(tolerance, off)
+        if extent <= shortest * shortest or top + 1 >= DEPTH:
             return OPEN
         # The first half below, the second on top.
         p = o + size

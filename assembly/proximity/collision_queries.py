@@ -34,7 +34,8 @@ def collisions(
     clearance : float
         Zero or positive; zero asks whether they meet.
     tolerance : float
-        Positive. Pieces of a curve that are shorter and not proven apart count as near.
+        Positive. Pieces of a curve that are shorter, or than 64 (degree + 1) 2^-52 of the largest coordinate, and not
+        proven apart count as near.
 
     Returns
     -------

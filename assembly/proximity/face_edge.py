@@ -229,7 +229,7 @@ def face_frame(parts, rates, residual, flags, fold):
         (residual[0], residual[1], residual[2], 0.0),
         flags[0],
         flags[2],
-        True,
+        flags[1] or fold > -LEVEL,
         fold,
     )
 
@@ -261,6 +261,6 @@ def turned_frame(rotation, shift, parts, rates, residual, flags, fold):
         (residual[0], -residual[1], residual[2], 0.0),
         flags[0],
         flags[2],
-        True,
+        flags[1] or fold > -LEVEL,
         fold,
     )

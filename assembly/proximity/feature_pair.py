@@ -97,7 +97,7 @@ def solve_features(table, pool, kind_f, f, kind_g, g, rotation, shift, x, n, siz
         residual : lengths, then tilts
         regular : whether both have a tangent here
         isolated : whether the pair is no part of a continuum
-        proper : whether two surfaces do not cross here (true for other pairs)
+        proper : whether two surfaces do not cross here, and an edge over a face is nearest here (true of other pairs)
         fold : determinant over squared norm of the equations' matrix: zero where a pair ceases to be isolated
     """
     if kind_f == FACE and kind_g == FACE:

@@ -72,6 +72,7 @@ from assembly.solve.settings import (
     ITERATION_LIMIT,
     ITERATIONS,
     LAST_LOOK,
+    MOST_ROUNDING,
     OBJECTIVE,
     OUT_OF_TIME,
     PENALTY,
@@ -143,7 +144,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
 
     reach = max(reach, turned(table, pool, here[1]))
     # What rounding of the user's coordinates, and of angles over many turns, alone can violate.
-    feasible = max(settings[FEASIBILITY], ROUNDING * reach)
+    feasible = max(settings[FEASIBILITY], min(ROUNDING * reach, MOST_ROUNDING))
     tick = settings[TICK] == 1.0
     # A tick goes on with the last one, if that one's time was spent.
     begin, done, looks = begin_tick(table, settings, results, memory)

@@ -71,7 +71,7 @@ def start_contacts(table, pool, q, contacts, free, lengths):
         i = table[row + BODY_F]
         j = table[row + BODY_G]
         if table[row + SHELL_F] >= 0:
-            if not search_row(table, pool, row, q, contacts, k):
+            if not search_row(table, pool, row, q, contacts, k, True):
                 return k
             continue
         turn, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))

@@ -232,7 +232,7 @@ class Mobility:
             lines += [f"  redundant: {_listed(names)}" for names in self.redundant_sets]
         else:
             lines.append(f"  the pose violates constraints by {self.feasibility:.3g}; counts are those of this pose")
-        if not self.feasibility <= HELD * self.size:
+        if not self._worst <= HELD:
             lines += [f"  conflicting: {_listed(names)}" for names in self.conflicting_sets]
         for k, motion in enumerate(self.free_motions[:MOST_MOTIONS]):
             for body, twist, place in zip(self._scene.bodies, motion, self.q[:, :3], strict=True):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
+from assembly.constraints.contact_rows import ends_unseen
 from assembly.constraints.layout import ROWS, WATCH
 from assembly.constraints.program import evaluate
 from assembly.proximity.extremal import BEND
@@ -41,7 +42,7 @@ def way_back(program, here, trial, rows, weights, mu, softness, share, enough, s
     carry(table, pool, bases, loose, here, trial, step, share)
     if table[WATCH] >= 0 and is_too_far(table, pool, loose[5], trial):
         return softness, math.inf
-    if evaluate(table, pool, loose[4], BEND, loose, room, trial) >= 0:
+    if evaluate(table, pool, loose[4], BEND, loose, room, trial) >= 0 or (tick and ends_unseen(table, here, trial)):
         return softness, math.inf
     return softness, off_rows(table, loose, one_sided, trial, tick)
 

@@ -7,7 +7,7 @@ shortened.
 from __future__ import annotations
 
 from assembly._kernel import kernel
-from assembly.constraints.contact_rows import MAY_GO, hold_all, is_guard, may_go
+from assembly.constraints.contact_rows import MAY_GO, ends_unseen, hold_all, is_guard, may_go
 from assembly.constraints.layout import MOVING, WATCH
 from assembly.constraints.program import evaluate
 from assembly.constraints.terms import objective
@@ -113,6 +113,11 @@ def search(program, tips, here, trial, rows, y, base, value, restoring, leave, m
             alpha *= 0.5
             continue
         lost = evaluate(table, pool, loose[4], BEND, loose, room, trial)
+        if not lets_go and lost < 0 and ends_unseen(table, here, trial):
+            # Nor has a tick a last look, which would tell of it.
+            bends = 2
+            alpha *= 0.5
+            continue
         if lost < 0:
             there = merit(trial[3], one_sided, rows, y, mu)
             if not restoring:

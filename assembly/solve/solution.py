@@ -312,11 +312,9 @@ class Solution:
         culprit = int(self._result(CULPRIT))
         if self.status is Status.CONTACT_LOST and culprit >= 0:
             return f"{self._packed.pair_name(culprit)!r}: {text}"
-        tolerance = 1e-9 * self._scene.scale
-        held_off = sorted(
-            (name for name, value in self.violations.items() if not value <= tolerance),
-            key=lambda name: -self.violations[name],
-        )
+        spans = zip(self._scene.constraints, self._packed.spans, strict=True)
+        off = [one.name for one, rows in spans if not self.violations[one.name] <= 1e-9 * self._unit_of(rows)]
+        held_off = sorted(off, key=lambda name: -self.violations[name])
         if held_off and not self.success:
             named = ", ".join(f"{name!r} ({self.violations[name]:.3g})" for name in held_off)
             text += f"; violated: {named}"
@@ -326,6 +324,10 @@ class Solution:
         if self._result(IMPROPER) > 0.0:
             text += "; at a contact the surfaces cross beside the point (indefinite relative curvature)"
         return text
+
+    def _unit_of(self, rows: NDArray[np.int_]) -> float:
+        """What violations of a constraint's rows are measured by: the scene's size, if one of them is a length."""
+        return self._scene.scale if self._packed.lengths[rows].any() else 1.0
 
     def iteration_table(self) -> str:
         """The history as text, a line an iteration."""

@@ -35,6 +35,8 @@ _STATUSES = tuple(Status)
 class _Value(Constraint):
     """Where a row that is kept reads its value."""
 
+    value: float
+
     def __init__(self, value: float) -> None:
         self.value = value
 

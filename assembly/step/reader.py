@@ -83,7 +83,7 @@ class _Shape:
 
 def checked_unit(unit: str) -> float:
     """Millimeters in a unit."""
-    if unit not in UNITS:
+    if not isinstance(unit, str) or unit not in UNITS:
         raise InputError(f"unit is {unit!r}; expected one of {', '.join(map(repr, UNITS))}")
     return UNITS[unit]
 

@@ -77,6 +77,19 @@ def test_touching_and_inside():
     assert collisions(np.array([inside]), []).shape == (1, 0)
 
 
+@pytest.mark.parametrize(("offset", "size", "tolerance"), [(1e8, 1.0, 1e-10), (0.0, 1e9, 1e-10), (1e5, 1e2, 1e-12)])
+@pytest.mark.parametrize("seed", range(3))
+def test_tolerances_below_the_rounding_of_coordinates(offset, size, tolerance, seed):
+    # Pieces as short as their rounding have halves that are no shorter.
+    rng = np.random.default_rng(seed)
+    curve = size * rng.normal(size=(5, 2)) + offset
+    on = asm.NurbsCurve.bezier(curve).evaluate(0.37)
+    touching = [on[None], np.array([on, on + size * rng.normal(size=2)])]
+    away = curve.max(axis=0) + 1e-3 * size
+    near = collisions(curve[None], [*touching, away[None]], 0.0, tolerance)
+    assert near.tolist() == [[True, True, False]]
+
+
 def test_bad_input():
     curves = np.zeros((3, 4, 2)) + np.arange(4)[:, None]
     square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
