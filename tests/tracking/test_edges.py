@@ -30,7 +30,7 @@ def drawn(rng, ticks, order):
     return scene.tracker(hold), [begin + (target - begin) * (k + 1) / ticks for k in range(ticks)]
 
 
-# Plates are thinner than the steps of a fast hand: of these hands 12 to 14 of 40 drew one plate through the other.
+# Of these hands 13 to 27 of 40 drew one plate through the other, told FOLLOWED.
 @pytest.mark.parametrize("ticks", [15, 100])
 @pytest.mark.parametrize("order", [1, -1])
 def test_plates_do_not_go_through_each_other(ticks, order):
