@@ -50,8 +50,10 @@ def test_boxes_that_are_drawn_together_come_to_rest(sides, seed, most):
 
 def test_a_contact_that_ends_where_it_touches_is_not_looked_for_forever():
     # A corner just over the border of a face, to the last bit: there these solves had arrived, and each look found the
-    # contact that evaluating its row had lost, until their steps were used up.
+    # contact that evaluating its row had lost, until their steps were used up. Rounding decides which solves get there:
+    # of these 64 it may take a few, as any of them.
     scenes = [([BOX] * 4, 5, 15), ([BOX] * 3, 5, 7), ([BOX, PLATE, BOX], 5, 8), ([BOX, PLATE, BOX], 6, 6)]
+    scenes += [(sides, seed, k) for sides in ([BOX] * 3, [BOX, PLATE, BOX]) for seed in (5, 6) for k in range(10, 17)]
     solved = 0
     for sides, seed, number in scenes:
         scene = drawn_together(np.random.default_rng([seed, number]), sides)
@@ -61,7 +63,7 @@ def test_a_contact_that_ends_where_it_touches_is_not_looked_for_forever():
             solved += solution.success
             assert not solution.success or least(solution.q, sides) > -1e-11
             solution = scene.solve(solution)
-    assert solved >= 6
+    assert solved >= 58
 
 
 def test_a_solve_that_began_again_tells_of_all_its_steps():
