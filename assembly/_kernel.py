@@ -272,7 +272,7 @@ class _OncePerSignature(dict[Any, Any]):
 def _trust_indices() -> None:
     """Have kernels of this package take an index into an array as it stands; it is never negative.
 
-    Numba lets one count from the end. To look whether it does takes inner loops as long as their work, and a tenth of
+    Numba lets one count from the end. To look whether it does takes a fifth of a large factorization, and a tenth of
     what there is to compile. With `NUMBA_BOUNDSCHECK=1` a negative index is an error, as is one past the end.
     """
     from numba.np import arrayobj

@@ -41,8 +41,6 @@ from assembly.proximity.velocity import GAP, RATES, RECORD, gradient_row, store_
 # A clearance's contact of solids that are hardly in each other may be given up where its pair ends: then MAY_GO - k
 # stands for what it holds on to, k. One that ends where they touch, which rounding decides, is as good as open.
 MAY_GO, HARDLY, TOUCHING = -1.0, 1e-3, 1e-9
-# Where solids are in each other by no more, the next look lists what is to part them.
-SLIGHTLY = 1e-5
 # A clearance's row that is open by more than the last needs its pair again after motions of this part of its gap, or of
 # this part of how far bodies may go where contacts may be born: from farther away Newton's method may find another one.
 UNSEEN, ASTRAY, FAR = 0.5, 0.15, 1e-5
@@ -82,36 +80,6 @@ def restart_contact(table, pool, row, q, records, k):
     if status == CONVERGED or status == SINGULAR:
         status, x, _distance = track_contact(table, pool, row, q, x, math.inf, records, k)
     return status, x
-
-
-@kernel(inner=True)
-def went(before, after, body):
-    """How far a point of a body went at most, in sizes of the scene, which no body is larger than."""
-    shift = 0.0
-    same = 0.0
-    other = 0.0
-    for i in range(3):
-        shift += (after[body, i] - before[body, i]) ** 2
-    for i in range(3, 7):
-        same += (after[body, i] - before[body, i]) ** 2
-        other += (after[body, i] + before[body, i]) ** 2
-    return math.sqrt(shift) + 2.0 * math.sqrt(min(same, other))
-
-
-@kernel(inner=True)
-def ends_unseen(table, before, after):
-    """Whether a clearance's contact of solids ends along a step that goes farther than it is open.
-
-    What takes its place, where features meet, is not listed yet, and was no nearer: over such a step it could pass
-    through, and be found at the far side, or nowhere.
-    """
-    for r in range(table[FIRST_GUARD], table[FIRST_GUARD] + table[GUARDS]):
-        if math.isnan(after[1][r, 0]) and not math.isnan(before[1][r, 0]) and is_of_solids(table, r):
-            row = table[ROW_TABLE] + ROW * r
-            far = went(before[0], after[0], table[row + BODY_F]) + went(before[0], after[0], table[row + BODY_G])
-            if far > max(before[3][r], SLIGHTLY):
-                return True
-    return False
 
 
 @kernel(inner=True)
@@ -232,7 +200,7 @@ def solids_row(table, pool, r, start, patience, point):
         far = abs(start[r, PAIR_GAP]) > HARDLY
         if not (far or table[row + ONE_SIDED] == 1 or patience == math.inf):
             return False
-        # Past an edge's nearest point solids may be deep in each other: a step that leads there is too long.
+        # Where an edge is farthest, solids may be deep in each other: a step that leads there is too long.
         lost = status != CONVERGED and status != SINGULAR
         if not search_row(table, pool, row, q, tracked, r, lost or patience == math.inf):
             return False

@@ -74,14 +74,20 @@ def mover(table, watch, p, q):
 
 
 @kernel(inline=True)
-def turned_by(memory, o, e):
-    """|e - e'|, 2 sin(a / 4) of the angle a by which a pair turned since its last look, in the memory at o."""
+def apart(e, f):
+    """|e - f| of two quaternions with their best signs, 2 sin(a / 4) of the angle a between the turns."""
     square = 0.0
     other = 0.0
     for k in range(4):
-        square += (e[k] - memory[o + TURN + k]) * (e[k] - memory[o + TURN + k])
-        other += (e[k] + memory[o + TURN + k]) * (e[k] + memory[o + TURN + k])
+        square += (e[k] - f[k]) * (e[k] - f[k])
+        other += (e[k] + f[k]) * (e[k] + f[k])
     return math.sqrt(min(square, other))
+
+
+@kernel(inline=True)
+def turned_by(memory, o, e):
+    """The same of the turn e of a pair and that of its last look, in the memory at o."""
+    return apart(e, (memory[o + TURN], memory[o + TURN + 1], memory[o + TURN + 2], memory[o + TURN + 3]))
 
 
 @kernel(inline=True)
@@ -162,6 +168,17 @@ def part_used(table, pool, watch, memory, p, q):
     if memory[o + SURE] == 0.0:
         memory[o + DOUBT] = part / STILL
     return part
+
+
+@kernel(inner=True)
+def went(table, pool, watch, p, before, after):
+    """How far a point of one body of pair p went at most, seen from the other one, between two poses of a scene."""
+    _side, tree, e, turn, shift = mover(table, watch, p, before)
+    _side, _tree, f, turned, shifted = mover(table, watch, p, after)
+    root = table[tree + NODE_POOL]
+    center = three(pool, root + CENTER)
+    d = sub(add(matvec(turned, center), shifted), add(matvec(turn, center), shift))
+    return math.sqrt(dot(d, d)) + 2.0 * pool[root + RADIUS] * apart(e, f)
 
 
 @kernel(inner=True)

@@ -10,8 +10,9 @@ tell most of the others apart, then a direction by GJK; what nothing parts is ha
 ends of halves are points of the curve: one within the clearance is an answer too. A piece shorter than the tolerance,
 or than its rounding, of which halves are no shorter, stays undecided, which counts as near.
 
-Halving is n sums, each off by half a unit: 50 depths of it, by which no piece is longer than its rounding, are off by
-25 n units 2^-52 of the largest number, of both X and w where there are weights, which (64 n + 64) pays for.
+Halving is n sums, each off by half a unit: 50 depths of it, by which no piece of a polynomial is longer than its
+rounding, are off by 25 n units 2^-52 of the largest number, of both X and w where there are weights, and 128 depths by
+what (64 n + 64) pays for.
 
 Hulls are a tuple: where the vertices of each begin and how many, the vertices, boxes, directions, the supports along
 them, polygons inside.

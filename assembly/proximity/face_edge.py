@@ -61,7 +61,8 @@ def solve_on_face(table, pool, face, kind, other, rotation, shift, x, size, turn
     (u, v, t, s), and
 
     (n, tx, ty, p, q, beta), (E^-1, A, tangent of the edge, k, |P C_t|, curvature unit), residual,
-    (regular, whether the other feature counts as a point, isolated), det H / |H|^2
+    (regular, whether the other feature counts as a point, isolated, whether the edge is nearest here; true of a point),
+    det H / |H|^2
     """
     tolerance = 4e-14 * size
     previous = 1e300
@@ -190,13 +191,15 @@ def solve_on_face(table, pool, face, kind, other, rotation, shift, x, size, turn
     scope = unit * (1.0 + abs(beta) * unit)
     _i, isolated = inverse(h, scope, RANK)
     fold = fold_of(h, scope)
+    # Past a center of curvature the foot is no nearest point of the face; nor is the edge's where it bends away.
+    nearest = point or (fold < LEVEL and k11 + k22 > 0.0 and k11 * k22 > k12 * k12)
     return (
         status,
         x,
         (n, tx, ty, p, q, beta),
         (e, a, (c0, c1), k, speed, unit),
         (r0, r1, tilt),
-        (regular and not (steep and not point), point, isolated),
+        (regular and not (steep and not point), point, isolated, nearest),
         # Positive, as of two faces, where the pair is closest or deepest.
         fold if point else -fold,
     )
@@ -229,7 +232,7 @@ def face_frame(parts, rates, residual, flags, fold):
         (residual[0], residual[1], residual[2], 0.0),
         flags[0],
         flags[2],
-        flags[1] or fold > -LEVEL,
+        flags[3],
         fold,
     )
 
@@ -261,6 +264,6 @@ def turned_frame(rotation, shift, parts, rates, residual, flags, fold):
         (residual[0], -residual[1], residual[2], 0.0),
         flags[0],
         flags[2],
-        flags[1] or fold > -LEVEL,
+        flags[3],
         fold,
     )

@@ -8,6 +8,7 @@ import numpy as np
 
 from assembly._address import call_address
 from assembly._kernel import kernel
+from assembly.constraints.contact_rows import is_of_solids
 from assembly.constraints.layout import (
     BODY_F,
     BODY_G,
@@ -25,7 +26,7 @@ from assembly.constraints.layout import (
 )
 from assembly.geometry.spline import surface_point
 from assembly.geometry.vec import dot, sub
-from assembly.proximity.allowances import STILL, largest_part, part_used
+from assembly.proximity.allowances import STILL, largest_part, part_used, went
 from assembly.proximity.solid_contact import FOLD, SLACK, TRACK
 from assembly.proximity.watch import USED
 from assembly.proximity.watch_memory import (
@@ -51,6 +52,9 @@ from assembly.proximity.watch_memory import (
     memory_places,
 )
 from assembly.solve.rows import move
+
+# Where solids are in each other by no more, in sizes of the scene, the next look lists what is to part them.
+SLIGHTLY = 1e-5
 
 
 @kernel(inner=True)
@@ -214,3 +218,21 @@ def allowed_share(table, pool, memory, here, trial, step, share):
 def is_too_far(table, pool, memory, point):
     """Whether the poses of a point are farther than the watch allows."""
     return largest_part(table, pool, table[WATCH], memory, point[0])[1] > 1.0
+
+
+@kernel(inner=True)
+def ends_unseen(table, pool, memory, before, after):
+    """Whether a clearance's contact of solids ends along a step that goes farther than it is open.
+
+    What takes its place, where features meet, is not listed yet, and was no nearer: over such a step it could pass
+    through, and be found at the far side, or nowhere.
+    """
+    watch = table[WATCH]
+    places = memory_places(table, watch)[1]
+    for k in range(table[GUARDS]):
+        r = table[FIRST_GUARD] + k
+        p = np.int64(memory[places + PLACE_MEMORY * k])
+        if p >= 0 and math.isnan(after[1][r, 0]) and not math.isnan(before[1][r, 0]) and is_of_solids(table, r):
+            if went(table, pool, watch, p, before[0], after[0]) > max(before[3][r], SLIGHTLY):
+                return True
+    return False

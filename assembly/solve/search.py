@@ -7,7 +7,7 @@ shortened.
 from __future__ import annotations
 
 from assembly._kernel import kernel
-from assembly.constraints.contact_rows import MAY_GO, ends_unseen, hold_all, is_guard, may_go
+from assembly.constraints.contact_rows import MAY_GO, hold_all, is_guard, may_go
 from assembly.constraints.layout import MOVING, WATCH
 from assembly.constraints.program import evaluate
 from assembly.constraints.terms import objective
@@ -15,7 +15,7 @@ from assembly.proximity.extremal import BEND
 from assembly.proximity.solid_contact import STAYS
 from assembly.solve.carry import carry
 from assembly.solve.dexterity import add_dexterities
-from assembly.solve.guards import is_too_far
+from assembly.solve.guards import ends_unseen, is_too_far
 from assembly.solve.linear import factorize_shifted, forward_step, solve_step
 from assembly.solve.rows import add_transposed, merit, move
 
@@ -113,8 +113,8 @@ def search(program, tips, here, trial, rows, y, base, value, restoring, leave, m
             alpha *= 0.5
             continue
         lost = evaluate(table, pool, loose[4], BEND, loose, room, trial)
-        if not lets_go and lost < 0 and ends_unseen(table, here, trial):
-            # Nor has a tick a last look, which would tell of it.
+        if table[WATCH] >= 0 and not lets_go and lost < 0 and ends_unseen(table, pool, loose[5], here, trial):
+            # A tick has no last look, which would tell of what it led through.
             bends = 2
             alpha *= 0.5
             continue

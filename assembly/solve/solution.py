@@ -209,8 +209,13 @@ class Solution:
             from assembly.solve.lost import violations
 
             return violations(self)
+        return self._largest(1.0)
+
+    def _largest(self, unit: float) -> dict[str, float]:
+        """The largest violation of every constraint's rows, lengths in a unit."""
         packed = self._packed
         each = np.where(packed.one_sided, np.maximum(-self._residuals, 0.0), np.abs(self._residuals))
+        each = np.where(packed.lengths, each / unit, each)
         return {
             constraint.name: float(each[rows].max(initial=0.0))
             for constraint, rows in zip(self._scene.constraints, packed.spans, strict=True)
@@ -312,9 +317,10 @@ class Solution:
         culprit = int(self._result(CULPRIT))
         if self.status is Status.CONTACT_LOST and culprit >= 0:
             return f"{self._packed.pair_name(culprit)!r}: {text}"
-        spans = zip(self._scene.constraints, self._packed.spans, strict=True)
-        off = [one.name for one, rows in spans if not self.violations[one.name] <= 1e-9 * self._unit_of(rows)]
-        held_off = sorted(off, key=lambda name: -self.violations[name])
+        scale = self._scene.scale
+        # Of a contact that was lost there are lengths alone.
+        parts = {k: v / scale for k, v in self.violations.items()} if self._is_lost else self._largest(scale)
+        held_off = sorted((name for name, part in parts.items() if not part <= 1e-9), key=lambda name: -parts[name])
         if held_off and not self.success:
             named = ", ".join(f"{name!r} ({self.violations[name]:.3g})" for name in held_off)
             text += f"; violated: {named}"
@@ -324,10 +330,6 @@ class Solution:
         if self._result(IMPROPER) > 0.0:
             text += "; at a contact the surfaces cross beside the point (indefinite relative curvature)"
         return text
-
-    def _unit_of(self, rows: NDArray[np.int_]) -> float:
-        """What violations of a constraint's rows are measured by: the scene's size, if one of them is a length."""
-        return self._scene.scale if self._packed.lengths[rows].any() else 1.0
 
     def iteration_table(self) -> str:
         """The history as text, a line an iteration."""

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 import assembly as asm
 from assembly.constraints.layout import MOVING, WATCH
 from assembly.proximity import watch
-from assembly.proximity.allowances import part_used
+from assembly.proximity.allowances import part_used, went
 from assembly.proximity.borders import feature_kind
 from assembly.proximity.bounding_tree import ELEMENT, ELEMENT_FEATURE, ELEMENT_POOL
 from assembly.proximity.holding import FEATURES, NOTHING, POINT
@@ -31,6 +31,7 @@ from assembly.proximity.watch_memory import (
     PAIR_SURFACE_G,
     PAIR_TABLE,
     PAIRS,
+    SMALLER,
     SURE,
     TREE_F,
     TREE_G,
@@ -165,3 +166,44 @@ def test_a_point_that_stays_on_an_edge_is_no_root():
                 assert is_known(table, pool, looked_into, e[0], d[0], roots, 1)[2] == known
             seen += 1
     assert seen > 4
+
+
+def seen(q, body, other, points):
+    """Points of a body in the axes of another one, (n, 3)."""
+    turns = [Rotation.from_quat(q[k, 3:], scalar_first=True) for k in (body, other)]
+    return turns[1].inv().apply(turns[0].apply(points) + q[body, :3] - q[other, :3])
+
+
+def test_no_point_goes_farther_than_is_told():
+    rng = np.random.default_rng(2)
+    # Shapes far from their bodies' origins: a small turn moves them far.
+    surfaces = [asm.shapes.torus(r, 0.3).transformed(translation=(40.0, 5.0 * r, -20.0)) for r in (1.0, 2.0)]
+    bodies = [asm.Body(f"ring {k}", surface, (3.0 * k, 0.0, 0.0)) for k, surface in enumerate(surfaces)]
+    scene = asm.Assembly(bodies)
+    scene.constrain(asm.Clearance())
+    packed = scene.packed()
+    table, pool, at = packed.table, packed.pool, packed.table[WATCH]
+    side = int(table[table[at + PAIR_TABLE] + SMALLER])
+    (u0, u1), (v0, v1) = surfaces[side].domain
+    points = surfaces[side].evaluate(*rng.uniform((u0, v0), (u1, v1), (400, 2)).T) / packed.scale
+    tight = 0.0
+    for size in (1e-9, 1e-6, 1e-3, 0.1, 1.0):
+        for _ in range(20):
+            before, after = scene.q.copy(), scene.q.copy()
+            for q in (before, after):
+                q[:, :3] /= packed.scale
+            after[:, :3] += size * rng.normal(size=(2, 3))
+            for k in range(2):
+                turn = Rotation.from_rotvec(size * rng.normal(size=3))
+                after[k, 3:] = rng.choice([-1.0, 1.0]) * turn.as_quat(scalar_first=True)
+            bound = went(table, pool, at, 0, before, after)
+            moved = seen(after, side, 1 - side, points) - seen(before, side, 1 - side, points)
+            most = np.linalg.norm(moved, axis=1).max()
+            # Rounding of places some sizes from the origin.
+            assert most <= bound + 1e-14
+            tight = max(tight, most / bound)
+    assert tight > 0.5
+    # Both together go nowhere, seen from each other.
+    q = scene.q.copy()
+    q[:, :3] += 1.0
+    assert went(table, pool, at, 0, scene.q.copy(), q) <= 1e-14

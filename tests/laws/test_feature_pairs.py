@@ -20,14 +20,18 @@ from assembly.proximity import (
     curve_gap_hessian,
     extremal_curve_pair,
 )
-from assembly.proximity.feature_query import GAP, NORMAL
+from assembly.proximity.feature_query import GAP, NORMAL, POINT_F, POINT_G, PROPER
 from assembly.proximity.shell import EDGE, EDGE_POINT, FACE, FACE_POINT, VERTEX
 from tests.laws.curve_witness import CurveStack, SurfaceCurve, errata_jacobian
 from tests.laws.feature_scenes import Feature, Packed, place, plane_curve, random_feature, space_curve
 from tests.laws.scenes import dome, inside, quadratic, random_gap
-from tests.laws.witness import OFFSETS, SLOPE, Stack, moved, product
+from tests.laws.witness import OFFSETS, SLOPE, Stack, moved, product, rotated
 
 STEP = 2e-4
+# Around a point, all ways.
+RING = np.stack([np.cos(np.arange(16) * np.pi / 8.0), np.sin(np.arange(16) * np.pi / 8.0)], axis=1)
+# The points of a pair in what `find_features` writes.
+POINT = (slice(POINT_F, POINT_F + 3), slice(POINT_G, POINT_G + 3))
 # Surface, and what the curve lies on.
 CURVES = (
     ("dome", None),
@@ -325,6 +329,36 @@ def test_swapping_the_bodies_swaps_everything(cases):
         assert worst(hessian_2[np.ix_(twists, twists)][None], hessian[None]) < 1e-12
         scale = case.speed[:, None]
         assert worst((rates_2[parameters][:, poses] * scale)[None], (rates * scale)[None]) < 1e-12
+
+
+def test_an_edge_is_proper_where_the_gap_grows_along_it():
+    # The gap of points of the edge beside the pair, each found again, against what the pair says of itself.
+    step, told = 1e-4, []
+    for kinds in ((FACE, EDGE), (EDGE, FACE)):
+        for case in random_cases(*kinds, 80):
+            f, g = (Feature(EDGE_POINT, s.face, s.curve) if s.kind == EDGE else s for s in (case.f, case.g))
+            column = 2 * kinds.index(EDGE)
+            gaps = []
+            for side in (-1.0, 1.0):
+                x = case.x.copy()
+                x[column] += side * step / case.speed[column]
+                status, out = Packed(f, g).solve(case.q, x, case.n)
+                gaps.append(out[GAP] if status == "CONVERGED" else np.nan)
+            bend = (gaps[0] - 2.0 * case.gap + gaps[1]) / step**2
+            status, out = case.packed.solve(case.q, case.x, case.n)
+            # Points of the face around the foot, seen from the edge's point.
+            k = kinds.index(FACE)
+            at = case.x[2 * k : 2 * k + 2] + step / case.speed[2 * k : 2 * k + 2] * RING
+            pose = case.q[7 * k : 7 * k + 7]
+            feet = rotated(np.tile(pose, (len(at), 1)), (f, g)[k].face.surface.evaluate(*at.T)) + pose[:3]
+            farther = np.linalg.norm(feet - out[POINT[1 - k]], axis=1) - abs(case.gap)
+            # Differences of second order say nothing of what is flat: they are off by some 1e-4.
+            if abs(bend) > 1e-2 and np.abs(farther).min() > 1e-2 * step**2:
+                proper = bend > 0.0 and (farther > 0.0).all()
+                assert (out[PROPER] == 1.0) == proper
+                told.append(proper)
+    # Of 160: what is left out is flat, next to a center of curvature, or has no foot beside it.
+    assert len(told) > 140 and sum(told) > 40 and len(told) - sum(told) > 40
 
 
 def test_rigid_motion_of_both_bodies_changes_nothing(cases):

@@ -242,3 +242,39 @@ def test_a_stuck_solve_says_that_nothing_contradicts():
             assert "; conflicting: none, all hold from another start" in solution.message
             return
     raise AssertionError("none of the starts got stuck")
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
+def test_messages_do_not_depend_on_the_unit_of_length(unit):
+    ground, crank = asm.Body("g", fixed=True), asm.Body("c", position=(unit, 0.0, 0.0))
+    scene = asm.Assembly([ground, crank])
+    axes = [body.frame((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)) for body in (ground, crank)]
+    # Two angles of the same axes that contradict each other by 2e-4 rad.
+    scene.constrain(*(asm.Angle(*axes, 1.0 + 2e-4 * k, f"angle {k}") for k in range(2)))
+    scene.constrain(asm.Distance(ground.point(0, 0, 0), crank.point(0, 0, 0), unit))
+    solution = scene.solve()
+    assert "violated: 'angle 0' (0.0001), 'angle 1' (0.0001); conflicting: 'angle 0', 'angle 1'" in solution.message
+    assert "conflicting: 'angle 0', 'angle 1'" in str(scene.mobility(solution))
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
+def test_an_angle_of_a_joint_that_has_lengths_is_told_in_any_unit(unit):
+    ground, part = asm.Body("g", fixed=True), asm.Body("p", position=(unit, 0.0, 0.0))
+    scene = asm.Assembly([ground, part])
+    turned = ground.frame((0.0, 0.0, 0.0), (2e-4, 0.0, 1.0))
+    scene.constrain(asm.Fixed(ground, part, "one"), asm.Fixed(turned, part, "other"))
+    # Another body makes the scene's size that of the unit.
+    scene.constrain(asm.Distance(ground.point(unit, 0, 0), part.point(0, 0, 0), unit, "far"))
+    solution = scene.solve()
+    assert not solution.success
+    assert "'one' (" in solution.message and "'other' (" in solution.message
+
+
+@pytest.mark.parametrize("pitch", [1e12, 1e16, 1e18])
+def test_a_violation_is_no_rounding_however_large_the_numbers(pitch):
+    ground, nut = asm.Body("ground", fixed=True), asm.Body("nut", position=(0.0, 0.0, 0.3))
+    scene = asm.Assembly([ground, nut])
+    scene.constrain(asm.Screw(ground, nut, pitch, angle=0.5))
+    solution = scene.solve()
+    # A millionth at most; it was half a radian.
+    assert not solution.success or solution.feasibility <= 1e-6
