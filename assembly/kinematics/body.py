@@ -94,7 +94,8 @@ class Body(KnownSettings):
             raise InputError(f"fixed is {fixed!r}; expected True or False")
         self._name = name
         self._fixed = bool(fixed)
-        self._pose = Pose(position, quaternion)  # type: ignore[arg-type]  # checked and converted there
+        # Pose takes what is like an array, which its fields do not say: they are tuples once it is made.
+        self._pose = Pose(position, quaternion)  # type: ignore[arg-type]
         self._faces = self._named(shape)
         self.color = color
 

@@ -9,7 +9,7 @@ from assembly.constraints.layout import ROWS, WATCH
 from assembly.constraints.program import evaluate
 from assembly.proximity.extremal import BEND
 from assembly.solve.carry import carry
-from assembly.solve.guards import ends_unseen, is_too_far
+from assembly.solve.guards import is_too_far
 from assembly.solve.multipliers import toward_rows
 from assembly.solve.rows import move
 from assembly.solve.tangency import off_rows
@@ -39,12 +39,9 @@ def way_back(program, here, trial, rows, weights, mu, softness, share, enough, s
     )
     move(table, here[0], step, share, trial[0])
     carry(table, pool, bases, loose, here, trial, step, share)
-    watched = table[WATCH] >= 0
-    if watched and is_too_far(table, pool, loose[5], trial):
+    if table[WATCH] >= 0 and is_too_far(table, pool, loose[5], trial):
         return softness, math.inf
     if evaluate(table, pool, loose[4], BEND, loose, room, trial) >= 0:
-        return softness, math.inf
-    if watched and tick and ends_unseen(table, pool, loose[5], here, trial):
         return softness, math.inf
     return softness, off_rows(table, loose, one_sided, trial, tick)
 

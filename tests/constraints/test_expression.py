@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import assembly as asm
 from assembly._kernel import kernel
 from assembly.constraints.constraint import Constraint
 from assembly.constraints.expression import Expression
@@ -390,34 +389,6 @@ def test_bad_functions_are_refused(function, text):
     made = function()
     with pytest.raises(InputError, match=text):
         Expression(made, BODIES[: max(made.n_in(), 1) if not made.is_null() else 1])
-
-
-@pytest.mark.parametrize(
-    ("bound", "farthest"),
-    [
-        # Each is defined below x = 1.5 only, and holds up to `farthest`.
-        (lambda q: ca.sqrt(1.5 - q[0]) - 0.1, 1.49),
-        (lambda q: ca.log(1.5 - q[0]) + 3.0, 1.5 - math.exp(-3.0)),
-    ],
-)
-def test_a_one_sided_row_keeps_a_solve_where_it_is_defined(bound, farthest):
-    body = asm.Body("body", position=(1.0, 0.0, 0.0))
-    scene = asm.Assembly([body])
-    scene.constrain(Expression(scalar(bound), [body], unilateral=True))
-    scene.minimize(asm.PointDistance(body.point(0, 0, 0), (5.0, 0.0, 0.0)))
-    solution = scene.solve()
-    assert solution.success
-    np.testing.assert_allclose(solution.q[0, 0], farthest, rtol=0, atol=1e-10)  # the tolerance over the row's slope
-
-
-@pytest.mark.parametrize("unilateral", [False, True])
-def test_a_start_without_a_value_is_not_solved(unilateral):
-    body = asm.Body("body", position=(1.0, 0.0, 0.0))
-    scene = asm.Assembly([body])
-    scene.constrain(Expression(scalar(lambda q: ca.log(-q[0])), [body], unilateral=unilateral))
-    solution = scene.solve()
-    assert not solution.success
-    assert solution.feasibility == inf
 
 
 @pytest.mark.parametrize("value", [3, None, "f", lambda q: q, ca.SX.sym("q", 7)])

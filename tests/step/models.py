@@ -10,6 +10,7 @@ import pytest
 
 pytest.importorskip("OCP", reason='STEP files need OCCT: pip install "assembly[step]"')
 
+# Only where OCCT is there, which the line above asks.
 from assembly.step.occt import occt, parts  # noqa: E402
 
 _NAMES = (
@@ -36,6 +37,7 @@ def _everything():
     return SimpleNamespace(**names)
 
 
+# As OCCT's names are written in the library, `o`, but of a module.
 O = _everything()  # noqa: E741
 
 
