@@ -31,7 +31,8 @@ step is a call over the steps it took. Bodies: cubes standing on one another, a 
 of balls held at distances, moved off and solved again: of a grid even the best order of elimination leaves N log N
 entries, and takes N^1.5 to find them. Facets: two paper clips, linked and touching; all pairs of patches that may hold
 a contact within a quarter of the wire's radius, from call to call bodies move by a fiftieth of it. A descent goes
-through as many pairs on every level where patches are smaller than what is near; the first levels have fewer."""
+through as many pairs on every level where patches are smaller than what is near: time is linear in the logarithm of N
+from there on, and tenfolds add as much. The first levels have fewer pairs."""
 
 Array = NDArray[np.float64]
 Times = list[tuple[float, float]]
@@ -163,13 +164,16 @@ def _facets(quick: bool) -> tuple[list[dict[str, Any]], dict[str, Any]]:
         times.append((n, statistics.median(row[0]["seconds"] for row in rows)))
         counts.append(statistics.median(descents.pairs(q, 0.25 * CLIP_RADIUS) for q in poses))
     few, many = f"{sizes[0]:,}", f"{sizes[-1]:,}"
-    # As logarithms grow.
-    reach = float(np.log(sizes[-1]) / np.log(sizes[0]))
     figures = [
         figure(f"clips of {many} facets each: who is near whom", "seconds", times[-1][1]),
-        figure(f"who is near whom, {many} facets over {few}", "ratio", times[-1][1] / times[0][1], reach=reach),
+        figure(f"who is near whom, {many} facets over {few}", "ratio", times[-1][1] / times[0][1]),
         figure(f"who is near whom, {many} facets over {few}: pairs found", "ratio", counts[-1] / counts[0]),
     ]
+    if len(sizes) > 2:
+        (_, least), (_, middle), (_, most) = times[-3:]
+        # One where times grow as the logarithm of N; 10^p where they grow as N^p.
+        what = "who is near whom, what the last tenfold of facets adds over what the one before adds"
+        figures.append(figure(what, "ratio", (most - middle) / (middle - least), reach=1.2))
     return figures, curve("Two clips of N facets: who is near whom", "N", "seconds", {"a look": times})
 
 

@@ -51,10 +51,22 @@ def unit_quaternion(name: str, value: ArrayLike) -> Array:
 def nonzero_quaternion(name: str, value: ArrayLike) -> Array:
     """A quaternion of any length but zero, as it came."""
     e = vector(name, value, 4)
+    check_quaternion(name, e.tolist())
+    return e
+
+
+def check_quaternion(name: str, e: list[float]) -> None:
+    """Raise where a quaternion has no direction that doubles can tell."""
     # Between these lengths |e|^2 neither vanishes nor overflows.
     if not 1e-150 < hypot(*e) < 1e150:
-        raise InputError(f"{name} is {e.tolist()}; expected a quaternion (w, x, y, z) of a length other than zero")
-    return e
+        raise InputError(f"{name} is {e}; expected a quaternion (w, x, y, z) of a length other than zero")
+
+
+def pose_row(name: str, value: ArrayLike) -> Array:
+    """One pose row x y z qw qx qy qz, (7,), its quaternion of any length but zero, as it came."""
+    row = vector(name, value, 7)
+    check_quaternion(f"{name}[3:]", row.tolist()[3:])
+    return row
 
 
 def pose_rows(name: str, value: ArrayLike, count: int | str = "n") -> Array:

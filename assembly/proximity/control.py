@@ -18,7 +18,7 @@ from assembly.geometry.face import Face
 from assembly.geometry.spline import BREAKS_U, BREAKS_V, CELLS, COEFFICIENTS, SURFACE_RECORD
 from assembly.geometry.surface import NurbsSurface
 from assembly.kinematics.body import BodyFace, Point
-from assembly.kinematics.pose import nonzero_quaternion
+from assembly.kinematics.pose import check_quaternion
 from assembly.proximity.control_laws import DISTANCE, ERROR, GAIN, LAW, MODE_F, MODE_G, ROW, run_control
 
 __all__ = ["ControlRun", "ControlStatus", "Controller"]
@@ -104,8 +104,7 @@ def _poses(name: str, side: object, q: ArrayLike | None) -> Array:
         return np.array([_IDENTITY if body is None else body.q], dtype=np.float64)
     rows = real_array(name, q, ("n", 7)) if np.ndim(q) > 1 else vector(name, q, 7)[None]
     for k, (_x, _y, _z, *e) in enumerate(rows.tolist()):
-        if not max(map(abs, e)) > 1e-100:
-            nonzero_quaternion(f"{name}[{k}, 3:]", e)
+        check_quaternion(f"{name}[{k}, 3:]", e)
     return rows
 
 

@@ -21,7 +21,7 @@ from assembly.geometry.curve import NurbsCurve
 from assembly.geometry.face import Face
 from assembly.geometry.spline import CURVE_BREAKS, CURVE_COEFFICIENTS, SURFACE_RECORD
 from assembly.geometry.surface import NurbsSurface
-from assembly.kinematics.pose import nonzero_quaternion
+from assembly.kinematics.pose import pose_row
 from assembly.proximity.feature_query import GAP, NORMAL, PAIR, POINT_F, feature_derivatives, find_features
 from assembly.proximity.pairs import EXTREMAL, OFFSETS, PairStatus, Side, as_face
 from assembly.proximity.shell import EDGE, EDGE_CURVE, EDGE_END, EDGE_RECORD, EDGE_START, EDGE_SURFACE, FACE
@@ -154,9 +154,7 @@ def _query(
     carrier = None if embedded_in is None else as_face("embedded_in", embedded_in).surface
     q = np.empty((2, 7))
     for k, (label, pose) in enumerate((("q_s", q_s), ("q_c", q_c))):
-        q[k] = vector(label, pose, 7)
-        if not np.abs(q[k, 3:]).max() > 1e-100:
-            nonzero_quaternion(f"{label}[3:]", q[k, 3:])
+        q[k] = pose_row(label, pose)
     packed = _packed((face.surface, face.reversed, curve, carrier))
     x = vector(name, value).tolist()
     limits = (*zip(face.surface.domain, face.surface.closed, strict=True), (curve.domain, packed.endless))

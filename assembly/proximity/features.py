@@ -14,11 +14,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.errors import InputError, vector
+from assembly.errors import InputError
 from assembly.geometry.face import Face
 from assembly.geometry.surface import NurbsSurface
 from assembly.kinematics.body import Body, BodyFace
-from assembly.kinematics.pose import nonzero_quaternion
+from assembly.kinematics.pose import pose_row
 from assembly.proximity.nearest_query import (
     GAP,
     LOWER,
@@ -144,10 +144,8 @@ def _pose(name: str, shape: Shape, q: ArrayLike | None) -> Array:
         if isinstance(shape, BodyFace):
             shape = shape.body
         return np.asarray(shape.q) if isinstance(shape, Body) else np.array(_IDENTITY)
-    row = vector(name, q, 7)
-    if not float(np.abs(row[3:]).max()) > 1e-100:
-        nonzero_quaternion(f"{name}[3:]", row[3:])
-    if not float(np.abs(row[:3]).max()) < _FARTHEST:
+    row = pose_row(name, q)
+    if not max(map(abs, row[:3].tolist())) < _FARTHEST:
         raise InputError(f"{name}[:3] is {row[:3].tolist()}; expected coordinates below {_FARTHEST:g}")
     return row
 

@@ -18,7 +18,7 @@ from assembly.geometry.face import Face
 from assembly.geometry.spline import BREAKS_U, BREAKS_V, CELLS, COEFFICIENTS, SURFACE_RECORD
 from assembly.geometry.surface import NurbsSurface
 from assembly.kinematics.body import BodyFace
-from assembly.kinematics.pose import nonzero_quaternion
+from assembly.kinematics.pose import pose_row
 from assembly.proximity.controller import CROSSED, find_descent
 from assembly.proximity.start import find_pair
 from assembly.proximity.velocity import pair_derivatives
@@ -102,10 +102,7 @@ def _packed(f: tuple[NurbsSurface, bool], g: tuple[NurbsSurface, bool]) -> tuple
 def _configuration(q_f: ArrayLike, q_g: ArrayLike) -> Array:
     q = np.empty((2, 7))
     for k, (name, value) in enumerate((("q_f", q_f), ("q_g", q_g))):
-        q[k] = vector(name, value, 7)
-        _, _, _, a, b, c, d = q[k].tolist()
-        if not max(abs(a), abs(b), abs(c), abs(d)) > 1e-100:
-            nonzero_quaternion(f"{name}[3:]", q[k, 3:])
+        q[k] = pose_row(name, value)
     return q
 
 

@@ -113,8 +113,10 @@ def test_bad_input_is_named():
         closest_features(box, ball, q_b=[np.nan] * 7)
     with pytest.raises(InputError, match=r"q_b\[:3\]"):
         closest_features(shapes.sphere(1.0), shapes.plane(1.0, 1.0), q_b=(0.0, 0.0, -1e160, 1.0, 0.0, 0.0, 0.0))
-    with pytest.raises(InputError, match=r"q_b\[3:\]"):
-        FeatureTracker(box, ball).step(None, [1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 0.0])
+    # No direction, or one whose squares no double holds.
+    for length in (0.0, 1e-160, 1e160):
+        with pytest.raises(InputError, match=r"q_b\[3:\]"):
+            FeatureTracker(box, ball).step(None, [1.0, 2.0, 3.0, length, 0.0, 0.0, 0.0])
 
 
 @pytest.mark.parametrize("gap", [1e-6, 1e-9, 1e-10, 1e-12, 1e-14, 0.0, -1e-14, -1e-12, -1e-9])
