@@ -80,8 +80,9 @@ def real_array(name: str, value: ArrayLike, shape: Sequence[int | str]) -> NDArr
         array = np.array(came, dtype=np.float64) if came.dtype.kind in "iuf" else None
     except (TypeError, ValueError, OverflowError):
         array = None
-    if array is not None and array.shape == tuple(shape) and all(map(math.isfinite, array.ravel().tolist())):
-        return array  # what nearly always comes, without numpy's price for small arrays
+    # What nearly always comes, without numpy's price for small arrays; a sum may overflow, and is looked at again below.
+    if array is not None and array.shape == tuple(shape) and math.isfinite(sum(array.ravel().tolist())):
+        return array
     wanted = "(" + ", ".join(str(extent) for extent in shape) + ("," if len(shape) == 1 else "") + ")"
     if array is None:
         raise InputError(f"{name} is {_shown(value)}; expected real numbers of shape {wanted}")
