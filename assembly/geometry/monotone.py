@@ -7,6 +7,8 @@ A span of a rational curve is C = N / w with Bezier points of N and w; the sign 
 whose Bernstein coefficients follow from products of Bernstein polynomials (Farouki & Rajan, "Algorithms for
 polynomials in Bernstein form", 1988). Its roots are where the curve is cut: each piece then stays in one octant of
 directions, its box is spanned by its two ends, and one of u and v changes along it at least as fast as the other.
+Where weights differ much along a piece, so does its speed, and bounds on its derivatives say little: it is halved until
+they do not.
 """
 
 from __future__ import annotations
@@ -19,6 +21,8 @@ from assembly._kernel import kernel
 ROW = 7
 # Cuts nearer to one another, or to an end, than this part of a span are one.
 NEAREST_CUTS = 1e-9
+# The largest quotient of two Bezier weights of a piece; shorter pieces than this part of a span are not halved.
+MOST_WEIGHTS, SHORTEST = 8.0, 1e-13
 
 
 @kernel(inner=True, allocates=True)
@@ -208,12 +212,24 @@ def _derivative_bounds(c, p):
     return m1, m2, m3
 
 
+@kernel(inner=True)
+def _weights_differ(c, p):
+    """Whether weights of a piece are farther apart than bounds on its derivatives bear."""
+    least = c[0, 2]
+    most = c[0, 2]
+    for k in range(1, p + 1):
+        least = min(least, c[k, 2])
+        most = max(most, c[k, 2])
+    return most > MOST_WEIGHTS * least
+
+
 @kernel
 def cut_curves(pieces, breaks, shape, binomials, rows):
     """Cut curves into pieces.
 
     `pieces` holds the homogeneous Bezier points (u w, v w, w) of all spans of all curves in order, `breaks` the
-    ends of their spans, `shape` (curves, 2) degrees and numbers of spans. Returns how many of `rows` were filled.
+    ends of their spans, `shape` (curves, 2) degrees and numbers of spans. Returns how many pieces there are; `rows`
+    has the first of them.
     """
     limit = 32
     b = np.empty((limit, 3))
@@ -252,18 +268,24 @@ def cut_curves(pieces, breaks, shape, binomials, rows):
                     high = cuts[k]
                     if high < low + NEAREST_CUTS or high > 1.0 - NEAREST_CUTS:
                         continue
-                _restrict(b, p, low, high, c, work)
-                m1, m2, m3 = _derivative_bounds(c, p)
-                scale_t = 1.0 / (width * (high - low))
-                row = rows[count]
-                row[0] = curve
-                row[1] = span
-                row[2] = t0 + width * low
-                row[3] = breaks[at_break + span + 1] if high == 1.0 else t0 + width * high
-                row[4] = m1 * scale_t
-                row[5] = m2 * scale_t**2
-                row[6] = m3 * scale_t**3
-                count += 1
-                low = high
+                while low < high:
+                    end = high
+                    _restrict(b, p, low, end, c, work)
+                    while _weights_differ(c, p) and end - low > SHORTEST:
+                        end = 0.5 * (low + end)
+                        _restrict(b, p, low, end, c, work)
+                    m1, m2, m3 = _derivative_bounds(c, p)
+                    scale_t = 1.0 / (width * (end - low))
+                    if count < rows.shape[0]:
+                        row = rows[count]
+                        row[0] = curve
+                        row[1] = span
+                        row[2] = t0 + width * low
+                        row[3] = breaks[at_break + span + 1] if end == 1.0 else t0 + width * end
+                        row[4] = m1 * scale_t
+                        row[5] = m2 * scale_t**2
+                        row[6] = m3 * scale_t**3
+                    count += 1
+                    low = end
         at_break += shape[curve, 1] + 1
     return count

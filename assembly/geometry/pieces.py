@@ -36,7 +36,7 @@ PIECE_DOUBLES = 16
 LET_GO = 1e-10
 _ROUNDING = 4e-15
 # Intervals that a query may look at on one piece before its bounds are taken as they are.
-_BUDGET = 4000
+_BUDGET = 100_000
 
 
 @kernel(inline=True)

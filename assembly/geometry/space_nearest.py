@@ -42,7 +42,7 @@ from assembly.geometry.spline import (
 )
 from assembly.geometry.vec import add, blend, dot, scale, sub
 
-_BUDGET = 4000
+_BUDGET = 100_000
 _ROUNDING = 4e-15
 
 

@@ -47,6 +47,9 @@ from assembly.geometry.trim import into_cell, winding
 
 # Neighbors whose directions differ by less [rad] are one smooth curve.
 _SMOOTH = 1e-6
+# A foot this near to the end of a piece, as a part of its parameters, is at the end if the point is beyond it by more
+# than this part of the boundary's size.
+_AT_END, _BEYOND = 1e-9, 1e-13
 
 
 @kernel(inline=True)
@@ -193,8 +196,12 @@ def _foot(table, pool, trim, begin, stop, piece, t, u, v, qx, qy):
     ox = qx - x - pool[i + SHIFT_U]
     oy = qy - y - pool[i + SHIFT_V]
     distance = np.sqrt(ox * ox + oy * oy)
-    at_start = t <= pool[i + PIECE_T0]
-    at_end = t >= pool[i + PIECE_T1]
+    # Where a foot at an end was rounded to beside it, the way to it is not across the curve.
+    near = _AT_END * (pool[i + PIECE_T1] - pool[i + PIECE_T0])
+    beyond = dx * ox + dy * oy
+    far = _BEYOND * size * np.sqrt(dx * dx + dy * dy)
+    at_start = t <= pool[i + PIECE_T0] or (t <= pool[i + PIECE_T0] + near and beyond < -far)
+    at_end = t >= pool[i + PIECE_T1] or (t >= pool[i + PIECE_T1] - near and beyond > far)
     other = -1
     if at_start or at_end:
         dx, dy = _end_direction(table, pool, o, i, at_end)

@@ -126,7 +126,12 @@ class _Pieces:
             [np.empty(0)] + [self.pool[r[CURVE_BREAKS] : r[CURVE_COEFFICIENTS]] for r in self.records.tolist()]
         )
         rows = np.empty((int((8 * shape[:, 0] * shape[:, 1]).sum()), ROW))
-        rows = rows[: cut_curves(bezier, breaks, shape, _BINOMIALS, rows)].copy()
+        count = cut_curves(bezier, breaks, shape, _BINOMIALS, rows)
+        if count > len(rows):
+            # Weights far apart.
+            rows = np.empty((count, ROW))
+            cut_curves(bezier, breaks, shape, _BINOMIALS, rows)
+        rows = rows[:count].copy()
         self.curve = rows[:, 0].astype(np.int64)
         span = rows[:, 1].astype(np.int64)
         record = self.records[self.curve]

@@ -28,7 +28,7 @@ from assembly.proximity.edge_frame import (
 )
 from assembly.proximity.extremal import BEND, CONVERGED, LEFT_PATCH, NOT_CONVERGED, SINGULAR, STAGNANT
 from assembly.proximity.pair_matrix import RANK
-from assembly.proximity.shell import VERTEX
+from assembly.proximity.shell import EDGE, VERTEX
 
 # Points closer than this part of the size coincide: their difference has no direction.
 COINCIDENT = 1e-13
@@ -124,6 +124,12 @@ def solve_off_face(table, pool, kind_f, f, kind_g, g, rotation, shift, x, normal
     """Newton from x = (t_f, t_g) for edges and vertices. Returns status, (t_f, t_g) and the frame."""
     same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
     origin = (0.0, 0.0, 0.0)
+    if limit > 0:
+        # A start carried along a step may be beyond an end, where a curve goes on and its edge does not.
+        x = (
+            edge_advance(table, pool, f, x[0], 0.0) if kind_f == EDGE else x[0],
+            edge_advance(table, pool, g, x[1], 0.0) if kind_g == EDGE else x[1],
+        )
     tolerance = 4e-14 * size
     previous = 1e300
     status = NOT_CONVERGED

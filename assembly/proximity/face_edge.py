@@ -64,6 +64,9 @@ def solve_on_face(table, pool, face, kind, other, rotation, shift, x, size, turn
     (regular, whether the other feature counts as a point, isolated, whether the edge is nearest here; true of a point),
     det H / |H|^2
     """
+    if limit > 0 and kind == EDGE:
+        # A start carried along a step may be beyond an end, where the curve goes on and the edge does not.
+        x = (x[0], x[1], edge_advance(table, pool, other, x[2], 0.0), x[3])
     tolerance = 4e-14 * size
     previous = 1e300
     status = NOT_CONVERGED
