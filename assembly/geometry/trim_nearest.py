@@ -47,9 +47,11 @@ from assembly.geometry.trim import into_cell, winding
 
 # Neighbors whose directions differ by less [rad] are one smooth curve.
 _SMOOTH = 1e-6
-# A foot this near to the end of a piece, as a part of its parameters, is at the end if the point is beyond it by more
-# than this part of the boundary's size.
+# A foot this near to the end of a piece is at the end if the point is beyond it by more than the second, both parts of
+# the boundary's size.
 _AT_END, _BEYOND = 1e-9, 1e-13
+# Where the speed of a piece is less than this part of its largest, its direction is rounding.
+_SLOW = 1e-9
 
 
 @kernel(inline=True)
@@ -64,7 +66,7 @@ def _end_direction(table, pool, o, i, at_end):
     t = pool[i + PIECE_T1] if at_end else pool[i + PIECE_T0]
     x, y, dx, dy = piece_line(pool, table[o + PIECE_COEFFICIENTS], table[o + PIECE_DEGREE], t - pool[i + MIDDLE])
     length = np.sqrt(dx * dx + dy * dy)
-    if length <= 1e-9 * pool[i + BOUND_1]:
+    if length <= _SLOW * pool[i + BOUND_1]:
         near = t + 1e-4 * (pool[i + PIECE_T0] - pool[i + PIECE_T1]) * (1.0 if at_end else -1.0)
         a, b, dx, dy = piece_line(pool, table[o + PIECE_COEFFICIENTS], table[o + PIECE_DEGREE], near - pool[i + MIDDLE])
         dx = x - a if at_end else a - x
@@ -196,12 +198,24 @@ def _foot(table, pool, trim, begin, stop, piece, t, u, v, qx, qy):
     ox = qx - x - pool[i + SHIFT_U]
     oy = qy - y - pool[i + SHIFT_V]
     distance = np.sqrt(ox * ox + oy * oy)
-    # Where a foot at an end was rounded to beside it, the way to it is not across the curve.
-    near = _AT_END * (pool[i + PIECE_T1] - pool[i + PIECE_T0])
+    at_start = t <= pool[i + PIECE_T0]
+    at_end = t >= pool[i + PIECE_T1]
     beyond = dx * ox + dy * oy
-    far = _BEYOND * size * np.sqrt(dx * dx + dy * dy)
-    at_start = t <= pool[i + PIECE_T0] or (t <= pool[i + PIECE_T0] + near and beyond < -far)
-    at_end = t >= pool[i + PIECE_T1] or (t >= pool[i + PIECE_T1] - near and beyond > far)
+    speed = np.sqrt(dx * dx + dy * dy)
+    unsure = speed <= _SLOW * pool[i + BOUND_1]
+    if not (at_start or at_end) and (unsure or abs(beyond) > _BEYOND * size * speed):
+        # The way to the foot is not across the curve: is it an end, that rounding or a vanishing speed has left?
+        first = t - pool[i + PIECE_T0] < pool[i + PIECE_T1] - t if unsure else beyond < 0.0
+        end = START if first else END
+        ax = pool[i + end] - pool[i + SHIFT_U] - x
+        ay = pool[i + end + 1] - pool[i + SHIFT_V] - y
+        if ax * ax + ay * ay <= (_AT_END * size) ** 2:
+            at_start = first
+            at_end = not first
+            t = pool[i + PIECE_T0] if at_start else pool[i + PIECE_T1]
+            ox -= ax
+            oy -= ay
+            distance = np.sqrt(ox * ox + oy * oy)
     other = -1
     if at_start or at_end:
         dx, dy = _end_direction(table, pool, o, i, at_end)

@@ -212,9 +212,9 @@ class _Pieces:
         if last >= 0:
             self.before[last] = piece + extra
 
-    def drop_empty(self) -> None:
-        """Leave out pieces without length, of repeated control points: they have no direction."""
-        keep = (self.ends[:, 0] != self.ends[:, 1]).any(axis=1)
+    def drop_empty(self, noise: float) -> None:
+        """Leave out pieces without length but rounding, of repeated control points: they have no direction."""
+        keep = (np.abs(self.ends[:, 0] - self.ends[:, 1]) > noise).any(axis=1)
         if keep.all():
             return
         for k in np.flatnonzero(~keep).tolist():
@@ -269,8 +269,9 @@ def build(
                 low[axis] = _largest_gap(values.min(axis=1), values.max(axis=1), period)
             high[axis] = low[axis] + period
             pieces.cut(axis, float(low[axis]), period)
+    pieces.drop_empty(1e-15 * float(np.abs(pieces.ends).max(initial=0.0)))
     pieces.join(periods)
-    pieces.drop_empty()
+    pieces.drop_empty(0.0)
     if periods[1]:
         # Upward through the bottom of the cell: material is to the left, so w falls by one to the right.
         begins, stops = pieces.ends[:, 0], pieces.ends[:, 1]

@@ -49,8 +49,9 @@ LIMIT, AROUND = 40, 120
 PATIENCE, SETTLED = 12, 1e-12
 # The most, in radians, that a step may turn a normal.
 BEND = 0.5
-# Steps below this many radians that do not shrink any more are rounding.
-STAGNANT = 1e-7
+# Steps below this many radians that do not shrink any more are rounding; where the end of a patch held the last one,
+# below the second.
+STAGNANT, HELD_STILL = 1e-7, 1e-12
 # A step that turns the normals by less leaves an error below rounding when a solve carries the frame along it.
 CLOSE = 2e-7
 
@@ -262,6 +263,12 @@ def settled(c, r, size):
     return abs(s0) + abs(s1) <= SETTLED and abs(r[0]) + abs(r[1]) <= SETTLED * size
 
 
+@kernel(inline=True)
+def stagnates(step, bend, previous, status):
+    """Whether a step that does not shrink any more is rounding: one that an end held does not shrink either."""
+    return bend < (HELD_STILL if status == LEFT_PATCH else STAGNANT) and step > 0.25 * previous
+
+
 @kernel(inner=True)
 def solve_pair(table, pool, f, g, rotation, shift, x, size, turn, close, downhill):
     """Newton from x to the extremal pair: status, parameters, iterations, frame, and H as `pair_matrix` gives it.
@@ -292,7 +299,7 @@ def solve_pair(table, pool, f, g, rotation, shift, x, size, turn, close, downhil
         bend = max(bend_f, bend_g)
         small = bend < close and isolated
         # Small against the scene and against the bodies' own curvature; or as small as rounding lets it become.
-        if (step <= tolerance and bend < 1e-9) or (bend < STAGNANT and step > 0.25 * previous):
+        if (step <= tolerance and bend < 1e-9) or stagnates(step, bend, previous, status):
             # In a singular system a vanishing step is a solution only if the residual vanishes too.
             status = CONVERGED if isolated else (SINGULAR if vanishes(r, size) else NOT_CONVERGED)
             break

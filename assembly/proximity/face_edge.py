@@ -40,9 +40,9 @@ from assembly.proximity.extremal import (
     LEFT_PATCH,
     NOT_CONVERGED,
     SINGULAR,
-    STAGNANT,
     advance,
     own_frame,
+    stagnates,
 )
 from assembly.proximity.pair_matrix import RANK, curvature_bound
 from assembly.proximity.shell import EDGE
@@ -163,7 +163,7 @@ def solve_on_face(table, pool, face, kind, other, rotation, shift, x, size, turn
         off = max(abs(r0), abs(r1))
         level = ROUNDING if fine else SLACK
         small = off <= level * size and abs(tilt) <= level
-        settled = (step <= tolerance and bend < 1e-9) or (bend < STAGNANT and step > 0.25 * previous)
+        settled = (step <= tolerance and bend < 1e-9) or stagnates(step, bend, previous, status)
         if not slide and (small or settled):
             _i, isolated = inverse(h, unit * (1.0 + abs(beta) * unit), RANK)
             done = abs(tilt) < LEVEL and off < LEVEL * size
