@@ -80,7 +80,7 @@ def real_array(name: str, value: ArrayLike, shape: Sequence[int | str]) -> NDArr
         array = np.array(came, dtype=np.float64) if came.dtype.kind in "iuf" else None
     except (TypeError, ValueError, OverflowError):
         array = None
-    # What nearly always comes, without numpy's price for small arrays; a sum may overflow, and is looked at again below.
+    # What nearly always comes, without numpy's price for small arrays. A sum may overflow: that is seen below.
     if array is not None and array.shape == tuple(shape) and math.isfinite(sum(array.ravel().tolist())):
         return array
     wanted = "(" + ", ".join(str(extent) for extent in shape) + ("," if len(shape) == 1 else "") + ")"
