@@ -16,6 +16,7 @@ from assembly.constraints.constraint import Constraint, structure_changes
 from assembly.constraints.expression import Expression
 from assembly.constraints.objectives import Objective
 from assembly.constraints.packing import Packed, lone_surfaces, pack, structure_of
+from assembly.constraints.scene_size import check_reach, scene_size
 from assembly.constraints.trim_contact import TrimContact
 from assembly.errors import InputError, items, vector
 from assembly.kinematics.body import Body, Frame, Point
@@ -172,6 +173,11 @@ class Assembly:
                 self._packed.stamp = structure_changes()
             else:
                 self._packed = None
+        before = self._packed
+        if before is not None and not before.has_size:
+            # Nothing was a length then: a slide driven to 0, bodies at one place. By now something may be.
+            if scene_size(self._bodies, self._constraints, self._objectives) > 0.0:
+                self._packed = None
         if self._packed is None:
             if all(body.fixed for body in self._bodies):
                 raise InputError(f"bodies are {[body.name for body in self._bodies]}, none moving; expected one")
@@ -179,6 +185,7 @@ class Assembly:
             self._scene = Scene(
                 self.bodies, self.constraints, tuple(packed.contacts), tuple(packed.sides), packed.scale
             )
+            packed.unsized = before
             self._packed = packed
         return self._packed
 
@@ -287,26 +294,27 @@ class Assembly:
     def _start(self, packed: Packed, q0: ArrayLike | Solution | None, starts: Mapping[str, ArrayLike] | None) -> Array:
         """State of the loop: configuration, contact parameters (NaN: to be found), multipliers, room for results."""
         if isinstance(q0, Solution):
-            state = self._own("q0", packed, q0)._state.copy()
+            state = self._state_of("q0", packed, q0).copy()
             q = state[: packed.contacts_at].reshape(-1, 7)
         else:
             state = packed.new_state()
             q = state[: packed.contacts_at].reshape(-1, 7)
             q[:] = self.q if q0 is None else pose_rows("q0", q0, len(self._bodies))
+            check_reach("a coordinate of the start", float(np.abs(q[:, :3]).max()), packed.scale)
             state[packed.contacts_at : packed.angles_at] = np.nan
-        if starts:
+        if starts is not None:
             self._place_starts(packed, state, starts)
         packed.refresh()
         packed.start_angles(q, state, isinstance(q0, Solution))
         return state
 
     @staticmethod
-    def _own(name: str, packed: Packed, solution: Solution) -> Solution:
-        if solution._packed is not packed:
-            raise InputError(
-                f"{name} is a solution of another assembly, or of this one before a change; expected its own"
-            )
-        return solution
+    def _state_of(name: str, packed: Packed, solution: Solution) -> Array:
+        if solution._packed is packed:
+            return solution._state
+        if packed.unsized is not None and solution._packed is packed.unsized:
+            return packed.taken_over(solution._state)
+        raise InputError(f"{name} is a solution of another assembly, or of this one before a change; expected its own")
 
     def _place_starts(self, packed: Packed, state: Array, starts: Mapping[str, ArrayLike]) -> None:
         if not isinstance(starts, Mapping):
@@ -372,7 +380,7 @@ class Assembly:
         solved = isinstance(q, Solution)
         # A solution keeps the values it was solved with.
         if isinstance(q, Solution):
-            state = self._own("q", packed, q)._state
+            state = self._state_of("q", packed, q)
         else:
             state = self._start(packed, None if q is None else pose_rows("q", q, len(self._bodies)), None)
         return Mobility.at(self._scene, packed, state, solved=solved, drives=bool(drives), tolerance=tolerance)

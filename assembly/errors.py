@@ -14,9 +14,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
+    "FARTHEST",
     "AssemblyError",
     "InputError",
     "KnownSettings",
+    "bounded",
+    "check_coordinates",
     "checked_color",
     "extent",
     "integer",
@@ -26,6 +29,10 @@ __all__ = [
     "real_array",
     "vector",
 ]
+
+
+# Coordinates and lengths are no larger: squares of those that come out of them must not overflow.
+FARTHEST = 1e150
 
 
 class AssemblyError(Exception):
@@ -114,6 +121,21 @@ def number(name: str, value: Any) -> float:
     if not np.isfinite(result):
         raise InputError(f"{name} is {result}; expected a finite real number")
     return result
+
+
+def bounded(name: str, value: Any) -> float:
+    """A number that may be a length: its square does not overflow."""
+    result = number(name, value)
+    if not -FARTHEST <= result <= FARTHEST:
+        raise InputError(f"{name} is {result:g}; expected a number from {-FARTHEST:g} to {FARTHEST:g}")
+    return result
+
+
+def check_coordinates(name: str, coordinates: Sequence[float]) -> None:
+    """Raise where coordinates, finite ones, are so large that their squares overflow."""
+    for k, x in enumerate(coordinates):
+        if not -FARTHEST <= x <= FARTHEST:
+            raise InputError(f"{name}[{k}] is {x:g}; expected coordinates from {-FARTHEST:g} to {FARTHEST:g}")
 
 
 def positive(name: str, value: Any) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from assembly.constraints.constraint import Constraint
-from assembly.errors import InputError, items, number
+from assembly.errors import InputError, bounded, items, number
 from assembly.kinematics.body import Body
 
 __all__ = ["Clearance"]
@@ -77,7 +77,7 @@ class Clearance(Constraint):
                 raise InputError(f"bodies has {len(chosen)} of them; expected two or more, or None for all")
         super().__init__(chosen or (), "clearance" if chosen is None and name is None else name, "clearance")
         self._all = chosen is None
-        self._minimum = number("minimum", minimum)
+        self._minimum = bounded("minimum", minimum)
         if not self._minimum >= 0.0:
             raise InputError(f"minimum is {self._minimum:g}; expected a length of zero or more")
         self._neglect = number("neglect", neglect)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from assembly.constraints.primitives import ANGLE, COINCIDENT, DISTANCE, SLIDE
-from assembly.errors import InputError, KnownSettings, number
+from assembly.errors import FARTHEST, InputError, KnownSettings, number
 from assembly.kinematics.body import Body, Frame
 
 if TYPE_CHECKING:
@@ -25,10 +25,11 @@ __all__ = ["Bounds", "Constraint", "Coordinate", "Equation", "FramePair", "Freed
 
 Bounds = tuple[float | None, float | None]
 
-# Values that a coordinate can take; the two ends are kinks, which no row can hold.
-_RANGES = {DISTANCE: (0.0, inf), ANGLE: (0.0, pi)}
+# Values that a coordinate can take: at 0 and pi are kinks, which no row can hold, farther lengths may overflow.
+_RANGES = {SLIDE: (-FARTHEST, FARTHEST), DISTANCE: (0.0, FARTHEST), ANGLE: (0.0, pi)}
 _EXPECTED = {
-    DISTANCE: "a distance above zero; points that coincide are Spherical",
+    SLIDE: f"a length between {-FARTHEST:g} and {FARTHEST:g}",
+    DISTANCE: f"a distance above zero; points that coincide are Spherical, and none is above {FARTHEST:g}",
     ANGLE: "an angle between 0 and pi, both excluded; axes along each other are Parallel, axes='aligned' or 'opposed'",
 }
 _changes = 0

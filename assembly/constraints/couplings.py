@@ -7,7 +7,7 @@ from typing import Any
 from assembly.constraints.constraint import Constraint, Coordinate, Equation, Freedom, words
 from assembly.constraints.joint import Joint, Offset
 from assembly.constraints.primitives import SLIDE
-from assembly.errors import InputError, number
+from assembly.errors import InputError, bounded, number
 
 __all__ = ["Coupling", "Gear", "RackPinion"]
 
@@ -147,7 +147,7 @@ class RackPinion(Coupling):
         name: str | None = None,
         offset: float = 0.0,
     ) -> None:
-        factor = number("radius", radius)
+        factor = bounded("radius", radius)
         if factor == 0.0:
             raise InputError("radius is 0; expected the travel of the rack a radian of the pinion, not zero")
         super().__init__(

@@ -14,7 +14,7 @@ import numpy as np
 
 from assembly.constraints.constraint import Bounds, Constraint, Coordinate, Equation, FramePair, Freedom, words
 from assembly.constraints.primitives import COINCIDENT, SLIDE, SWING
-from assembly.errors import InputError, number
+from assembly.errors import InputError, bounded
 from assembly.kinematics.body import Body, Frame, Point
 
 __all__ = ["Axes", "Driven", "Joint", "Limits", "Offset", "Side", "SidePoint"]
@@ -222,4 +222,4 @@ class Offset:
         return value
 
     def __set__(self, constraint: Constraint, value: float) -> None:
-        constraint.__dict__["offset"] = number("offset", value)
+        constraint.__dict__["offset"] = bounded("offset", value)

@@ -31,7 +31,7 @@ from assembly.constraints.joint import (
     SidePoint,
 )
 from assembly.constraints.primitives import ANGLE, AZIMUTH, DOT, SLIDE, TURN
-from assembly.errors import InputError, number
+from assembly.errors import InputError, bounded
 
 __all__ = [
     "Cylindrical",
@@ -170,7 +170,7 @@ class Screw(Cylindrical):
         angle_limits: Range = None,
         slide_limits: Range = None,
     ) -> None:
-        self._pitch = number("pitch", pitch)
+        self._pitch = bounded("pitch", pitch)
         if self._pitch == 0.0:
             raise InputError("pitch is 0; expected the travel a turn, not zero; a nut that cannot slide is Revolute")
         super().__init__(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.errors import KnownSettings, extent, positive, vector
+from assembly.errors import KnownSettings, check_coordinates, extent, positive, vector
 from assembly.kinematics.body import Body, Frame, Point
 from assembly.kinematics.pose import Pose, axes_quaternion, multiply, pose_rows
 
@@ -66,7 +66,9 @@ class PointDistance(Objective):
 
     @target.setter
     def target(self, value: ArrayLike) -> None:
-        self._target = vector("target", value)
+        target = vector("target", value)
+        check_coordinates("target", target.tolist())
+        self._target = target
 
     def __repr__(self) -> str:
         return f"PointDistance({self.point!r}, target={self._target.tolist()}, weight={self.weight:g})"
@@ -152,6 +154,7 @@ class FrameDistance(Objective):
     def target(self, value: Pose) -> None:
         if not isinstance(value, Pose):
             raise TypeError(f"target is {value!r}; expected a Pose")
+        check_coordinates("target.position", value.position.tolist())
         self._pose = value
         self._target = value.position
         self._body_quaternion = multiply(value.quaternion, self._back)

@@ -23,11 +23,13 @@ from assembly.constraints.primitives import RECORD as JOINT_FRAMES
 from assembly.constraints.primitives import coordinate as coordinate_value
 from assembly.constraints.primitives import place_frames
 from assembly.constraints.row_packing import RowPacking
-from assembly.constraints.scene_writer import SceneWriter, scene_size
+from assembly.constraints.scene_size import check_reach, scene_size
+from assembly.constraints.scene_writer import SceneWriter
 from assembly.constraints.term_packing import TermPacking, natural_unit
 from assembly.constraints.trim_contact import TrimContact
 from assembly.constraints.turns import Turns
 from assembly.constraints.watch_packing import LAST_REACH, guarded_pairs, pack_watch, place_count
+from assembly.errors import FARTHEST, InputError
 from assembly.geometry.surface import NurbsSurface
 from assembly.kinematics.body import Body, BodyFace
 from assembly.proximity import watch_memory
@@ -38,6 +40,8 @@ __all__ = ["Packed", "lone_surfaces", "pack", "structure_of"]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
+# Smaller numbers have fewer digits; those whose reciprocals are, too, may overflow.
+LEAST_UNIT = 1e-305
 
 
 class Packed:
@@ -48,7 +52,11 @@ class Packed:
     table, pool : arrays
         See `constraints/layout.py`. Lengths in the pool are divided by `scale`.
     scale : float
-        The scene's size: the largest diagonal of a body's box.
+        The scene's size (`scene_size`), 1 where it has none.
+    has_size : bool
+        Whether the scene has a size.
+    unsized : Packed or None
+        The same scene as it was packed before it had a size.
     unit : float
         What one of the loop's objective counts in the user's units.
     sides : list of (Body or BodyFace, Body or BodyFace)
@@ -84,7 +92,10 @@ class Packed:
         self.count = len(bodies)
         self.stamp = structure_changes()
         self.structure = structure_of(constraints)
-        self.scale = scene_size(bodies, constraints, objectives)
+        size = scene_size(bodies, constraints, objectives)
+        self.has_size = size > 0.0
+        self.scale = size if self.has_size else 1.0
+        self.unsized: Packed | None = None
         self.reference = bodies[0].pose.position.copy()
         self.contacts = [constraint for constraint in constraints if isinstance(constraint, Contact)]
         # Of a contact with trims the surfaces take part without their own boundaries.
@@ -124,6 +135,11 @@ class Packed:
         """Write table and pool, part by part, and keep what tells of them."""
         goals = objectives or [(1.0, Posture())]
         self.unit = max(term.weight * natural_unit(term, self.scale) for _, term in goals)
+        if not LEAST_UNIT <= self.unit <= 1.0 / LEAST_UNIT:
+            raise InputError(
+                f"the objective counts in units of {self.unit:g}, by its weights and the scene's size {self.scale:g}; "
+                f"expected from {LEAST_UNIT:g} to {1.0 / LEAST_UNIT:g}"
+            )
         writer = SceneWriter(bodies, self.scale, self.pair_rows)
         header = writer.header
         writer.add(header, self._pool_header())
@@ -234,6 +250,15 @@ class Packed:
                     row[layout.MINIMUM], row[layout.GUARD_NUMBER] = pair[watch_memory.PAIR_MINIMUM], number
         return table
 
+    def taken_over(self, state: Array) -> Array:
+        """A state of the scene as it was without a size, with multipliers in the units of this one."""
+        assert self.unsized is not None
+        taken = state.copy()
+        multipliers = taken[self.multipliers_at : self.residuals_at]
+        multipliers *= self.unsized.unit / self.unit
+        multipliers[self.lengths] *= self.scale / self.unsized.scale
+        return taken
+
     def listed(self, state: Array) -> list[tuple[int, int]]:
         """Of every place of a watch in a state: its pair of bodies, or -1, and the number of its contact."""
         pairs = sum(map(len, self.guarded))
@@ -295,9 +320,15 @@ class Packed:
         pool, scale = self.pool, self.scale
         x, y, z = self.reference.tolist()
         for equation, at, unit in self._sources:
-            pool[at] = equation.current() / unit
+            value = equation.current() / unit
+            if not -FARTHEST <= value <= FARTHEST and not equation.terms[0][1].is_angle:
+                assert equation.source is not None
+                check_reach(f"a value of {equation.source[0]!r}", abs(equation.current()), scale)
+            pool[at] = value
         for distance, at in self._targets:
-            target = distance._target
+            target = distance._target.tolist()
+            if not max(map(abs, target)) <= FARTHEST * scale:
+                check_reach(f"a target of body {distance.bodies[0].name!r}", max(map(abs, target)), scale)
             pool[at] = (target[0] - x) / scale
             pool[at + 1] = (target[1] - y) / scale
             pool[at + 2] = (target[2] - z) / scale

@@ -8,10 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.constraints import layout
-from assembly.constraints.constraint import Constraint, Coordinate, FramePair
-from assembly.constraints.dexterity import Dexterity
+from assembly.constraints.constraint import Coordinate, FramePair
 from assembly.constraints.expression import Expression
-from assembly.constraints.objectives import FrameDistance, Objective, PointDistance
 from assembly.constraints.primitives import AZIMUTH, TURN
 from assembly.geometry import tape
 from assembly.geometry.face import Face
@@ -22,7 +20,7 @@ from assembly.proximity.shell_packing import pack_shell
 from assembly.proximity.solid import solid_of
 from assembly.proximity.writer import Writer
 
-__all__ = ["SceneWriter", "scene_size"]
+__all__ = ["SceneWriter"]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
@@ -131,32 +129,3 @@ class SceneWriter(Writer):
         header[layout.JOINTS] = len(self.frames)
         header[layout.TRACKED] = self._pair_rows + len(self.angles)
         header[layout.TAPE_ROOM], _ = self.add(self._tape_room)
-
-
-def scene_size(
-    bodies: Sequence[Body], constraints: Sequence[Constraint], objectives: Sequence[tuple[float, Objective]]
-) -> float:
-    """The largest body, by its shape or by the frames and points on it; of points alone, their spread."""
-    marks: dict[int, list[Array]] = {id(body): [] for body in bodies}
-    for item in constraints:
-        for equation in getattr(item, "equations", ()):
-            for _, coordinate in equation.terms:
-                for frame in (coordinate.frames.frame_a, coordinate.frames.frame_b):
-                    marks[id(frame.body)].append(frame.origin)
-    for _, term in objectives:
-        if isinstance(term, PointDistance):
-            marks[id(term.point.body)].append(term.point.coordinates)
-        elif isinstance(term, FrameDistance):
-            marks[id(term.frame.body)].append(term.frame.origin)
-        elif isinstance(term, Dexterity):
-            marks[id(term.tip_task.tip.body)].append(term.tip_task.origin)
-    sizes = [max(body.size, _spread(marks[id(body)])) for body in bodies]
-    size = max(sizes)
-    if not size > 0.0:
-        size = _spread([body.pose.apply(mark) for body in bodies for mark in (np.zeros(3), *marks[id(body)])])
-    return size if size > 0.0 else 1.0
-
-
-def _spread(points: Sequence[Array]) -> float:
-    """Diagonal of the box around points."""
-    return float(np.linalg.norm(np.ptp(points, axis=0))) if points else 0.0

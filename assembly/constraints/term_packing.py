@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import prod, sqrt
+from math import inf, prod, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from assembly.constraints import layout, terms
 from assembly.constraints.dexterity import MEASURES, TASKS, Dexterity
 from assembly.constraints.expression import Expression
 from assembly.constraints.objectives import FrameDistance, Objective, PointDistance, Posture
+from assembly.constraints.scene_size import check_reach
 from assembly.constraints.scene_writer import SceneWriter
 from assembly.errors import InputError
 from assembly.kinematics.body import Body
@@ -80,6 +81,7 @@ class TermPacking:
 
     def _add_turn(self, weight: float, term: FrameDistance) -> None:
         """A body turned to a quaternion: a posture whose place has no weight."""
+        check_reach("length", term.length, self._writer.scale)
         lever = term.length / self._writer.scale
         _, at = self._writer.add(pool=[0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, weight * lever**2])
         self.turns.append((term, at + terms.POSTURE_QUATERNION))
@@ -93,6 +95,7 @@ class TermPacking:
             if not body.fixed:
                 lever = 0.5 * (body.size or scale) / scale
                 row = body.q if term.reference is None else term.reference[k]
+                check_reach("a coordinate of a reference", float(np.abs(row[:3]).max()), scale)
                 place = (row[:3] - self._reference) / scale
                 _, at = self._writer.add(pool=[weight, *place, *row[3:], weight * lever**2])
                 self._records.append([terms.POSTURE, k, at, 0, int(term.reference is None)])
@@ -136,4 +139,7 @@ def natural_unit(term: Objective, scale: float) -> float:
         "smallest_singular_value": 1,
         "force_transmission": -1,
     }
-    return float(entry ** powers.get(term.measure, 0))
+    try:
+        return float(entry ** powers.get(term.measure, 0))
+    except OverflowError:
+        return inf

@@ -8,15 +8,22 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.errors import InputError, KnownSettings, checked_color, vector
+from assembly.errors import InputError, KnownSettings, check_coordinates, checked_color, vector
 from assembly.geometry.face import Face
 from assembly.geometry.surface import NurbsSurface
-from assembly.kinematics.pose import Pose, direction
+from assembly.kinematics.pose import Pose, direction, length
 
 __all__ = ["Body", "BodyFace", "Frame", "Point", "Shape"]
 
 Array = NDArray[np.float64]
 Shape = NurbsSurface | Face | Iterable[NurbsSurface | Face]
+
+
+def _place(name: str, value: ArrayLike) -> Array:
+    """Coordinates of a point, read-only."""
+    place = vector(name, value)
+    check_coordinates(name, place.tolist())
+    return _frozen(place)
 
 
 def _frozen(array: Array) -> Array:
@@ -96,6 +103,7 @@ class Body(KnownSettings):
         self._fixed = bool(fixed)
         # Pose takes what is like an array, which its fields do not say: they are tuples once it is made.
         self._pose = Pose(position, quaternion)  # type: ignore[arg-type]
+        check_coordinates("position", self._pose.position.tolist())
         self._faces = self._named(shape)
         self.color = color
 
@@ -123,6 +131,7 @@ class Body(KnownSettings):
     def pose(self, value: Pose) -> None:
         if not isinstance(value, Pose):
             raise TypeError(f"pose is {value!r}; expected a Pose")
+        check_coordinates("pose.position", value.position.tolist())
         self._pose = value
 
     @property
@@ -169,7 +178,7 @@ class Body(KnownSettings):
         boxes = [face.face.surface.bounding_box() for face in self.faces]
         low = np.min([box[0] for box in boxes], axis=0)
         high = np.max([box[1] for box in boxes], axis=0)
-        return float(np.linalg.norm(high - low))
+        return length(high - low)
 
     def face(self, name: str | None = None) -> BodyFace:
         """A face by name; the only face when no name is given.
@@ -189,7 +198,7 @@ class Body(KnownSettings):
 
     def point(self, x: float, y: float, z: float) -> Point:
         """The point (x, y, z) of the body, in body coordinates."""
-        return Point(self, _frozen(vector("point", (x, y, z))))
+        return Point(self, _place("point", (x, y, z)))
 
     def frame(
         self, at: ArrayLike = (0.0, 0.0, 0.0), z: ArrayLike = (0.0, 0.0, 1.0), x: ArrayLike | None = None
@@ -199,7 +208,7 @@ class Body(KnownSettings):
         Without `x`, the x axis is the coordinate axis farthest from `z`, made orthogonal to it; a given `x` is made
         orthogonal to `z` too and must not be parallel to it.
         """
-        origin, axis = vector("at", at), direction("z", z)
+        origin, axis = _place("at", at), direction("z", z)
         side = np.eye(3)[np.argmin(np.abs(axis))] if x is None else direction("x", x)
         across = side - (side @ axis) * axis
         if not np.linalg.norm(across) > 1e-9:
@@ -208,4 +217,4 @@ class Body(KnownSettings):
         across = direction("x", across)
         across = direction("x", across - (across @ axis) * axis)
         axes = np.column_stack([across, np.cross(axis, across), axis])
-        return Frame(self, _frozen(origin), _frozen(axes))
+        return Frame(self, origin, _frozen(axes))

@@ -16,13 +16,14 @@ from math import hypot
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.errors import InputError, number, real_array, vector
+from assembly.errors import InputError, check_coordinates, number, real_array, vector
 
 __all__ = [
     "Pose",
     "angular_velocity_map",
     "axes_quaternion",
     "direction",
+    "length",
     "multiply",
     "pose_rows",
     "quaternion_rate_map",
@@ -73,6 +74,7 @@ def pose_rows(name: str, value: ArrayLike, count: int | str = "n") -> Array:
     """Pose rows x y z qw qx qy qz, (count, 7), their quaternions normalized as in `unit_quaternion`."""
     rows = real_array(name, value, (count, 7))
     for k, row in enumerate(rows):
+        check_coordinates(f"{name}[{k}]", row[:3].tolist())
         row[3:] = unit_quaternion(f"{name}[{k}, 3:]", row[3:])
     return rows
 
@@ -86,6 +88,13 @@ def direction(name: str, value: ArrayLike) -> Array:
     v /= largest  # squares of very short and very long vectors have no doubles
     unit: Array = v / np.linalg.norm(v)
     return unit
+
+
+def length(v: Array) -> float:
+    """Euclidean norm of a vector, where squares of its components vanish or overflow, too."""
+    # A power of two changes no bit of what needs none.
+    unit = 2.0 ** np.frexp(np.abs(v).max())[1]
+    return float(unit * np.linalg.norm(v / unit))
 
 
 def _vectors(name: str, value: ArrayLike, length: int = 3) -> Array:

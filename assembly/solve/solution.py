@@ -75,7 +75,7 @@ class Scene:
     def index(self, body: Body | str) -> int:
         """Place of a body, given itself or its name."""
         for k, other in enumerate(self.bodies):
-            if other is body or other.name == body:
+            if other is body or (isinstance(body, str) and other.name == body):
                 return k
         known = ", ".join(repr(other.name) for other in self.bodies)
         raise InputError(f"body is {body!r}; expected one of {known}")
