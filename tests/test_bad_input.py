@@ -305,6 +305,10 @@ CASES = {
         track_what_cannot_hold,
         "q0 is a start that leads to no pose to begin at; expected one: .*conflicting",
     ),
+    "solution body an array": (
+        lambda: solve().pose(np.array([1, 2])),
+        r"body is array\(\[1, 2\]\); expected one of 'a', 'b'",
+    ),
     "solution body": (lambda: solve().pose("c"), "body is 'c'; expected one of 'a', 'b'"),
 }
 
@@ -334,6 +338,11 @@ TYPES = {
     "manager bodies": (lambda: asm.Manager(3.0), "bodies is 3.0; expected bodies"),
     "manager body": (lambda: asm.Manager([BALL, BALL]), r"bodies\[0\] is NurbsSurface.*; expected a Body"),
     "follow": (lambda: touching().tracker((0, 0, 0)), r"follow is \(0, 0, 0\); expected a Point, a Frame or a Body"),
+    "starts an array": (lambda: solve(starts=np.array([1, 2])), r"starts is array\(\[1, 2\]\); expected a mapping"),
+    "starts zero": (lambda: solve(starts=0), "starts is 0; expected a mapping of constraint name to parameters"),
+    "starts a text": (lambda: solve(starts=""), "starts is ''; expected a mapping"),
+    "starts false": (lambda: solve(starts=False), "starts is False; expected a mapping"),
+    "starts an empty list": (lambda: solve(starts=[]), r"starts is \[\]; expected a mapping"),
     "pose": (lambda: setattr(pair()[0], "pose", (0, 0, 0)), r"pose is \(0, 0, 0\); expected a Pose"),
 }
 

@@ -135,7 +135,7 @@ def _farthest(points: Sequence[Array]) -> float:
     if not largest > 0.0:
         return 0.0
     # By a power of two, which changes no bit, so that squares neither vanish nor overflow.
-    unit = 2.0 ** np.frexp(largest)[1]
+    unit = 2.0 ** (np.frexp(largest)[1] - 1)
     scaled = places / unit
     square = max(float(((scaled[k:] - place) ** 2).sum(axis=1).max()) for k, place in enumerate(scaled))
     far = unit * float(np.sqrt(square))

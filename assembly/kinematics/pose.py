@@ -93,7 +93,7 @@ def direction(name: str, value: ArrayLike) -> Array:
 def length(v: Array) -> float:
     """Euclidean norm of a vector, where squares of its components vanish or overflow, too."""
     # A power of two changes no bit of what needs none.
-    unit = 2.0 ** np.frexp(np.abs(v).max())[1]
+    unit = 2.0 ** (np.frexp(np.abs(v).max())[1] - 1)
     return float(unit * np.linalg.norm(v / unit))
 
 
