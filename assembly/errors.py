@@ -131,11 +131,11 @@ def bounded(name: str, value: Any) -> float:
     return result
 
 
-def check_coordinates(name: str, coordinates: Sequence[float]) -> None:
-    """Raise where coordinates, finite ones, are so large that their squares overflow."""
+def check_coordinates(name: str, coordinates: Sequence[float], row: str = "") -> None:
+    """Raise where coordinates, finite ones, are so large that their squares overflow; `row` is "2, " in row 2."""
     for k, x in enumerate(coordinates):
         if not -FARTHEST <= x <= FARTHEST:
-            raise InputError(f"{name}[{k}] is {x:g}; expected coordinates from {-FARTHEST:g} to {FARTHEST:g}")
+            raise InputError(f"{name}[{row}{k}] is {x:g}; expected coordinates from {-FARTHEST:g} to {FARTHEST:g}")
 
 
 def positive(name: str, value: Any) -> float:

@@ -74,7 +74,7 @@ def pose_rows(name: str, value: ArrayLike, count: int | str = "n") -> Array:
     """Pose rows x y z qw qx qy qz, (count, 7), their quaternions normalized as in `unit_quaternion`."""
     rows = real_array(name, value, (count, 7))
     for k, row in enumerate(rows):
-        check_coordinates(f"{name}[{k}]", row[:3].tolist())
+        check_coordinates(name, row[:3].tolist(), f"{k}, ")
         row[3:] = unit_quaternion(f"{name}[{k}, 3:]", row[3:])
     return rows
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from math import isfinite
 from time import perf_counter, sleep
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +14,7 @@ from assembly.constraints.constraint import structure_changes
 from assembly.constraints.layout import CLOCK_AT, WATCH
 from assembly.constraints.objectives import FrameDistance, PointDistance
 from assembly.constraints.packing import structure_of
-from assembly.errors import InputError, integer, number, positive
+from assembly.errors import FARTHEST, InputError, integer, number, positive
 from assembly.kinematics.body import Body, Frame, Point
 from assembly.kinematics.pose import Pose, axes_quaternion, rotation_matrix
 from assembly.proximity.solid_contact import STAYS, TRACK
@@ -277,16 +276,16 @@ class Tracker:
                 if row.dtype.kind not in "iuf" or isinstance(target, np.ma.MaskedArray):
                     return None
                 row = np.asarray(row, dtype=np.float64)
+            if row.shape != ((3,) if isinstance(hand, PointDistance) else (7,)):
+                return None
+            x, y, z = row.tolist()[:3]
+            # Farther ones would overflow, and what is not a number is no nearer.
+            far = FARTHEST * packed.scale
+            if not (-far <= x <= far and -far <= y <= far and -far <= z <= far):
+                return None
             if isinstance(hand, PointDistance):
-                if row.shape != (3,):
-                    return None
-                x, y, z = row.tolist()
-                if not isfinite(x + y + z):
-                    return None
                 hand._target = row
             else:
-                if row.shape != (7,):
-                    return None
                 hand.target = Pose(row[:3], row[3:])
         except Exception:  # whatever a target of the user's own does when it is read
             return None

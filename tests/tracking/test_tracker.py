@@ -65,6 +65,7 @@ def circling(center, radius, ticks, turns=1.0):
         object(),
         asm.Pose(),
         10**400,
+        (1e160, 0.0, 0.0),
         ["1", "2", "3"],
         (True, False, True),
         np.array(["2026-01-01"] * 3, dtype="datetime64[D]"),
@@ -83,7 +84,10 @@ def test_a_target_that_is_none_moves_nothing(target):
     assert tracker.step((1.0, 0.0, 1.5)).status is not TrackStatus.BAD_TARGET
 
 
-@pytest.mark.parametrize("target", [None, (0, 0, 0), np.zeros(7), np.full(7, np.nan), (0, 0, 0, 3, 0, 0, 0), "pose"])
+@pytest.mark.parametrize(
+    "target",
+    [None, (0, 0, 0), np.zeros(7), np.full(7, np.nan), (0, 0, 0, 3, 0, 0, 0), "pose", (0, 1e160, 0, 1, 0, 0, 0)],
+)
 def test_a_pose_that_is_none_moves_nothing(target):
     scene, _ = arm()
     tracker = scene.tracker(scene.bodies[2])
