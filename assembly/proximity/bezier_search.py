@@ -333,8 +333,10 @@ def curve_distance(ra, qa, rb, qb, tolerance, clearance, budget, polish, plane, 
             if far < upper:
                 upper = far
                 keep(ra, qa, ia, a, ka, rb, qb, ib, b, kb, x, y, upper, out)
-                if plane and clearance >= 0.0 and meeting_proven(ra, qa, a, oa, rb, qb, b, ob, shift, error, x, y):
-                    status = MEETING
+                # Points that prove a distance of at most a clearance are as near to each other as doubles tell.
+                if plane and (clearance == 0.0 or (clearance > 0.0 and far <= 16.0 * (error + away))):
+                    if meeting_proven(ra, qa, a, oa, rb, qb, b, ob, shift, error, x, y):
+                        status = MEETING
             if proven:
                 key = max(key, low)
                 if far - low <= max(step, 16.0 * (error + away)):

@@ -11,7 +11,7 @@ from assembly.geometry.formula import formula_point
 from assembly.geometry.interval import UNIT
 from assembly.geometry.vec import blend, dot, sub
 from assembly.proximity.enclosures import FORMULA, HULL
-from assembly.proximity.gjk import INSIDE, VERTEX, WEIGHTS, gjk
+from assembly.proximity.gjk import INSIDE, VERTEX, WEIGHTS, gjk, inside_weights
 
 _ROUNDS = 24
 
@@ -61,7 +61,7 @@ def hull_point(full, points, count, x, g):
     g[WEIGHTS + 4], g[WEIGHTS + 5], g[WEIGHTS + 6] = x
     how, _v, kept = gjk(full, g, WEIGHTS + 4, 1, -1.0, points, 0, count, -1.0, v, math.inf, 1e-15, g)
     if how == INSIDE:
-        return x, kept, True, 0.0
+        inside_weights(full, g)
     o = VERTEX * (kept - 1) + 6
     last = (g[o], g[o + 1], g[o + 2])
     b = last
@@ -71,7 +71,7 @@ def hull_point(full, points, count, x, g):
         d = sub((g[o], g[o + 1], g[o + 2]), last)
         b = blend(1.0, b, g[WEIGHTS + k], d)
         off += 8.0 * (abs(d[0]) + abs(d[1]) + abs(d[2]))
-    return b, kept, False, UNIT * (off + abs(b[0]) + abs(b[1]) + abs(b[2]))
+    return b, kept, how == INSIDE, UNIT * (off + abs(b[0]) + abs(b[1]) + abs(b[2]))
 
 
 @kernel(inline=True)

@@ -11,7 +11,7 @@ import math
 from assembly._kernel import kernel
 from assembly.geometry import formula
 from assembly.geometry.interval import UNIT, up
-from assembly.geometry.vec import cross, dot, sub
+from assembly.geometry.vec import add, cross, dot, scale, sub
 from assembly.proximity.enclosure_newton import hull_point, newton
 from assembly.proximity.enclosure_taylor import (
     across_feature,
@@ -45,6 +45,11 @@ from assembly.proximity.gjk import INSIDE, VERTEX, gjk
 UPPER, AT_S, SPAN_A, AT_T, SPAN_B, POINT_A, POINT_B, MET, COUNT, SLACK, STATE = 0, 1, 2, 3, 4, 5, 8, 11, 12, 13, 16
 # Behind it: values at two parameters, a record across a feature, rows of the feature.
 VALUES, OTHER_VALUES, ACROSS, ROWS, SCRATCH = 16, 34, 52, 112, 128
+# Corners of a triangle and of a tetrahedron around zero, turned so that nothing made by hand is parallel to them, and
+# the sizes of their copies about a point, as parts of the hull's.
+_TRIANGLE = ((0.765, 0.644, 0.0), (-0.94, 0.34, 0.0), (0.175, -0.984, 0.0))
+_TETRAHEDRON = ((-0.787, -0.573, 0.229), (0.78, -0.582, -0.229), (0.232, 0.576, 0.784), (-0.226, 0.579, -0.784))
+NEAR_BY = (1e-4, 1e-8, 1e-12)
 
 
 @kernel(inner=True, exact=True)
@@ -73,6 +78,41 @@ def inside_proven(full, g, x, off):
     return min(min(u, v), min(w, z)) > least or max(max(u, v), max(w, z)) < -least
 
 
+@kernel(inline=True)
+def corner_around(full, k, size):
+    """The k-th of `full` places around zero, about `size` from it: zero is inside of their simplex."""
+    if full == 3:
+        return scale(size, _TRIANGLE[k])
+    return scale(size, _TETRAHEDRON[k])
+
+
+@kernel(inner=True, exact=True)
+def surrounded(full, points, count, x, off, g):
+    """Whether a point, known up to `off`, is proven inside a hull by places around it. Overwrites g.
+
+    On a diagonal of the hull, as in the middle of a cube, a point is on the border of every simplex that the search for
+    the nearest point ends with. Places about it are not, and a convex set that holds them holds it.
+    """
+    farthest = 0.0
+    for i in range(count):
+        d = sub((points[3 * i], points[3 * i + 1], points[3 * i + 2]), x)
+        farthest = max(farthest, dot(d, d))
+    farthest = math.sqrt(farthest)
+    # What the sums below are rounded by.
+    off += 4.0 * UNIT * (abs(x[0]) + abs(x[1]) + abs(x[2]) + farthest)
+    for part in NEAR_BY:
+        proven = 0
+        for k in range(full):
+            y = add(x, corner_around(full, k, part * farthest))
+            inside = hull_point(full, points, count, y, g)[2]
+            if not (inside and inside_proven(full, g, y, off)):
+                break
+            proven += 1
+        if proven == full:
+            return True
+    return False
+
+
 @kernel(inner=True, exact=True)
 def meet_points(full, kb, points, count, a, off_a, b, off_b, state, g):
     """Distance of two points, rounded up, or of a point and a hull with its nearest point and what carries it.
@@ -87,7 +127,14 @@ def meet_points(full, kb, points, count, a, off_a, b, off_b, state, g):
             state[MET] = 1.0
             return 0.0, a, full
     d = sub(a, b)
-    return up(math.sqrt(dot(d, d)) * (1.0 + 8.0 * UNIT) + off_a + off_b), b, kept
+    distance = math.sqrt(dot(d, d))
+    if count > full and distance <= off_a + off_b:
+        if surrounded(full, points, count, a, off_a, g):
+            state[MET] = 1.0
+            return 0.0, a, full
+        # For what carries the point.
+        b, kept, _inside, off_b = hull_point(full, points, count, a, g)
+    return up(distance * (1.0 + 8.0 * UNIT) + off_a + off_b), b, kept
 
 
 @kernel(inner=True, exact=True)

@@ -33,9 +33,11 @@ from assembly.proximity.enclosure_node import (
     SLACK,
     SPAN_A,
     SPAN_B,
+    NEAR_BY,
     STATE,
     UPPER,
     bound_node,
+    corner_around,
     domain_of,
     inside_proven,
 )
@@ -56,7 +58,7 @@ from assembly.proximity.enclosures import (
     hull_support,
     split_piece,
 )
-from assembly.proximity.gjk import INSIDE, ROOM, VERTEX, gjk, witnesses
+from assembly.proximity.gjk import INSIDE, ROOM, VERTEX, gjk, inside_weights, witnesses
 
 # Why a search ended.
 CONVERGED, SEPARATED, NOT_SEPARATED, HIT, DISJOINT, UNDECIDED, BUDGET_SPENT, ROUNDED = range(8)
@@ -351,6 +353,44 @@ def search(
     return why
 
 
+@kernel(inner=True)
+def differences(g, count):
+    """Put the differences that a simplex is made of where points of a hull are looked for."""
+    for k in range(count):
+        for c in range(3):
+            g[VERTEX * k + 6 + c] = g[VERTEX * k + c]
+
+
+@kernel(inner=True, allocates=True, exact=True)
+def overlap_proven(full, a, count_a, b, count_b, slack, g):
+    """Whether two hulls about a center are proven to meet: places around zero are inside of their difference.
+
+    See `surrounded` in `enclosure_node.py`. Overwrites g.
+    """
+    farthest = 0.0
+    for i in range(3 * count_a):
+        farthest = max(farthest, abs(a[i]))
+    for i in range(3 * count_b):
+        farthest = max(farthest, abs(b[i]))
+    origin = (0.0, 0.0, 0.0)
+    for part in NEAR_BY:
+        proven = 0
+        for k in range(full):
+            moved, off = about_center(a, count_a, corner_around(full, k, part * farthest))
+            first = (moved[0] - b[0], moved[1] - b[1], moved[2] - b[2])
+            how, _v, kept = gjk(full, moved, 0, count_a, -1.0, b, 0, count_b, -1.0, first, math.inf, 1e-15, g)
+            if how != INSIDE:
+                break
+            differences(g, kept)
+            # Differences are rounded once more, by their size at most.
+            if not inside_proven(full, g, origin, off + slack + 16.0 * UNIT * farthest):
+                break
+            proven += 1
+        if proven == full:
+            return True
+    return False
+
+
 @kernel
 def hull_distance(full, a, count_a, b, count_b, state):
     """The same answer for two hulls, by their nearest points and one direction."""
@@ -366,14 +406,12 @@ def hull_distance(full, a, count_a, b, count_b, state):
     lower = 0.0
     if how == INSIDE:
         # The origin is inside a simplex of differences: proven like a point inside a simplex.
-        for k in range(kept):
-            for c in range(3):
-                g[VERTEX * k + 6 + c] = g[VERTEX * k + c]
-        origin = (0.0, 0.0, 0.0)
+        inside_weights(full, g)
+        x, y = witnesses(g, kept)
+        differences(g, kept)
         off = 4.0 * UNIT * (abs(g[0]) + abs(g[1]) + abs(g[2])) + slack
-        if inside_proven(full, g, origin, off):
+        if inside_proven(full, g, (0.0, 0.0, 0.0), off):
             state[MET] = 1.0
-        x, y = origin, origin
     else:
         x, y = witnesses(g, kept)
         size = math.sqrt(dot(v, v))
@@ -387,6 +425,9 @@ def hull_distance(full, a, count_a, b, count_b, state):
         state[POINT_A + c] = x[c] + center[c]
         state[POINT_B + c] = y[c] + center[c]
         off += 16.0 * UNIT * (abs(x[c]) + abs(y[c]))
+    if state[MET] == 0.0 and lower == 0.0:
+        if overlap_proven(full, a, count_a, b, count_b, slack, g):
+            state[MET] = 1.0
     state[UPPER] = up(math.sqrt(dot(d, d)) * (1.0 + 8.0 * UNIT) + off)
     state[STATE - 1] = min(lower, state[UPPER])
     state[COUNT] = 1.0

@@ -156,6 +156,23 @@ def inside_tetrahedron(g):
 
 
 @kernel(inner=True)
+def inside_weights(full, g):
+    """Weights of the vertices of a full simplex that has the origin inside."""
+    total = 0.0
+    for k in range(full):
+        a = vertex(g, (k + 1) % full)
+        b = vertex(g, (k + 2) % full)
+        if full == 3:
+            part = abs(a[0] * b[1] - a[1] * b[0])
+        else:
+            part = abs(dot(a, cross(b, vertex(g, (k + 3) % full))))
+        g[WEIGHTS + k] = part
+        total += part
+    for k in range(full):
+        g[WEIGHTS + k] /= total
+
+
+@kernel(inner=True)
 def gjk(full, xa, oa, ca, wa, xb, ob, cb, wb, v, limit, part, g):
     """Nearest points of a set at xa[oa:] and one at xb[ob:], `full` - 1 dimensions, from a first direction v.
 

@@ -19,7 +19,7 @@ from assembly.geometry.formula import ROOM
 from assembly.geometry.surface import NurbsSurface
 from assembly.proximity.bezier_capsules import OPEN, capsule_tree, compare_curves, compare_point
 from assembly.proximity.bezier_point import UNFINISHED, point_distance
-from assembly.proximity.bezier_search import ANSWER, curve_distance
+from assembly.proximity.bezier_search import ANSWER, MEETING, curve_distance
 from assembly.proximity.patch_packing import pack_patches
 from assembly.proximity.patch_search import PATCH_ANSWER, patch_distance
 from assembly.proximity.query_operands import coordinates, is_formula, share_a_point
@@ -164,6 +164,9 @@ def _status(a: Any, b: Any, code: int, out: Array, tolerance: float, clearance: 
 def written_answer(a: NurbsCurve, b: Any, code: int, out: Array, tolerance: float, clearance: float) -> Separation:
     """What a kernel wrote, as a result."""
     lower, upper, *_, evaluations = out.tolist()
+    if code == MEETING and upper > clearance > 0.0:
+        # The distance is zero; how far apart the two points may be is their rounding alone.
+        upper = clearance
     converged = code == 0 and upper - lower <= tolerance
     answer = object.__new__(Separation)
     # What the initializer of a frozen dataclass does, at a third of its time; arrays are made when they are read.
