@@ -23,6 +23,7 @@ __all__ = [
     "checked_color",
     "extent",
     "integer",
+    "is_masked",
     "items",
     "number",
     "positive",
@@ -65,6 +66,11 @@ def _shown(value: Any) -> str:
     return text if len(text) <= 80 else text[:77] + "..."
 
 
+def is_masked(value: Any) -> bool:
+    """Whether an array has masked values: they are no numbers, though what is below the mask may be."""
+    return type(value) is not np.ndarray and isinstance(value, np.ndarray) and bool(np.ma.is_masked(value))
+
+
 def real_array(name: str, value: ArrayLike, shape: Sequence[int | str]) -> NDArray[np.float64]:
     """A new array of finite doubles of the given shape.
 
@@ -87,6 +93,8 @@ def real_array(name: str, value: ArrayLike, shape: Sequence[int | str]) -> NDArr
         array = np.array(came, dtype=np.float64) if came.dtype.kind in "iuf" else None
     except (TypeError, ValueError, OverflowError):
         array = None
+    if is_masked(value):
+        raise InputError(f"{name} has masked values; expected real numbers")
     # What nearly always comes, without numpy's price for small arrays. A sum may overflow: that is seen below.
     if array is not None and array.shape == tuple(shape) and math.isfinite(sum(array.ravel().tolist())):
         return array
@@ -116,7 +124,7 @@ def number(name: str, value: Any) -> float:
         if isinstance(value, (str, bytes, bool, np.bool_)):
             raise TypeError
         result = float(value)
-    except (TypeError, ValueError, OverflowError):
+    except (TypeError, ValueError, OverflowError, RuntimeError):  # the last is CasADi's, of a vector
         raise InputError(f"{name} is {_shown(value)}; expected a finite real number") from None
     if not np.isfinite(result):
         raise InputError(f"{name} is {result}; expected a finite real number")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -206,6 +207,11 @@ CASES = {
         "weight is 0; expected a positive number",
     ),
     "weight negative": (lambda: asm.Posture(weight=-1.0), "weight is -1; expected a positive number"),
+    "weight vector": (lambda: asm.Posture(weight=ca.DM([1, 2])), r"weight is DM\(\[1, 2\]\); expected a finite real"),
+    "target masked": (
+        lambda: set_target(np.ma.array([1.0, 2.0, 3.0], mask=[False, True, False])),
+        "target has masked values; expected real numbers",
+    ),
     "weight nan": (lambda: asm.Posture(weight=NAN), "weight is nan; expected a finite real number"),
     "reference shape": (lambda: asm.Posture([1, 0, 0, 0]), r"reference has shape \(4,\); expected \(n, 7\)"),
     "reference": (lambda: asm.Posture(q_of([0] * 7)), r"reference\[1, 3:\] is .* with norm 0; expected a unit"),

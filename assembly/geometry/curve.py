@@ -15,7 +15,7 @@ from typing import Any, Literal, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.errors import InputError, integer, number, real_array, vector
+from assembly.errors import InputError, integer, is_masked, number, real_array, vector
 from assembly.geometry import bezier
 from assembly.geometry.bezier_packing import pack_pieces
 from assembly.geometry.bezier_pieces import evaluate_pieces
@@ -50,6 +50,8 @@ def checked_name(name: str | None) -> str | None:
 
 def parameters(name: str, value: ArrayLike) -> Array:
     """Parameters as doubles of any shape; not yet checked against the domain."""
+    if is_masked(value):
+        raise InputError(f"{name} has masked values; expected real numbers")
     try:
         came = np.asarray(value)
         if came.dtype.kind not in "iuf":

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.errors import InputError, checked_color
+from assembly.errors import InputError, checked_color, items
 from assembly.geometry.boundary import Boundary, LoopLike, make_boundary
 from assembly.geometry.curve import NurbsCurve, checked_name, flat, parameters
 from assembly.geometry.derivative_bounds import derivative_bounds
@@ -86,7 +86,7 @@ class Face:
         self.name = surface.name if name is None else checked_name(name)
         self.reversed = bool(reversed)
         self.color = color
-        self._outer, self._holes = outer, tuple(holes)
+        self._outer, self._holes = outer, items("holes", holes, "a sequence of loops")
         if outer is not None or self._holes:
             _ = self._boundary
 

@@ -114,7 +114,7 @@ def refine(values, o, half, m):
 
 @kernel(inner=True, exact=True)
 def arc_bound(table, pool, lo, hi, room):
-    """Upper bound of the length of arc over [lo, hi] by the user's expression; infinite where there is none."""
+    """Upper bound of the length of arc over [lo, hi] by the user's expression; infinite where it has no length."""
     if table[ARC_TAPE] == 0:
         return math.inf
     if table[ARC_PLAIN] != 0:
@@ -127,7 +127,7 @@ def arc_bound(table, pool, lo, hi, room):
     room[2] = hi
     room[3] = hi
     run_bounds(table, pool, table[ARC_TAPE], room, room[WORK_AT:], room[RESULTS:])
-    return room[RESULTS + 1]
+    return room[RESULTS + 1] if room[RESULTS + 1] >= 0.0 else math.inf
 
 
 @kernel

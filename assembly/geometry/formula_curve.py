@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from math import isfinite
+from math import inf, isfinite
 from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
@@ -47,6 +47,8 @@ Array = NDArray[np.float64]
 # Points at which a new curve is looked at; intervals by which it is boxed in, how often one is halved of which nothing
 # is known, how often for a narrower box, and how many may be halved at a time.
 _LOOKS, _BOXES, _HALVINGS, _NARROWINGS, _AT_ONCE = 257, 64, 44, 12, 2048
+# Squares of what is below are doubles, and their sums.
+LARGEST = 1e100
 # Operations whose values may jump.
 _JUMPS = frozenset("SIGN COPYSIGN LT LE EQ NE NOT AND OR IF_ELSE_ZERO FLOOR CEIL FMOD REMAINDER ATAN2".split())
 
@@ -62,7 +64,7 @@ class FormulaCurve:
     parameter : casadi.SX
         That symbol.
     domain : (float, float)
-        First and last parameter.
+        First and last parameter, below 1e100.
     arc_length : callable, optional
         Takes the symbols (t0, t1) and returns an SX expression that is nowhere less than the length of arc from t0 to
         t1, for which you vouch: sqrt((t1 - t0) * (integral of |C'|^2)) is one (Lakshmanan et al., lemma 1). Without
@@ -88,8 +90,8 @@ class FormulaCurve:
     ------
     InputError, TypeError
         No such column, other symbols in it, instructions that are no elementary functions, an empty domain, points
-        that are not finite, or a place about which intervals have no bound of the expression, however short they are:
-        a pole, or one that is removable, as of sin(t) / t.
+        that are not finite or not below 1e100, or a place about which intervals have no bound of the expression,
+        however short they are: a pole, or one that is removable, as of sin(t) / t.
     """
 
     def __init__(
@@ -114,7 +116,7 @@ class FormulaCurve:
         if derivative is not None:
             slope = _checked_column("derivative", derivative, parameter, (self.dimension,))
         self._table, self._pool = _packed_record(
-            column, parameter, self.domain, slope, _arc_expression(arc_length), self.error
+            column, parameter, self.domain, slope, _arc_expression(arc_length, self.domain), self.error
         )
         self._room = np.zeros(int(self._table[ROOM]))
         self._has_arc = arc_length is not None
@@ -126,6 +128,9 @@ class FormulaCurve:
                 f"expression is {out[bad, : self.dimension].tolist()} at {at[bad]:g}; "
                 "expected finite numbers on the domain"
             )
+        largest = float(np.abs(out[:, : self.dimension]).max())
+        if not largest < LARGEST:
+            raise InputError(f"expression reaches {largest:g} on the domain; expected coordinates below {LARGEST:g}")
         self._box = self._boxed_in(out[:, : self.dimension])
         self.closed: bool = bool(np.linalg.norm(out[0, :3] - out[-1, :3]) <= COINCIDENT * max(np.ptp(out[:, :3], 0)))
 
@@ -272,10 +277,12 @@ class FormulaCurve:
 def _checked_domain(value: Any) -> tuple[float, float]:
     try:
         first, last = (float(x) for x in value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError, RuntimeError):
         raise InputError(f"domain is {value!r}; expected two numbers, the first and the last parameter") from None
     if not (isfinite(first) and isfinite(last) and first < last):
         raise InputError(f"domain is [{first:g}, {last:g}]; expected two finite numbers, the first below the last")
+    if not max(-first, last) < LARGEST:
+        raise InputError(f"domain is [{first:g}, {last:g}]; expected parameters below {LARGEST:g}")
     return first, last
 
 
@@ -296,7 +303,7 @@ def _checked_column(what: str, value: Any, parameter: Any, rows: tuple[int, ...]
     return ca.densify(value)
 
 
-def _arc_expression(arc_length: Any) -> tuple[ca.SX, ca.SX] | None:
+def _arc_expression(arc_length: Any, domain: tuple[float, float]) -> tuple[ca.SX, ca.SX] | None:
     """The two ends as a column, and the bound of the length between them."""
     import casadi as ca
 
@@ -306,14 +313,25 @@ def _arc_expression(arc_length: Any) -> tuple[ca.SX, ca.SX] | None:
         raise TypeError(f"arc_length is {arc_length!r}; expected a callable of two casadi.SX symbols, or None")
     ends = ca.SX.sym("ends", 2)
     try:
-        bound = ca.SX(arc_length(ends[0], ends[1]))
-    except NotImplementedError:  # what CasADi raises for a value that is no expression
+        value = arc_length(ends[0], ends[1])
+    except (TypeError, NotImplementedError, RuntimeError) as error:  # the latter two are CasADi's
+        raise TypeError(
+            f"arc_length is {arc_length!r}, which takes no two casadi.SX symbols ({error}); expected a callable of two"
+        ) from error
+    try:
+        bound = ca.SX(value)
+    except (TypeError, NotImplementedError, RuntimeError):
         raise TypeError("arc_length returns no casadi.SX expression; expected one of the two ends") from None
     if not bound.is_scalar():
         raise InputError(f"arc_length returns shape {bound.shape}; expected one number")
     free = [s.name() for s in ca.symvar(bound) if not any(ca.is_equal(s, ends[k]) for k in range(2))]
     if free:
         raise InputError(f"arc_length has the symbols {free} beside the two ends; expected these alone")
+    whole = float(ca.Function("arc", [ends], [bound])(domain))
+    if not 0.0 <= whole < inf:
+        raise InputError(
+            f"arc_length is {whole:g} over the domain [{domain[0]:g}, {domain[1]:g}]; expected a finite length"
+        )
     return ends, bound
 
 

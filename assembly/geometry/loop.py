@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.errors import InputError, items, number
+from assembly.errors import InputError, items, number, vector
 from assembly.geometry.curve import NurbsCurve
 from assembly.geometry.curve_packing import signed_area
 from assembly.geometry.trim_table import build
@@ -23,6 +23,13 @@ Array = NDArray[np.float64]
 TOLERANCE = 1e-9
 # Curves smaller than this part of the loop's size are left out.
 _NO_LENGTH = 1e-12
+
+
+def _checked_period(value: Sequence[float]) -> tuple[float, float]:
+    u, v = vector("period", value, 2).tolist()
+    if min(u, v) < 0.0:
+        raise InputError(f"period is [{u:g}, {v:g}]; expected lengths in u and v, zero where the surface is not closed")
+    return u, v
 
 
 def curve_ends(curve: NurbsCurve) -> Array:
@@ -127,7 +134,7 @@ class Loop:
             if curve.control_points.shape[1] != 2:
                 raise InputError(f"{name}[{k}] is a curve in space; expected a plane curve in (u, v)")
         self.tolerance = number("tolerance", tolerance)
-        self.period = (0.0, 0.0) if period is None else (float(period[0]), float(period[1]))
+        self.period = (0.0, 0.0) if period is None else _checked_period(period)
         self.curves = tuple(parts)
         low, high = self._box()
         self.size = float(np.linalg.norm(high - low))

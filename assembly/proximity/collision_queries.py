@@ -64,8 +64,9 @@ def _packed_curves(curves: Any) -> tuple[NDArray[np.int64], Array, int, int]:
     """Rows of pieces, their homogeneous points, and the number and dimension of the curves."""
     if isinstance(curves, (list, tuple)) and any(isinstance(curve, NurbsCurve) for curve in curves):
         return _packed_splines(curves)
-    points = np.asarray(curves)
-    if points.ndim != 3 or points.dtype != np.float64 or not np.isfinite(points).all():
+    points = curves
+    fits = type(points) is np.ndarray and points.ndim == 3 and points.dtype == np.float64
+    if not fits or not np.isfinite(points).all():
         # What it takes a large array apart for is to say what is wrong with it.
         points = real_array("curves", curves, ("n", "k", "d"))
     n, k, d = points.shape
@@ -102,9 +103,19 @@ def _packed_splines(curves: Sequence[NurbsCurve]) -> tuple[NDArray[np.int64], Ar
     return np.array(rows, dtype=np.int64), np.concatenate(pool), len(curves), dimension or 3
 
 
+def _hold_points(obstacles: Any) -> bool:
+    """Whether the first is no row of numbers: to give the vertices of one obstacle alone is the usual mistake."""
+    if isinstance(obstacles, np.ndarray) and obstacles.ndim == 0:
+        return False
+    try:
+        return len(obstacles) == 0 or np.ndim(obstacles[0]) == 2
+    except ValueError:  # rows of several lengths: what is wrong with them is said with their number
+        return True
+
+
 def _packed_obstacles(obstacles: Any, dimension: int) -> tuple[Array, NDArray[np.int64], Array]:
     """Vertices of all in a row, place and number of each one's, and their boxes."""
-    if not isinstance(obstacles, (list, tuple, np.ndarray)) or np.ndim(obstacles[0] if len(obstacles) else [[]]) != 2:
+    if not isinstance(obstacles, (list, tuple, np.ndarray)) or not _hold_points(obstacles):
         raise InputError("obstacles is no sequence of arrays of vertices (k, d); expected one array an obstacle")
     vertices: list[Array] = []
     hulls = np.zeros((len(obstacles), 2), dtype=np.int64)

@@ -19,6 +19,7 @@ from assembly.geometry.curve import NurbsCurve
 from assembly.geometry.formula_curve import FormulaCurve
 from assembly.proximity import enclosure_node as en
 from assembly.proximity import enclosure_search as es
+from assembly.proximity import hull_pair
 from assembly.proximity.enclosures import AUTO, BEZIER, CAPSULE, ELLIPSOID, FORMULA, HULL, PIECE, TAYLOR
 from assembly.proximity.formula_packing import about
 from assembly.proximity.separation import Separation, SeparationStatus
@@ -124,7 +125,7 @@ def enclosed_distance(
         gap = number("clearance", clearance)
         if gap < 0.0:
             raise InputError(f"clearance is {gap:g}; expected zero, a positive number or None")
-    if bound not in BOUNDS:
+    if not isinstance(bound, str) or bound not in BOUNDS:
         raise InputError(f"bound is {bound!r}; expected one of {', '.join(BOUNDS)}")
     if not isinstance(polish, (bool, np.bool_)):
         raise InputError(f"polish is {polish!r}; expected True or False")
@@ -226,7 +227,7 @@ def _workspace(nodes: int) -> Workspace:
 
 def _between_hulls(a: Operand, b: Operand, tolerance: float, clearance: float) -> Separation:
     state = np.zeros(en.SCRATCH)
-    es.hull_distance(a.dimension + 1, a.pool, int(a.table[1]), b.pool, int(b.table[1]), state)
+    hull_pair.hull_distance(a.dimension + 1, a.pool, int(a.table[1]), b.pool, int(b.table[1]), state)
     met = state[en.MET] > 0.0
     if met:
         state[en.UPPER] = state[en.STATE - 1] = 0.0

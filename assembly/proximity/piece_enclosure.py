@@ -49,7 +49,7 @@ class Enclosure:
         size = np.linalg.norm(n, axis=1)
         if not (size > 0.0).all():
             raise InputError("directions has a zero row; expected directions")
-        if bound not in BOUNDS:
+        if not isinstance(bound, str) or bound not in BOUNDS:
             raise InputError(f"bound is {bound!r}; expected one of {', '.join(BOUNDS)}")
         rows = np.zeros((len(n), 3))
         rows[:, : n.shape[1]] = n / size[:, None]

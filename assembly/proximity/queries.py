@@ -90,7 +90,8 @@ def minimum_distance(
             raise InputError(f"clearance is {limit:g}; expected a distance, zero or more")
     if not (type(max_evaluations) is int and 0 < max_evaluations < 2**40):
         max_evaluations = integer("max_evaluations", max_evaluations, 1, 2**40)
-    if bound not in _BOUNDS:
+    # An array would be compared by its elements.
+    if not isinstance(bound, str) or bound not in _BOUNDS:
         raise InputError(f"bound is {bound!r}; expected one of {', '.join(_BOUNDS)}")
     if not isinstance(polish, (bool, np.bool_)):
         raise InputError(f"polish is {polish!r}; expected True or False")
@@ -186,6 +187,7 @@ def minimum_distances(
     Parameters
     ----------
     points : (n, d)
+        An array of no rows has no distances.
     curve : NurbsCurve
     tolerance : float
     max_evaluations : int
@@ -206,7 +208,8 @@ def minimum_distances(
     if not isinstance(curve, NurbsCurve):
         raise TypeError(f"curve is {curve!r}; expected a NurbsCurve")
     d = curve.control_points.shape[1]
-    rows = real_array("points", points, ("n", d))
+    none = isinstance(points, np.ndarray) and points.shape == (0, d)
+    rows = np.empty((0, d)) if none else real_array("points", points, ("n", d))
     out = np.empty((len(rows), ANSWER))
     codes = np.empty(len(rows), dtype=np.int64)
     space = np.zeros((len(rows), 3))

@@ -22,7 +22,7 @@ class SeparationStatus(Enum):
 
     CONVERGED = "the two bounds are within the tolerance of each other"
     SEPARATED = "farther apart than the clearance"
-    NOT_SEPARATED = "not farther apart than the clearance: the points prove it"
+    NOT_SEPARATED = "not farther apart than the clearance: the points prove it, or a crossing"
     HIT = "the shapes meet, which is proven"
     DISJOINT = "the shapes do not meet, which is proven"
     UNDECIDED = "the distance is within the tolerance of what was asked; ask with a smaller tolerance"

@@ -15,6 +15,7 @@ K = [0.0, 0.0, 1.0, 1.0]
 GOOD_CURVE = NurbsCurve(LINE, K, 1)
 GOOD = NurbsSurface(PATCH, (K, K), (1, 1))
 RING = Path().line(5.0)
+HIDDEN = np.ma.array(LINE, mask=[[True, False], [False, False]])
 MANY = np.random.default_rng(0).normal(size=(20, 2))
 
 CASES = {
@@ -46,6 +47,8 @@ CASES = {
     "weights zero": (lambda: NurbsCurve(LINE, K, 1, [1, 0]), r"weights\[1\] is 0; expected positive"),
     "weights nan": (lambda: NurbsCurve(LINE, K, 1, [1, np.nan]), r"weights\[1\] is nan"),
     "t text": (lambda: GOOD_CURVE.evaluate("here"), "t is 'here'; expected real numbers"),
+    "curve masked": (lambda: NurbsCurve(HIDDEN, K, 1), "control_points has masked values; expected real numbers"),
+    "t masked": (lambda: GOOD_CURVE.evaluate(HIDDEN[0]), "t has masked values; expected real numbers"),
     "t complex": (lambda: GOOD_CURVE.evaluate(1j), "t is 1j"),
     "t outside": (lambda: GOOD_CURVE.evaluate([0.5, 1.5]), r"t is 1.5; expected a parameter in the domain \[0, 1\]"),
     "order": (lambda: GOOD_CURVE.evaluate(0.5, 3), "order is 3; expected an integer from 0 to 2"),

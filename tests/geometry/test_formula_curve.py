@@ -150,6 +150,27 @@ def test_bad_input():
     bad("arc_length returns no casadi.SX", TypeError, arc_length=lambda t0, t1: "long")
     bad("arc_length has the symbols", arc_length=lambda t0, t1: S)
     bad(r"arc_length returns shape \(2, 1\)", arc_length=lambda t0, t1: ca.vertcat(t0, t1))
+    for what in (lambda t0: t0, lambda: 1.0, float, ca.Function("f", [T], [T]), str.upper):
+        bad("arc_length is .*, which takes no two casadi.SX symbols", TypeError, arc_length=what)
+    bad("arc_length returns no casadi.SX", TypeError, arc_length=lambda t0, t1: object())
+    for value in (math.nan, math.inf, -1.0):
+        bad("arc_length is .* over the domain", arc_length=lambda t0, t1, value=value: value)
+    bad(r"arc_length is -1 over the domain \[0, 1\]; expected a finite length", arc_length=lambda t0, t1: t0 - t1)
+    bad("domain is .*expected two numbers", domain=(ca.DM([1, 2]), 3.0))
+    bad("error is DM", error=ca.DM([1, 2]))
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("end", [1e99, 1e100, 1e300, 1e308])
+def test_coordinates_that_squares_cannot_hold(end):
+    column = ca.vertcat(T, ca.sin(T))
+    if end < 1e100:
+        assert asm.FormulaCurve(column, T, (-end, end)).size >= 2 * end
+        bad(
+            "expression reaches 1e.102 on the domain; expected coordinates", expression=1e3 * column, domain=(-end, end)
+        )
+    else:
+        bad("domain is .*; expected parameters below 1e.100", expression=column, domain=(-end, end))
 
 
 GAP = ca.fabs(T - 0.3) - 1e-4

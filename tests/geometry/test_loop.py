@@ -91,6 +91,14 @@ def test_bad_loops_are_refused(curves, text):
         Loop(["circle"])
 
 
+@pytest.mark.parametrize(
+    "period", [[], {}, "x", 3, np.array([1.0]), np.array([np.nan, 0, 0]), (1.0, -1.0), (1.0, np.inf)]
+)
+def test_bad_periods_are_refused(period):
+    with pytest.raises(InputError, match="^period.* expected "):
+        Loop(segment((0.0, 0.0), (1.0, 0.0)), period=period)
+
+
 def eight():
     points = [[0, 0], [2, 2], [-2, 2], [0, 0], [-2, -2], [2, -2], [0, 0]]
     return NurbsCurve(points, [0, 0, 0, 0, 1, 1, 1, 2, 2, 2, 2], 3)
@@ -274,6 +282,9 @@ def test_curves_a_little_beyond_the_domain_are_clamped():
 def test_arguments_of_another_kind_are_named():
     with pytest.raises(TypeError, match="outer is 3"):
         Face(PLANE, 3)
+    for holes in (3, None, segment((0, 0), (1, 1))):
+        with pytest.raises(TypeError, match="holes is .*; expected a sequence of loops"):
+            Face(PLANE, None, holes)
     with pytest.raises(TypeError, match=r"holes\[0\]\[0\] is 'x'"):
         Face(PLANE, None, [["x"]])
     with pytest.raises(InputError, match="u is nan"):

@@ -174,6 +174,9 @@ def test_bad_input():
     piece = asm.proximity.enclosure(curve, 0.0, 1.0)
     with pytest.raises(asm.errors.InputError, match="directions has a zero row"):
         piece.support([[0.0, 0.0]])
+    for bound in ([], {}, np.zeros(2)):
+        with pytest.raises(asm.errors.InputError, match="bound is .*; expected one of auto"):
+            piece.support([[1.0, 0.0]], bound)
     with pytest.raises(asm.errors.InputError, match="bound is 'sphere'"):
         piece.support([[0.0, 1.0]], "sphere")
 

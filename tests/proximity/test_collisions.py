@@ -105,6 +105,21 @@ def test_bad_input():
         collisions(curves, [square], -1.0)
     with pytest.raises(InputError, match="tolerance is 0"):
         collisions(curves, [square], 0.0, 0.0)
+    ragged = [[0.0, 0.0, 0.0], [1.0, 1.0]]
+    with pytest.raises(InputError, match="curves is .*; expected real numbers of shape"):
+        collisions(ragged, [square])
+    for obstacles, k in (([ragged], 0), ([square, ragged], 1)):
+        with pytest.raises(InputError, match=rf"obstacles\[{k}\] is .*; expected real numbers of shape"):
+            collisions(curves, obstacles)
+    for obstacles in (np.array(1.0), 1.0, "square", None):
+        with pytest.raises(InputError, match="obstacles is no sequence"):
+            collisions(curves, obstacles)
+    masked = np.ma.array(curves, mask=curves > 2.0)
+    with pytest.raises(InputError, match="curves has masked values"):
+        collisions(masked, [square])
+    with pytest.raises(InputError, match=r"obstacles\[0\] has masked values"):
+        collisions(curves, [masked[0]])
+    assert collisions(np.ma.array(curves), [square]).shape == (3, 1)  # nothing is masked
     line = asm.NurbsCurve.polyline([[0.0, 0.0], [1.0, 1.0]])
     with pytest.raises(TypeError, match=r"curves\[1\] is 3"):
         collisions([line, 3], [square])

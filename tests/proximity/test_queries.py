@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -185,6 +186,26 @@ def test_hits():
     assert collides(arc(1.0, start=-0.5), segment((1, -1), (1, 1)))
 
 
+@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9, 1e53])
+def test_a_crossing_is_within_every_clearance(scale):
+    """Also where doubles cannot say how near two points of the crossing are to each other."""
+    rng = np.random.default_rng(6)
+    for polish in (True, False):
+        for _ in range(20):
+            a, b = (asm.NurbsCurve.bezier(scale * rng.normal(size=(4, 2))) for _ in range(2))
+            if minimum_distance(a, b, 1e-12 * scale, clearance=0.0).status is not Status.HIT:
+                continue
+            for part in (1e-40, 1e-20, 1e-16, 1e-14, 1e-6, 1e-2):
+                answer = minimum_distance(a, b, 1e-12 * scale, clearance=part * scale, polish=polish)
+                if answer.status is Status.NOT_SEPARATED:
+                    assert answer.lower == 0.0 and answer.upper <= part * scale
+                    # Points are within the clearance, or as near as doubles tell.
+                    apart = np.linalg.norm(answer.points[0] - answer.points[1])
+                    assert apart <= max(part, 1e-13) * scale
+                else:
+                    assert answer.status is Status.UNDECIDED and not polish
+
+
 def test_near_misses_are_no_hits():
     rng = np.random.default_rng(2)
     for _ in range(100):
@@ -335,6 +356,7 @@ def test_many_points():
             assert (lower[i], upper[i], parameters[i]) == (answer.lower, answer.upper, answer.parameters[0])
 
 
+MASKED = np.ma.array([0.0, 1.0, 2.0], mask=[False, True, False])
 BAD = {
     "text": (("curve", bezier(1)), {}, TypeError, "a is 'curve'; expected a NurbsCurve"),
     "none": ((bezier(1), None), {}, TypeError, "b is None; expected"),
@@ -348,6 +370,16 @@ BAD = {
     "tolerance nan": ((bezier(1), bezier(2), math.nan), {}, InputError, "tolerance is nan"),
     "clearance": ((bezier(1), bezier(2)), {"clearance": -1.0}, InputError, "clearance is -1; expected a distance"),
     "bound": ((bezier(1), bezier(2)), {"bound": "ball"}, InputError, "bound is 'ball'; expected one of auto, hull"),
+    "bound array": (
+        (bezier(1), bezier(2)),
+        {"bound": np.ones(3)},
+        InputError,
+        r"bound is array.*; expected one of auto",
+    ),
+    "bound list": ((bezier(1), np.zeros((4, 3))), {"bound": []}, InputError, r"bound is \[\]; expected one of auto"),
+    "masked": ((bezier(1), MASKED), {}, InputError, "b has masked values; expected real numbers"),
+    "masked hull": ((bezier(1), np.ma.stack([MASKED, MASKED])), {}, InputError, "b has masked values"),
+    "vector": ((bezier(1), bezier(2), ca.DM([1, 2])), {}, InputError, r"tolerance is DM.*; expected a finite real"),
     "budget": ((bezier(1), bezier(2)), {"max_evaluations": 0}, InputError, "max_evaluations is 0; expected an integer"),
 }
 
@@ -368,3 +400,9 @@ def test_bad_input_of_the_other_verbs():
         minimum_distances([[0.0, 0.0, 0.0]], 3)
     with pytest.raises(InputError, match=r"points has shape \(3,\); expected \(n, 3\)"):
         minimum_distances([0.0, 0.0, 0.0], bezier(1))
+    with pytest.raises(InputError, match=r"points has shape \(0, 2\); expected \(n, 3\)"):
+        minimum_distances(np.zeros((0, 2)), bezier(1))
+
+
+def test_no_points_have_no_distances():
+    assert [part.shape for part in minimum_distances(np.zeros((0, 3)), bezier(1))] == [(0,)] * 3
