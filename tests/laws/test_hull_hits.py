@@ -49,9 +49,9 @@ def parts(rng, count):
 def checked(said, inside, part):
     assert (said is not Status.HIT) or inside
     assert (said is not Status.DISJOINT) or not inside
-    # A depth of 1e-10 of the size is enough on any diagonal.
-    assert part > 1.0 - 1e-9 or said is Status.HIT
-    assert part < 1.0 + 1e-12 or said is Status.DISJOINT
+    # At a corner simplexes are small: a depth of 1e-6 of the size is enough on any diagonal.
+    assert part > 1.0 - 1e-6 or said is Status.HIT
+    assert part < 1.0 + 1e-6 or said is Status.DISJOINT
 
 
 @pytest.mark.parametrize("n", [3, 4, 5, 6, 8, 12])
