@@ -76,7 +76,7 @@ def _solids(
     q[:, :3] = (q[:, :3] - packed.reference) / packed.scale
     tracked = solution._parameters[k : k + 1].copy()
     scene = (table, packed.pool, table[row + SHELL_F], table[row + SHELL_G], 0, 1, q)
-    if np.isnan(tracked).any():
+    if np.isnan(tracked[0, :4]).any():
         nearest, deepest = packed.table[NEAREST_AT], packed.table[DEEPEST_AT]
         if search_solids(*scene, nearest, deepest, tracked, 0) == 0:
             return _crossing(solution, k, places)
