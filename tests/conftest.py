@@ -16,10 +16,23 @@ ROOT = Path(__file__).resolve().parent.parent
 # The first example of a test may compile kernels, so no deadline; the same examples in every run,
 # so that a failure is one for everybody.
 hypothesis.settings.register_profile("assembly", deadline=None, derandomize=True, max_examples=50)
+hypothesis.settings.register_profile("long", hypothesis.settings.get_profile("assembly"), max_examples=150)
 hypothesis.settings.load_profile("assembly")
 
 
-@pytest.fixture
+def pytest_configure(config: pytest.Config) -> None:
+    """Before modules are imported, whose tests have numbers of examples."""
+    if config.getoption("--long"):
+        hypothesis.settings.load_profile("long")
+
+
+@pytest.fixture(scope="session")
+def cases(request: pytest.FixtureRequest) -> Callable[[int, int], int]:
+    """How many random cases are tried: `few`, or `many` with ``--long``; counts that are judged are in proportion."""
+    return lambda few, many: many if request.config.getoption("--long") else few
+
+
+@pytest.fixture(scope="session")
 def run_python() -> Callable[..., str]:
     """Run code in a fresh interpreter with changed environment variables; what it printed.
 
@@ -37,5 +50,6 @@ def run_python() -> Callable[..., str]:
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """``--long``: the stress tests try for hours."""
-    parser.addoption("--long", action="store_true", help="stress tests: a hundred times as many random cases")
+    """``--long``: the stress tests try for hours, others for minutes."""
+    text = "a hundred times as many random cases in stress tests, and three times as many in others"
+    parser.addoption("--long", action="store_true", help=text)

@@ -6,6 +6,8 @@ quotient of two small numbers.
 
 from __future__ import annotations
 
+from copy import deepcopy
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -31,20 +33,23 @@ def circle_distance(turn, shift):
     """The least distance of two circles of radius MAJOR, about the z axis and about that of a pose."""
 
     def distances(angles):
-        points = MAJOR * np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], 1) @ turn.T + shift
-        return np.hypot(np.hypot(points[:, 0], points[:, 1]) - MAJOR, points[:, 2])
+        points = MAJOR * np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], -1) @ turn.T + shift
+        return np.hypot(np.hypot(points[..., 0], points[..., 1]) - MAJOR, points[..., 2])
 
     angles = np.linspace(0.0, 2.0 * np.pi, 2001)[:-1]
     found = distances(angles)
-    least = np.inf
-    for best in angles[(found <= np.roll(found, 1)) & (found <= np.roll(found, -1))]:
-        width = angles[1]
-        for _ in range(10):
-            around = best + np.linspace(-width, width, 41)
-            best = around[np.argmin(distances(around))]
-            width /= 15.0
-        least = min(least, distances(np.array([best]))[0])
-    return least
+    lowest = (found <= np.roll(found, 1)) & (found <= np.roll(found, -1))
+    best, found, width = angles[lowest], found[lowest], angles[1]
+    for _ in range(10):
+        # The distance of circles 0.2 apart is bent by less than 8: nothing else comes below what is least so far.
+        # Where it is all but level rounding makes minima of half of the places.
+        near = found <= found.min() + 4.0 * width**2 + 1e-15
+        around = best[near, None] + np.linspace(-width, width, 41)
+        values = distances(around)
+        rows, columns = np.arange(len(values)), values.argmin(axis=1)
+        best, found = around[rows, columns], values[rows, columns]
+        width /= 15.0
+    return found.min()
 
 
 def stacked(rng):
@@ -65,12 +70,14 @@ def test_a_first_look_finds_the_least_gap_of_tori_that_all_but_lie_on_each_other
     # all, or one that was not the least.
     rng = np.random.default_rng(7)
     shape = asm.shapes.torus(MAJOR, MINOR)
+    lower, upper = asm.Body("lower", shape), asm.Body("upper", shape, (0.0, 0.0, 2.0 * MINOR))
+    fresh = [asm.Manager(bodies, reach=0.02) for bodies in ((lower, upper), (upper, lower))]
     for k in range(80):
         turn, shift, gap = stacked(rng)
-        upper = asm.Body("upper", shape, shift, turn.as_quat(scalar_first=True))
-        bodies = [asm.Body("lower", shape), upper]
-        manager = asm.Manager(bodies if k % 2 == 0 else bodies[::-1], reach=0.02)
-        manager.update(np.stack([body.q for body in manager.bodies]))
+        q = np.array([lower.q, [*shift, *turn.as_quat(scalar_first=True)]])
+        # One that has seen nothing; making one takes a second.
+        manager = deepcopy(fresh[k % 2])
+        manager.update(q if k % 2 == 0 else q[::-1])
         # A pair may rest where normals are parallel to 1e-9 along the circle, which is a length of four.
         assert min(contact.gap for contact in manager.contacts) == pytest.approx(gap, abs=1e-10)
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from assembly.geometry.vec import dot
 from assembly.proximity.spine_box import apart
 from assembly.proximity.spine_curve import HALF, PART_BEND
 from assembly.proximity.spine_minima import MINIMA, valley_minima
@@ -17,10 +18,10 @@ from tests.laws.test_spines import Two
 CLOSED = (False, False, False, False)
 
 
-def slopes(two, s, t):
-    """F_s, F_t, F_ss, F_tt."""
-    d, f, c, g, e = (np.array(row) for row in apart(two.pool, two.o, two.p, *two.pose(), s, t))
-    return -d @ f, d @ g, 1.0 - d @ c, 1.0 + d @ e
+def slopes(two, pose, s, t):
+    """F_s, F_t, F_ss, F_tt, of numbers or of arrays of them."""
+    d, f, c, g, e = apart(two.pool, two.o, two.p, *pose, s, t)
+    return -dot(d, f), dot(d, g), 1.0 - dot(d, c), 1.0 + dot(d, e)
 
 
 def thin(two, width):
@@ -43,8 +44,10 @@ def minima_by_samples(two, box, side, open_ends, count=120):
     low = across[0] if ends[2] else across[0] - 0.5 * (across[1] - across[0])
     high = across[1] if ends[3] else across[1] + 0.5 * (across[1] - across[0])
 
+    pose = two.pose()
+
     def at(x, y):
-        values = slopes(two, *((x, y) if side == 0 else (y, x)))
+        values = slopes(two, pose, *((x, y) if side == 0 else (y, x)))
         return (values[0], values[1]) if side == 0 else (values[1], values[0])
 
     def foot(x):
@@ -52,13 +55,23 @@ def minima_by_samples(two, box, side, open_ends, count=120):
             return low
         return high if at(x, high)[1] <= 0.0 else brentq(lambda y: at(x, y)[1], low, high, xtol=1e-15)
 
+    def feet(x):
+        """Feet of all places at once, by bisection."""
+        below, above = np.full_like(x, low), np.full_like(x, high)
+        first, last = at(x, below)[1] >= 0.0, at(x, above)[1] <= 0.0
+        for _ in range(60):
+            middle = 0.5 * (below + above)
+            rising = at(x, middle)[1] >= 0.0
+            below, above = np.where(rising, below, middle), np.where(rising, middle, above)
+        return np.where(first, low, np.where(last, high, 0.5 * (below + above)))
+
     def is_one(x):
         y = foot(x)
         on_piece = (y > low or ends[2]) and (y < high or ends[3])
         return on_piece and across[0] - 1e-9 <= y <= across[1] + 1e-9
 
     places = np.linspace(*own, count)
-    slope = np.array([at(x, foot(x))[0] for x in places])
+    slope = at(places, feet(places))[0]
     found = []
     if ends[0] and slope[0] > 0.0 and is_one(places[0]):
         found.append(places[0])
@@ -74,7 +87,7 @@ def minima_by_samples(two, box, side, open_ends, count=120):
 
 def side_of(two, box):
     """Which spine is followed: that across which F is curved the most."""
-    _, _, ss, tt = slopes(two, 0.5 * (box[0] + box[1]), 0.5 * (box[2] + box[3]))
+    _, _, ss, tt = slopes(two, two.pose(), 0.5 * (box[0] + box[1]), 0.5 * (box[2] + box[3]))
     return (0 if tt >= ss else 1), max(ss, tt)
 
 
