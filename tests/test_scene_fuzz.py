@@ -17,6 +17,9 @@ import assembly as asm
 from assembly.errors import InputError
 from assembly.scene_file.kinds import CONSTRAINTS, OBJECTIVES
 
+# Of examples: 50, or 150 with --long.
+COUNT = settings.default.max_examples
+
 
 @cache
 def small_document():
@@ -156,19 +159,19 @@ def check(path, document):
     assert path.read_bytes() == first
 
 
-@settings(max_examples=400)
+@settings(max_examples=8 * COUNT // 3)
 @given(changed_documents())
 def test_a_changed_document_loads_or_raises_input_error(tmp_path_factory, document):
     check(tmp_path_factory.getbasetemp() / "fuzz.json", document)
 
 
-@settings(max_examples=150)
+@settings(max_examples=COUNT)
 @given(changed_documents(within=("constraints", len(CONSTRAINTS.kinds) + 1, "function")))
 def test_a_changed_function_loads_or_raises_input_error(tmp_path_factory, document):
     check(tmp_path_factory.getbasetemp() / "function.json", document)
 
 
-@settings(max_examples=150)
+@settings(max_examples=COUNT)
 @given(st.data())
 def test_damaged_bytes_load_or_raise_input_error(tmp_path_factory, data):
     path = tmp_path_factory.getbasetemp() / "damaged.json"

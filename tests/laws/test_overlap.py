@@ -120,10 +120,10 @@ def test_a_ring_that_lies_in_a_plate_is_told_of_where_it_is_deepest():
 
 
 @pytest.mark.parametrize("name", SOLIDS)
-def test_bodies_that_begin_in_each_other_are_pushed_apart(name):
+def test_bodies_that_begin_in_each_other_are_pushed_apart(name, cases):
     shape, half, distance = SOLIDS[name]
     rng = np.random.default_rng(14)
-    for _ in range(40):
+    for _ in range(cases(13, 40)):
         q = dented(rng, half, distance, 10.0 ** rng.uniform(-5.0, -2.0))
         scene = asm.Assembly([asm.Body("f", shape, fixed=True), asm.Body("g", asm.shapes.sphere(0.5))])
         scene.constrain(asm.Clearance())
@@ -133,10 +133,10 @@ def test_bodies_that_begin_in_each_other_are_pushed_apart(name):
 
 
 @pytest.mark.parametrize("sides", [(PLATE, PLATE), (BOX, PLATE), (BOX, BOX)], ids=["plates", "on a plate", "boxes"])
-def test_boxes_cross_where_no_axis_separates_them(sides):
+def test_boxes_cross_where_no_axis_separates_them(sides, cases):
     crossed = judge(asm.shapes.box(*sides[0]), asm.shapes.box(*sides[1]))
     rng = np.random.default_rng(11)
-    for _ in range(40):
+    for _ in range(cases(13, 40)):
         turn = Rotation.random(random_state=int(rng.integers(1 << 30))).as_quat(scalar_first=True)
         start, way = 0.7 * rng.normal(size=3), rng.normal(size=3)
         way /= np.linalg.norm(way)
@@ -190,11 +190,11 @@ def test_a_peg_that_leans_in_a_bore_does_not_cross_it(angle, tilt):
     ("f", "g"),
     [("clip", "clip"), ("ring", "clip"), ("thick ring", "clip"), ("ball", "clip"), ("ball", "ring")],
 )
-def test_wires_cross_where_their_center_lines_say_so(f, g):
+def test_wires_cross_where_their_center_lines_say_so(f, g, cases):
     oracle = WireOracle([WIRES[f][1], WIRES[g][1]])
     crossed = judge(WIRES[f][0], WIRES[g][0])
     rng = np.random.default_rng(5)
-    for gap in (1e-3, 1e-2, 0.1, -1e-3, -0.1) * 6:
+    for gap in (1e-3, 1e-2, 0.1, -1e-3, -0.1) * cases(2, 6):
         q = stopped(oracle, rng, gap)
         true = oracle.gaps(q)[0]
         told, deepest = crossed(q)

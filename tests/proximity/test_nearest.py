@@ -26,10 +26,10 @@ def turned(q):
     return rotated(np.tile(np.concatenate([np.zeros(3), q[3:]]), (3, 1)), np.eye(3)).T
 
 
-def test_tori_are_never_wrong():
+def test_tori_are_never_wrong(cases):
     rng = np.random.default_rng(12)
     count = 0
-    while count < 150:
+    while count < cases(50, 150):
         minor = rng.uniform(0.1, 0.5, 2)
         major = minor * rng.uniform(1.3, 6.0, 2)
         q = np.concatenate([rng.normal(size=3), random_quaternion(rng)])
@@ -74,7 +74,7 @@ def test_trimmed_patches():
     assert len(kinds) > 2
 
 
-def test_solids():
+def test_solids(cases):
     rng = np.random.default_rng(14)
     bodies = [
         shapes.box(1.0, 1.3, 0.8),
@@ -85,7 +85,7 @@ def test_solids():
     ]
     sampled = [Sampled(body, 20000) for body in bodies]
     kinds = set()
-    for _ in range(20):
+    for _ in range(cases(12, 20)):
         i, j = rng.integers(len(bodies), size=2)
         q = np.concatenate([rng.normal(size=3), random_quaternion(rng)])
         q[:3] *= rng.uniform(0.25, 0.65) * (sampled[i].size + sampled[j].size) / np.linalg.norm(q[:3])

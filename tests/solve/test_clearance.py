@@ -67,11 +67,9 @@ def test_most_rings_out_of_reach_are_solved(taut):
 
 
 @pytest.mark.parametrize("k", range(0, 10, 3))
-def test_rings_stay_linked_step_by_step(k):
+def test_rings_stay_linked_step_by_step(near, k):
     # The path of the iterates: every solve of a step starts where the one before ended.
-    scenes = linked_rings(SCENES, NEAR)
-    drag = scenes.drag
-    drag.scene.constrain(asm.Clearance())
+    scenes, drag = near, near.drag
     drag.grip.target = scenes.targets[k]
     solution = drag.scene.solve(scenes.q[k], max_iterations=1)
     for _ in range(200):
@@ -104,18 +102,18 @@ def test_the_gap_is_at_least_the_minimum(minimum):
     assert oracle.links(solution.q).tolist() == oracle.links(scene.q).tolist() != [0]
 
 
-def test_no_pull_draws_rings_through_each_other():
+def test_no_pull_draws_rings_through_each_other(cases):
     # Where rings touch along an arc, contacts are born and merge at folds; rounding decides when.
     rng = np.random.default_rng(0)
-    solved = 0
-    for shift in 1e-6 * rng.normal(size=(60, 3)):
+    solved, count = 0, cases(20, 60)
+    for shift in 1e-6 * rng.normal(size=(count, 3)):
         scene, oracle = two_rings(0.0, (1.0, 0.05, 0.1) + shift, (9.0, 0.3, 0.2) - shift)
         solution = scene.solve()
         solved += solution.success
         deepest = oracle.deepest(solution.q)
         assert oracle.links(solution.q).tolist() == [1]
         assert deepest > -HOLDS if solution.success else -deepest <= solution.feasibility + HOLDS
-    assert solved >= 45
+    assert solved >= 0.75 * count
 
 
 @pytest.mark.parametrize("k", range(12))
@@ -184,18 +182,18 @@ def test_pairs_that_are_excluded_may_overlap_and_no_others(exclude):
             assert apart(solution.q, i, j) > -1e-9
 
 
-def test_three_cubes_that_are_drawn_into_each_other_come_to_lie_side_by_side():
+def test_three_cubes_that_are_drawn_into_each_other_come_to_lie_side_by_side(cases):
     # Flush faces: which corners are listed is decided by rounding, of 60 such starts 53 are SOLVED.
     rng = np.random.default_rng(0)
-    solved = 0
-    for _ in range(20):
+    solved, count = 0, cases(7, 20)
+    for _ in range(count):
         scene = boxes(())
         q = scene.q.copy()
         q[1:, :3] += 1e-7 * rng.normal(size=(2, 3))
         solution = scene.solve(q)
         solved += solution.success
         assert min(apart(solution.q, i, j) for i, j in combinations(range(3), 2)) > -1e-9
-    assert solved >= 13
+    assert solved >= 0.65 * count
 
 
 @pytest.mark.parametrize("axis", [(0.3, -0.8, 0.4), (1.0, 0.2, 0.1)])

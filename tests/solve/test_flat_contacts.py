@@ -37,16 +37,16 @@ def drawn(rng, sides):
 
 
 @pytest.mark.parametrize("sides", [(BOX, BOX), (BOX, PLATE), (PLATE, PLATE)], ids=["boxes", "on a box", "plates"])
-def test_boxes_that_come_to_lie_on_each_other(sides):
+def test_boxes_that_come_to_lie_on_each_other(sides, cases):
     # Of 60 such scenes, 13 were SOLVED when a row knew of the lowest corner alone. Rounding decides about the last few.
     rng = np.random.default_rng(5)
-    solved = 0
-    for _ in range(20):
+    solved, count = 0, cases(7, 20)
+    for _ in range(count):
         solution = drawn(rng, sides).solve()
         solved += solution.success
         # Gaps of 1e-12 of the scene's size, and rounding.
         assert not solution.success or apart(solution.q, sides) > -1e-11
-    assert solved >= 18
+    assert solved >= 0.9 * count
 
 
 def test_a_box_set_down_on_a_plate_lies_flat():
@@ -104,13 +104,13 @@ def in_each_other(pose, radius=0.4, height=1.0):
     return deepest
 
 
-def test_cylinders_that_come_to_lie_on_a_plate():
-    # Of these, 17 were SOLVED before points of rims were rows; of the others two rocked for 300 steps.
+def test_cylinders_that_come_to_lie_on_a_plate(cases):
+    # Of 20 of these, 17 were SOLVED before points of rims were rows; of the others two rocked for 300 steps.
     rng = np.random.default_rng(5)
     a = asm.Body("a", asm.shapes.box(*PLATE), fixed=True)
     can = asm.shapes.solid_cylinder(0.4, 1.0)
-    solved = 0
-    for _ in range(20):
+    solved, count = 0, cases(7, 20)
+    for _ in range(count):
         gap = -1.0
         while gap < 0.02:
             place = rng.uniform(-1.6, 1.6, 3)
@@ -123,7 +123,7 @@ def test_cylinders_that_come_to_lie_on_a_plate():
         solution = scene.solve()
         solved += solution.success
         assert not solution.success or in_each_other(solution.q[1]) < 1e-11
-    assert solved >= 19
+    assert solved >= 0.95 * count
 
 
 def test_crossing_bars_are_carried_where_their_edges_cross():
@@ -162,14 +162,14 @@ def random_turn(rng):
 
 
 @pytest.mark.parametrize(("major", "minor"), [(0.7, 0.1), (0.5, 0.02)], ids=["ring", "thin ring"])
-def test_rings_that_come_to_lie_on_a_plate(major, minor):
+def test_rings_that_come_to_lie_on_a_plate(major, minor, cases):
     # Of a ring that is all but flat the lowest point runs around it. With that point alone for a row all of these were
     # rocked through the plate; points of the valley between the two faces hold them. Nor got a thin ring there in 300
     # steps that was the first of the two, before it was the smaller one's motion that looks are measured by.
     rng = np.random.default_rng(3)
     plate = asm.Body("plate", asm.shapes.box(4.0, 4.0, 0.1), fixed=True)
-    solved = 0
-    for k in range(20):
+    solved, count = 0, cases(7, 20)
+    for k in range(count):
         order = k % 2
         place, turn = (*rng.uniform(-0.3, 0.3, 2), 1.5), random_turn(rng)
         scene = ring_scene(plate, asm.shapes.torus(major, minor), place, turn, (0.0, 0.0, -1.0), order == 0)
@@ -185,16 +185,16 @@ def test_rings_that_come_to_lie_on_a_plate(major, minor):
             assert np.hypot(*Rotation.from_quat(pose[3:], scalar_first=True).as_matrix()[:2, 2]) < 1e-9
             # Few stand for all of the circle.
             assert 3 <= len(solution.contacts) <= 12
-    assert solved >= 18
+    assert solved >= 0.9 * count
 
 
-def test_rings_that_come_to_lie_on_a_box_smaller_than_they_are():
+def test_rings_that_come_to_lie_on_a_box_smaller_than_they_are(cases):
     # They rest on arcs at the four corners of the top. As they lean their points are free to turn about the axis: of
-    # these 11 were SOLVED before steps that are cut time and again were damped.
+    # 20 of these 11 were SOLVED before steps that are cut time and again were damped.
     rng = np.random.default_rng(3)
     box = asm.Body("box", asm.shapes.box(1.2, 1.2, 0.5), fixed=True)
-    solved = 0
-    for k in range(20):
+    solved, count = 0, cases(7, 20)
+    for k in range(count):
         place = (*rng.uniform(-0.2, 0.2, 2), 1.0)
         scene = ring_scene(box, asm.shapes.torus(0.7, 0.1), place, random_turn(rng), (0.1, 0.0, -0.5), k % 2 == 0)
         solution = scene.solve()
@@ -202,7 +202,7 @@ def test_rings_that_come_to_lie_on_a_box_smaller_than_they_are():
         low = solution.q[1 - k % 2, 2]
         assert low > 0.35 - 1e-9
         assert not solution.success or low == pytest.approx(0.35, abs=1e-9)
-    assert solved >= 16
+    assert solved >= 0.8 * count
 
 
 @pytest.mark.parametrize("order", [0, 1])

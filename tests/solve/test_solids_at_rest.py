@@ -36,16 +36,17 @@ def drawn_together(rng, sides):
     return scene
 
 
-@pytest.mark.parametrize(("sides", "seed", "most"), [([BOX] * 3, 6, 23), ([BOX] * 4, 5, 21)], ids=["three", "four"])
-def test_boxes_that_are_drawn_together_come_to_rest(sides, seed, most):
-    # 23 of either are SOLVED; 24 and 18 while a solve that was stuck did not begin again. Rounding decides about some.
-    solved = 0
-    for number in range(SCENES):
+@pytest.mark.parametrize(("sides", "seed", "part"), [([BOX] * 3, 6, 23), ([BOX] * 4, 5, 21)], ids=["three", "four"])
+def test_boxes_that_are_drawn_together_come_to_rest(sides, seed, part, cases):
+    # Of 24, 23 of either are SOLVED; 24 and 18 while a solve that was stuck did not begin again. Rounding decides about
+    # some.
+    solved, count = 0, cases(8, SCENES)
+    for number in range(count):
         solution = drawn_together(np.random.default_rng([seed, number]), sides).solve()
         solved += solution.success
         # Gaps of 1e-12 of the scene's size, and rounding.
         assert not solution.success or least(solution.q, sides) > -1e-11
-    assert solved >= most
+    assert solved >= part / SCENES * count
 
 
 def test_a_contact_that_ends_where_it_touches_is_not_looked_for_forever():
@@ -100,14 +101,14 @@ def cylinders(rng):
     return scene
 
 
-def test_rows_that_held_are_not_suspected_of_contradicting_each_other():
+def test_rows_that_held_are_not_suspected_of_contradicting_each_other(cases):
     # A gap that had closed just now, by rounding, where every so many steps a solve compares violations: it left the
     # objective alone from there, and was STALLED (number 51).
-    solved = 0
-    for number in range(40, 60):
+    solved, numbers = 0, range(cases(45, 40), cases(52, 60))
+    for number in numbers:
         solution = cylinders(np.random.default_rng([9, number])).solve()
         solved += solution.success
         penalty, violation = solution.history[:, 3], solution.history[:, 1]
         leaves = (penalty[:-1] != 1.0) & (penalty[1:] == 1.0)
         assert (violation[:-1][leaves] > 1e-6).all()
-    assert solved >= 19
+    assert solved >= 0.95 * len(numbers)
