@@ -31,13 +31,16 @@ def scenes() -> None:
 
 
 def queries() -> None:
-    """Distances of curves, points and surfaces; then a solve with a dexterity, whose kernel is one of its own."""
+    """Distances of curves, points and surfaces, a descent; a solve with a dexterity, whose kernel is one of its own."""
     rng = np.random.default_rng(0)
     curve, other = (asm.NurbsCurve.bezier(rng.normal(size=(6, 3))) for _ in range(2))
     ball = asm.shapes.sphere(0.5)
     drawn = asm.curves.helix(1.0, 0.3, 1.0)
-    for a, b in ((curve, other), (curve, np.zeros(3)), (curve, ball), (ball, np.zeros(3)), (drawn, other)):
+    pairs = ((curve, other), (curve, np.zeros(3)), (curve, ball), (ball, np.zeros(3)), (drawn, other), (drawn, ball))
+    for a, b in pairs:
         asm.proximity.minimum_distance(a, b)
+    still, apart = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 3.0, 1.0, 0.0, 0.0, 0.0)
+    asm.proximity.descend(ball, still, ball, apart, (0.1, 0.2, 0.3, 0.4))
     scene, tip, inputs = arm(3)
     for hinge in inputs:
         hinge.angle = None
