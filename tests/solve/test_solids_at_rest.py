@@ -49,12 +49,13 @@ def test_boxes_that_are_drawn_together_come_to_rest(sides, seed, part, cases):
     assert solved >= int(part / SCENES * count)
 
 
-def test_a_contact_that_ends_where_it_touches_is_not_looked_for_forever():
+def test_a_contact_that_ends_where_it_touches_is_not_looked_for_forever(cases):
     # A corner just over the border of a face, to the last bit: there these solves had arrived, and each look found the
     # contact that evaluating its row had lost, until their steps were used up. Rounding decides which solves get there:
-    # of these 64 it may take a few, as any of them.
+    # a tenth of these may, as any of them.
     scenes = [([BOX] * 4, 5, 15), ([BOX] * 3, 5, 7), ([BOX, PLATE, BOX], 5, 8), ([BOX, PLATE, BOX], 6, 6)]
-    scenes += [(sides, seed, k) for sides in ([BOX] * 3, [BOX, PLATE, BOX]) for seed in (5, 6) for k in range(10, 17)]
+    numbers = range(10, cases(13, 17))
+    scenes += [(sides, seed, k) for sides in ([BOX] * 3, [BOX, PLATE, BOX]) for seed in (5, 6) for k in numbers]
     solved = 0
     for sides, seed, number in scenes:
         scene = drawn_together(np.random.default_rng([seed, number]), sides)
@@ -64,7 +65,8 @@ def test_a_contact_that_ends_where_it_touches_is_not_looked_for_forever():
             solved += solution.success
             assert not solution.success or least(solution.q, sides) > -1e-11
             solution = scene.solve(solution)
-    assert solved >= 58
+    # Each is solved twice.
+    assert solved >= int(0.9 * 2 * len(scenes))
 
 
 def test_a_solve_that_began_again_tells_of_all_its_steps():

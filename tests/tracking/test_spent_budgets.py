@@ -84,20 +84,20 @@ def test_ticks_without_time_come_to_the_same_pose():
 
 
 @pytest.mark.parametrize("way", [(0.5, 0.2, -0.8), (-2.0, 3.0, -3.0), (4.0, -1.0, -9.0)])
-def test_a_chain_comes_to_where_it_does_with_time(chain, way):
+def test_a_chain_comes_to_where_it_does_with_time(chain, way, cases):
     judge = paper_clips()
     ends = []
     for time in (None, NO_TIME):
         tracker, begin = dragged(chain, budget=time)
         target = begin + way
         moved = 0
-        for _ in range(1500):
+        for k in range(1500):
             before = tracker.q
             step = tracker.step(target)
             assert np.array_equal(step.q, tracker.q)
             assert step.feasibility <= 1e-9 * WIRE
             # Whatever is not done, what is returned holds, found from the center curves alone.
-            assert judge.deepest(step.q) > -1e-9
+            assert k % cases(4, 1) != 0 or judge.deepest(step.q) > -1e-9
             if step.status in SPENT:
                 # A tick may be spent where its pose holds, and it has moved; one that is carried returns what was.
                 moved += not np.array_equal(step.q, before)
