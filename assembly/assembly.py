@@ -40,6 +40,8 @@ _SETTINGS = Options().settings()
 _WARM_SETTINGS = Options().settings(warm=True)
 # How many times as many places as they ask for a solve gives to clearances.
 MOST_CROWDING = 16
+# A size that rests on values alone is another one where they have grown or shrunk by this factor.
+OUTGROWN = 1e4
 
 
 class Assembly:
@@ -174,9 +176,10 @@ class Assembly:
             else:
                 self._packed = None
         before = self._packed
-        if before is not None and not before.has_size:
-            # Nothing was a length then: a slide driven to 0, bodies at one place. By now something may be.
-            if scene_size(self._bodies, self._constraints, self._objectives) > 0.0:
+        if before is not None and before.may_outgrow:
+            # Nothing was a length then, a slide driven to 0 say, or only one that was rounding.
+            size = scene_size(self._bodies, self._constraints, self._objectives)
+            if size > 0.0 and not (before.has_size and size <= OUTGROWN * before.scale <= OUTGROWN**2 * size):
                 self._packed = None
         if self._packed is None:
             if all(body.fixed for body in self._bodies):
@@ -185,7 +188,7 @@ class Assembly:
             self._scene = Scene(
                 self.bodies, self.constraints, tuple(packed.contacts), tuple(packed.sides), packed.scale
             )
-            packed.unsized = before
+            packed.outgrown = before
             self._packed = packed
         return self._packed
 
@@ -312,7 +315,7 @@ class Assembly:
     def _state_of(name: str, packed: Packed, solution: Solution) -> Array:
         if solution._packed is packed:
             return solution._state
-        if packed.unsized is not None and solution._packed is packed.unsized:
+        if packed.outgrown is not None and solution._packed is packed.outgrown:
             return packed.taken_over(solution._state)
         raise InputError(f"{name} is a solution of another assembly, or of this one before a change; expected its own")
 

@@ -23,7 +23,7 @@ from assembly.constraints.primitives import RECORD as JOINT_FRAMES
 from assembly.constraints.primitives import coordinate as coordinate_value
 from assembly.constraints.primitives import place_frames
 from assembly.constraints.row_packing import RowPacking
-from assembly.constraints.scene_size import check_reach, scene_size
+from assembly.constraints.scene_size import check_reach, has_no_extent, scene_size
 from assembly.constraints.scene_writer import SceneWriter
 from assembly.constraints.term_packing import TermPacking, natural_unit
 from assembly.constraints.trim_contact import TrimContact
@@ -55,8 +55,10 @@ class Packed:
         The scene's size (`scene_size`), 1 where it has none.
     has_size : bool
         Whether the scene has a size.
-    unsized : Packed or None
-        The same scene as it was packed before it had a size.
+    may_outgrow : bool
+        Whether that rests on values and places alone, which may become others by far.
+    outgrown : Packed or None
+        The same scene as it was packed before it had this size.
     unit : float
         What one of the loop's objective counts in the user's units.
     sides : list of (Body or BodyFace, Body or BodyFace)
@@ -94,8 +96,9 @@ class Packed:
         self.structure = structure_of(constraints)
         size = scene_size(bodies, constraints, objectives)
         self.has_size = size > 0.0
+        self.may_outgrow = has_no_extent(bodies, constraints, objectives)
         self.scale = size if self.has_size else 1.0
-        self.unsized: Packed | None = None
+        self.outgrown: Packed | None = None
         self.reference = bodies[0].pose.position.copy()
         self.contacts = [constraint for constraint in constraints if isinstance(constraint, Contact)]
         # Of a contact with trims the surfaces take part without their own boundaries.
@@ -251,12 +254,12 @@ class Packed:
         return table
 
     def taken_over(self, state: Array) -> Array:
-        """A state of the scene as it was without a size, with multipliers in the units of this one."""
-        assert self.unsized is not None
+        """A state of the scene as it was before it had this size, with multipliers in the units of this one."""
+        assert self.outgrown is not None
         taken = state.copy()
         multipliers = taken[self.multipliers_at : self.residuals_at]
-        multipliers *= self.unsized.unit / self.unit
-        multipliers[self.lengths] *= self.scale / self.unsized.scale
+        multipliers *= self.outgrown.unit / self.unit
+        multipliers[self.lengths] *= self.scale / self.outgrown.scale
         return taken
 
     def listed(self, state: Array) -> list[tuple[int, int]]:

@@ -14,7 +14,7 @@ from assembly.errors import FARTHEST, InputError
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import length
 
-__all__ = ["check_reach", "scene_size"]
+__all__ = ["check_reach", "has_no_extent", "scene_size"]
 
 Array = NDArray[np.float64]
 Objectives = Sequence[tuple[float, Objective]]
@@ -49,6 +49,12 @@ def scene_size(bodies: Sequence[Body], constraints: Sequence[Constraint], object
         wished = [far for far in (limits, _farthest_target(bodies, objectives)) if far > 0.0]
         known = max(known, min(wished, default=0.0))
     return _checked(known, marks) if known > 0.0 else 0.0
+
+
+def has_no_extent(bodies: Sequence[Body], constraints: Sequence[Constraint], objectives: Objectives) -> bool:
+    """Whether no body has a shape or two marks: then the size rests on values and places, which may change."""
+    marks = _marks(bodies, constraints, objectives).values()
+    return max(body.size for body in bodies) == 0.0 and max(map(_box, marks)) < LEAST
 
 
 def check_reach(what: str, far: float, size: float) -> None:

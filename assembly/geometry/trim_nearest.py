@@ -203,7 +203,8 @@ def _foot(table, pool, trim, begin, stop, piece, t, u, v, qx, qy):
     beyond = dx * ox + dy * oy
     speed = np.sqrt(dx * dx + dy * dy)
     unsure = speed <= _SLOW * pool[i + BOUND_1]
-    if not (at_start or at_end) and (unsure or abs(beyond) > _BEYOND * size * speed):
+    far = max(_BEYOND * size, 4e-15 * (abs(qx) + abs(qy)))
+    if not (at_start or at_end) and (unsure or abs(beyond) > far * speed):
         # The way to the foot is not across the curve: is it an end, that rounding or a vanishing speed has left?
         first = t - pool[i + PIECE_T0] < pool[i + PIECE_T1] - t if unsure else beyond < 0.0
         end = START if first else END

@@ -50,8 +50,8 @@ PATIENCE, SETTLED = 12, 1e-12
 # The most, in radians, that a step may turn a normal.
 BEND = 0.5
 # Steps below this many radians that do not shrink any more are rounding; where the end of a patch held the last one,
-# below the second.
-STAGNANT, HELD_STILL = 1e-7, 1e-12
+# below the second, and some roundings of coordinates.
+STAGNANT, HELD_STILL, HELD_ROUNDING = 1e-7, 1e-12, 4e-15
 # A step that turns the normals by less leaves an error below rounding when a solve carries the frame along it.
 CLOSE = 2e-7
 
@@ -264,9 +264,12 @@ def settled(c, r, size):
 
 
 @kernel(inline=True)
-def stagnates(step, bend, previous, status):
+def stagnates(step, bend, previous, status, p, q, size):
     """Whether a step that does not shrink any more is rounding: one that an end held does not shrink either."""
-    return bend < (HELD_STILL if status == LEFT_PATCH else STAGNANT) and step > 0.25 * previous
+    least = STAGNANT
+    if status == LEFT_PATCH:
+        least = min(HELD_STILL + HELD_ROUNDING * math.sqrt(dot(p, p) + dot(q, q)) / size, least)
+    return bend < least and step > 0.25 * previous
 
 
 @kernel(inner=True)
@@ -299,7 +302,7 @@ def solve_pair(table, pool, f, g, rotation, shift, x, size, turn, close, downhil
         bend = max(bend_f, bend_g)
         small = bend < close and isolated
         # Small against the scene and against the bodies' own curvature; or as small as rounding lets it become.
-        if (step <= tolerance and bend < 1e-9) or stagnates(step, bend, previous, status):
+        if (step <= tolerance and bend < 1e-9) or stagnates(step, bend, previous, status, pf, pg, size):
             # In a singular system a vanishing step is a solution only if the residual vanishes too.
             status = CONVERGED if isolated else (SINGULAR if vanishes(r, size) else NOT_CONVERGED)
             break

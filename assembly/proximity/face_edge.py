@@ -163,7 +163,7 @@ def solve_on_face(table, pool, face, kind, other, rotation, shift, x, size, turn
         off = max(abs(r0), abs(r1))
         level = ROUNDING if fine else SLACK
         small = off <= level * size and abs(tilt) <= level
-        settled = (step <= tolerance and bend < 1e-9) or stagnates(step, bend, previous, status)
+        settled = (step <= tolerance and bend < 1e-9) or stagnates(step, bend, previous, status, p, q, size)
         if not slide and (small or settled):
             _i, isolated = inverse(h, unit * (1.0 + abs(beta) * unit), RANK)
             done = abs(tilt) < LEVEL and off < LEVEL * size

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.errors import InputError
+from assembly.errors import InputError, check_coordinates
 from assembly.geometry.face import Face
 from assembly.geometry.surface import NurbsSurface
 from assembly.kinematics.body import Body, BodyFace
@@ -42,8 +42,6 @@ Table = NDArray[np.int64]
 Shape = Body | BodyFace | Face | NurbsSurface | Iterable[Face | NurbsSurface]
 Faces = tuple[Face, ...]
 _IDENTITY = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
-# The squares of distances beyond this would overflow.
-_FARTHEST = 1e150
 
 
 class FeatureStatus(Enum):
@@ -145,8 +143,7 @@ def _pose(name: str, shape: Shape, q: ArrayLike | None) -> Array:
             shape = shape.body
         return np.asarray(shape.q) if isinstance(shape, Body) else np.array(_IDENTITY)
     row = pose_row(name, q)
-    if not max(map(abs, row[:3].tolist())) < _FARTHEST:
-        raise InputError(f"{name}[:3] is {row[:3].tolist()}; expected coordinates below {_FARTHEST:g}")
+    check_coordinates(name, row[:3].tolist())
     return row
 
 

@@ -115,8 +115,9 @@ def follow_nearest(table, pool, shell_f, shell_g, q, size, codes, out):
     status, f, g, y, frame, switches = track_features(
         table, pool, shell_f, shell_g, turn, shift, codes[0], codes[1], x, n, size, 1.0
     )
-    # An edge may have become the farthest one of its neighborhood, surfaces may cross beside their points.
-    if (status != CONVERGED and status != SINGULAR) or not frame[14]:
+    # An edge may have become the farthest one of its neighborhood, surfaces may cross beside their points. In a
+    # continuum, of flush faces say, nothing tells.
+    if not (status == SINGULAR or (status == CONVERGED and frame[14])):
         return LOST
     codes[0] = f
     codes[1] = g

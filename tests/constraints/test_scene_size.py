@@ -316,7 +316,7 @@ def test_forces_of_a_scene_that_got_its_size_go_on_from_where_they_were():
     forces = np.arange(1.0, 7.0) * packed.unit / np.where(packed.lengths, packed.scale, 1.0)
     joint.slide = 1e-3
     sized = scene.packed()
-    assert sized.unsized is packed and sized.scale == 1e-3
+    assert sized.outgrown is packed and sized.scale == 1e-3
     taken = sized.taken_over(state)[sized.multipliers_at : sized.residuals_at]
     np.testing.assert_allclose(taken * sized.unit / np.where(sized.lengths, sized.scale, 1.0), forces, rtol=1e-15)
 
@@ -437,3 +437,18 @@ def test_a_norm_is_that_of_numpy_bit_for_bit_and_goes_on_where_squares_have_no_d
         assert length(factor * np.array([3.0, 0.0, 4.0])) == pytest.approx(5.0 * factor, rel=1e-15, abs=5e-324)
     assert length(np.array([1.7e308, 0.0, 0.0])) == 1.7e308
     assert length(np.array([ROOT, ROOT, 0.0])) == pytest.approx(1.0, rel=1e-15)
+
+
+@pytest.mark.parametrize("first", [6e-17, 1e-9, 1e9])
+def test_a_first_value_is_not_the_size_for_good(first):
+    # The sine of a half turn, the begin of a homotopy, a value that was meant as "far".
+    ground, arm, scene = bodies_at_one_place()
+    joint = asm.Prismatic(ground, arm, "joint", slide=first)
+    scene.constrain(joint)
+    solution = scene.solve()
+    assert solution.success and solution.values["joint.slide"] == pytest.approx(first, rel=1e-12)
+    for slide in (0.5, 0.7, 0.3):
+        joint.slide = slide
+        solution = scene.solve(solution)
+        assert solution.success and scene.packed().scale == 0.5
+        assert solution.values["joint.slide"] == pytest.approx(slide, abs=1e-12)

@@ -190,11 +190,13 @@ def test_hits():
 def test_a_crossing_is_within_every_clearance(scale):
     """Also where doubles cannot say how near two points of the crossing are to each other."""
     rng = np.random.default_rng(6)
+    tried = 0
     for polish in (True, False):
         for _ in range(20):
             a, b = (asm.NurbsCurve.bezier(scale * rng.normal(size=(4, 2))) for _ in range(2))
             if minimum_distance(a, b, 1e-12 * scale, clearance=0.0).status is not Status.HIT:
                 continue
+            tried += 1
             for part in (1e-40, 1e-20, 1e-16, 1e-14, 1e-6, 1e-2):
                 answer = minimum_distance(a, b, 1e-12 * scale, clearance=part * scale, polish=polish)
                 if answer.status is Status.NOT_SEPARATED:
@@ -204,6 +206,7 @@ def test_a_crossing_is_within_every_clearance(scale):
                     assert apart <= max(part, 2e-12) * scale
                 else:
                     assert answer.status is Status.UNDECIDED and not polish
+    assert tried > 10
 
 
 def test_near_misses_are_no_hits():

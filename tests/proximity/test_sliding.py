@@ -62,3 +62,14 @@ def loops(face, scale):
     return {"reversed": face.reversed, "name": face.name} | (
         {} if face.outer is None else {"outer": face.outer.curves, "holes": [hole.curves for hole in face.holes]}
     )
+
+
+@pytest.mark.parametrize("height", [0.4, 0.0, -0.1])
+def test_flush_boxes_are_followed(height):
+    # Their faces are as near everywhere: a continuum, which is followed as any pair is, apart and in each other.
+    box = shapes.box(1.0, 0.8, 0.6)
+    tracker = FeatureTracker(box, box)
+    for k in range(20):
+        pair = tracker.step(None, (0.01 * k, -0.005 * k, 0.6 + height, 1.0, 0.0, 0.0, 0.0))
+        assert pair.gap == pytest.approx(height, abs=1e-14)
+    assert tracker.searches == 1

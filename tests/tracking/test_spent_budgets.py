@@ -103,7 +103,7 @@ def test_a_chain_comes_to_where_it_does_with_time(chain, way, cases):
                 moved += not np.array_equal(step.q, before)
             if step.status is TrackStatus.FOLLOWED:
                 break
-        assert step.status is TrackStatus.FOLLOWED
+        assert step.status is TrackStatus.FOLLOWED and judge.deepest(step.q) > -1e-9
         ends.append(np.linalg.norm(held_point(chain, step.q) - target))
     # Both are as near to the hand as their contacts allow; which contacts these are may differ.
     assert ends[1] < 1.02 * ends[0] + 1e-6
