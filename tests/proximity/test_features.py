@@ -206,3 +206,15 @@ def test_solids_with_flush_faces_that_overlap_are_not_apart(place):
 def test_solids_that_touch_do_not_overlap(place):
     pair = closest_features(BOX, BOX, q_b=[*place, 1.0, 0.0, 0.0, 0.0])
     assert pair.status is not FeatureStatus.CROSSING and abs(pair.gap) < 1e-14
+
+
+def test_a_ball_that_crosses_the_axis_of_a_hole_has_the_near_side_of_the_rim():
+    # Behind the axis the rim's point that was nearest is the farthest one, and still one where nothing pulls.
+    plate = shapes.plate(2.0, 2.0, 0.2, holes=[(0.0, 0.0, 0.5)])
+    ball = shapes.sphere(0.1)
+    tracker = FeatureTracker(plate, ball)
+    for k in range(60):
+        pose = (0.3 - 0.0101 * k, 0.0, 0.35, 1.0, 0.0, 0.0, 0.0)
+        pair = tracker.step(None, pose)
+        assert pair.gap == pytest.approx(np.hypot(0.5 - abs(pose[0]), 0.25) - 0.1, abs=1e-12)
+    assert tracker.searches == 2
