@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.constraints.constraint import Constraint, structure_changes
 from assembly.constraints.expression import Expression
 from assembly.constraints.objectives import Objective
-from assembly.constraints.packing import Packed, lone_surfaces, pack, structure_of
+from assembly.constraints.packing import OUTGROWN, Packed, lone_surfaces, pack, structure_of
 from assembly.constraints.scene_size import check_reach, scene_size
 from assembly.constraints.trim_contact import TrimContact
 from assembly.errors import InputError, items, vector
@@ -40,8 +40,6 @@ _SETTINGS = Options().settings()
 _WARM_SETTINGS = Options().settings(warm=True)
 # How many times as many places as they ask for a solve gives to clearances.
 MOST_CROWDING = 16
-# A size that rests on values alone is another one where they have grown or shrunk by this factor.
-OUTGROWN = 1e4
 
 
 class Assembly:
@@ -176,7 +174,7 @@ class Assembly:
             else:
                 self._packed = None
         before = self._packed
-        if before is not None and before.may_outgrow:
+        if before is not None and before.may_have_outgrown():
             # Nothing was a length then, a slide driven to 0 say, or only one that was rounding.
             size = scene_size(self._bodies, self._constraints, self._objectives)
             if size > 0.0 and not (before.has_size and size <= OUTGROWN * before.scale <= OUTGROWN**2 * size):

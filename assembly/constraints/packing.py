@@ -36,12 +36,14 @@ from assembly.proximity import watch_memory
 from assembly.proximity.events import fresh_memory
 from assembly.proximity.solid_contact import TRACK
 
-__all__ = ["Packed", "lone_surfaces", "pack", "structure_of"]
+__all__ = ["OUTGROWN", "Packed", "lone_surfaces", "pack", "structure_of"]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
 # Smaller numbers have fewer digits; those whose reciprocals are, too, may overflow.
 LEAST_UNIT = 1e-305
+# A size that rests on values alone is another one where they have grown or shrunk by this factor.
+OUTGROWN = 1e4
 
 
 class Packed:
@@ -55,8 +57,6 @@ class Packed:
         The scene's size (`scene_size`), 1 where it has none.
     has_size : bool
         Whether the scene has a size.
-    may_outgrow : bool
-        Whether that rests on values and places alone, which may become others by far.
     outgrown : Packed or None
         The same scene as it was packed before it had this size.
     unit : float
@@ -96,7 +96,7 @@ class Packed:
         self.structure = structure_of(constraints)
         size = scene_size(bodies, constraints, objectives)
         self.has_size = size > 0.0
-        self.may_outgrow = has_no_extent(bodies, constraints, objectives)
+        self._has_no_extent = has_no_extent(bodies, constraints, objectives)
         self.scale = size if self.has_size else 1.0
         self.outgrown: Packed | None = None
         self.reference = bodies[0].pose.position.copy()
@@ -252,6 +252,14 @@ class Packed:
                     ]
                     row[layout.MINIMUM], row[layout.GUARD_NUMBER] = pair[watch_memory.PAIR_MINIMUM], number
         return table
+
+    def may_have_outgrown(self) -> bool:
+        """Whether the size rests on values and places alone and the values have become others by far."""
+        if not self._has_no_extent or not self.has_size:
+            return self._has_no_extent
+        values = [abs(row.current()) for row, _, _ in self._sources if not row.terms[0][1].is_angle]
+        largest = max(values, default=0.0)
+        return largest > 0.0 and not self.scale <= OUTGROWN * largest <= OUTGROWN**2 * self.scale
 
     def taken_over(self, state: Array) -> Array:
         """A state of the scene as it was before it had this size, with multipliers in the units of this one."""
