@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.constraints.constraint import Constraint, structure_changes
 from assembly.constraints.expression import Expression
 from assembly.constraints.objectives import Objective
-from assembly.constraints.packing import OUTGROWN, Packed, lone_surfaces, pack, structure_of
+from assembly.constraints.packing import Packed, lone_surfaces, pack, structure_of
 from assembly.constraints.scene_size import check_reach, scene_size
 from assembly.constraints.trim_contact import TrimContact
 from assembly.errors import InputError, items, vector
@@ -176,8 +176,7 @@ class Assembly:
         before = self._packed
         if before is not None and before.may_have_outgrown():
             # Nothing was a length then, a slide driven to 0 say, or only one that was rounding.
-            size = scene_size(self._bodies, self._constraints, self._objectives)
-            if size > 0.0 and not (before.has_size and size <= OUTGROWN * before.scale <= OUTGROWN**2 * size):
+            if before.is_outgrown(scene_size(self._bodies, self._constraints, self._objectives)):
                 self._packed = None
         if self._packed is None:
             if all(body.fixed for body in self._bodies):

@@ -36,7 +36,7 @@ from assembly.proximity import watch_memory
 from assembly.proximity.events import fresh_memory
 from assembly.proximity.solid_contact import TRACK
 
-__all__ = ["OUTGROWN", "Packed", "lone_surfaces", "pack", "structure_of"]
+__all__ = ["Packed", "lone_surfaces", "pack", "structure_of"]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
@@ -258,8 +258,12 @@ class Packed:
         if not self._has_no_extent or not self.has_size:
             return self._has_no_extent
         values = [abs(row.current()) for row, _, _ in self._sources if not row.terms[0][1].is_angle]
-        largest = max(values, default=0.0)
-        return largest > 0.0 and not self.scale <= OUTGROWN * largest <= OUTGROWN**2 * self.scale
+        return self.is_outgrown(max(values, default=0.0))
+
+    def is_outgrown(self, length: float) -> bool:
+        """Whether a length, not zero, is another one than the size by far, or there is none."""
+        near = self.has_size and self.scale <= OUTGROWN * length <= OUTGROWN**2 * self.scale
+        return length > 0.0 and not near
 
     def taken_over(self, state: Array) -> Array:
         """A state of the scene as it was before it had this size, with multipliers in the units of this one."""

@@ -55,22 +55,17 @@ def nut(unit):
     return scene
 
 
-def rack(unit):
+def rack(unit, radius=-1.0, offset=0.0):
     ground, arm = asm.Body("ground", fixed=True), asm.Body("arm")
     slider = asm.Body("slider")
     scene = asm.Assembly([ground, arm, slider])
     hinge, rail = asm.Revolute(ground, arm, angle=0.7), asm.Prismatic(ground, slider)
-    scene.constrain(hinge, rail, asm.RackPinion(hinge, rail, -unit, "joint"))
+    scene.constrain(hinge, rail, asm.RackPinion(hinge, rail, radius * unit, "joint", offset=offset * unit))
     return scene
 
 
 def rack_with_offset(unit):
-    ground, arm = asm.Body("ground", fixed=True), asm.Body("arm")
-    slider = asm.Body("slider")
-    scene = asm.Assembly([ground, arm, slider])
-    hinge, rail = asm.Revolute(ground, arm, angle=0.7), asm.Prismatic(ground, slider)
-    scene.constrain(hinge, rail, asm.RackPinion(hinge, rail, 0.1 * unit, "joint", offset=3.0 * unit))
-    return scene
+    return rack(unit, radius=0.1, offset=3.0)
 
 
 def limits(unit):

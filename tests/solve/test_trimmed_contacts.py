@@ -72,3 +72,22 @@ def test_boxes_that_are_solved_touch(trimmed):
         assert abs(solution.contacts[contact.name].gap) < 1e-11, case
     # Some stall at a kink, or stand in each other at the start.
     assert solved >= 0.6 * len(CASES)
+
+
+def test_a_solution_shows_the_pair_that_was_held():
+    # An L sinks into a plate elsewhere than at its contact, which touches; the nearest features are others there.
+    corners = [(-0.5, -0.5), (0.5, -0.5), (0.5, -0.2), (-0.2, -0.2), (-0.2, 0.5), (-0.5, 0.5)]
+    sides = []
+    for a, b in zip(corners, corners[1:] + corners[:1], strict=True):
+        length = float(np.hypot(*np.subtract(b, a)))
+        sides.append(asm.NurbsCurve([a, b], [0.0, 0.0, length, length], 1))
+    ell = asm.Body("ell", asm.shapes.extrusion(sides, 0.8), fixed=True)
+    place = [-0.0010180195842079964, 1.2654968544334633, 0.612683512781489]
+    turn = [-0.0654334028192018, -0.7832854452412044, -0.5489155340402845, 0.28438375051689874]
+    plate = asm.Body("plate", asm.shapes.box(3.0, 3.0, 0.04), place, turn)
+    scene = asm.Assembly([ell, plate])
+    scene.constrain(asm.Contact(ell, plate, "touch"))
+    solution = scene.solve()
+    assert solution.success and solution.crossings == (("ell", "plate"),)
+    assert closest_features(ell, plate, *solution.q).gap < -0.01
+    assert abs(solution.contacts["touch"].gap) < 1e-11
