@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from assembly.geometry.curve import NurbsCurve
 from assembly.geometry.curve_parts import sampled
@@ -99,6 +98,8 @@ class _Line(_Axis):
 
 def _root(curve: NurbsCurve, axis: int, line: float, low: float, high: float) -> float:
     """Where a coordinate of a curve takes a value, between parameters on either side of it."""
+    from scipy.optimize import brentq  # a quarter of a second of import
+
     return float(brentq(lambda t: float(curve.evaluate(t)[axis]) - line, low, high, xtol=1e-300, rtol=1e-15))
 
 

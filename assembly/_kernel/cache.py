@@ -1,0 +1,179 @@
+"""Compiled entries on disk: one file for every signature and state of the sources, with a checksum of its own.
+
+Numba's own cache has an index file a function and looks at the function's own file alone. Here an entry is found by its
+name, so that processes which run at the same time can at worst write the same entry twice. Whatever is wrong with an
+entry, the answer is to compile again.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import hashlib
+import logging
+import os
+import pickle
+import tempfile
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from types import FunctionType
+from typing import Any
+
+import llvmlite.binding as llvm
+from numba.core import caching, serialize
+from numba.core.compiler import CompileResult
+from numba.core.runtime import rtsys
+from numba.core.sigutils import normalize_signature
+
+from assembly._kernel.sources import source_stamp
+from assembly._kernel.targets import Target, targets_that_run
+
+__all__ = ["EntryCache", "NoCache"]
+
+_LOG = logging.getLogger("assembly")
+_CHECKSUM = hashlib.sha256().digest_size
+_HASH_LENGTH = 16
+# So many states of the sources are kept of every signature, those used last: branches that one goes between.
+_STATES_KEPT = 4
+
+
+def _description(value: object) -> object:
+    """What a kernel made by a factory closes over: of functions their names, as the stamp has their sources."""
+    function = getattr(value, "py_func", value)
+    if isinstance(function, FunctionType):
+        cells = function.__closure__ or ()
+        # A function that calls itself closes over itself.
+        held = [cell.cell_contents for cell in cells if getattr(cell.cell_contents, "py_func", None) is not function]
+        return function.__module__, function.__qualname__, [_description(part) for part in held]
+    return [_description(part) for part in value] if isinstance(value, tuple) else serialize.dumps(value)
+
+
+class EntryCache(caching._Cache):
+    """The compiled forms of one kernel on disk."""
+
+    _announced = False
+    # What a loaded entry holds of its code for others to link to: nothing, until one does.
+    _no_code = b""
+
+    def __init__(self, function: FunctionType, folder: Path, prepare: Callable[[], None]) -> None:
+        self._function = function
+        self._folder = folder
+        self._prepare = prepare
+        self._title = f"{function.__module__}.{function.__qualname__}".replace("<", "").replace(">", "")
+
+    @property
+    def cache_path(self) -> str:
+        return str(self._folder)
+
+    def enable(self) -> None:
+        """Nothing to do: whether a kernel is cached is decided when it is made."""
+
+    def disable(self) -> None:
+        """Nothing to do, as in `enable`."""
+
+    def flush(self) -> None:
+        for path in self._folder.glob(f"{self._title}-*"):
+            path.unlink(missing_ok=True)
+
+    def paths(self, sig: Any, own: Target) -> list[Path]:
+        """Where the entry of a signature may be, best first; the first is where this process keeps it."""
+        if self._stamp is None:
+            return []
+        return [self._folder / f"{self._variant(sig, target)}-{self._stamp}" for target in targets_that_run(own)]
+
+    @functools.cached_property
+    def _stamp(self) -> str | None:
+        stamp = source_stamp(self._function)
+        return stamp and stamp[:_HASH_LENGTH]
+
+    def _variant(self, sig: Any, target: Target) -> str:
+        """What tells entries of one function apart: types of arguments, processor, what it closes over."""
+        key = repr((normalize_signature(sig), target, _description(self._function))).encode()
+        return f"{self._title}-{hashlib.sha256(key).hexdigest()[:_HASH_LENGTH]}"
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        # What machine code calls is there then; all else that Numba's own cache has loaded is for who compiles.
+        rtsys.initialize(target_context)
+        paths = self.paths(sig, target_context.codegen().magic_tuple())
+        for path in paths:
+            try:
+                return self._load(path, target_context)
+            except FileNotFoundError:
+                continue
+            except Exception as error:  # loading is a shortcut: nothing that goes wrong in it may stop a solve
+                _LOG.warning("compiling %s again: its cache entry %s is damaged (%s)", self._title, path, error)
+                break
+        else:
+            if not EntryCache._announced:
+                EntryCache._announced = True
+                _LOG.warning("compiling kernels, which may take a minute, once; kept in %s", self._folder)
+        self._prepare()
+        return None
+
+    def _load(self, path: Path, target_context: Any) -> Any:
+        entry = path.read_bytes()
+        payload = entry[_CHECKSUM:]
+        if hashlib.sha256(payload).digest() != entry[:_CHECKSUM]:
+            raise ValueError("the checksum does not fit")
+        loaded = self._rebuilt(target_context, *pickle.loads(payload))
+        with contextlib.suppress(OSError):
+            os.utime(path)  # the time of last use
+        return loaded
+
+    @classmethod
+    def _rebuilt(cls, target_context: Any, library: Any, names: Any, *rest: Any) -> Any:
+        """A kernel from its parts, as Numba does it, but that bitcode is not read unless another kernel links to it."""
+        name, kind, (machine_code, bitcode) = library
+        cls._no_code = cls._no_code or llvm.parse_assembly("").as_bitcode()
+        # What Numba would read from there.
+        symbols = (names.llvm_func_name, names.llvm_cpython_wrapper_name, names.llvm_cfunc_wrapper_name)
+        target_context.codegen()._engine._defined_symbols.update(symbols)
+        parts = (name, kind, (machine_code, cls._no_code))
+        result = CompileResult._rebuild(target_context, parts, names, *rest)
+        result.library._get_module_for_linking = functools.cache(lambda: llvm.parse_bitcode(bitcode))
+        return result
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        if data.library.has_dynamic_globals:
+            warnings.warn(f"{self._title} uses an address or a large global array and is not cached", stacklevel=2)
+            return
+        payload = serialize.dumps(data._reduce())
+        own: Target = data.codegen.magic_tuple()
+        path = next(iter(self.paths(sig, own)), None)
+        if path is None:
+            return
+        try:
+            self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            handle, unfinished = tempfile.mkstemp(dir=self._folder)
+            try:
+                with os.fdopen(handle, "wb") as file:
+                    file.write(hashlib.sha256(payload).digest() + payload)
+                os.replace(unfinished, path)
+            except OSError:
+                os.unlink(unfinished)
+                raise
+        except OSError as error:
+            _LOG.info("%s is not cached: %s", self._title, error)
+        self._drop_old_states(self._variant(sig, own))
+
+    def _drop_old_states(self, variant: str) -> None:
+        """Keep what was compiled for a signature from the few states of the sources that were used last."""
+        used: list[tuple[float, Path]] = []
+        for path in self._folder.glob(f"{variant}-*"):
+            try:
+                used.append((path.stat().st_mtime, path))
+            except OSError:  # another process dropped it first
+                continue
+        for _, path in sorted(used, reverse=True)[_STATES_KEPT:]:
+            path.unlink(missing_ok=True)
+
+
+class NoCache(caching.NullCache):
+    """Of a kernel that every process compiles."""
+
+    def __init__(self, prepare: Callable[[], None]) -> None:
+        self._prepare = prepare
+
+    def load_overload(self, _sig: Any, _target_context: Any) -> None:
+        self._prepare()
