@@ -1,8 +1,7 @@
 """Kernels called by address.
 
 What calls another kernel is optimized together with it, as often as it is called; a large kernel that is rarely needed
-is compiled for itself, and its caller is given the address of its machine code. `_kernel.py` stamps its cache with this
-file: machine code holds these calls.
+is compiled for itself, and its caller is given the address of its machine code.
 """
 
 from __future__ import annotations
@@ -12,36 +11,37 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-import numba
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils, config
 from numba.extending import intrinsic, overload
+
+from assembly._kernel.decorator import ENTRIES
 
 __all__ = ["address_of", "call_address", "clock_address"]
 
 _ADDRESSED: dict[int, Callable[..., int]] = {}
 
 
-def address_of(entry: Any, *examples: Any) -> int:
-    """The address of a kernel that is an entry, compiled for arguments of the types of these examples.
+def address_of(entry: Any) -> int:
+    """The address of a kernel that is an entry and has one signature.
 
-    It returns an integer. Only for this process: not to be kept in a file.
+    The kernel returns an integer. The address is for this process: not to be kept in a file.
     """
     if config.DISABLE_JIT:
         address = id(entry)
         _ADDRESSED[address] = entry
         return address
-    signature = tuple(numba.typeof(example) for example in examples)
-    entry.compile(signature)
-    compiled = entry.overloads[signature]
+    (argument_types,) = ENTRIES[entry.py_func].argument_types()
+    entry.compile(argument_types)
+    compiled = entry.overloads[argument_types]
     address = int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name))
     _ADDRESSED[address] = entry
     return address
 
 
 def call_address(address: int, arguments: tuple[Any, ...]) -> int:
-    """Call the kernel at an address that `address_of` gave; the arguments have the types of its examples."""
+    """Call the kernel at an address that `address_of` gave; the arguments have the types of its signature."""
     return int(_ADDRESSED[int(address)](*arguments))
 
 

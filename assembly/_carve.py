@@ -2,7 +2,7 @@
 
 An array of its own costs a kernel some hundred nanoseconds: to allocate it, to count references to it wherever it goes,
 to free it. A tick of some microseconds works in thirty. Those that are carved from one block cost nothing; the block
-has to be an argument of the kernel that carves, so that it outlives them. `_kernel.py` stamps its cache with this file.
+has to be an argument of the kernel that carves, so that it outlives them.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""Values of four lanes in kernels: (x, y, z, w) as one vector value. Without JIT the names work on numpy 4-vectors.
-
-`_kernel.py` stamps its cache with this file: machine code holds these instructions.
-"""
+"""Values of four lanes in kernels: (x, y, z, w) as one vector value. Without JIT the names work on numpy 4-vectors."""
 
 from __future__ import annotations
 

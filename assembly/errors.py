@@ -90,7 +90,7 @@ def real_array(name: str, value: ArrayLike, shape: Sequence[int | str]) -> NDArr
     """
     try:
         came = np.asarray(value)
-        array = np.array(came, dtype=np.float64) if came.dtype.kind in "iuf" else None
+        array = np.array(came, dtype=np.float64, order="C") if came.dtype.kind in "iuf" else None
     except (TypeError, ValueError, OverflowError):
         array = None
     if is_masked(value):

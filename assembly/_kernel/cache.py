@@ -76,11 +76,9 @@ class EntryCache(caching._Cache):
         for path in self._folder.glob(f"{self._title}-*"):
             path.unlink(missing_ok=True)
 
-    def paths(self, sig: Any, own: Target) -> list[Path]:
-        """Where the entry of a signature may be, best first; the first is where this process keeps it."""
-        if self._stamp is None:
-            return []
-        return [self._folder / f"{self._variant(sig, target)}-{self._stamp}" for target in targets_that_run(own)]
+    def path(self, sig: Any, target: Target) -> Path | None:
+        """Where the entry of a signature for a target is kept, if it can be."""
+        return None if self._stamp is None else self._folder / f"{self._variant(sig, target)}-{self._stamp}"
 
     @functools.cached_property
     def _stamp(self) -> str | None:
@@ -95,10 +93,11 @@ class EntryCache(caching._Cache):
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         # What machine code calls is there then; all else that Numba's own cache has loaded is for who compiles.
         rtsys.initialize(target_context)
-        paths = self.paths(sig, target_context.codegen().magic_tuple())
-        for path in paths:
+        for target in targets_that_run(target_context.codegen().magic_tuple()):
+            path = self.path(sig, target)
             try:
-                return self._load(path, target_context)
+                if path is not None:
+                    return self._load(path, target_context)
             except FileNotFoundError:
                 continue
             except Exception as error:  # loading is a shortcut: nothing that goes wrong in it may stop a solve
@@ -140,7 +139,7 @@ class EntryCache(caching._Cache):
             return
         payload = serialize.dumps(data._reduce())
         own: Target = data.codegen.magic_tuple()
-        path = next(iter(self.paths(sig, own)), None)
+        path = self.path(sig, own)
         if path is None:
             return
         try:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from numba import njit
 from numba.core import config
+from numba.core.sigutils import normalize_signature
 
 from assembly._kernel.cache import EntryCache, NoCache
 from assembly._kernel.folders import entry_folder
@@ -20,21 +22,25 @@ __all__ = ["ENTRIES", "Entry", "kernel"]
 
 @dataclass(frozen=True)
 class Entry:
-    """A kernel with machine code of its own.
+    """A kernel of this package with machine code of its own.
 
     Attributes
     ----------
     compiled
         Numba's object, which is called.
     signatures
-        The types of arguments for which the package calls it, as Numba writes them.
+        The types of arguments for which the package calls it.
     """
 
     compiled: Any
     signatures: tuple[str, ...]
 
+    def argument_types(self) -> list[tuple[Any, ...]]:
+        """Numba's types of arguments, a tuple a signature."""
+        return [normalize_signature(signature)[0] for signature in self.signatures]
 
-# By the function that is compiled.
+
+# All of them, by the functions that they compile; filled as modules are imported.
 ENTRIES: dict[Callable[..., Any], Entry] = {}
 
 
@@ -52,9 +58,9 @@ def kernel(
     Parameters
     ----------
     signatures
-        Of an entry: the types of arguments for which the package calls it, one string each, as in
-        ``"(float64[::1], int64)"``. They say what can be compiled ahead. A call with other types is compiled when it
-        comes.
+        Of an entry: the types of arguments for which the package calls it, a string each, as Numba writes them:
+        ``"(f8[::1], i8)"`` for a vector of doubles and an integer. They are what is compiled ahead. A call with other
+        types is compiled when it comes, and in this package it is a fault.
     inline
         Copied into its callers by LLVM: for small helpers. From Python it runs as plain Python.
     inner
@@ -78,19 +84,22 @@ def kernel(
         announce(function, {**settings, "forceinline": inline, "_nrt": allocates})
         return function
     compiled = njit(pipeline_class=EntryCompiler, **settings)(function)
-    if not config.DISABLE_JIT:
-        compiled._cache = _cache_of(function)
+    if config.DISABLE_JIT:
+        return compiled
+    compiled._cache = NoCache(make_callable)
+    path = source_of(compiled.py_func)
+    if PACKAGE in path.parents:
         ENTRIES[function] = Entry(compiled, (signatures,) if isinstance(signatures, str) else signatures)
+        folder = entry_folder()
+        if folder is not None and _can_be_read(path):
+            compiled._cache = EntryCache(compiled.py_func, folder, make_callable)
     return compiled
 
 
-def _cache_of(function: Any) -> EntryCache | NoCache:
-    """Where the machine code of an entry is kept."""
-    path, folder = source_of(function), entry_folder()
+def _can_be_read(path: Path) -> bool:
+    """Whether the sources of a module are there. They are read now, so that what counts is what is being imported."""
     try:
-        if PACKAGE in path.parents and folder is not None:
-            sources_of(path)  # read now, so that the cache knows what this process imported
-            return EntryCache(function, folder, make_callable)
-    except OSError:  # there are no sources, or they cannot be read
-        pass
-    return NoCache(make_callable)
+        sources_of(path)
+    except OSError:
+        return False
+    return True

@@ -11,7 +11,7 @@ import platform
 
 import llvmlite.binding as llvm
 
-__all__ = ["PORTABLE_VARIABLES", "Target", "targets_that_run"]
+__all__ = ["PORTABLE_VARIABLES", "PROCESSOR", "Target", "targets_that_run"]
 
 # Triple, processor and features, as Numba's code generator names what it compiles for.
 Target = tuple[str, str, str]
@@ -20,18 +20,19 @@ _X86_64_V3 = (
     *("cx16", "sahf", "popcnt", "sse3", "sse4.1", "sse4.2", "ssse3"),
     *("avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe", "xsave"),
 )
-_PROCESSOR = "x86-64-v3" if platform.machine().lower() in ("x86_64", "amd64") else "generic"
+# The processor of portable entries.
+PROCESSOR = "x86-64-v3" if platform.machine().lower() in ("x86_64", "amd64") else "generic"
 # A process with these environment variables compiles for the portable target. Numba reads them when it is imported.
-PORTABLE_VARIABLES = {"NUMBA_CPU_NAME": _PROCESSOR, "NUMBA_CPU_FEATURES": ""}
+PORTABLE_VARIABLES = {"NUMBA_CPU_NAME": PROCESSOR, "NUMBA_CPU_FEATURES": ""}
 
 
 @functools.cache
 def _runs_portable_code() -> bool:
     features = llvm.get_host_cpu_features()
-    return _PROCESSOR == "generic" or all(features.get(name) for name in _X86_64_V3)
+    return PROCESSOR == "generic" or all(features.get(name) for name in _X86_64_V3)
 
 
 def targets_that_run(own: Target) -> list[Target]:
     """The targets whose entries run here, best first: the one that this process compiles for, and the portable one."""
-    portable = (own[0], _PROCESSOR, "")
+    portable = (own[0], PROCESSOR, "")
     return [own, portable] if _runs_portable_code() and portable != own else [own]

@@ -11,8 +11,6 @@ loop works on
                                 one of trims that are vectors
     residual       (m,)         rows: contacts, trims, joints, tapes; behind them four for every free pair
     jacobian       (m, 16 + e)  in the twists of a row's two bodies (12), a free pair's coordinates (4), further bodies
-
-`_kernel.py` stamps its cache with this file: kernels hold these constants.
 """
 
 from __future__ import annotations

@@ -320,7 +320,7 @@ def growth(table, pool, r, j, loose, point):
     return factor * value
 
 
-@kernel
+@kernel(signatures="(i8[::1], f8[::1], i8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1])")
 def trim_rows(table, pool, free, lengths, q, tracked, records, residual, jacobian):
     """All rows of trims, and their gradients."""
     loose = (free, lengths)
@@ -354,7 +354,11 @@ def part_of(jacobian, r, rates, k):
     return (rs * gg - rg * sg) / det if det > 1e-12 * ss * gg else 0.0
 
 
-@kernel
+@kernel(
+    signatures=(
+        "(i8[::1], f8[::1], i8, i8[::1], f8[:, ::1], i8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8, f8[:, ::1])"
+    ),
+)
 def trim_terms(table, pool, r, free, lengths, bases, tracked, records, jacobian, y, hessian):
     """Upper triangle of hessian += y (second derivative of row r).
 

@@ -95,7 +95,7 @@ def bezier_derivatives(rows, o, pool, binomials, n, x):
     return (scale * rest * rest) * v, (n * scale * rest) * d, (n * (n - 1.0) * scale) * h
 
 
-@kernel
+@kernel(signatures="(i8[::1], f8[::1], f8[::1], b1, i8, f8[::1])")
 def evaluate_pieces(record, pool, t, closed, order, out):
     """`spline.evaluate_curve` from Bezier pieces: as accurate at any degree."""
     count = t.size

@@ -192,7 +192,7 @@ def _meet(table, pool, ints, doubles, a, b, move_u, move_v, tolerance, size, sta
     return False, 0.0, 0.0, budget
 
 
-@kernel
+@kernel(signatures="(i8[::1], f8[::1], i8, i8, i8[::1], f8[:, ::1], i8[::1], f8, f8, f8[::1])")
 def first_crossing(table, pool, ints, doubles, pieces, moves, order, tolerance, size, where):
     """The first two pieces that cross, touch or overlap: their numbers, and the point in `where`; (-1, -1): none.
 

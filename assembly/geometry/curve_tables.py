@@ -19,7 +19,7 @@ from assembly.geometry.spline import (
 )
 
 
-@kernel
+@kernel(signatures="(f8[:, ::1], f8[::1], f8[::1], i8[:, ::1], f8[:, :, ::1], f8, f8[::1], f8[::1], i8[:, ::1])")
 def bezier_tables(points, weights, knots, shape, powers, coincident, bezier, pool, records):
     """Fill Bezier points (u w, v w, w), pools and records of curves.
 
@@ -103,7 +103,7 @@ def bezier_tables(points, weights, knots, shape, powers, coincident, bezier, poo
     return at, place, finite
 
 
-@kernel
+@kernel(signatures="(f8[::1], i8[:, ::1], f8, f8, f8[::1], f8[::1])")
 def swept_area(pool, records, u, v, nodes, weights):
     """The area that the way from (u, v) to a point sweeps as the point runs along curves."""
     total = 0.0

@@ -130,7 +130,7 @@ def arc_bound(table, pool, lo, hi, room):
     return room[RESULTS + 1] if room[RESULTS + 1] >= 0.0 else math.inf
 
 
-@kernel
+@kernel(signatures="(i8[::1], f8[::1], f8[::1], f8[:, ::1], f8[::1])")
 def formula_points(table, pool, t, out, room):
     """C, C', C'' at every t to out (n, 9). Returns the first place where C is not finite, or -1."""
     bad = -1
@@ -143,7 +143,7 @@ def formula_points(table, pool, t, out, room):
     return bad
 
 
-@kernel
+@kernel(signatures="(i8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[::1])")
 def formula_ranges(table, pool, lo, hi, out, room):
     """Bounds over the intervals [lo[i], hi[i]] to out (n, 43).
 
@@ -165,7 +165,7 @@ def formula_ranges(table, pool, lo, hi, out, room):
     return told
 
 
-@kernel
+@kernel(signatures="(i8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1])")
 def arc_bounds(table, pool, lo, hi, out, room):
     """`arc_bound` of every interval [lo[i], hi[i]]; many at a time where plain doubles do."""
     if table[ARC_TAPE] != 0 and table[ARC_PLAIN] != 0:

@@ -46,7 +46,7 @@ def _column(table, pool, u, v, levels, nodes, weights):
     return area, volume
 
 
-@kernel
+@kernel(signatures="(i8[::1], f8[::1], f8[:, ::1], i8[::1], i8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1])")
 def along_pieces(table, pool, rows, coefficients, degrees, levels, nodes, weights, out):
     """Integrals of u' G over parts of pieces.
 
@@ -68,7 +68,7 @@ def along_pieces(table, pool, rows, coefficients, degrees, levels, nodes, weight
         out[k, 1] = volume
 
 
-@kernel
+@kernel(signatures="(i8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[:, ::1])")
 def along_bottom(table, pool, stretches, levels, nodes, weights, out):
     """Integrals of G over stretches (u0, u1) of the bottom."""
     for k in range(stretches.shape[0]):

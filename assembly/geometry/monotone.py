@@ -223,7 +223,7 @@ def _weights_differ(c, p):
     return most > MOST_WEIGHTS * least
 
 
-@kernel
+@kernel(signatures="(f8[::1], f8[::1], i8[:, ::1], f8[:, ::1], f8[:, ::1])")
 def cut_curves(pieces, breaks, shape, binomials, rows):
     """Cut curves into pieces.
 

@@ -218,14 +218,14 @@ def polished(pool, o, degree, middle, t0, t1, t, qx, qy):
     return t
 
 
-@kernel
+@kernel(signatures="(f8[::1], i8[::1], i8[::1], f8[::1], f8[::1], f8[:, ::1])")
 def ends_of_pieces(pool, coefficients, degrees, middles, t, out):
     """Points of pieces at parameters."""
     for k in range(t.size):
         out[k, 0], out[k, 1], _du, _dv = piece_line(pool, coefficients[k], degrees[k], t[k] - middles[k])
 
 
-@kernel
+@kernel(signatures="(f8[::1], i8, i8, f8, f8, f8, i8, f8, f8, f8)")
 def cut_of_piece(pool, coefficients, degree, middle, t0, t1, axis, target, start, end):
     """The parameter at which a piece has a coordinate, and its point there."""
     t, x, y, _dx, _dy = piece_at(pool, coefficients, degree, middle, t0, t1, axis, target, start, end)

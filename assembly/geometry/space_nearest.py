@@ -152,7 +152,7 @@ def _search(table, pool, surface, o, i, q, m1, m2, m3, best):
     return best, found
 
 
-@kernel
+@kernel(signatures="(i8[::1], f8[::1], i8, i8, f8[::1], f8[::1], f8[::1], f8[:, ::1])")
 def nearest_in_space(table, pool, surface, trim, bounds, u, v, out):
     """For flat parameters: distance in space to the boundary, index of the curve and its parameter, a row each.
 

@@ -156,7 +156,7 @@ def xyz(a):
     return (lane(a, 0), lane(a, 1), lane(a, 2))
 
 
-@kernel
+@kernel(signatures="(i8[::1], f8[::1], i8, f8, f8)")
 def surface_point(table, pool, r, u, v):
     """S, Su, Sv, Suu, Suv, Svv as 3-tuples."""
     a, au, av, auu, auv, avv = surface_lanes(table, pool, r, u, v)
@@ -182,7 +182,7 @@ def into_domain(pool, breaks, count, closed, u):
     return min(max(u, low), high), low - slack <= u <= high + slack
 
 
-@kernel
+@kernel(signatures="(i8[::1], f8[::1], f8[::1], f8[::1], i8, f8[::1])")
 def evaluate_surface(table, pool, u, v, order, out):
     """Points and derivatives to `order` at flat parameters into flat `out`, quantity by quantity.
 
@@ -224,14 +224,14 @@ def curve_lanes(table, pool, r, t):
     return p, pt, i * (2.0 * h - (2.0 * lane(d, 3)) * pt - (2.0 * lane(h, 3)) * p)
 
 
-@kernel
+@kernel(signatures="(i8[::1], f8[::1], i8, f8)")
 def curve_point(table, pool, r, t):
     """C, Ct, Ctt as 3-tuples (z is zero for plane curves)."""
     a, d, h = curve_lanes(table, pool, r, t)
     return xyz(a), xyz(d), xyz(h)
 
 
-@kernel
+@kernel(signatures="(i8[::1], f8[::1], f8[::1], i8, f8[::1])")
 def evaluate_curve(table, pool, t, order, out):
     """Points and derivatives to `order` at flat parameters into flat `out`; -1, or the index of a bad parameter."""
     count = t.size
@@ -265,7 +265,7 @@ def _row_third(pool, o, degree, t):
     return p, d, h, w
 
 
-@kernel
+@kernel(signatures="(i8[::1], f8[::1], i8, f8, f8)")
 def third_derivatives(table, pool, r, u, v):
     """Suuu, Suuv, Suvv, Svvv as 3-tuples: what a pair at a fold needs and nothing else does."""
     iu = find_span(pool, table[r + BREAKS_U], table[r + SPANS_U], u)

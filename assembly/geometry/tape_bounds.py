@@ -372,7 +372,7 @@ def run_bounds(table, pool, o, x, work, y):
     return told
 
 
-@kernel
+@kernel(signatures="(i8[::1], f8[::1], i8, f8[::1], f8[::1], f8[::1])")
 def bound_outputs(table, pool, o, x, work, y):
     """`run_bounds` for Python."""
     return run_bounds(table, pool, o, x, work, y)

@@ -173,14 +173,14 @@ def trim_side(table, pool, trim, u, v):
     return 1 if w == 1.0 else -1
 
 
-@kernel
+@kernel(signatures="(i8[::1], f8[::1], i8, f8[::1], f8[::1], i8[::1])")
 def locate_points(table, pool, trim, u, v, side):
     """`trim_side` at flat points."""
     for k in range(u.size):
         side[k] = trim_side(table, pool, trim, u[k], v[k])
 
 
-@kernel
+@kernel(signatures="(i8[::1], f8[::1], i8, f8[::1], f8[::1], f8[::1])")
 def windings(table, pool, trim, u, v, out):
     """w at flat points, before the table knows what w at the bottom is."""
     for k in range(u.size):

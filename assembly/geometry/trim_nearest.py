@@ -262,7 +262,7 @@ def _foot(table, pool, trim, begin, stop, piece, t, u, v, qx, qy):
     return sign * distance, curve, t, u - ox, v - oy, -dy, dx
 
 
-@kernel
+@kernel(signatures="(i8[::1], f8[::1], i8, i8, i8, f8[::1], f8[::1], f8[:, ::1])")
 def nearest_points(table, pool, trim, first, count, u, v, out):
     """`trim_nearest` at flat points, a row of seven each."""
     for k in range(u.size):

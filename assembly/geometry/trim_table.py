@@ -121,7 +121,7 @@ class _Pieces:
 
     def __init__(self, curves: Sequence[NurbsCurve], chains: Sequence[range], closing: Sequence[bool]) -> None:
         bezier, self.pool, self.records = packed_curves(curves)
-        shape = self.records[:, [CURVE_DEGREE, CURVE_SPANS]]
+        shape = np.ascontiguousarray(self.records[:, [CURVE_DEGREE, CURVE_SPANS]])
         breaks = np.concatenate(
             [np.empty(0)] + [self.pool[r[CURVE_BREAKS] : r[CURVE_COEFFICIENTS]] for r in self.records.tolist()]
         )
@@ -135,7 +135,7 @@ class _Pieces:
         self.curve = rows[:, 0].astype(np.int64)
         span = rows[:, 1].astype(np.int64)
         record = self.records[self.curve]
-        self.degree = record[:, CURVE_DEGREE]
+        self.degree = np.ascontiguousarray(record[:, CURVE_DEGREE])
         self.coefficients = record[:, CURVE_COEFFICIENTS] + 4 * (self.degree + 1) * span
         at = record[:, CURVE_BREAKS] + span
         self.middle = 0.5 * (self.pool[at] + self.pool[at + 1])

@@ -34,7 +34,7 @@ _LEAVES = 32
 _STACK = 128
 
 
-@kernel(allocates=True, exact=True)
+@kernel(signatures="(i8[::1], f8[::1])", allocates=True, exact=True)
 def capsule_tree(record, pool):
     """The tree of a packed curve."""
     n = record[DEGREE]
@@ -152,7 +152,7 @@ def _extent(tree, o):
     return length(three(tree, o + EXTENT)) + 2.0 * tree[o + RADIUS]
 
 
-@kernel(allocates=True, exact=True)
+@kernel(signatures="(f8[::1], f8[::1], f8)", allocates=True, exact=True)
 def compare_curves(a, b, clearance):
     """Whether two curves are proven farther apart than a clearance, or proven not to be; else OPEN."""
     shift = (b[ORIGIN] - a[ORIGIN], b[ORIGIN + 1] - a[ORIGIN + 1], b[ORIGIN + 2] - a[ORIGIN + 2])
@@ -186,7 +186,7 @@ def compare_curves(a, b, clearance):
     return FARTHER
 
 
-@kernel(allocates=True, exact=True)
+@kernel(signatures="(f8[::1], f8, f8, f8, f8)", allocates=True, exact=True)
 def compare_point(tree, x, y, z, clearance):
     """The same of a curve and a point."""
     p = (x - tree[ORIGIN], y - tree[ORIGIN + 1], z - tree[ORIGIN + 2])

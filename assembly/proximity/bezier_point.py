@@ -283,7 +283,7 @@ def nearest_on_curve(record, pool, px, py, pz, tolerance, clearance, budget, wor
     return SPENT if bounded >= budget else UNFINISHED
 
 
-@kernel
+@kernel(signatures="(i8[::1], f8[::1], f8, f8, f8, f8, f8, i8, f8[::1])")
 def point_distance(record, pool, px, py, pz, tolerance, clearance, budget, out):
     """Bounds of the distance of a point and a packed curve; a clearance below zero asks for the distance itself."""
     if clearance >= 0.0:
@@ -311,7 +311,7 @@ def point_distance(record, pool, px, py, pz, tolerance, clearance, budget, out):
     return nearest_on_curve(record, pool, px, py, pz, tolerance, clearance, budget, work, stack, out)
 
 
-@kernel
+@kernel(signatures="(i8[::1], f8[::1], f8[:, ::1], f8, i8, i8[::1], f8[:, ::1])")
 def point_distances(record, pool, points, tolerance, budget, codes, out):
     """`point_distance` for the rows of an array (n, 3) into rows of `out` and `codes`."""
     work = np.empty((_DEEPEST + 2) * (SQUARE + (2 * record[DEGREE] + 1) * (1 + record[RATIONAL])))

@@ -238,7 +238,7 @@ def meeting_proven(ra, qa, a, o, rb, qb, b, p, shift, error, x, y):
     return inverse * (far + bend * r * r) * (1.0 + 1e-8) + 1e-8 * r < r
 
 
-@kernel(allocates=True)
+@kernel(signatures="(i8[::1], f8[::1], i8[::1], f8[::1], f8, f8, i8, b1, b1, f8[::1])", allocates=True)
 def curve_distance(ra, qa, rb, qb, tolerance, clearance, budget, polish, plane, out):
     """Bounds of the distance of two packed curves; a clearance below zero asks for the distance itself."""
     shift = (qb[CENTER] - qa[CENTER], qb[CENTER + 1] - qa[CENTER + 1], qb[CENTER + 2] - qa[CENTER + 2])

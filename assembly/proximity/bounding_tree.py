@@ -262,7 +262,7 @@ def still_within(table, pool, tree_f, tree_g, rotation, shift, reach, listed, co
     return found
 
 
-@kernel
+@kernel(signatures="(i8[::1], f8[::1], i8, i8, UniTuple(f8, 9), UniTuple(f8, 3), f8, i8[:, ::1], i8[:, ::1])")
 def facing_pairs(table, pool, tree_f, tree_g, rotation, shift, reach, stack, out):
     """`pairs_within` for Python."""
     return pairs_within(table, pool, tree_f, tree_g, rotation, shift, reach, stack, out)
@@ -369,7 +369,7 @@ def least_distance(table, pool, tree_f, tree_g, rotation, shift, upper, stack):
     return max(math.sqrt(best) - slack, 0.0)
 
 
-@kernel
+@kernel(signatures="(i8[::1], f8[::1], i8, i8, UniTuple(f8, 9), UniTuple(f8, 3), f8, i8[:, ::1])")
 def tree_distance(table, pool, tree_f, tree_g, rotation, shift, upper, stack):
     """`least_distance` for Python."""
     return least_distance(table, pool, tree_f, tree_g, rotation, shift, upper, stack)

@@ -281,7 +281,7 @@ def parted(points, o, count, directions, supports, j, reach):
     return False
 
 
-@kernel
+@kernel(signatures="(i8, i8[:, ::1], f8[::1], i8[:, ::1], f8[::1], f8[:, ::1], f8, f8, i8[:, ::1])")
 def near_pairs(full, table, pool, hulls, obstacles, boxes, clearance, tolerance, out):
     """Whether curve i comes near obstacle j, to out (curves, obstacles).
 

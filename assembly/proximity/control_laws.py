@@ -251,7 +251,12 @@ def write_row(out, row, x, distance, error, mode_f, mode_g, gain):
     out[row, GAIN] = gain
 
 
-@kernel
+@kernel(
+    signatures=(
+        "(i8[::1], f8[::1], i8, i8, UniTuple(f8, 3), f8[:, :, ::1], UniTuple(f8, 4), f8, i8, i8, f8[::1], f8, "
+        "f8, f8[:, ::1])"
+    ),
+)
 def run_control(table, pool, f, g, point, poses, x, dt, steps, form, law, tolerance, meet, out):
     """`steps` Euler steps of the controller from x, along poses (n, 2, 7), the last of which stays: status and steps.
 
@@ -325,7 +330,7 @@ def newton_change(s, d, form):
     return du, dv
 
 
-@kernel
+@kernel(signatures="(i8[::1], f8[::1], UniTuple(f8, 3), f8[:, ::1], i8, i8, i8, f8, f8[:, ::1])")
 def attraction(table, pool, point, starts, method, form, limit, tolerance, out):
     """Where a witness point ends from every start (n, 2): out (n, 3) of parameters and error; how many ended.
 

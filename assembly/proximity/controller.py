@@ -304,7 +304,7 @@ def descend_pair(table, pool, f, g, turn, shift, x, size, limit):
     return status, x, count, (n, tx, ty, pf, pg, e, t, a, c, r, beta, regular), matrices
 
 
-@kernel
+@kernel(signatures="(i8[::1], f8[::1], i8, i8, f8[:, ::1], UniTuple(f8, 4), f8, i8, f8[::1])")
 def find_descent(table, pool, f, g, q, x, size, limit, out):
     """The descent for Python.
 

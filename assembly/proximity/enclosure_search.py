@@ -171,7 +171,12 @@ def longer(xa, oa, xb, ob):
     return a >= b
 
 
-@kernel
+@kernel(
+    signatures=(
+        "(i8, i8, i8[::1], f8[::1], f8[::1], i8, i8[::1], f8[::1], f8[::1], f8[::1], f8, f8, i8, b1, i8, "
+        "f8[::1], f8[::1], i8[:, ::1], f8[::1], f8[::1])"
+    ),
+)
 def search(
     full,
     ka,

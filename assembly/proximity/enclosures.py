@@ -263,7 +263,7 @@ def separation_along(xa, oa, xb, ob, count_b, n, bound):
     return lower if lower > 0.0 else 0.0
 
 
-@kernel
+@kernel(signatures="(i8, i8[::1], f8[::1], f8[::1], i8, f8, f8, f8[::1])")
 def enclose(kind, table, pool, room, span, t0, t1, x):
     """The record of the piece over [t0, t1], to x; of a smooth part `span` of the curve."""
     x[T0], x[T1], x[SPAN] = t0, t1, span
@@ -276,7 +276,7 @@ def enclose(kind, table, pool, room, span, t0, t1, x):
     fill_piece(kind, table, pool, room, x, 0)
 
 
-@kernel
+@kernel(signatures="(f8[::1], f8[:, ::1], i8, f8[::1])")
 def supports(x, directions, bound, out):
     """Upper bounds of n.C over the piece of a record for unit directions (k, 3)."""
     for i in range(directions.shape[0]):

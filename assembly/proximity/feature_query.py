@@ -18,7 +18,9 @@ from assembly.proximity.velocity import RATES, RECORD, ZED, add_gap_terms, gradi
 PARAMETERS, POINT_F, POINT_G, NORMAL, GAP, ISOLATED, PROPER, FOLD, RESIDUAL, PAIR = 0, 4, 7, 10, 13, 14, 15, 16, 17, 21
 
 
-@kernel
+@kernel(
+    signatures="(i8[::1], f8[::1], i8, i8, i8, i8, f8[:, ::1], UniTuple(f8, 4), UniTuple(f8, 3), f8, f8, f8[::1])",
+)
 def find_features(table, pool, kind_f, f, kind_g, g, q, x, n, size, turn, out):
     """`solve_features` at the poses q (2, 7); n and what is written to `out` (PAIR,) are in world axes.
 
@@ -47,7 +49,11 @@ def find_features(table, pool, kind_f, f, kind_g, g, q, x, n, size, turn, out):
     return status
 
 
-@kernel
+@kernel(
+    signatures=(
+        "(i8[::1], f8[::1], i8, i8, i8, i8, f8[:, ::1], UniTuple(f8, 4), UniTuple(f8, 3), f8, f8[:, ::1], f8[:, ::1])"
+    ),
+)
 def feature_derivatives(table, pool, kind_f, f, kind_g, g, q, x, n, size, first, hessian):
     """d(parameters)/dq and d(gap)/dq in `first` (5, 14), the gap's Hessian over the twists in `hessian` (12, 12).
 

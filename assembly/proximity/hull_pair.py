@@ -63,7 +63,7 @@ def overlap_proven(full, a, count_a, b, count_b, slack, g):
     return False
 
 
-@kernel
+@kernel(signatures="(i8, f8[::1], i8, f8[::1], i8, f8[::1])")
 def hull_distance(full, a, count_a, b, count_b, state):
     """What `search` of `enclosure_search.py` answers, of two hulls."""
     g = np.zeros(ROOM)

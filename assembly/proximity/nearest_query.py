@@ -65,7 +65,7 @@ def write_features(table, pool, shell_f, shell_g, q, turn_f, turn, shift, f, g, 
     write_pair(q, turn_f, x, pf, pg, scale(1.0 / length, d) if length > 1e-9 * size else frame[0], length, out)
 
 
-@kernel
+@kernel(signatures="(i8[::1], f8[::1], i8, i8, f8[:, ::1], f8, i8[::1], f8[::1])")
 def find_nearest(table, pool, shell_f, shell_g, q, size, codes, out):
     """The nearest pair at the poses q (2, 7); its features into codes (2,), the pair into out. Returns the status."""
     turn_f = rotation(q, 0)
@@ -89,7 +89,7 @@ def find_nearest(table, pool, shell_f, shell_g, q, size, codes, out):
     return status
 
 
-@kernel
+@kernel(signatures="(i8[::1], f8[::1], i8, i8, f8[:, ::1], f8, i8[::1], f8[::1])")
 def find_deepest(table, pool, shell_f, shell_g, q, size, codes, out):
     """The pair of two shells that cross at the features and coordinates in codes and out. Returns the status.
 
@@ -105,7 +105,7 @@ def find_deepest(table, pool, shell_f, shell_g, q, size, codes, out):
     return PENETRATING if gap < 0.0 else APART
 
 
-@kernel
+@kernel(signatures="(i8[::1], f8[::1], i8, i8, f8[:, ::1], f8, i8[::1], f8[::1])")
 def follow_nearest(table, pool, shell_f, shell_g, q, size, codes, out):
     """The pair in codes and out carried to the poses q. Returns TRACKED, or LOST and leaves the pair."""
     turn_f = rotation(q, 0)

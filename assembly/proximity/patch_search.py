@@ -114,7 +114,13 @@ def between(pool, at, low, high, x):
     return pool[at] * (1.0 - u) + pool[at + 1] * u
 
 
-@kernel(allocates=True)
+@kernel(
+    signatures=(
+        "(i8[::1], f8[::1], i8[::1], f8[::1], Tuple((i8[::1], f8[::1], f8[::1])), f8, f8, i8, b1, f8[::1])",
+        "(i8[::1], f8[::1], i8[::1], f8[::1], none, f8, f8, i8, b1, f8[::1])",
+    ),
+    allocates=True,
+)
 def patch_distance(ra, qa, rb, qb, curve, tolerance, clearance, budget, polish, out):
     """Bounds of the distance of two packed shapes, the first no point; a clearance below zero asks for the distance.
 

@@ -23,7 +23,7 @@ def _jet(table, pool, surface, curve, t):
     return s, blend(rate[0], su, rate[1], sv), cross(su, sv)
 
 
-@kernel
+@kernel(signatures="(i8[::1], f8[::1], i8[::1], i8[::1], i8[::1], f8[::1], f8[:, ::1])")
 def along_rims(table, pool, surfaces, curves, which, t, out):
     """C, C_t and S_u x S_v of curves `which` at parameters t into rows of nine."""
     for i in range(t.size):
@@ -50,7 +50,12 @@ def _nearest_sample(samples, first, stop, p):
     return found
 
 
-@kernel
+@kernel(
+    signatures=(
+        "(i8[::1], f8[::1], i8[::1], i8[::1], b1[::1], i8[::1], f8[:, ::1], i8[::1], f8[:, ::1], f8[::1], f8, "
+        "f8[:, ::1])"
+    ),
+)
 def nearest_on_rims(table, pool, surfaces, curves, closed, begins, samples, which, points, guess, close, out):
     """Nearest points of curves `which` to points near them: rows of the parameter and the distance.
 

@@ -211,6 +211,7 @@ class Batch:
     def along(self, which: Indices, t: Array) -> tuple[Array, Array, Array]:
         """Points, derivatives and Su x Sv at parameters (m,) of rims (m,), each (m, 3)."""
         out = np.empty((t.size, 9))
+        t = np.ascontiguousarray(t)
         along_rims(self.survey.table, self.survey.pool, self.surfaces, self.curves, which, t, out)
         return out[:, :3], out[:, 3:6], out[:, 6:]
 
@@ -228,9 +229,9 @@ class Batch:
             closed,
             begins,
             samples,
-            which,
+            np.ascontiguousarray(which),
             np.ascontiguousarray(points),
-            guess,
+            np.ascontiguousarray(guess),
             _CLOSE * self.survey.tolerance,
             out,
         )

@@ -7,8 +7,6 @@ edges, then vertices; the coordinates of a feature are (u, v) of a face, (t, 0) 
 An edge is the curve S_a(c_a(t)): a plane curve c_a in the parameters of a surface S_a, t in the curve's domain. With
 EDGE_SURFACE = -1 it is a curve in space, EDGE_CURVE itself. Where two faces meet, the second one's curve runs through
 the same points at t_b = m0 + m1 t, to first order. An edge that is closed smoothly has no vertices (-1 both).
-
-`_kernel.py` stamps its cache with this file: kernels hold these constants.
 """
 
 from __future__ import annotations

@@ -55,7 +55,7 @@ def track_row(table, pool, shell_f, shell_g, relative, shift, start, r, patience
     return track_features(table, pool, shell_f, shell_g, relative, shift, code_f, code_g, x, n, 1.0, patience)
 
 
-@kernel
+@kernel(signatures="(i8[::1], f8[::1], i8, i8, i8, i8, f8[:, ::1], f8[:, ::1], f8, f8[:, ::1], f8[:, ::1], i8)")
 def track_solids(table, pool, shell_f, shell_g, i, j, q, start, patience, records, tracked, r):
     """Newton and switching from the tracked values start[r]; fills record r and tracked[r]. Returns the status.
 
@@ -75,7 +75,7 @@ def track_solids(table, pool, shell_f, shell_g, i, j, q, start, patience, record
     return status
 
 
-@kernel
+@kernel(signatures="(i8[::1], f8[::1], i8, i8, i8, i8, f8[:, ::1], i8, i8, f8[:, ::1], i8)")
 def search_solids(table, pool, shell_f, shell_g, i, j, q, nearest_at, deepest_at, tracked, r):
     """The closest features wherever they are, into tracked[r]. Returns 1, or 0 where there are none.
 

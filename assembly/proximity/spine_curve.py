@@ -151,7 +151,7 @@ def spine_place(table, pool, spine, surface, u, v):
     return part, reach * length - pool[o + PLACE]
 
 
-@kernel
+@kernel(signatures="(i8[::1], f8[::1], i8, i8, f8, f8[::1])")
 def point_of(table, pool, spine, part, s, out):
     """`spine_point` for Python: point, tangent and curvature into out (9,)."""
     p, t, c = spine_point(pool, table[spine + PART_POOL] + PART * part, s)
@@ -161,13 +161,13 @@ def point_of(table, pool, spine, part, s, out):
         out[6 + i] = c[i]
 
 
-@kernel
+@kernel(signatures="(i8[::1], f8[::1], i8, i8, i8, f8, f8, f8, f8)")
 def parameters_of(table, pool, spine, surface, part, s, x, y, z):
     """`wire_parameters` for Python."""
     return wire_parameters(table, pool, spine, surface, part, s, (x, y, z))
 
 
-@kernel
+@kernel(signatures="(i8[::1], f8[::1], i8, i8, f8, f8)")
 def place_of(table, pool, spine, surface, u, v):
     """`spine_place` for Python."""
     return spine_place(table, pool, spine, surface, u, v)

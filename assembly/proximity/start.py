@@ -258,7 +258,7 @@ def global_start(table, pool, f, g, rotation, shift, size):
     return best[2], best[3], best[1]
 
 
-@kernel
+@kernel(signatures="(i8[::1], f8[::1], i8, i8, f8[:, ::1], UniTuple(f8, 4), f8, f8[::1])")
 def find_pair(table, pool, f, g, q, x, size, out):
     """One pair for Python: from x, or a global start where x is NaN.
 

@@ -203,7 +203,7 @@ def into_quaternions(row, q, out, r):
         )
 
 
-@kernel
+@kernel(signatures="(i8[::1], f8[::1], i8, i8, f8[:, ::1], UniTuple(f8, 4), f8, f8[:, ::1], f8[:, ::1])")
 def pair_derivatives(table, pool, f, g, q, x, size, first, hessian):
     """The public derivatives of one pair: d(parameters)/dq and d(gap)/dq in `first` (5, 14), the Hessian (12, 12).
 

@@ -353,7 +353,7 @@ def look_at_due(table, pool, watch, memory, q, tracked, how, first, most):
         look_at_pair(table, pool, watch, memory, p, q, tracked, rooms, roots, asks)
 
 
-@kernel
+@kernel(signatures="(i8[::1], f8[::1], i8, f8[::1], f8[:, ::1], f8[:, ::1], i8)")
 def look(table, pool, watch, memory, q, tracked, how):
     """Look at the pairs of bodies that need it, or at all that moved, and list what is near.
 

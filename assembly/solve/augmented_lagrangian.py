@@ -108,7 +108,12 @@ EXTRA_TIME = 4
 KICKS = 3
 
 
-@kernel
+@kernel(
+    signatures=(
+        "(i8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], i8)",
+        "(i8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], none)",
+    ),
+)
 def solve_program(table, pool, settings, state, history, tips):
     """Solve in place. State: q (n, 7) | tracked (k, 4) | multipliers (m) | residuals (m) | results.
 

@@ -162,7 +162,7 @@ def point_at(table, pool, state, free):
     return lost, count, point, loose, room
 
 
-@kernel
+@kernel(signatures="(i8[::1], f8[::1], f8[::1], i8[::1], f8[::1], f8[:, ::1])")
 def rows_at(table, pool, state, free, residual, jacobian):
     """Evaluate all rows at a state. Returns a contact that has no pair there, or -1.
 
@@ -183,7 +183,7 @@ def rows_at(table, pool, state, free, residual, jacobian):
     return lost
 
 
-@kernel
+@kernel(signatures="(i8[::1], f8[::1], f8[::1], i8[::1], f8[::1], none)")
 def gradient_at(table, pool, state, free, gradient, tips):
     """The objective's gradient in the twists of all bodies (6 bodies), zero for fixed ones. Returns its value.
 

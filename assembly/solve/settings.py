@@ -1,7 +1,4 @@
-"""What the loop is told and what it tells: its settings, its results, its outcomes.
-
-`_kernel.py` stamps its cache with this file: kernels hold these constants.
-"""
+"""What the loop is told and what it tells: its settings, its results, its outcomes."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from assembly.solve.rows import place_rows
 from assembly.solve.singular_values import measure_jacobian
 
 
-@kernel
+@kernel(signatures="(i8[::1], f8[::1], i8, f8[::1], i8[::1], f8[:, ::1])")
 def tip_at(table, pool, term, state, free, jacobian):
     """The Jacobian of a term of dexterity at a state, in the user's units.
 

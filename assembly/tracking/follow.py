@@ -185,7 +185,11 @@ def doubt_twins(table, pool, memory, k, records):
             look_at_all_of(table, memory, k)
 
 
-@kernel
+@kernel(
+    signatures=(
+        "(i8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], UniTuple(f8[:, ::1], 5), i8[::1], f8[::1])"
+    ),
+)
 def follow(table, pool, q, poses, tracked, records, room, free, memory):
     """Bodies stand at q (n, 7) in the user's coordinates now: carry the listed contacts, look, list what is near.
 

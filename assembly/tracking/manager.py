@@ -206,7 +206,7 @@ class Manager:
             Wrong shape, numbers that are not finite, quaternions far from unit; then nothing has changed.
         """
         rows = q if isinstance(q, np.ndarray) and q.dtype == np.float64 and q.shape == self._poses.shape else None
-        code = -1 if rows is None or not rows.flags.c_contiguous else self._follow(rows)
+        code = -1 if rows is None or not rows.flags.carray else self._follow(rows)
         if code < 0:
             code = self._follow(pose_rows("q", q, len(self._bodies)))
         while code > 0 and self._is_full():

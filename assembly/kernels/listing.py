@@ -1,0 +1,99 @@
+"""What there is to compile, and what is compiled."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from numba.core.registry import cpu_target
+
+from assembly._kernel.cache import EntryCache
+from assembly._kernel.decorator import ENTRIES, Entry
+from assembly._kernel.sources import PACKAGE, source_of, sources_of
+from assembly._kernel.targets import PROCESSOR, Target, targets_that_run
+
+__all__ = ["Item", "all_items", "own_target", "portable"]
+
+
+@dataclass(frozen=True)
+class Item:
+    """One signature of one entry.
+
+    Attributes
+    ----------
+    module : str
+        Where the entry is made.
+    position : int
+        Which of this module's entries it is.
+    number : int
+        Which of the entry's signatures.
+    """
+
+    module: str
+    position: int
+    number: int
+
+    @property
+    def entry(self) -> Entry:
+        """The entry; its module is imported."""
+        import_module(self.module)
+        return [entry for entry in ENTRIES.values() if entry.compiled.__module__ == self.module][self.position]
+
+    @property
+    def types(self) -> tuple[Any, ...]:
+        """Numba's types of the arguments."""
+        return self.entry.argument_types()[self.number]
+
+    @property
+    def name(self) -> str:
+        """Name of the kernel, and of several signatures which."""
+        entry = self.entry
+        which = f" {self.number + 1}" if len(entry.signatures) > 1 else ""
+        return f"{self.module}.{entry.compiled.__qualname__}{which}"
+
+    @property
+    def source_size(self) -> int:
+        """Size of the sources it is made from, in bytes: a measure of what there is to compile."""
+        return sum(path.stat().st_size for path in sources_of(source_of(self.entry.compiled.py_func)))
+
+    def path(self, target: Target) -> Path | None:
+        """The compiled form for a target, if there is one."""
+        cache = self.entry.compiled._cache
+        path = cache.path(self.types, target) if isinstance(cache, EntryCache) else None
+        return path if path is not None and path.exists() else None
+
+    def found(self) -> tuple[Path, Target] | None:
+        """What this machine would run, and what it was compiled for; None if it has to be compiled."""
+        paths = ((self.path(target), target) for target in targets_that_run(own_target()))
+        return next(((path, target) for path, target in paths if path is not None), None)
+
+
+def own_target() -> Target:
+    """What this process compiles for."""
+    target: Target = cpu_target.target_context.codegen().magic_tuple()
+    return target
+
+
+def portable(target: Target) -> Target:
+    """The target for any processor of this machine's kind."""
+    return target[0], PROCESSOR, ""
+
+
+def _modules() -> Iterator[str]:
+    """Names of the modules that make kernels."""
+    for path in sorted(PACKAGE.rglob("*.py")):
+        if "from assembly._kernel import kernel" in path.read_text():
+            yield ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts)
+
+
+def all_items() -> list[Item]:
+    """Every signature of every entry, in the order of modules."""
+    items: list[Item] = []
+    for module in _modules():
+        import_module(module)
+        entries = [entry for entry in ENTRIES.values() if entry.compiled.__module__ == module]
+        items += [Item(module, i, n) for i, entry in enumerate(entries) for n in range(len(entry.signatures))]
+    return items
