@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import importlib
+import inspect
 import tomllib
 from pathlib import Path
 
@@ -12,6 +13,10 @@ import pytest
 import assembly
 import assembly.proximity
 import assembly.view
+from assembly._kernel.decorator import Entry
+from assembly._kernel.sources import source_of as source_of_kernel
+from assembly._kernel.sources import sources_of
+from assembly.kernels.listing import all_items
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "assembly"
@@ -39,6 +44,22 @@ def source_of(module: str) -> Path | None:
     """The file of a module of this package, if there is one; packages are not meant."""
     path = ROOT.joinpath(*module.split(".")).with_suffix(".py")
     return path if path.is_file() else None
+
+
+def package_of(module: str) -> Path | None:
+    """The file of a package of this package, if there is one."""
+    path = ROOT.joinpath(*module.split("."), "__init__.py")
+    return path if path.is_file() else None
+
+
+def holds_objects(path: Path) -> bool:
+    """Whether a file defines classes, or functions that are no kernels."""
+    return any(isinstance(node, (ast.ClassDef, ast.FunctionDef)) for node in ast.parse(path.read_text()).body)
+
+
+def listed_entries() -> list[Entry]:
+    """All entries of the package, imported."""
+    return list({id(item.entry): item.entry for item in all_items()}.values())
 
 
 def makes_kernels(path):
@@ -112,13 +133,42 @@ def test_there_are_kernel_files():
     assert {"geometry/vec.py", "geometry/spline.py"} <= {p.relative_to(PACKAGE).as_posix() for p in KERNEL_FILES}
 
 
+@pytest.mark.parametrize("path", sorted(PACKAGE.rglob("*.py")), ids=lambda p: p.relative_to(PACKAGE).as_posix())
+def test_the_stamp_of_the_cache_sees_all_imports(path):
+    # What Python's parser finds, by names that are asked for from packages as well.
+    found = {source_of(module) or package_of(module) for module in imported_modules(path)} - {None}
+    packages = {source for source in found if source.name == "__init__.py"}
+    assert found - packages <= sources_of(path)
+
+
 @pytest.mark.parametrize("path", KERNEL_FILES, ids=lambda p: p.relative_to(PACKAGE).as_posix())
-def test_kernels_use_only_what_the_cache_is_stamped_with(path):
-    # The stamp covers the files that name _kernel. A constant from any other file could change
-    # while the machine code it went into is still found on disk.
-    sources = {source_of(module) for module in imported_modules(path)} - {None}
-    assert PACKAGE / "_kernel.py" in sources
-    assert [s.name for s in sources if b"_kernel" not in s.read_bytes()] == []
+def test_kernels_reach_no_objects(path):
+    # An entry is compiled again after an edit of any file that its module reaches: these are kernels and constants.
+    door = PACKAGE / "_kernel"
+    reached = {source for source in sources_of(path) if door not in source.parents and source.parent != PACKAGE}
+    assert [s.name for s in reached if s not in KERNEL_FILES and (holds_objects(s) or s.name == "__init__.py")] == []
+
+
+def test_an_edit_compiles_what_it_reaches():
+    # How many of the entries an edit of a file compiles again.
+    counts = {
+        "solve/step.py": 1,
+        "solve/augmented_lagrangian.py": 1,
+        "proximity/watch.py": 6,
+        "proximity/extremal.py": 22,
+    }
+    entries = [source_of_kernel(entry.compiled.py_func) for entry in listed_entries()]
+    assert len(entries) == 61
+    for name, count in counts.items():
+        assert sum(PACKAGE / name in sources_of(path) for path in entries) == count, name
+
+
+def test_every_entry_declares_what_it_is_called_with():
+    for entry in listed_entries():
+        names = inspect.signature(entry.compiled.py_func).parameters
+        assert entry.signatures
+        assert [len(types) for types in entry.argument_types()] == [len(names)] * len(entry.signatures)
+        assert len(set(entry.argument_types())) == len(entry.signatures)
 
 
 @pytest.mark.parametrize("path", KERNEL_FILES, ids=lambda p: p.relative_to(PACKAGE).as_posix())

@@ -1,8 +1,9 @@
-"""The kernel cache, on a small package of its own that holds a copy of assembly/_kernel.py."""
+"""The kernel cache, on a small package of its own that holds a copy of assembly/_kernel/."""
 
 from __future__ import annotations
 
 import hashlib
+import importlib
 import os
 import pickle
 import shutil
@@ -13,10 +14,12 @@ from pathlib import Path
 
 import pytest
 
-KERNEL = Path(__file__).resolve().parent.parent / "assembly" / "_kernel.py"
+from assembly._kernel import kernel
+
+KERNEL = Path(__file__).resolve().parent.parent / "assembly" / "_kernel"
 FILES = {
     "__init__.py": "",
-    "constants.py": "from small._kernel import kernel\nFACTOR = 2.0\n",
+    "constants.py": "FACTOR = 2.0\n",
     "callee.py": """
 from small._kernel import kernel
 @kernel
@@ -39,6 +42,32 @@ def power(exponent):
         return x**exponent
     return raised
 """,
+    # A driver made of another file's parts, and a kernel that uses nothing of the others.
+    "driver.py": """
+from small._kernel import kernel
+def twice(part):
+    @kernel
+    def driven(x):
+        return part(part(x))
+    return driven
+""",
+    "parts.py": """
+from small._kernel import kernel
+from small.driver import twice
+@kernel(inner=True)
+def step(x):
+    return x + 5.0
+@kernel(inner=True)
+def other_step(x):
+    return x + 7.0
+walked, other_walked = twice(step), twice(other_step)
+""",
+    "alone.py": """
+from small._kernel import kernel
+@kernel
+def alone(x):
+    return -x
+""",
 }
 AT = """
 @kernel
@@ -48,11 +77,11 @@ def at(values, index):
 # Prints the answer, how often it was found on disk and compiled, and where the cache is.
 CALL = """
 from small.caller import outer
-from small import _kernel
+from small._kernel.folders import entry_folder
 answer = outer(3.0)
 stats = outer.stats
 print(answer, sum(stats.cache_hits.values()), sum(stats.cache_misses.values()), sep="|", end="|")
-print(_kernel._FOLDER)
+print(entry_folder())
 """
 UNSET = dict.fromkeys(("NUMBA_DISABLE_JIT", "NUMBA_CACHE_LOCATOR_CLASSES", "XDG_CACHE_HOME", "LOCALAPPDATA"))
 
@@ -65,7 +94,9 @@ class Package:
         self.folder.mkdir(parents=True)
         for name, text in FILES.items():
             (self.folder / name).write_text(text)
-        shutil.copy(KERNEL, self.folder / "_kernel.py")
+        shutil.copytree(KERNEL, self.folder / "_kernel", ignore=shutil.ignore_patterns("__pycache__"))
+        for path in (self.folder / "_kernel").iterdir():
+            path.write_text(path.read_text().replace("from assembly._kernel", "from small._kernel"))
         self.cache = folder / "cache"
         self._run_python = run_python
 
@@ -109,15 +140,13 @@ def compiled(package, filled) -> Package:
 
 
 @pytest.fixture
-def cache_module(package, monkeypatch):
-    """The copied _kernel module in this process, with its cache in the package's cache folder."""
+def folders(package, monkeypatch):
+    """The copied module of folders in this process, with the user's cache in the package's cache folder."""
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(package.cache))
     monkeypatch.syspath_prepend(str(package.folder.parent))
     monkeypatch.setattr(tempfile, "tempdir", str(package.folder.parent.parent / "temporary"))
     Path(tempfile.gettempdir()).mkdir()
-    import small._kernel as module
-
-    yield module
+    yield importlib.import_module("small._kernel.folders")
     for name in [name for name in sys.modules if name.partition(".")[0] == "small"]:
         del sys.modules[name]
 
@@ -128,9 +157,9 @@ def test_second_process_loads_what_the_first_compiled(package):
     assert folder.parent == package.cache / "assembly"
     # Two kernels, one signature each: the inlined helper has no entry of its own.
     assert [p.name.split("-")[0] for p in package.entries(folder)] == ["small.callee.inner", "small.caller.outer"]
-    before = [p.stat().st_mtime_ns for p in package.entries(folder)]
+    before = [p.stat().st_ino for p in package.entries(folder)]
     assert package.call() == (8.0, 1, 0, folder)
-    assert [p.stat().st_mtime_ns for p in package.entries(folder)] == before
+    assert [p.stat().st_ino for p in package.entries(folder)] == before
 
 
 @pytest.mark.parametrize(
@@ -142,11 +171,68 @@ def test_second_process_loads_what_the_first_compiled(package):
         ("caller.py", "FACTOR *", "10.0 * FACTOR *", 80.0),
     ],
 )
-def test_an_edit_in_any_kernel_file_is_seen(compiled, name, old, new, answer):
+def test_an_edit_in_any_file_that_is_reached_is_seen(compiled, name, old, new, answer):
     compiled.edit(name, old, new)
-    fresh = compiled.call()
-    assert fresh[:3] == (answer, 0, 1)
-    assert fresh[3] != compiled.found
+    assert compiled.call() == (answer, 0, 1, compiled.found)
+
+
+# What a process loads and compiles of the kernels that it names.
+USED = """
+from small.alone import alone
+from small.callee import inner
+from small.caller import outer
+from small.parts import other_walked, walked
+for kernel in (alone, inner, outer, walked, other_walked):
+    answer = kernel(3.0)
+    print(kernel.__name__, answer, "compiled" if kernel.stats.cache_misses else "found")
+"""
+
+
+@pytest.fixture(scope="module")
+def all_filled(tmp_path_factory, run_python) -> Package:
+    """A package whose cache holds what `USED` needs."""
+    package = Package(tmp_path_factory.mktemp("all_filled"), run_python)
+    lines = package.run(USED).splitlines()[:5]
+    # `inner` was compiled by itself, and once more as a part of `outer`.
+    assert lines == [
+        *("alone -3.0 compiled", "inner 4.0 compiled", "outer 8.0 compiled"),
+        *("driven 13.0 compiled", "driven 17.0 compiled"),
+    ]
+    return package
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "compiled_again"),
+    [
+        ("alone.py", "-x", "-2.0 * x", ["alone"]),
+        ("callee.py", "x + 1.0", "x + 2.0", ["inner", "outer"]),
+        ("caller.py", "FACTOR *", "3.0 *", ["outer"]),
+        ("constants.py", "2.0", "3.0", ["outer"]),
+        # The driver's file knows nothing of the parts: kernels made by it depend on what they close over, too.
+        ("parts.py", "x + 5.0", "x + 6.0", ["driven", "driven"]),
+        ("driver.py", "part(part(x))", "part(x)", ["driven", "driven"]),
+        ("_kernel/linking.py", '"""How kernels', '"""  How kernels', ["alone", "inner", "outer", "driven", "driven"]),
+    ],
+)
+def test_an_edit_compiles_the_callers_and_only_these(package, all_filled, name, old, new, compiled_again):
+    shutil.copytree(all_filled.cache, package.cache)
+    package.edit(name, old, new)
+    used = [line.split() for line in package.run(USED).splitlines() if line.endswith(("found", "compiled"))]
+    assert [line[0] for line in used if line[2] == "compiled"] == compiled_again
+    assert len(used) == 5
+
+
+def test_a_line_that_moves_a_kernel_leaves_nothing_behind_for_long(compiled):
+    (before,) = [p for p in compiled.entries(compiled.found) if "outer" in p.name]
+    names = set()
+    for k in range(6):
+        compiled.edit("caller.py", "from small._kernel", "\nfrom small._kernel")
+        assert compiled.call()[:3] == (8.0, 0, 1)
+        kept = {p.name for p in compiled.entries(compiled.found) if "outer" in p.name}
+        names |= kept
+        assert len(kept) == min(k + 2, 4)  # the states of the sources that were used last
+    assert before.name in names
+    assert len(names) == 7
 
 
 def test_an_edit_that_is_undone_finds_the_old_entry(compiled):
@@ -154,6 +240,15 @@ def test_an_edit_that_is_undone_finds_the_old_entry(compiled):
     compiled.call()
     compiled.edit("callee.py", "x + 2.0", "x + 1.0")
     assert compiled.call() == (8.0, 1, 0, compiled.found)
+
+
+def test_what_counts_is_what_was_imported(compiled):
+    # The file changes between the import and the first call: the old code must not be kept under the new name.
+    code = CALL.replace("answer =", "edit()\nanswer =")
+    path = compiled.folder / "constants.py"
+    begin = f"from pathlib import Path\nedit = lambda: Path({str(path)!r}).write_text('FACTOR = 5.0')\n"
+    assert compiled.run(begin + code).startswith("8.0|1|0|")
+    assert compiled.call()[:3] == (20.0, 0, 1)
 
 
 def test_settings_that_change_the_code_have_their_own_folder(compiled):
@@ -224,29 +319,33 @@ def test_unwritable_cache_falls_back_to_a_private_temporary_folder(package, tmp_
     assert package.call(**blocked) == (8.0, 0, 1, None)
 
 
-def test_no_writable_place_at_all(package, cache_module, monkeypatch):
+def test_no_writable_place_at_all(package, folders, monkeypatch):
     (package.cache.parent / "file").write_text("")
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(package.cache.parent / "file" / "cache"))
     monkeypatch.setattr(tempfile, "tempdir", str(package.cache.parent / "file"))
-    assert cache_module._cache_folder("0" * 24) is None
+    assert folders._writable_folder("0" * 24) is None
 
 
-def test_a_package_without_sources_is_not_cached(cache_module, tmp_path):
-    (tmp_path / "empty").mkdir()
-    assert cache_module._source_stamp(tmp_path / "empty") is None
-    assert cache_module._cache_folder(None) is None
+def test_a_package_without_sources_is_not_cached(package):
+    subprocess.run([sys.executable, "-m", "compileall", "-q", "-b", str(package.folder)], check=True)
+    for source in package.folder.rglob("*.py"):
+        source.unlink()
+    for _ in range(2):
+        assert package.call()[:3] == (8.0, 0, 1)
+    assert package.entries(package.cache / "assembly" / package.call()[3].name) == []
 
 
 def test_cache_that_vanishes_or_fills_up_while_in_use(package):
     code = """
 import shutil
-from small import _kernel
+from small._kernel.folders import entry_folder
 from small.caller import outer
-shutil.rmtree(_kernel._FOLDER)
-_kernel._FOLDER.write_text("")
+folder = entry_folder()
+shutil.rmtree(folder)
+folder.write_text("")
 print(outer(3.0), outer.stats.cache_misses.total(), flush=True)
-_kernel._FOLDER.unlink()
-print(outer(3), outer.stats.cache_misses.total(), len(list(_kernel._FOLDER.iterdir())))
+folder.unlink()
+print(outer(3), outer.stats.cache_misses.total(), len(list(folder.iterdir())))
 """
     lines = [line for line in package.run(code).splitlines() if line[0].isdigit()]
     # Integer argument: another signature of both kernels, saved into a folder that is made again.
@@ -262,7 +361,9 @@ def test_an_entry_that_cannot_be_replaced(compiled):
 
 
 def test_what_is_found_on_disk_needs_no_word_to_numba(compiled):
-    code = CALL + "print([function.__name__ for function, _ in _kernel._WAITING])\n"
+    code = (
+        CALL + "from small._kernel.overloads import _WAITING\nprint([function.__name__ for function, _ in _WAITING])\n"
+    )
     assert compiled.run(code).splitlines()[-1] == "['helper']"
 
 
@@ -286,11 +387,11 @@ def test_a_kernel_tied_to_this_process_is_not_cached(package):
     for _ in range(2):
         output = package.run()
         assert output.startswith("8.0|0|1|")
-        assert "outer-7 uses an address or a large global array and is not cached" in output
+        assert "outer uses an address or a large global array and is not cached" in output
 
 
 def test_compiling_is_logged_once_and_loading_is_not(package):
-    line = "compiling kernels for the first time"
+    line = "compiling kernels"
     code = CALL + "outer(3)\n"
     assert package.run(code).count(line) == 1
     assert package.run(code).count(line) == 0
@@ -323,23 +424,22 @@ def test_concurrent_processes(package):
     assert package.call()[:3] == (8.0, 1, 0)
 
 
-def test_only_the_folders_used_last_are_kept(cache_module, package):
+def test_only_the_folders_used_last_are_kept(folders, package):
     root = package.cache / "assembly"
-    shutil.rmtree(root)
     stamps = [f"{k:024d}" for k in range(7)]
     for age, stamp in enumerate(stamps[:6]):
-        cache_module._cache_folder(stamp)
+        folders._writable_folder(stamp)
         os.utime(root / stamp, (1000.0 + age, 1000.0 + age))
     (root / "notes").mkdir()  # somebody else's
-    cache_module._cache_folder(stamps[2])  # in use again, so the youngest
-    cache_module._cache_folder(stamps[6])
+    folders._writable_folder(stamps[2])  # in use again, so the youngest
+    folders._writable_folder(stamps[6])
     assert sorted(p.name for p in root.iterdir()) == [stamps[2], stamps[4], stamps[5], stamps[6], "notes"]
 
 
-def test_dropping_folders_survives_another_process_doing_the_same(cache_module, package, monkeypatch):
+def test_dropping_folders_survives_another_process_doing_the_same(folders, package, monkeypatch):
     root = package.cache / "assembly"
     for k in range(8):
-        (root / f"{k:024d}").mkdir(exist_ok=True)
+        (root / f"{k:024d}").mkdir(parents=True)
     sound = Path.iterdir
 
     def iterdir(folder):
@@ -348,13 +448,13 @@ def test_dropping_folders_survives_another_process_doing_the_same(cache_module, 
             yield found
 
     monkeypatch.setattr(Path, "iterdir", iterdir)
-    cache_module._drop_old_folders(root)
+    folders._drop_old_folders(root)
     monkeypatch.undo()
     assert list(root.iterdir()) == []
 
 
-def test_a_kernel_outside_the_package_is_not_cached(cache_module):
-    @cache_module.kernel
+def test_a_kernel_outside_the_package_is_not_cached():
+    @kernel
     def doubled(x):
         return 2.0 * x
 
