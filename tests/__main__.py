@@ -1,6 +1,6 @@
 """All checks of the project: ``python -m tests [arguments for pytest]``.
 
-The large kernels are compiled meanwhile, once, for all processes that run tests.
+Kernels are compiled first, once, for all processes that run tests, while the other checks run.
 """
 
 from __future__ import annotations
@@ -15,19 +15,19 @@ CHECKS = (
     ["-m", "ruff", "check", "."],
     ["-m", "mypy"],
     ["-c", "from importlinter.cli import lint_imports_command as lint_imports; lint_imports()"],
-    ["-m", "pytest", "-n", "auto", "--dist", "worksteal", "--durations", "25"],
+    ["-m", "pytest", "-n", "auto", "--dist", "worksteal", "--durations", "20"],
 )
 
 
 def main(arguments: list[str]) -> int:
     """Run every check, the tests last; the number of those that failed."""
     failed = 0
-    warming = [subprocess.Popen([sys.executable, "-m", "tests.warm", part], cwd=ROOT) for part in ("scenes", "queries")]
+    compiling = subprocess.Popen([sys.executable, "-m", "assembly.kernels", "--compile"], cwd=ROOT)
     for check in CHECKS:
         command = check
         if "pytest" in check:
             command = [*check, *arguments]
-            failed += sum(process.wait() != 0 for process in warming)
+            failed += compiling.wait() != 0
         print(f"\n$ python {shlex.join(command)}", flush=True)
         failed += subprocess.run([sys.executable, *command], cwd=ROOT, check=False).returncode != 0
     return failed

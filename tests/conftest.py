@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import hypothesis
@@ -30,6 +30,19 @@ def pytest_configure(config: pytest.Config) -> None:
 def cases(request: pytest.FixtureRequest) -> Callable[[int, int], int]:
     """How many random cases are tried: `few`, or `many` with ``--long``; counts that are judged are in proportion."""
     return lambda few, many: many if request.config.getoption("--long") else few
+
+
+@pytest.fixture(scope="session", autouse=True)
+def only_declared_signatures() -> Iterator[None]:
+    """After all tests of a process: the package called its kernels with the types that are compiled ahead alone."""
+    yield
+    decorator = sys.modules.get("assembly._kernel.decorator")
+    entries = decorator.ENTRIES.values() if decorator else ()
+    called = [(entry, types) for entry in entries for types in entry.compiled.overloads]
+    # Kernels of tests that call an entry with a number that is written there have an entry for that number.
+    called = [(entry, types) for entry, types in called if not any(hasattr(kind, "literal_value") for kind in types)]
+    others = [(entry.compiled.__qualname__, types) for entry, types in called if types not in entry.argument_types()]
+    assert others == [], "kernels were called with types that they do not declare"
 
 
 @pytest.fixture(scope="session")

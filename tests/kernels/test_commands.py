@@ -10,8 +10,7 @@ from pathlib import Path
 import pytest
 
 from assembly.kernels import __main__ as commands
-from assembly.kernels.ahead import shares
-from assembly.kernels.listing import Item, all_items
+from assembly.kernels.listing import all_items
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 # Two kernels that take a second.
@@ -121,12 +120,3 @@ if __name__ == "__main__":
     variables = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(ROOT)}
     done = subprocess.run([sys.executable, str(script)], env=variables, capture_output=True, text=True)
     assert "RuntimeError: assembly.proximity.spine_curve.point_of cannot be compiled" in done.stderr
-
-
-@pytest.mark.parametrize("workers", [1, 2, 3, 100])
-def test_every_kernel_is_some_worker_s(workers):
-    items = all_items()
-    parts = shares(items, workers)
-    assert len(parts) == min(workers, len(items))
-    assert sorted((item for part in parts for item in part), key=items.index) == items
-    assert all(isinstance(item, Item) for part in parts for item in part)
