@@ -76,13 +76,22 @@ def minima_by_samples(two, box, side, open_ends, count=120):
     if ends[0] and slope[0] > 0.0 and is_one(places[0]):
         found.append(places[0])
     for k in np.flatnonzero((slope[:-1] < 0.0) & (slope[1:] > 0.0)):
-        x = brentq(lambda x: at(x, foot(x))[0], places[k], places[k + 1], xtol=1e-14)
+        x = root_between(lambda x: at(x, foot(x))[0], places[k], places[k + 1])
         if is_one(x):
             found.append(x)
     if ends[1] and slope[-1] < 0.0 and is_one(places[-1]):
         found.append(places[-1])
     turns = int((np.diff(np.sign(slope)) != 0).sum())
     return [(x, foot(x)) if side == 0 else (foot(x), x) for x in found], slope, turns
+
+
+def root_between(slope, low, high):
+    """A root of a function that changes its sign, or, where that is rounding alone, the end at which it is smaller."""
+    # numpy may round a sine otherwise in a row of many than alone.
+    values = slope(low), slope(high)
+    if values[0] * values[1] >= 0.0:
+        return low if abs(values[0]) <= abs(values[1]) else high
+    return brentq(slope, low, high, xtol=1e-14)
 
 
 def side_of(two, box):
