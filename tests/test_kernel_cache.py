@@ -162,21 +162,7 @@ def test_second_process_loads_what_the_first_compiled(package):
     assert [p.stat().st_ino for p in package.entries(folder)] == before
 
 
-@pytest.mark.parametrize(
-    ("name", "old", "new", "answer"),
-    [
-        ("callee.py", "x + 1.0", "x + 2.0", 10.0),  # a callee in another file
-        ("callee.py", "    return x\n", "    return -x\n", -8.0),  # an inlined callee in another file
-        ("constants.py", "2.0", "3.0", 12.0),  # a constant in another file
-        ("caller.py", "FACTOR *", "10.0 * FACTOR *", 80.0),
-    ],
-)
-def test_an_edit_in_any_file_that_is_reached_is_seen(compiled, name, old, new, answer):
-    compiled.edit(name, old, new)
-    assert compiled.call() == (answer, 0, 1, compiled.found)
-
-
-# What a process loads and compiles of the kernels that it names.
+# What a process says of each kernel: its name, its answer, whether it was compiled.
 USED = """
 from small.alone import alone
 from small.callee import inner
@@ -186,53 +172,60 @@ for kernel in (alone, inner, outer, walked, other_walked):
     answer = kernel(3.0)
     print(kernel.__name__, answer, "compiled" if kernel.stats.cache_misses else "found")
 """
+NAMES = ("alone", "inner", "outer", "driven", "driven")
+ANSWERS = (-3.0, 4.0, 8.0, 13.0, 17.0)
+
+
+def said(package: Package) -> list[list[str]]:
+    return [line.split() for line in package.run(USED).splitlines() if line.endswith(("found", "compiled"))]
 
 
 @pytest.fixture(scope="module")
 def all_filled(tmp_path_factory, run_python) -> Package:
     """A package whose cache holds what `USED` needs."""
     package = Package(tmp_path_factory.mktemp("all_filled"), run_python)
-    lines = package.run(USED).splitlines()[:5]
-    # `inner` was compiled by itself, and once more as a part of `outer`.
-    assert lines == [
-        *("alone -3.0 compiled", "inner 4.0 compiled", "outer 8.0 compiled"),
-        *("driven 13.0 compiled", "driven 17.0 compiled"),
-    ]
+    assert said(package) == [[name, str(x), "compiled"] for name, x in zip(NAMES, ANSWERS, strict=True)]
     return package
 
 
 @pytest.mark.parametrize(
-    ("name", "old", "new", "compiled_again"),
+    ("name", "old", "new", "answers"),
     [
-        ("alone.py", "-x", "-2.0 * x", ["alone"]),
-        ("callee.py", "x + 1.0", "x + 2.0", ["inner", "outer"]),
-        ("caller.py", "FACTOR *", "3.0 *", ["outer"]),
-        ("constants.py", "2.0", "3.0", ["outer"]),
-        # The driver's file knows nothing of the parts: kernels made by it depend on what they close over, too.
-        ("parts.py", "x + 5.0", "x + 6.0", ["driven", "driven"]),
-        ("driver.py", "part(part(x))", "part(x)", ["driven", "driven"]),
-        ("_kernel/linking.py", '"""How kernels', '"""  How kernels', ["alone", "inner", "outer", "driven", "driven"]),
+        ("alone.py", "-x", "-2.0 * x", (-6.0, None, None, None, None)),
+        ("caller.py", "FACTOR *", "10.0 * FACTOR *", (None, None, 80.0, None, None)),
+        # A callee in another file, an inlined one, a constant.
+        ("callee.py", "x + 1.0", "x + 2.0", (None, 5.0, 10.0, None, None)),
+        ("callee.py", "    return x\n", "    return -x\n", (None, 4.0, -8.0, None, None)),
+        ("constants.py", "2.0", "3.0", (None, None, 12.0, None, None)),
+        # The driver's file knows nothing of the parts: a kernel that it makes depends on what it closes over, too.
+        ("parts.py", "x + 5.0", "x + 6.0", (None, None, None, 15.0, 17.0)),
+        ("driver.py", "part(part(x))", "part(x)", (None, None, None, 8.0, 10.0)),
+        ("_kernel/linking.py", '"""How kernels', '"""  How kernels', ANSWERS),
     ],
 )
-def test_an_edit_compiles_the_callers_and_only_these(package, all_filled, name, old, new, compiled_again):
+def test_an_edit_compiles_the_callers_and_only_these(package, all_filled, name, old, new, answers):
     shutil.copytree(all_filled.cache, package.cache)
     package.edit(name, old, new)
-    used = [line.split() for line in package.run(USED).splitlines() if line.endswith(("found", "compiled"))]
-    assert [line[0] for line in used if line[2] == "compiled"] == compiled_again
-    assert len(used) == 5
+    expected = [
+        [kernel, str(before), "found"] if now is None else [kernel, str(now), "compiled"]
+        for kernel, before, now in zip(NAMES, ANSWERS, answers, strict=True)
+    ]
+    assert said(package) == expected
 
 
-def test_a_line_that_moves_a_kernel_leaves_nothing_behind_for_long(compiled):
-    (before,) = [p for p in compiled.entries(compiled.found) if "outer" in p.name]
-    names = set()
-    for k in range(6):
-        compiled.edit("caller.py", "from small._kernel", "\nfrom small._kernel")
-        assert compiled.call()[:3] == (8.0, 0, 1)
-        kept = {p.name for p in compiled.entries(compiled.found) if "outer" in p.name}
-        names |= kept
-        assert len(kept) == min(k + 2, 4)  # the states of the sources that were used last
-    assert before.name in names
-    assert len(names) == 7
+def test_few_states_of_the_sources_are_kept(compiled):
+    (first,) = [p for p in compiled.entries(compiled.found) if "outer" in p.name]
+    older = [first.with_name(first.name[:-16] + f"{k:016d}") for k in range(5)]
+    for age, path in enumerate(older):
+        path.write_bytes(b"")
+        os.utime(path, (1000.0 + age, 1000.0 + age))
+    compiled.edit("caller.py", "from small._kernel", "\nfrom small._kernel")
+    assert compiled.call()[:3] == (8.0, 0, 1)
+    kept = {p for p in compiled.entries(compiled.found) if "outer" in p.name}
+    # The new one and those that were used last; of `inner`, which did not change, one.
+    assert len(kept) == 4
+    assert {first, *older[3:]} < kept
+    assert len(compiled.entries(compiled.found)) == 5
 
 
 def test_an_edit_that_is_undone_finds_the_old_entry(compiled):

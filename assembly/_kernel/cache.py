@@ -27,7 +27,7 @@ from numba.core.runtime import rtsys
 from numba.core.sigutils import normalize_signature
 
 from assembly._kernel.sources import source_stamp
-from assembly._kernel.targets import Target, targets_that_run
+from assembly._kernel.targets import Target, own_target, targets_that_run
 
 __all__ = ["EntryCache", "NoCache"]
 
@@ -93,7 +93,7 @@ class EntryCache(caching._Cache):
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         # What machine code calls is there then; all else that Numba's own cache has loaded is for who compiles.
         rtsys.initialize(target_context)
-        for target in targets_that_run(target_context.codegen().magic_tuple()):
+        for target in targets_that_run():
             path = self.path(sig, target)
             try:
                 if path is not None:
@@ -138,8 +138,7 @@ class EntryCache(caching._Cache):
             warnings.warn(f"{self._title} uses an address or a large global array and is not cached", stacklevel=2)
             return
         payload = serialize.dumps(data._reduce())
-        own: Target = data.codegen.magic_tuple()
-        path = self.path(sig, own)
+        path = self.path(sig, own_target())
         if path is None:
             return
         try:
@@ -154,7 +153,7 @@ class EntryCache(caching._Cache):
                 raise
         except OSError as error:
             _LOG.info("%s is not cached: %s", self._title, error)
-        self._drop_old_states(self._variant(sig, own))
+        self._drop_old_states(self._variant(sig, own_target()))
 
     def _drop_old_states(self, variant: str) -> None:
         """Keep what was compiled for a signature from the few states of the sources that were used last."""

@@ -10,8 +10,9 @@ import functools
 import platform
 
 import llvmlite.binding as llvm
+from numba.core.registry import cpu_target
 
-__all__ = ["PORTABLE_VARIABLES", "PROCESSOR", "Target", "targets_that_run"]
+__all__ = ["PORTABLE_VARIABLES", "Target", "own_target", "portable_target", "targets_that_run"]
 
 # Triple, processor and features, as Numba's code generator names what it compiles for.
 Target = tuple[str, str, str]
@@ -20,19 +21,30 @@ _X86_64_V3 = (
     *("cx16", "sahf", "popcnt", "sse3", "sse4.1", "sse4.2", "ssse3"),
     *("avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe", "xsave"),
 )
-# The processor of portable entries.
-PROCESSOR = "x86-64-v3" if platform.machine().lower() in ("x86_64", "amd64") else "generic"
+# The processor of portable entries: any one that is not older than this.
+_PROCESSOR = "x86-64-v3" if platform.machine().lower() in ("x86_64", "amd64") else "generic"
 # A process with these environment variables compiles for the portable target. Numba reads them when it is imported.
-PORTABLE_VARIABLES = {"NUMBA_CPU_NAME": PROCESSOR, "NUMBA_CPU_FEATURES": ""}
+PORTABLE_VARIABLES = {"NUMBA_CPU_NAME": _PROCESSOR, "NUMBA_CPU_FEATURES": ""}
 
 
 @functools.cache
 def _runs_portable_code() -> bool:
     features = llvm.get_host_cpu_features()
-    return PROCESSOR == "generic" or all(features.get(name) for name in _X86_64_V3)
+    return _PROCESSOR == "generic" or all(features.get(name) for name in _X86_64_V3)
 
 
-def targets_that_run(own: Target) -> list[Target]:
+def own_target() -> Target:
+    """What this process compiles for."""
+    target: Target = cpu_target.target_context.codegen().magic_tuple()
+    return target
+
+
+def portable_target() -> Target:
+    """What processes compile for that have `PORTABLE_VARIABLES`."""
+    return own_target()[0], _PROCESSOR, ""
+
+
+def targets_that_run() -> list[Target]:
     """The targets whose entries run here, best first: the one that this process compiles for, and the portable one."""
-    portable = (own[0], PROCESSOR, "")
+    own, portable = own_target(), portable_target()
     return [own, portable] if _runs_portable_code() and portable != own else [own]

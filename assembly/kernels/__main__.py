@@ -7,9 +7,9 @@ import os
 import sys
 
 from assembly._kernel.folders import entry_folder
-from assembly._kernel.targets import PORTABLE_VARIABLES
+from assembly._kernel.targets import PORTABLE_VARIABLES, own_target, portable_target
 from assembly.kernels.ahead import compile_all, default_workers
-from assembly.kernels.listing import Item, all_items, own_target, portable
+from assembly.kernels.listing import Item, all_items
 
 ABOUT = """\
 Lists the compiled kernels of this installation. A kernel that is not there is compiled when it is first needed;
@@ -57,7 +57,7 @@ def main(arguments: list[str]) -> int:
     if entry_folder() is None:
         parser.error("there is no folder to keep kernels in; set NUMBA_CACHE_DIR to one that can be written to")
     makes_portable = kind == "portable" and not wanted.native
-    target = portable(own_target()) if makes_portable else own_target()
+    target = portable_target() if makes_portable else own_target()
     only_this = makes_portable or wanted.native
     missing = [item for item in items if (item.path(target) if only_this else item.found()) is None]
     if missing:

@@ -8,14 +8,12 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from numba.core.registry import cpu_target
-
 from assembly._kernel.cache import EntryCache
 from assembly._kernel.decorator import ENTRIES, Entry
 from assembly._kernel.sources import PACKAGE, source_of, sources_of
-from assembly._kernel.targets import PROCESSOR, Target, targets_that_run
+from assembly._kernel.targets import Target, targets_that_run
 
-__all__ = ["Item", "all_items", "own_target", "portable"]
+__all__ = ["Item", "all_items"]
 
 
 @dataclass(frozen=True)
@@ -67,19 +65,8 @@ class Item:
 
     def found(self) -> tuple[Path, Target] | None:
         """What this machine would run, and what it was compiled for; None if it has to be compiled."""
-        paths = ((self.path(target), target) for target in targets_that_run(own_target()))
+        paths = ((self.path(target), target) for target in targets_that_run())
         return next(((path, target) for path, target in paths if path is not None), None)
-
-
-def own_target() -> Target:
-    """What this process compiles for."""
-    target: Target = cpu_target.target_context.codegen().magic_tuple()
-    return target
-
-
-def portable(target: Target) -> Target:
-    """The target for any processor of this machine's kind."""
-    return target[0], PROCESSOR, ""
 
 
 def _modules() -> Iterator[str]:

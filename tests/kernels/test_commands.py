@@ -25,10 +25,11 @@ if __name__ == "__main__":
 # What a new process has of them, and what one of them says; then whether it was compiled.
 USE = f"""
 import numpy as np
-from assembly.kernels.listing import all_items, own_target, portable
+from assembly._kernel.targets import portable_target
+from assembly.kernels.listing import all_items
 for item in all_items():
     if item.module in {SMALL}:
-        print(item.found()[1] == portable(own_target()))
+        print(item.found()[1] == portable_target())
 from assembly.geometry.curve_tables import swept_area
 out = swept_area(np.zeros(1), np.zeros((0, 2), np.int64), 0.0, 0.0, np.zeros(1), np.zeros(1))
 print(swept_area.stats.cache_misses.total(), swept_area.stats.cache_hits.total())
