@@ -51,6 +51,8 @@ def main(arguments: list[str]) -> int:
     if wanted.workers < 1:
         parser.error(f"--workers is {wanted.workers}; expected at least 1")
     items = all_items()
+    if not items:
+        parser.error("NUMBA_DISABLE_JIT is set, so nothing is compiled")
     if not wanted.compile:
         _list(items)
         return 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import multiprocessing
 import os
 from collections.abc import Iterator, Mapping
@@ -34,7 +35,10 @@ def compile_all(items: list[Item], workers: int, variables: Mapping[str, str]) -
     """
     largest_first = sorted(items, key=lambda item: item.source_size, reverse=True)
     fresh = multiprocessing.get_context("spawn")  # Numba reads the variables when it is imported
-    with _environment(variables), ProcessPoolExecutor(min(workers, len(items)), mp_context=fresh) as pool:
+    with (
+        _environment(variables),
+        ProcessPoolExecutor(min(workers, len(items)), mp_context=fresh, initializer=_say_errors_only) as pool,
+    ):
         running = {pool.submit(_compile_one, item): item for item in largest_first}
         for done in tqdm(as_completed(running), "compiling kernels", len(running), unit="kernel"):
             try:
@@ -42,6 +46,11 @@ def compile_all(items: list[Item], workers: int, variables: Mapping[str, str]) -
             except Exception as error:
                 pool.shutdown(cancel_futures=True)
                 raise RuntimeError(f"{running[done].name} cannot be compiled") from error
+
+
+def _say_errors_only() -> None:
+    """In a worker: the progress bar says that kernels are compiled."""
+    logging.getLogger("assembly").setLevel(logging.ERROR)
 
 
 def _compile_one(item: Item) -> None:

@@ -101,6 +101,19 @@ def test_what_it_cannot_do_is_said(arguments, kind, message, monkeypatch, capsys
     assert message in capsys.readouterr().err
 
 
+def test_without_compilation_there_is_nothing_to_list(run_python):
+    code = """
+from assembly.kernels.__main__ import main
+try:
+    main([])
+except SystemExit as caught:
+    print(caught.code)
+"""
+    said = run_python(code, NUMBA_DISABLE_JIT="1")
+    assert said.startswith("2\n")
+    assert "NUMBA_DISABLE_JIT is set, so nothing is compiled" in said
+
+
 def test_a_cache_that_nobody_can_write_is_said(monkeypatch, capsys):
     monkeypatch.setattr(commands, "entry_folder", lambda: None)
     with pytest.raises(SystemExit):
