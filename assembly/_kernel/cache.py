@@ -29,7 +29,7 @@ from numba.core.sigutils import normalize_signature
 from assembly._kernel.sources import source_stamp
 from assembly._kernel.targets import Target, own_target, targets_that_run
 
-__all__ = ["EntryCache", "NoCache"]
+__all__ = ["EntryCache", "NoCache", "read_entry"]
 
 _LOG = logging.getLogger("assembly")
 _CHECKSUM = hashlib.sha256().digest_size
@@ -47,6 +47,23 @@ def _description(value: object) -> object:
         held = [cell.cell_contents for cell in cells if getattr(cell.cell_contents, "py_func", None) is not function]
         return function.__module__, function.__qualname__, [_description(part) for part in held]
     return [_description(part) for part in value] if isinstance(value, tuple) else serialize.dumps(value)
+
+
+def read_entry(path: Path) -> bytes:
+    """What an entry holds.
+
+    Raises
+    ------
+    OSError
+        There is none, or it cannot be read.
+    ValueError
+        Its checksum does not fit.
+    """
+    entry = path.read_bytes()
+    payload = entry[_CHECKSUM:]
+    if hashlib.sha256(payload).digest() != entry[:_CHECKSUM]:
+        raise ValueError("the checksum does not fit")
+    return payload
 
 
 class EntryCache(caching._Cache):
@@ -111,11 +128,7 @@ class EntryCache(caching._Cache):
         return None
 
     def _load(self, path: Path, target_context: Any) -> Any:
-        entry = path.read_bytes()
-        payload = entry[_CHECKSUM:]
-        if hashlib.sha256(payload).digest() != entry[:_CHECKSUM]:
-            raise ValueError("the checksum does not fit")
-        loaded = self._rebuilt(target_context, *pickle.loads(payload))
+        loaded = self._rebuilt(target_context, *pickle.loads(read_entry(path)))
         with contextlib.suppress(OSError):
             os.utime(path)  # the time of last use
         return loaded

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any
 
+from numba.core import event
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 
@@ -26,10 +28,10 @@ class _NoEnvironment:
 
 
 class _InnerLibrary(JITCodeLibrary):
-    """The code of a kernel that only kernels call: linked together and left as it is.
+    """The code of a kernel that only kernels call: left as it is until an entry links it.
 
-    Numba optimizes every library with all it calls and makes machine code of it, once more at every level of calls.
-    Of inner kernels neither is ever used: the entry that calls them is optimized as a whole.
+    Numba links every library with all it calls, optimizes it and makes machine code of it, once more at every level of
+    calls. Of inner kernels none of these is ever used: the entry that calls them is linked and optimized as a whole.
     """
 
     @property
@@ -40,13 +42,18 @@ class _InnerLibrary(JITCodeLibrary):
         self._ensure_finalized()
         return 0
 
-    def _optimize_final_module(self) -> None:
-        pass
-
-    def _finalize_final_module(self) -> None:
-        self._finalize_dynamic_globals()
-        self._verify_declare_only_symbols()
+    def finalize(self) -> None:
         self._finalized = True
+
+
+def _reached(library: Any, found: dict[Any, None]) -> dict[Any, None]:
+    """The libraries that one calls, and those that inner ones among them call."""
+    for called in library._linking_libraries:
+        if called not in found:
+            found[called] = None
+            if isinstance(called, _InnerLibrary):
+                _reached(called, found)
+    return found
 
 
 class _EntryLibrary(JITCodeLibrary):
@@ -58,6 +65,7 @@ class _EntryLibrary(JITCodeLibrary):
 
     def finalize(self) -> None:
         self._entries = {function.name for function in self.get_defined_functions()}
+        self._linking_libraries = list(_reached(self, {}))
         super().finalize()
 
     def _optimize_final_module(self) -> None:
@@ -85,11 +93,29 @@ class EntryCompiler(Compiler):
         super().__init__(typing_context, target_context, library, *rest)
 
     def compile_extra(self, func: Callable[..., Any]) -> Any:
-        """Compile a function, and what it calls, without collecting garbage: a seventh of the time, and little is."""
-        collects = gc.isenabled()
-        gc.disable()
-        try:
+        """Compile a function and all that it calls."""
+        with _nothing_else():
             return super().compile_extra(func)
-        finally:
-            if collects:
-                gc.enable()
+
+
+@contextmanager
+def _nothing_else() -> Iterator[None]:
+    """Meanwhile no garbage is collected, of which there is little, and Numba times no nested compilation.
+
+    Numba starts two timers for each of them, which hear of every call of LLVM. Each of the two takes a tenth of the
+    time. Only one thread at a time is here, because Numba compiles under a lock.
+    """
+    collects, timer = gc.isenabled(), event.install_timer
+    gc.disable()
+    event.install_timer = _no_timer
+    try:
+        yield
+    finally:
+        event.install_timer = timer
+        if collects:
+            gc.enable()
+
+
+def _no_timer(_kind: str, _callback: Callable[[float], None]) -> AbstractContextManager[None]:
+    """Stands for Numba's `install_timer`."""
+    return nullcontext()

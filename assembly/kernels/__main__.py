@@ -42,7 +42,7 @@ def _list(items: list[Item]) -> None:
 
 
 def main(arguments: list[str]) -> int:
-    """Run the command; 0, or 1 if a kernel cannot be compiled, or 2 for what it cannot do."""
+    """Run the command; 0, or 1 where kernels cannot be kept, or 2 for what it cannot do."""
     parser = _arguments()
     wanted = parser.parse_args(arguments)
     kind = os.environ.get("ASSEMBLY_KERNELS", "native")
@@ -61,10 +61,18 @@ def main(arguments: list[str]) -> int:
     makes_portable = kind == "portable" and not wanted.native
     target = portable_target() if makes_portable else own_target()
     only_this = makes_portable or wanted.native
-    missing = [item for item in items if (item.path(target) if only_this else item.found()) is None]
-    if missing:
-        compile_all(missing, wanted.workers, PORTABLE_VARIABLES if makes_portable else {})
-    print(f"{len(items) - len(missing)} kernels were compiled, {len(missing)} are compiled now, in {entry_folder()}")
+
+    def missing() -> list[Item]:
+        return [item for item in items if (item.path(target) if only_this else item.found()) is None]
+
+    wanting = missing()
+    if wanting:
+        compile_all(wanting, wanted.workers, PORTABLE_VARIABLES if makes_portable else {})
+    unkept = missing()
+    if unkept:
+        print(f"{len(unkept)} kernels were compiled but could not be kept in {entry_folder()}", file=sys.stderr)
+        return 1
+    print(f"{len(items) - len(wanting)} kernels were compiled, {len(wanting)} are compiled now, in {entry_folder()}")
     return 0
 
 

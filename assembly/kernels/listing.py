@@ -8,7 +8,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from assembly._kernel.cache import EntryCache
+from assembly._kernel.cache import EntryCache, read_entry
 from assembly._kernel.decorator import ENTRIES, Entry
 from assembly._kernel.sources import PACKAGE, source_of, sources_of
 from assembly._kernel.targets import Target, targets_that_run
@@ -58,10 +58,13 @@ class Item:
         return sum(path.stat().st_size for path in sources_of(source_of(self.entry.compiled.py_func)))
 
     def path(self, target: Target) -> Path | None:
-        """The compiled form for a target, if there is one."""
+        """The compiled form for a target, if there is a sound one."""
         cache = self.entry.compiled._cache
         path = cache.path(self.types, target) if isinstance(cache, EntryCache) else None
-        return path if path is not None and path.exists() else None
+        try:
+            return path if path is not None and read_entry(path) else None
+        except (OSError, ValueError):
+            return None
 
     def found(self) -> tuple[Path, Target] | None:
         """What this machine would run, and what it was compiled for; None if it has to be compiled."""

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from assembly.kernels import __main__ as commands
-from assembly.kernels.listing import all_items
+from assembly.kernels.listing import Item, all_items
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 # Two kernels that take a second.
@@ -99,6 +99,13 @@ def test_what_it_cannot_do_is_said(arguments, kind, message, monkeypatch, capsys
         commands.main(arguments)
     assert caught.value.code == 2
     assert message in capsys.readouterr().err
+
+
+def test_kernels_that_cannot_be_kept_are_said(monkeypatch, capsys):
+    monkeypatch.setattr(commands, "compile_all", lambda *_: None)  # as on a disk that is full
+    monkeypatch.setattr(Item, "path", lambda *_: None)
+    assert commands.main(["--compile"]) == 1
+    assert f"{len(all_items())} kernels were compiled but could not be kept" in capsys.readouterr().err
 
 
 def test_without_compilation_there_is_nothing_to_list(run_python):
