@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
@@ -102,8 +104,8 @@ def test_the_same_by_dense_linear_algebra(name):
     rates = np.linalg.lstsq(system, right, rcond=1e-9)[0]
     velocities = _tip_rows(packed, task, poses)[:, moving] @ rates
     found = asm.tip_jacobian(scene, mechanism.tip, mechanism.inputs, solution, task=mechanism.tasks[-1])
-    # Compared in the scene's lengths, as rows are: in the user's, of which a small arm is a thousandth, rounding of 1e-15
-    # in how a slide turns the tip, which it does not, would be 1e-12.
+    # Compared in the scene's lengths, as rows are. A small arm is a thousandth of the user's: what rounding makes of
+    # how its slide turns the tip, 1e-15 instead of 0, would be 1e-12.
     found *= [1.0 if freedom.coordinate.is_angle else packed.scale for freedom in task.inputs]
     found[:3] /= packed.scale
     size = np.abs(velocities).max(axis=0)
@@ -340,24 +342,18 @@ def test_scenes_are_left_as_they_are(robot):
         np.testing.assert_array_equal(one, other)
 
 
-WITHOUT_JIT = """
-import numpy as np
-import assembly as asm
-from tests.laws.tip_scenes import MECHANISMS
-out = []
-for name in ("arm of three", "planar four-bar", "spinning link", "cam", "geared arm"):
-    mechanism = MECHANISMS[name]()
-    out.append(asm.tip_jacobian(mechanism.scene, mechanism.tip, mechanism.inputs).ravel().tolist())
-    term = asm.Dexterity(mechanism.tip, mechanism.inputs, "manipulability", task="position")
-    out.append([asm.dexterity_value(mechanism.scene, term)])
-print("FOUND", out)
-"""
+def numbers():
+    out = []
+    for name in ("arm of three", "planar four-bar", "spinning link", "cam", "geared arm"):
+        mechanism = MECHANISMS[name]()
+        out += asm.tip_jacobian(mechanism.scene, mechanism.tip, mechanism.inputs).ravel().tolist()
+        term = asm.Dexterity(mechanism.tip, mechanism.inputs, "manipulability", task="position")
+        out.append(asm.dexterity_value(mechanism.scene, term))
+    return out
 
 
 def test_the_same_with_and_without_compilation(run_python):
-    found = []
-    for switch in ("1", None):
-        line = next(k for k in run_python(WITHOUT_JIT, NUMBA_DISABLE_JIT=switch).splitlines() if k.startswith("FOUND"))
-        found.append(np.concatenate([np.ravel(row) for row in eval(line.removeprefix("FOUND"))]))
+    code = "import json; from tests.solve.test_tip import *; print(json.dumps(numbers()))"
+    plain = json.loads(run_python(code, NUMBA_DISABLE_JIT="1"))
     # Compiled code fuses multiplications and additions; Newton's method stops within 1e-12 of a pair.
-    np.testing.assert_allclose(*found, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(plain, numbers(), rtol=0, atol=1e-11)
