@@ -284,33 +284,26 @@ def test_bad_input():
             call()
 
 
-PROGRAM = """
-import json
-import numpy as np
-from assembly.geometry import shapes
-from assembly.proximity import Controller, descend
-
-home = [0, 0, 0, 1, 0, 0, 0]
-torus, egg = shapes.torus(3.0, 1.0), shapes.ellipsoid(1.0, 2.0, 1.5)
-flat = shapes.plane(2.0, 2.0)
-out = []
-for f, g, q, x in (
-    (torus, egg, [6.5, 1, 2, 1, 0.2, 0.1, 0.4], (0.5, 0.5, 1.0, 3.0)),
-    (flat, egg, [4.0, 0.2, 2.5, 0.5, 0.0, 0.5, 0.0], (0.5, 0.3, 0.3, 2.0)),
-    (egg, egg, [0.3, 0.2, 2.999, 1, 0, 0, 0], (0.5, 1.5, 4.0, 0.4)),
-):
-    pair = descend(f, home, g, q, x)
-    out.append([pair.status.name, pair.parameters.tolist(), pair.points.tolist()])
-    run = Controller(f, g, start=x, form="contravariant").run(20, q_target=q)
-    out.append([run.status.name, run.parameters.tolist(), run.distance.tolist()])
-print(json.dumps(out))
-"""
+def pairs_and_runs():
+    home = [0, 0, 0, 1, 0, 0, 0]
+    torus, egg = shapes.torus(3.0, 1.0), shapes.ellipsoid(1.0, 2.0, 1.5)
+    flat = shapes.plane(2.0, 2.0)
+    out = []
+    for f, g, q, x in (
+        (torus, egg, [6.5, 1, 2, 1, 0.2, 0.1, 0.4], (0.5, 0.5, 1.0, 3.0)),
+        (flat, egg, [4.0, 0.2, 2.5, 0.5, 0.0, 0.5, 0.0], (0.5, 0.3, 0.3, 2.0)),
+        (egg, egg, [0.3, 0.2, 2.999, 1, 0, 0, 0], (0.5, 1.5, 4.0, 0.4)),
+    ):
+        pair = descend(f, home, g, q, x)
+        out.append([pair.status.name, pair.parameters.tolist(), pair.points.tolist()])
+        run = Controller(f, g, start=x, form="contravariant").run(20, q_target=q)
+        out.append([run.status.name, run.parameters.tolist(), run.distance.tolist()])
+    return out
 
 
 def test_plain_python_gives_the_same(run_python):
-    compiled, plain = (
-        json.loads(run_python(PROGRAM, NUMBA_DISABLE_JIT=value).strip().splitlines()[0]) for value in ("0", "1")
-    )
+    code = "import json; from tests.proximity.test_controller import *; print(json.dumps(pairs_and_runs()))"
+    compiled, plain = pairs_and_runs(), json.loads(run_python(code, NUMBA_DISABLE_JIT="1"))
     assert {row[0] for row in plain} >= {"CONVERGED", "LEFT_PATCH", "ON_ITS_WAY"}
     for a, b in zip(compiled, plain, strict=True):
         assert a[0] == b[0]

@@ -113,10 +113,10 @@ def check(a, b, answer, tolerance=1e-10):
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("d", [2, 3])
-def test_random_pairs(seed, d):
+def test_random_pairs(seed, d, cases):
     rng = np.random.default_rng([seed, d])
     seen = set()
-    for _ in range(15):
+    for _ in range(cases(4, 15)):
         a = random_curve(rng, d)
         b = random_curve(rng, d) if rng.random() < 0.5 else random_hull(rng, d)
         answer = enclosed_distance(a, b)
@@ -182,10 +182,10 @@ def test_features_of_hulls():
 
 
 @pytest.mark.parametrize("d", [2, 3])
-def test_the_nearest_feature_changes_along_the_curve(d):
+def test_the_nearest_feature_changes_along_the_curve(d, cases):
     # Small and thin hulls: on most pieces the curve passes several features, and the least distance is at any of them.
     rng = np.random.default_rng(d)
-    for _ in range(60):
+    for _ in range(cases(20, 60)):
         curve = random_curve(rng, d)
         hull = rng.uniform(-1, 1, d) + rng.normal(size=(rng.integers(2, 6), d)) * 10.0 ** rng.uniform(-3, -0.5, d)
         answer = enclosed_distance(curve, hull)

@@ -134,10 +134,10 @@ def test_linked_tori():
 
 
 @pytest.mark.parametrize("gap", [1.0, 1e-6, 0.0, -1e-6, -1e-4, -1e-3, -1e-2])
-def test_tori_at_contact(gap):
+def test_tori_at_contact(gap, cases):
     rng = np.random.default_rng(4)
     count = 0
-    while count < 60:
+    while count < cases(20, 60):
         surfaces = [shapes.torus(rng.uniform(1.5, 3.0), rng.uniform(0.3, 0.8)) for _ in range(2)]
         f, g = (Face(s) for s in surfaces)
         uv_f, uv_g = inside(rng, f.surface), inside(rng, g.surface)

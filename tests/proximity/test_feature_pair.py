@@ -15,7 +15,7 @@ from assembly.proximity.feature_query import FOLD, GAP, ISOLATED, NORMAL, PAIR, 
 from assembly.proximity.shell import EDGE, FACE, VERTEX
 from tests.laws.feature_scenes import Feature, Packed, random_feature
 from tests.laws.scenes import quaternion_of, random_quaternion
-from tests.laws.test_feature_pairs import KINDS
+from tests.laws.test_feature_pairs import KINDS, random_cases
 from tests.laws.witness import rotated
 
 HOME = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
@@ -393,19 +393,16 @@ def test_places_without_a_tangent_are_not_converged():
 
 # ---- without JIT -------------------------------------------------------------------------------------------------
 
-PROGRAM = """
-import json
-import numpy as np
-from tests.laws.test_feature_pairs import KINDS, random_cases
 
-out = []
-for kinds in KINDS:
-    for case in random_cases(*kinds, 2):
+def pairs_of_every_kind():
+    out = []
+    for kinds in KINDS:
+        (case,) = random_cases(*kinds, 1)
         status, found = case.packed.solve(case.q, case.x + 1e-3 * case.moves, case.n)
         derivatives = case.packed.derivatives(case.q, case.x, case.n)
         out.append([status, found.tolist(), *(np.asarray(a).tolist() for a in derivatives)])
-print(json.dumps(out))
-"""
+    return out
+
 
 STEPS = """
 import json
@@ -416,7 +413,7 @@ from tests.laws.test_feature_pairs import KINDS, random_cases
 
 rng, out = np.random.default_rng(6), []
 for kinds in KINDS[1:]:
-    for case in random_cases(*kinds, 5):
+    for case in random_cases(*kinds, 2):
         q = case.q.reshape(2, 7)
         relative, shift = relative_pose(q, 0, rotation(q, 0), 1, rotation(q, 1))
         features = (case.packed.kinds[0], case.packed.at[0], case.packed.kinds[1], case.packed.at[1])
@@ -433,14 +430,11 @@ print(json.dumps(out))
 """
 
 
-def run_program(run_python, program, plain):
-    return json.loads(run_python(program, NUMBA_DISABLE_JIT=plain).strip().splitlines()[0])
-
-
 def test_plain_python_gives_the_same_pairs(run_python):
-    compiled, plain = (run_program(run_python, PROGRAM, value) for value in ("0", "1"))
-    assert len(plain) == 2 * len(KINDS) and len(plain[0][1]) == PAIR
-    for a, b in zip(compiled, plain, strict=True):
+    code = "import json; from tests.proximity.test_feature_pair import *; print(json.dumps(pairs_of_every_kind()))"
+    plain = json.loads(run_python(code, NUMBA_DISABLE_JIT="1"))
+    assert len(plain) == len(KINDS) and len(plain[0][1]) == PAIR
+    for a, b in zip(pairs_of_every_kind(), plain, strict=True):
         assert a[0] == b[0] == "CONVERGED"
         for x, y in zip(a[1:], b[1:], strict=True):
             # Without fused multiply-add: other roundings, amplified by the solve.
@@ -449,7 +443,7 @@ def test_plain_python_gives_the_same_pairs(run_python):
 
 def test_convergence_is_quadratic(run_python):
     # One step from three distances: a tenth of the distance leaves a hundredth of the error.
-    for errors in run_program(run_python, STEPS, "1"):
+    for errors in json.loads(run_python(STEPS, NUMBA_DISABLE_JIT="1")):
         for far, near in zip(errors[:2], errors[1:], strict=True):
             assert near < 0.03 * far + 1e-12
         assert errors[2] < 1e-5

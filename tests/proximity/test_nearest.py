@@ -63,10 +63,10 @@ def check(a, b, sampled_a, sampled_b, q, size):
     return "-".join(feature.kind for feature in pair.features)
 
 
-def test_trimmed_patches():
+def test_trimmed_patches(cases):
     rng = np.random.default_rng(13)
     kinds = set()
-    for _ in range(16):
+    for _ in range(cases(8, 16)):
         a, b = random_patch(rng), random_patch(rng)
         q = np.concatenate([rng.normal(size=3), random_quaternion(rng)])
         q[:3] *= rng.uniform(0.3, 1.2) / np.linalg.norm(q[:3])
@@ -85,7 +85,7 @@ def test_solids(cases):
     ]
     sampled = [Sampled(body, 20000) for body in bodies]
     kinds = set()
-    for _ in range(cases(12, 20)):
+    for _ in range(cases(8, 20)):
         i, j = rng.integers(len(bodies), size=2)
         q = np.concatenate([rng.normal(size=3), random_quaternion(rng)])
         q[:3] *= rng.uniform(0.25, 0.65) * (sampled[i].size + sampled[j].size) / np.linalg.norm(q[:3])
@@ -148,23 +148,24 @@ def test_a_box_in_a_corner_of_every_kind():
             assert abs(pair.gap - (lowest[2] - 0.5)) < 1e-13
 
 
+def pairs_of_a_box_and_a_cylinder():
+    rows, box, can = [], shapes.box(1, 1.3, 0.8), solids.solid_cylinder(0.4, 1.0)
+    for move in ([0.9, 0.8, 0.9], [0.2, 0.1, 0.9]):
+        pair = closest_features(box, can, q_b=[*move, 0.9, 0.3, 0.1, 0.2])
+        rows.append([pair.status.name, [f.name for f in pair.features], pair.points.tolist(), pair.gap])
+    return rows
+
+
 PROGRAM = """
 import json
-from assembly.geometry import shapes, solids
-from assembly.proximity import closest_features
-rows = []
-for move in ([0.2, 0.1, 1.4], [0.9, 0.8, 0.9], [0.2, 0.1, 0.8]):
-    pair = closest_features(shapes.box(1, 1.3, 0.8), solids.solid_cylinder(0.4, 1.0), q_b=[*move, 0.9, 0.3, 0.1, 0.2])
-    rows.append([pair.status.name, [f.name for f in pair.features], pair.points.tolist(), pair.gap])
-print(json.dumps(rows))
+from tests.proximity.test_nearest import pairs_of_a_box_and_a_cylinder
+print(json.dumps(pairs_of_a_box_and_a_cylinder()))
 """
 
 
 def test_plain_python_finds_the_same(run_python):
-    compiled, plain = (
-        json.loads(run_python(PROGRAM, NUMBA_DISABLE_JIT=value).strip().splitlines()[0]) for value in ("0", "1")
-    )
-    for one, other in zip(compiled, plain, strict=True):
+    plain = json.loads(run_python(PROGRAM, NUMBA_DISABLE_JIT="1"))
+    for one, other in zip(pairs_of_a_box_and_a_cylinder(), plain, strict=True):
         assert one[:2] == other[:2]
         np.testing.assert_allclose(one[2], other[2], atol=1e-9)
         assert abs(one[3] - other[3]) < 1e-13

@@ -25,7 +25,7 @@ CASES = {
 
 @pytest.mark.parametrize("scale", [1e-4, 1.0, 1e4])
 @pytest.mark.parametrize("name", CASES)
-def test_a_pair_follows_the_slope(name, scale):
+def test_a_pair_follows_the_slope(name, scale, cases):
     a, b, place = CASES[name]
     a, b = ([type(f)(f.surface.transformed(scale=scale), **loops(f, scale)) for f in part] for part in (a, b))
     place = np.array(place, dtype=float)
@@ -33,7 +33,7 @@ def test_a_pair_follows_the_slope(name, scale):
     rng = np.random.default_rng(8)
     followed = 0
     for angle in (1e-8, 1e-5, 1e-3, 0.03):
-        for _ in range(4):
+        for _ in range(cases(1, 4)):
             tracker = FeatureTracker(a, b)
             level = tracker.step(IDENTITY, place)
             of_faces = all(feature.kind == "face" for feature in level.features)

@@ -491,8 +491,8 @@ def test_two_bodies_side_by_side():
     assert apart.chi == 4
 
 
-def test_random_prisms():
-    for seed in range(20):
+def test_random_prisms(cases):
+    for seed in range(cases(7, 20)):
         rng = np.random.default_rng(seed)
         count = int(rng.integers(3, 30))
         angles = np.sort(rng.uniform(0, 2 * pi, count) + 0.0)

@@ -20,16 +20,16 @@ HOLDS = 1e-11
 # Stationary is what is so to 1e-10 of the size: a gap that carries a force may be open by as much.
 STATIONARY = 3e-10
 # Of taut scenes rounding decides which stall at a fold: of 50 some 48 are solved.
-MOST = 44
+MOST = 0.88
 
 
 @pytest.fixture(scope="module")
-def near():
-    return with_clearance(NEAR)
+def near(cases):
+    return with_clearance(NEAR, cases(13, SCENES))
 
 
-def with_clearance(distance):
-    scenes = linked_rings(SCENES, distance)
+def with_clearance(distance, count):
+    scenes = linked_rings(count, distance)
     scenes.drag.scene.constrain(asm.Clearance())
     return scenes
 
@@ -42,28 +42,22 @@ def ended(scenes, k):
     return solution, drag.deepest(solution.q), (drag.links(solution.q) == scenes.links[k]).all()
 
 
-@pytest.mark.parametrize("k", range(SCENES))
-def test_linked_rings_end_clear_and_linked(near, k):
-    solution, deepest, linked = ended(near, k)
-    assert solution.success and deepest > -HOLDS and linked
+def test_linked_rings_end_clear_and_linked(near):
+    for k in range(len(near.q)):
+        solution, deepest, linked = ended(near, k)
+        assert solution.success and deepest > -HOLDS and linked, k
 
 
-@pytest.fixture(scope="module")
-def taut():
-    scenes = with_clearance(TAUT)
-    return [ended(scenes, k) for k in range(SCENES)]
-
-
-@pytest.mark.parametrize("k", range(SCENES))
-def test_linked_rings_out_of_reach_end_clear_and_linked(taut, k):
-    solution, deepest, linked = taut[k]
-    assert linked
-    # The violation that is told is the deepest crossing.
-    assert deepest > -(HOLDS if solution.success else max(1e-6, 2.0 * solution.feasibility))
-
-
-def test_most_rings_out_of_reach_are_solved(taut):
-    assert sum(solution.success for solution, _deepest, _linked in taut) >= MOST
+def test_linked_rings_out_of_reach_end_clear_and_linked(cases):
+    taut = with_clearance(TAUT, cases(13, SCENES))
+    solved, count = 0, len(taut.q)
+    for k in range(count):
+        solution, deepest, linked = ended(taut, k)
+        assert linked, k
+        # The violation that is told is the deepest crossing.
+        assert deepest > -(HOLDS if solution.success else max(1e-6, 2.0 * solution.feasibility)), k
+        solved += solution.success
+    assert solved >= int(MOST * count)
 
 
 @pytest.mark.parametrize("k", range(0, 10, 3))
@@ -105,7 +99,7 @@ def test_the_gap_is_at_least_the_minimum(minimum):
 def test_no_pull_draws_rings_through_each_other(cases):
     # Where rings touch along an arc, contacts are born and merge at folds; rounding decides when.
     rng = np.random.default_rng(0)
-    solved, count = 0, cases(20, 60)
+    solved, count = 0, cases(8, 60)
     for shift in 1e-6 * rng.normal(size=(count, 3)):
         scene, oracle = two_rings(0.0, (1.0, 0.05, 0.1) + shift, (9.0, 0.3, 0.2) - shift)
         solution = scene.solve()
@@ -116,19 +110,19 @@ def test_no_pull_draws_rings_through_each_other(cases):
     assert solved >= int(0.75 * count)
 
 
-@pytest.mark.parametrize("k", range(12))
-def test_a_contact_and_a_clearance_that_asks_for_a_gap(k):
+def test_a_contact_and_a_clearance_that_asks_for_a_gap(cases):
     # Elsewhere: where the contact stands, or is on its way to, the clearance asks for nothing.
-    rng = np.random.default_rng([5, k])
-    ring = asm.shapes.torus(MAJOR, MINOR)
-    first = asm.Body("first", ring, fixed=True)
-    second = asm.Body("second", ring, rng.uniform(-1.5, 1.5, 3), Rotation.random(rng=rng).as_quat(scalar_first=True))
-    scene = asm.Assembly([first, second])
-    scene.constrain(asm.Contact(first, second), asm.Clearance(minimum=0.05))
-    solution = scene.solve()
-    gaps = WireOracle([torus_wire(MAJOR, MINOR)] * 2).minima(solution.q, 0.05 - 1e-9).gap
-    # The contact alone is nearer than the clearance asks for.
-    assert solution.success and len(gaps) == 1 and abs(gaps[0]) < HOLDS
+    ring, oracle = asm.Face(asm.shapes.torus(MAJOR, MINOR)), WireOracle([torus_wire(MAJOR, MINOR)] * 2)
+    for k in range(cases(5, 12)):
+        rng = np.random.default_rng([5, k])
+        place, turn = rng.uniform(-1.5, 1.5, 3), Rotation.random(rng=rng).as_quat(scalar_first=True)
+        first, second = asm.Body("first", ring, fixed=True), asm.Body("second", ring, place, turn)
+        scene = asm.Assembly([first, second])
+        scene.constrain(asm.Contact(first, second), asm.Clearance(minimum=0.05))
+        solution = scene.solve()
+        gaps = oracle.minima(solution.q, 0.05 - 1e-9).gap
+        # The contact alone is nearer than the clearance asks for.
+        assert solution.success and len(gaps) == 1 and abs(gaps[0]) < HOLDS, k
 
 
 def test_a_start_that_crosses_ends_clear():
@@ -185,7 +179,7 @@ def test_pairs_that_are_excluded_may_overlap_and_no_others(exclude):
 def test_three_cubes_that_are_drawn_into_each_other_come_to_lie_side_by_side(cases):
     # Flush faces: which corners are listed is decided by rounding, of 60 such starts 53 are SOLVED.
     rng = np.random.default_rng(0)
-    solved, count = 0, cases(7, 20)
+    solved, count = 0, cases(4, 20)
     for _ in range(count):
         scene = boxes(())
         q = scene.q.copy()

@@ -26,12 +26,12 @@ def two(rng, reach, turned):
 
 @pytest.mark.parametrize("turned", [True, False], ids=["turned", "parallel"])
 @pytest.mark.parametrize("guarded", [False, True], ids=["alone", "with a clearance"])
-def test_solids_are_brought_to_touch(turned, guarded):
+def test_solids_are_brought_to_touch(turned, guarded, cases):
     if guarded and not turned:
         pytest.skip("a clearance of parallel solids has rows all over their faces: docs/decisions.md")
     rng = np.random.default_rng(4)
-    solved = 0
-    for _ in range(25):
+    solved, count = 0, cases(8, 25)
+    for _ in range(count):
         a, b = two(rng, (1.8, 2.5), turned)
         scene = asm.Assembly([a, b])
         scene.constrain(asm.Contact(a, b))
@@ -45,14 +45,14 @@ def test_solids_are_brought_to_touch(turned, guarded):
             pair = closest_features(a, b, solution.q[0], solution.q[1])
             assert -3e-9 < pair.gap < 1e-7
             assert solution.feasibility < 1e-11
-    assert solved >= 24
+    assert solved >= int(0.96 * count)
 
 
 @pytest.mark.parametrize("turned", [True, False], ids=["turned", "parallel"])
-def test_solids_in_each_other_are_brought_apart(turned):
+def test_solids_in_each_other_are_brought_apart(turned, cases):
     rng = np.random.default_rng(6)
-    moved = 0
-    for _ in range(12):
+    moved, count = 0, cases(5, 12)
+    for _ in range(count):
         a, b = two(rng, (0.5, 1.0), turned)
         scene = asm.Assembly([a, b])
         scene.constrain(asm.Contact(a, b, unilateral=True))
@@ -61,14 +61,14 @@ def test_solids_in_each_other_are_brought_apart(turned):
         pair = closest_features(a, b, solution.q[0], solution.q[1])
         assert pair.gap > -3e-9
         moved += np.linalg.norm(solution.q[1, :3] - b.q[:3]) > 1e-3
-    assert moved > 6
+    assert moved > count // 2
 
 
-def test_an_objective_that_is_not_met_is_no_success():
+def test_an_objective_that_is_not_met_is_no_success(cases):
     # The same scene with the least move asked for: at a kink it is not stationary, and that is said.
     rng = np.random.default_rng(4)
     failed = 0
-    for _ in range(10):
+    for _ in range(cases(4, 10)):
         a, b = two(rng, (1.8, 2.5), True)
         scene = asm.Assembly([a, b])
         scene.constrain(asm.Contact(a, b))

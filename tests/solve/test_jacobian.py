@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ast import literal_eval
+import json
 
 import casadi as ca
 import numpy as np
@@ -167,21 +167,14 @@ def test_a_pose_without_a_pair_is_named(monkeypatch):
         rows_of(packed, state)
 
 
-WITHOUT_JIT = """
-import numpy as np
-from assembly.solve.jacobian import rows_of
-from tests.solve.test_jacobian import at, everything, floor_and_tile
-for scene in (everything(np.random.default_rng(1)), floor_and_tile()):
-    rows = rows_of(*at(scene, scene.q))
-    print([*rows.residual.tolist(), *rows.jacobian.ravel().tolist()])
-"""
+def numbers():
+    scenes = everything(np.random.default_rng(1)), floor_and_tile()
+    rows = [rows_of(*at(scene, scene.q)) for scene in scenes]
+    return [[*each.residual.tolist(), *each.jacobian.ravel().tolist()] for each in rows]
 
 
 def test_the_same_with_and_without_compilation(run_python):
-    plain, compiled = (
-        [np.array(literal_eval(line)) for line in run_python(WITHOUT_JIT, NUMBA_DISABLE_JIT=switch).splitlines()[-2:]]
-        for switch in ("1", None)
-    )
-    for one, other in zip(plain, compiled, strict=True):
+    code = "import json; from tests.solve.test_jacobian import *; print(json.dumps(numbers()))"
+    for one, other in zip(json.loads(run_python(code, NUMBA_DISABLE_JIT="1")), numbers(), strict=True):
         # Compiled code fuses multiplications and additions; Newton's method stops within 1e-12 of a pair.
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-11)

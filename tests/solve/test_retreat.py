@@ -27,18 +27,17 @@ def tori(k):
     return scene
 
 
-@pytest.mark.parametrize("k", [1, 3, 4, 5])
-def test_a_torus_is_not_drawn_through_an_equal_one(k):
+def test_a_torus_is_not_drawn_through_an_equal_one(cases):
     # As the ring comes to lie flat its lowest point runs around it, and steps sink one side of it. These ended SOLVED
     # on the other side.
-    scene = tori(k)
-    solution = scene.solve()
-    pose = solution.q[1 - k % 2]
-    turn = Rotation.from_quat(pose[3:], scalar_first=True).as_matrix()
-    # Where it is not SOLVED it ends at the last pose at which no contact is deeper than 1e-9 of the scene's size.
-    assert circle_distance(turn, pose[:3]) - 2.0 * MINOR > -1e-8
-    # On its side: a ring that lies on the other one is 0.2 above it; what leans on it is higher.
-    assert 0.2 - 1e-8 < pose[2] < 0.25
+    for k in (1, 4, 3, 5)[: cases(2, 4)]:
+        solution = tori(k).solve()
+        pose = solution.q[1 - k % 2]
+        turn = Rotation.from_quat(pose[3:], scalar_first=True).as_matrix()
+        # Where it is not SOLVED it ends at the last pose at which no contact is deeper than 1e-9 of the scene's size.
+        assert circle_distance(turn, pose[:3]) - 2.0 * MINOR > -1e-8, k
+        # On its side: a ring that lies on the other one is 0.2 above it; what leans on it is higher.
+        assert 0.2 - 1e-8 < pose[2] < 0.25, k
 
 
 def test_what_has_sunk():

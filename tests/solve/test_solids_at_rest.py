@@ -40,7 +40,7 @@ def drawn_together(rng, sides):
 def test_boxes_that_are_drawn_together_come_to_rest(sides, seed, part, cases):
     # Of 24, 23 of either are SOLVED; 24 and 18 while a solve that was stuck did not begin again. Rounding decides about
     # some.
-    solved, count = 0, cases(8, SCENES)
+    solved, count = 0, cases(4, SCENES)
     for number in range(count):
         solution = drawn_together(np.random.default_rng([seed, number]), sides).solve()
         solved += solution.success
@@ -54,7 +54,7 @@ def test_a_contact_that_ends_where_it_touches_is_not_looked_for_forever(cases):
     # contact that evaluating its row had lost, until their steps were used up. Rounding decides which solves get there:
     # a tenth of these may, as any of them.
     scenes = [([BOX] * 4, 5, 15), ([BOX] * 3, 5, 7), ([BOX, PLATE, BOX], 5, 8), ([BOX, PLATE, BOX], 6, 6)]
-    numbers = range(10, cases(13, 17))
+    numbers = range(10, cases(11, 17))
     scenes += [(sides, seed, k) for sides in ([BOX] * 3, [BOX, PLATE, BOX]) for seed in (5, 6) for k in numbers]
     solved = 0
     for sides, seed, number in scenes:
@@ -71,7 +71,7 @@ def test_a_contact_that_ends_where_it_touches_is_not_looked_for_forever(cases):
 
 def test_a_solve_that_began_again_tells_of_all_its_steps():
     again = 0
-    for number in (2, 9, 10, 14):
+    for number in (2, 9):
         solution = drawn_together(np.random.default_rng([5, number]), [BOX] * 4).solve()
         history = solution.history
         assert len(history) == solution.iterations + 1 and np.isfinite(history).all()

@@ -43,16 +43,16 @@ def separation(q):
     return float((np.abs(axes @ q[:3]) - np.abs(axes) @ half - np.abs(axes @ turn) @ half).max())
 
 
-# Of the first 60, seven ended SOLVED with the boxes up to 1e-4 apart: an edge's parameter was beyond its end. At the
-# last three a corner was up to 1e-7 beside the face it was held on.
-CASES = [*range(1, 61), 86, 576, 1959]
+# At the first three a corner was up to 1e-7 beside the face it was held on. Of the others, seven ended SOLVED with the
+# boxes up to 1e-4 apart: an edge's parameter was beyond its end.
+CASES = [86, 576, 1959, *range(1, 61)]
 
 
 @pytest.mark.parametrize("trimmed", [True, False])
-def test_boxes_that_are_solved_touch(trimmed):
+def test_boxes_that_are_solved_touch(trimmed, cases):
     first = trimmed_box(*SIDES) if trimmed else asm.shapes.box(*SIDES)
-    solved = 0
-    for case in CASES:
+    solved, count = 0, cases(23, len(CASES))
+    for case in CASES[:count]:
         rng = np.random.default_rng([5, case])
         position = rng.uniform(-1.5, 1.5, 3)
         turn = Rotation.random(random_state=int(rng.integers(1 << 30))).as_quat(scalar_first=True)
@@ -71,7 +71,7 @@ def test_boxes_that_are_solved_touch(trimmed):
         assert abs(separation(solution.q[1])) < 1e-11, case
         assert abs(solution.contacts[contact.name].gap) < 1e-11, case
     # Some stall at a kink, or stand in each other at the start.
-    assert solved >= 0.6 * len(CASES)
+    assert solved >= 0.6 * count
 
 
 def test_a_solution_shows_the_pair_that_was_held():

@@ -16,7 +16,8 @@ from benchmarks.center_lines import ball_wire, paper_clip_wire, torus_wire
 from benchmarks.wire_oracle import WireOracle
 
 BALL = asm.shapes.sphere(1.0)
-CLIP = asm.shapes.paper_clip(length=33.0, width=8.0, wire_radius=0.5)
+# One face, whose tree is found once.
+CLIP = asm.Face(asm.shapes.paper_clip(length=33.0, width=8.0, wire_radius=0.5))
 
 
 def row(*position, turn=None):
@@ -158,38 +159,37 @@ CLIPS = np.array(
 )
 
 
-@pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("pace", [0.003, 0.03])
-def test_what_is_listed_is_what_the_oracle_finds(seed, pace):
+def test_what_is_listed_is_what_the_oracle_finds(pace, cases):
     # Wires of radius 0.5 move by up to 2 and turn by up to 0.3, through each other, too.
     reach = 0.5
-    manager = asm.Manager([asm.Body(name, CLIP) for name in "abc"], reach=reach)
     oracle = WireOracle([paper_clip_wire()] * 3)
-    poses = motion(CLIPS, seed, 2.0, 0.3)
-    compared = missed = 0
-    for k in range(300):
-        q = poses(pace * k)
-        manager.update(q)
-        if k % 10:
-            continue
-        expected = oracle.minima(q, reach)
-        # Of wires that cross, some pairs are deeper in each other than looks see, or born there.
-        sound = expected.gap > 0.0
-        contacts = manager.contacts
-        missed += matched(contacts, expected.take(sound), "abc").count(None)
-        everything = oracle.minima(q, 40.0)
-        listed = [c for c in contacts if -0.2 < c.gap]
-        found = matched(listed, everything, "abc")
-        assert len({c.number for c in found if c is not None}) == len(listed), k
-        assert sum(c is not None for c in found) == len(listed), k
-        compared += int(sound.sum())
-    assert compared > 20
-    # A minimum that is born in the valley of one that is listed, and deeper, is found by the next look.
-    assert missed <= (1 if (pace, seed) == (0.03, 5) else 0)
+    for seed in (5, 0, 1, 2, 3, 4)[: cases(2, 6)]:
+        manager = asm.Manager([asm.Body(name, CLIP) for name in "abc"], reach=reach)
+        poses = motion(CLIPS, seed, 2.0, 0.3)
+        compared = missed = 0
+        for k in range(300):
+            q = poses(pace * k)
+            manager.update(q)
+            if k % 10:
+                continue
+            everything = oracle.minima(q, 40.0)
+            # Of wires that cross, some pairs are deeper in each other than looks see, or born there.
+            sound = (0.0 < everything.gap) & (everything.gap <= reach)
+            contacts = manager.contacts
+            missed += matched(contacts, everything.take(sound), "abc").count(None)
+            listed = [c for c in contacts if -0.2 < c.gap]
+            found = matched(listed, everything, "abc")
+            assert len({c.number for c in found if c is not None}) == len(listed), (seed, k)
+            assert sum(c is not None for c in found) == len(listed), (seed, k)
+            compared += int(sound.sum())
+        assert compared > 20
+        # A minimum that is born in the valley of one that is listed, and deeper, is found by the next look.
+        assert missed <= (1 if (pace, seed) == (0.03, 5) else 0)
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_gaps_are_lower_bounds(seed):
+def test_gaps_are_lower_bounds(seed, cases):
     manager = asm.Manager([asm.Body(name, CLIP) for name in "abc"])
     oracle = WireOracle([paper_clip_wire()] * 3)
     poses = motion(CLIPS + [0, 9.0, 0, 0, 0, 0, 0] * np.array([[0], [0], [1]]), seed, 3.0, 0.3)
@@ -197,6 +197,8 @@ def test_gaps_are_lower_bounds(seed):
     for k in range(60):
         q = poses(0.03 * k)
         manager.update(q)
+        if k % cases(3, 1):
+            continue
         bounds = np.array(list(manager.gaps.values()))
         exact = oracle.gaps(q)
         # Crossing wires have gaps down to minus their thickness; what is deeper is not seen.
@@ -211,8 +213,8 @@ def test_the_same_motion_gives_the_same_contacts_to_the_bit():
     for _ in range(2):
         manager = asm.Manager([asm.Body(name, CLIP) for name in "abc"], reach=0.3)
         record = []
-        for k in range(200):
-            events = manager.update(poses(0.02 * k))
+        for k in range(100):
+            events = manager.update(poses(0.04 * k))
             record.append(
                 (events, [(c.number, c.gap, c.parameters.tobytes(), c.points.tobytes()) for c in manager.contacts])
             )
@@ -224,8 +226,8 @@ def test_the_same_motion_gives_the_same_contacts_to_the_bit():
 def test_poses_of_either_sign_and_of_nearly_unit_length_are_the_same():
     poses = motion(CLIPS, 3, 2.0, 0.3)
     one, other = (asm.Manager([asm.Body(name, CLIP) for name in "abc"], reach=0.3) for _ in range(2))
-    for k in range(100):
-        q = poses(0.02 * k)
+    for k in range(50):
+        q = poses(0.04 * k)
         flipped = q.copy()
         flipped[:, 3:] *= (-1.0) ** k * (1.0 + 1e-3)
         assert kinds(one.update(q)) == kinds(other.update(flipped))
@@ -234,7 +236,7 @@ def test_poses_of_either_sign_and_of_nearly_unit_length_are_the_same():
     assert np.allclose([c.gap for c in one.contacts], [c.gap for c in other.contacts], rtol=0.0, atol=1e-12)
 
 
-def test_memory_does_not_grow():
+def test_memory_does_not_grow(cases):
     manager = asm.Manager([asm.Body(name, CLIP) for name in "abc"], reach=0.3)
     poses = [motion(CLIPS, 3, 2.0, 0.3)(0.02 * k) for k in range(200)]
     for q in poses:
@@ -246,13 +248,13 @@ def test_memory_does_not_grow():
     ours = tracemalloc.Filter(True, str(Path(asm.__file__).parent / "*"))
     used = []
     for _ in range(3):
-        for q in 4 * poses:
+        for q in cases(1, 4) * poses:
             manager.update(q)
         gc.collect()  # the interpreter keeps some numbers and tuples for later
         snapshot = tracemalloc.take_snapshot().filter_traces([ours])
         used.append(sum(trace.size for trace in snapshot.traces))
     tracemalloc.stop()
-    # A row of numbers an update would be 50 kB.
+    # A row of numbers an update would be 12 kB at least.
     assert used[2] - used[1] < 512
     assert len(manager.log) <= 64
 
@@ -275,8 +277,8 @@ def test_the_unit_of_length_does_not_matter():
     mm = asm.Manager([asm.Body(name, CLIP) for name in "abc"], reach=0.3)
     small = asm.shapes.paper_clip(length=0.033, width=0.008, wire_radius=0.0005)
     m = asm.Manager([asm.Body(name, small) for name in "abc"], reach=0.0003)
-    for k in range(100):
-        q = poses(0.02 * k)
+    for k in range(50):
+        q = poses(0.04 * k)
         mm.update(q)
         q[:, :3] *= 1e-3
         m.update(q)
