@@ -120,9 +120,8 @@ def compared(listed: Listed, extrema: Extrema, tolerance: float, flat: float) ->
 @cache
 def _judged(name_f: str, name_g: str) -> tuple[Watch, WireOracle]:
     """Two wires under watch, and who judges them; making a watch takes longer than a motion."""
-    return Watch([SHAPES[name][1] for name in (name_f, name_g)]), WireOracle(
-        [SHAPES[name][0] for name in (name_f, name_g)]
-    )
+    shapes = SHAPES[name_f], SHAPES[name_g]
+    return Watch([surface for _, surface, _ in shapes]), WireOracle([wire for wire, _, _ in shapes])
 
 
 def wander(rng: np.random.Generator, name_f: str, name_g: str, steps: int, errors: Errors) -> None:
