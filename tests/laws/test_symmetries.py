@@ -15,8 +15,8 @@ POSITIONS = np.array([0, 1, 2, 7, 8, 9])
 
 @pytest.fixture(scope="session")
 def some(group, cases):
-    """Ten of the pairs; with ``--long`` twenty."""
-    return range(0, len(group.f), cases(7, 10))
+    """Fourteen of the pairs; with ``--long`` twenty."""
+    return range(0, len(group.f), cases(5, 10))
 
 
 def all_of(f, q_f, g, q_g, x):
