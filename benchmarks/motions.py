@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -116,10 +117,17 @@ def compared(listed: Listed, extrema: Extrema, tolerance: float, flat: float) ->
     )
 
 
+@cache
+def _judged(name_f: str, name_g: str) -> tuple[Watch, WireOracle]:
+    """Two wires under watch, and who judges them; making a watch takes longer than a motion."""
+    shapes = SHAPES[name_f], SHAPES[name_g]
+    return Watch([surface for _, surface, _ in shapes]), WireOracle([wire for wire, _, _ in shapes])
+
+
 def wander(rng: np.random.Generator, name_f: str, name_g: str, steps: int, errors: Errors) -> None:
     """A random motion, looked at step by step; every list is compared with all extrema."""
-    watch = Watch([SHAPES[name][1] for name in (name_f, name_g)])
-    oracle = WireOracle([SHAPES[name][0] for name in (name_f, name_g)])
+    watch, oracle = _judged(name_f, name_g)
+    watch.forget()
     size = max(float(SHAPES[name][0].length.sum()) for name in (name_f, name_g))
     for q in random_motion(rng, name_f, name_g, steps):
         listed = watch.look(q)

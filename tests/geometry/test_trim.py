@@ -272,11 +272,11 @@ from tests.geometry.loops import circle, polygon, random_face
 faces = [
     random_face(np.random.default_rng(0), shapes.plane(10.0, 10.0)),
     Face(shapes.cylinder(1.0, 2.0), None, [circle((0.1, 1.0), 0.3)]),
-    Face(shapes.torus(3.0, 1.0), None, [polygon((0, 0), (5, 1), (2, 3))]),
+    Face(shapes.torus(3.0, 1.0), None, [polygon((4.2, 0.2), (5.2, 0.4), (4.5, 0.9))]),
 ]
 out = []
 for face in faces:
-    u, v = np.random.default_rng(1).uniform(-3, 3, (2, 40))
+    u, v = np.random.default_rng(1).uniform(-3, 3, (2, 8))
     near = face.nearest_on_boundary(u, v)
     side = face.locate(u, v).tolist()
     inside = v.clip(*face.surface.domain[1])

@@ -15,6 +15,6 @@ KINDS = (
 
 
 @pytest.fixture(scope="session", params=range(len(KINDS)), ids=["-".join(kinds) for kinds in KINDS])
-def group(request):
-    """200 random pairs; 1,000 over all parameters."""
-    return random_group(20 + request.param, *KINDS[request.param], 200)
+def group(request, cases):
+    """Random pairs; with ``--long`` 200, 1,000 over all parameters."""
+    return random_group(20 + request.param, *KINDS[request.param], cases(70, 200))

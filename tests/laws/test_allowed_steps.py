@@ -80,10 +80,10 @@ class Looked:
         return self.memory[at:][: PAIR_MEMORY * len(self.pairs)].reshape(len(self.pairs), -1)[:, k]
 
 
-def test_steps_end_within_what_looks_allow():
+def test_steps_end_within_what_looks_allow(cases):
     rng = np.random.default_rng(8)
-    cuts = 0
-    for _ in range(10):
+    cuts, scenes = 0, cases(3, 10)
+    for _ in range(scenes):
         looked = Looked(rng)
         n = 6 * int(looked.table[MOVING])
         for size in (1e-4, 1e-2, 0.03, 0.1):
@@ -102,7 +102,7 @@ def test_steps_end_within_what_looks_allow():
                 cuts += 1
                 # What is asked of the next looks: as far as each pair was to go.
                 np.testing.assert_allclose(looked.column(CUT_SHORT), end * looked.column(ALLOWANCE), rtol=1e-12)
-    assert cuts > 10
+    assert cuts > scenes
 
 
 def test_a_pair_that_is_nearly_spent_and_hardly_moves_is_not_in_the_way():

@@ -15,10 +15,9 @@ from assembly.geometry.face import Face
 from assembly.geometry.spline import surface_point
 from assembly.geometry.surface import NurbsSurface
 from assembly.proximity import box_model as box
-from assembly.proximity.cell_tree import INFO, give_model, grow, plant, room
+from assembly.proximity.cell_tree import CELL, HAS_MODEL, INFO, KIND, LEVEL, RECORD, give_model, grow, plant, room
 from assembly.proximity.edge_frame import edge_jet
-from assembly.proximity.edge_model import edge_model
-from assembly.proximity.shell import EDGE, EDGE_CURVE, EDGE_RECORD, EDGE_TABLE, EDGES, FACE
+from assembly.proximity.shell import EDGE, EDGE_CURVE, EDGE_RECORD, EDGE_TABLE, EDGES, FACE, FACE_RECORD
 from assembly.proximity.shell_packing import pack_shell
 from assembly.proximity.topology import topology_of
 from tests.geometry.test_surface import random_surface
@@ -45,21 +44,10 @@ def edge_points(table, pool, edge, t, out):
 
 
 @kernel
-def fill_face(table, pool, turn, shift, nodes, work):
-    box.face_model(table, pool, 0, turn, shift, nodes, 0, work)
-
-
-@kernel
-def fill_edge(table, pool, edge, turn, shift, nodes, work):
-    edge_model(table, pool, edge, turn, shift, nodes, 0, work)
-
-
-@kernel
 def fill(table, pool, turn, shift, nodes, info, i, work):
     give_model(table, pool, turn, shift, nodes, info, i, work)
 
 
-@kernel
 def open_all(table, pool, shell, turn, shift, nodes, info, work):
     used = plant(table, pool, shell, turn, shift, nodes, info)
     for i in range(1, used):
@@ -115,6 +103,13 @@ def new_node(nodes, i, u, v):
     nodes[i, box.RADIUS] = np.inf
 
 
+def cell_of(kind, record):
+    """What a node is: a cell of a feature, without its model."""
+    info = np.zeros((1, INFO), np.int64)
+    info[0, [LEVEL, KIND, RECORD]] = CELL, kind, record
+    return info
+
+
 def check(rng, node, s, t, points, rounding):
     """A node against points over (s, t) in [-1, 1]^2."""
     o, p, q, l, m, k = (
@@ -139,19 +134,24 @@ def check(rng, node, s, t, points, rounding):
 
 
 @pytest.mark.parametrize("name", SURFACES)
-def test_models_of_faces_hold(name):
+def test_models_of_faces_hold(name, cases):
     surface = SURFACES[name]
     rng = np.random.default_rng(5)
     table, pool = surface.packed()
+    # The record of a face after that of its surface, which is at 0.
+    info = cell_of(FACE, table.size)
+    table = np.append(table, np.zeros(FACE_RECORD, np.int64))
     work = np.empty((4, 16, 16))
     nodes = np.empty((1, box.NODE))
     rounding = 4e-15 * (np.abs(surface.control_points).max() + 10.0)
     tight = []
-    for _ in range(40):
+    count = cases(13, 40)
+    for _ in range(count):
         turn, shift = pose(rng)
         u, v = random_box(rng, surface)
         new_node(nodes, 0, u, v)
-        fill_face(table, pool, turn, shift, nodes, work)
+        info[0, HAS_MODEL] = 0
+        fill(table, pool, turn, shift, nodes, info, 0, work)
         s, t = np.concatenate([rng.uniform(-1.0, 1.0, (2, 60)), [[-1, -1, 1, 1], [-1, 1, -1, 1]]], axis=1)
         (a, b), (c, d) = surface.domain
         points = surface.evaluate(np.clip(u[0] + s * u[1], a, b), np.clip(v[0] + t * v[1], c, d))
@@ -159,35 +159,35 @@ def test_models_of_faces_hold(name):
         check(rng, nodes[0], s, t, points, rounding)
         if nodes[0, box.REST] < np.inf:
             tight.append(nodes[0, box.REST] / nodes[0, box.RADIUS])
-    assert len(tight) > 20
+    assert len(tight) > count / 2
     # The law would hold for boundless models too: the remainder is of third order in the width.
     assert np.median(tight) < 0.05
 
 
 @pytest.mark.parametrize("name", SOLIDS)
-def test_models_of_edges_hold(name):
+def test_models_of_edges_hold(name, cases):
     rng = np.random.default_rng(6)
     table, pool, shell = pack_shell(topology_of(SOLIDS[name]), 1.0)
     work = np.empty((4, 16, 16))
     nodes = np.empty((1, box.NODE))
     same, origin = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
-    tight = []
+    tight, count = [], cases(4, 10)
     for k in range(table[shell + EDGES]):
         edge = table[shell + EDGE_TABLE] + EDGE_RECORD * k
         curve = table[edge + EDGE_CURVE]
         breaks = pool[table[curve + 2] : table[curve + 2] + table[curve + 1] + 1]
-        for _ in range(10):
+        for _ in range(count):
             piece = rng.integers(breaks.size - 1)
             width = (breaks[piece + 1] - breaks[piece]) * 10.0 ** rng.uniform(-3.0, -0.5)
             low = rng.uniform(breaks[piece], breaks[piece + 1] - width)
             new_node(nodes, 0, (low + 0.5 * width, 0.5 * width), (0.0, 0.0))
-            fill_edge(table, pool, edge, same, origin, nodes, work)
+            fill(table, pool, same, origin, nodes, cell_of(EDGE, edge), 0, work)
             s = np.concatenate([rng.uniform(-1.0, 1.0, 40), [-1.0, 1.0]])
             points = points_of_edge(table, pool, edge, low + 0.5 * width * (1.0 + s))
             check(rng, nodes[0], s, 0.0 * s, points, 1e-14)
             if nodes[0, box.REST] < np.inf:
                 tight.append(nodes[0, box.REST] / nodes[0, box.RADIUS])
-    assert len(tight) >= 10 and np.median(tight) < 0.05
+    assert len(tight) >= count and np.median(tight) < 0.05
 
 
 def tree(faces, turn, shift):
@@ -215,15 +215,15 @@ def samples(arrays, nodes, info, i, rng):
 
 
 @pytest.mark.parametrize("names", [("cylinder", "plate"), ("bent", "bent"), ("bent", "cylinder")])
-def test_no_samples_are_nearer_than_the_bound(names):
+def test_no_samples_are_nearer_than_the_bound(names, cases):
     rng = np.random.default_rng(7)
     same, origin = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
     a, ai, one = tree(SOLIDS[names[0]], same, origin)
     turn, shift = pose(rng)
     b, bi, other = tree(SOLIDS[names[1]], turn, shift)
     cells_a, cells_b = np.flatnonzero(ai[:, 0] == 3), np.flatnonzero(bi[:, 0] == 3)
-    useful = 0
-    for _ in range(150):
+    useful, count = 0, cases(50, 150)
+    for _ in range(count):
         i, j = rng.choice(cells_a), rng.choice(cells_b)
         for arrays, nodes, info, k in ((one, a, ai, i), (other, b, bi, j)):
             fill(*arrays[:4], nodes, info, k, arrays[4])
@@ -233,4 +233,4 @@ def test_no_samples_are_nearer_than_the_bound(names):
         assert bound <= nearest + 1e-13
         useful += bound > 0.7 * nearest
     # Bounds that are always low would pass.
-    assert useful > 40
+    assert useful > count / 4

@@ -1,6 +1,6 @@
 """Certificates hold: no sample, and no minimum that Newton's method finds, is nearer than the lower bound.
 
-The counts here take seconds; `python -m tests.laws.certificates` makes 100,000 queries of each sort.
+The counts here take a second or two; `python -m tests.laws.certificates` makes 100,000 queries of each sort.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from tests.laws.curve_queries import CURVES
 
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("kind", CURVES)
-def test_points_and_curves(kind, dimension):
-    assert faults(point_queries(np.random.default_rng(1), kind, dimension, 100), 33) == []
+def test_points_and_curves(kind, dimension, cases):
+    assert faults(point_queries(np.random.default_rng(1), kind, dimension, cases(40, 100)), 33) == []
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("kinds", PAIRS, ids=" and ".join)
-def test_two_curves(kinds, dimension):
-    assert faults(curve_queries(np.random.default_rng(2), kinds, dimension, 10), 25) == []
+def test_two_curves(kinds, dimension, cases):
+    assert faults(curve_queries(np.random.default_rng(2), kinds, dimension, cases(4, 10)), 25) == []

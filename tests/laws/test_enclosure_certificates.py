@@ -22,15 +22,17 @@ from tests.laws.enclosure_certificates import (
 
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("sort", SORTS)
-def test_random_queries(sort, dimension):
-    found, done, statuses = faults(np.random.default_rng(3), sort, dimension, 150)
-    assert found == [] and done >= 150
+def test_random_queries(sort, dimension, cases):
+    count = cases(50, 150)
+    found, done, statuses = faults(np.random.default_rng(3), sort, dimension, count)
+    assert found == [] and done >= count
     assert {"CONVERGED", "DISJOINT", "UNDECIDED"} <= set(statuses)
 
 
-def test_random_surfaces():
-    found, done, statuses = surface_faults(np.random.default_rng(4), 150)
-    assert found == [] and done >= 150
+def test_random_surfaces(cases):
+    count = cases(50, 150)
+    found, done, statuses = surface_faults(np.random.default_rng(4), count)
+    assert found == [] and done >= count
     assert {"CONVERGED", "DISJOINT", "UNDECIDED", "BUDGET_SPENT"} <= set(statuses)
 
 

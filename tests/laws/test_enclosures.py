@@ -57,9 +57,9 @@ def directions(d, rng, count):
 
 
 @pytest.mark.parametrize("curve", CURVES, ids=lambda c: c.name)
-def test_supports(curve):
+def test_supports(curve, cases):
     rng = np.random.default_rng(2)
-    for t0, t1 in pieces(curve, rng, 60):
+    for t0, t1 in pieces(curve, rng, cases(25, 60)):
         piece = asm.proximity.enclosure(curve, t0, t1)
         points = curve.evaluate(np.clip(np.linspace(t0, t1, 60), t0, t1))
         n = directions(points.shape[1], rng, 20)
@@ -81,10 +81,10 @@ def test_supports(curve):
 
 
 @pytest.mark.parametrize("curve", CURVES, ids=lambda c: c.name)
-def test_widths_and_lengths(curve):
+def test_widths_and_lengths(curve, cases):
     rng = np.random.default_rng(3)
     nodes, weights = np.polynomial.legendre.leggauss(20)
-    for t0, t1 in pieces(curve, rng, 60):
+    for t0, t1 in pieces(curve, rng, cases(25, 60)):
         piece = asm.proximity.enclosure(curve, t0, t1)
         if curve.name in ("kink", "steep") and t0 <= 1e-3:
             continue  # not for Gauss's sum
@@ -212,11 +212,11 @@ PAIRS = [(0, 1), (0, 7), (4, 8), (4, 9), (7, 10), (8, 9), (3, 2), (11, 0)]
 
 
 @pytest.mark.parametrize(("i", "j"), PAIRS)
-def test_bounds_by_second_derivatives(i, j):
+def test_bounds_by_second_derivatives(i, j, cases):
     rng = np.random.default_rng(10 * i + j)
     a, b = CURVES[i], CURVES[j]
     one, two = packed_operand("a", a), packed_operand("b", b)
-    count = 150
+    count = cases(50, 150)
     rows_a, rows_b = local_intervals(a, rng, count), local_intervals(b, rng, count)
     out = np.empty((count, 5))
     pair_bounds(
@@ -278,11 +278,11 @@ def nearest(full, xa, ca_, wa, xb, cb, wb, first, out):
 
 
 @pytest.mark.parametrize("d", [2, 3])
-def test_gjk_of_hulls(d):
+def test_gjk_of_hulls(d, cases):
     rng = np.random.default_rng(d)
     out = np.empty(9)
     seen = set()
-    for _ in range(300):
+    for _ in range(cases(100, 300)):
         m, n = rng.integers(1, 12, 2)
         a, b = np.zeros((m, 3)), np.zeros((n, 3))
         a[:, :d], b[:, :d] = rng.normal(size=(m, d)), rng.normal(size=(n, d)) + rng.choice([0.0, 2.0, 4.0])

@@ -41,7 +41,6 @@ CURVES = (
     ("quadratic", "dome"),
     ("quadratic", "quadratic"),
 )
-COUNT = 170
 MAKERS = {"dome": dome, "quadratic": quadratic}
 
 
@@ -94,9 +93,9 @@ def random_curves(seed, kind, on, count):
 
 
 @pytest.fixture(scope="module", params=range(len(CURVES)), ids=[f"{a}-{b or 'space'}" for a, b in CURVES])
-def group(request):
-    """170 random pairs; 1,020 over all parameters."""
-    return random_curves(50 + request.param, *CURVES[request.param], COUNT)
+def group(request, cases):
+    """Random pairs; with ``--long`` 170, 1,020 over all parameters."""
+    return random_curves(50 + request.param, *CURVES[request.param], cases(68, 170))
 
 
 def worst(found, expected):
@@ -124,7 +123,7 @@ def test_the_random_pairs_are_extremal(group):
     # Placed by numpy: a few roundings of lengths near ten.
     assert np.abs(group.witness.residual(group.x, group.q)).max() < 1e-12
     assert np.abs(group.witness.gap(group.x, group.q) - group.gap).max() < 1e-13
-    assert group.gap.min() < -0.01 and group.gap.max() > 0.1 and (group.gap == 0.0).sum() > 10
+    assert group.gap.min() < -0.01 and group.gap.max() > 0.1 and (group.gap == 0.0).sum() > len(group.faces) / 17
 
 
 def test_curve_jacobian_is_the_implicit_derivative(group):
@@ -168,7 +167,7 @@ def test_curve_jacobian_is_the_difference_of_pairs_solved_again(group):
 
 
 def test_curve_gradient_is_the_derivative_of_the_gap(group):
-    columns = [group.witness.gap_rate(group.x, group.q, np.tile(e, (COUNT, 1))) for e in np.eye(14)]
+    columns = [group.witness.gap_rate(group.x, group.q, np.tile(e, (len(group.faces), 1))) for e in np.eye(14)]
     assert worst(each(curve_gap_gradient, group), np.stack(columns, 1)) < 1e-12
 
 
@@ -183,7 +182,7 @@ def curvature(group, twist, step):
 
 
 def test_curve_hessian_is_the_second_derivative_along_any_twist(group):
-    twist = np.random.default_rng(5).normal(size=(COUNT, 12)) / 3.0
+    twist = np.random.default_rng(5).normal(size=(len(group.faces), 12)) / 3.0
     found = np.einsum("ni,nij,nj->n", twist, each(curve_gap_hessian, group), twist)
     expected = curvature(group, twist, steps(group, STEP))
     assert worst(found[:, None], expected[:, None]) < 1e-8
@@ -191,7 +190,7 @@ def test_curve_hessian_is_the_second_derivative_along_any_twist(group):
 
 def test_curve_hessian_entry_by_entry(group):
     # By polarization: e_i H e_j = (Q(e_i + e_j) - Q(e_i) - Q(e_j)) / 2.
-    rows = np.arange(0, COUNT, 34)
+    rows = np.arange(0, len(group.faces), 17 if len(group.faces) < 100 else 34)
     i, j = np.tril_indices(12)
     twist = np.eye(12)[i] + (i != j)[:, None] * np.eye(12)[j]
     many = np.repeat(rows, i.size)
@@ -257,13 +256,13 @@ def random_cases(kind_f, kind_g, count):
 
 
 @pytest.fixture(scope="module", params=KINDS, ids=[f"{NAMES[f]}-{NAMES[g]}" for f, g in KINDS])
-def cases(request):
-    return random_cases(*request.param, 40)
+def pairs(request, cases):
+    return random_cases(*request.param, cases(13, 40))
 
 
-def test_pairs_are_found_from_nearby(cases):
+def test_pairs_are_found_from_nearby(pairs):
     rng = np.random.default_rng(8)
-    for case in cases:
+    for case in pairs:
         start = case.x + 1e-3 / case.speed * rng.uniform(-1.0, 1.0, 4) * case.moves
         status, out = case.packed.solve(case.q, start, case.n)
         assert status == "CONVERGED"
@@ -273,9 +272,9 @@ def test_pairs_are_found_from_nearby(cases):
         assert np.abs(out[NORMAL : NORMAL + 3] - case.n).max() < 1e-12
 
 
-def test_rates_gradient_and_hessian_are_differences_of_pairs_solved_again(cases):
+def test_rates_gradient_and_hessian_are_differences_of_pairs_solved_again(pairs):
     rng = np.random.default_rng(9)
-    for case in cases:
+    for case in pairs:
         rates, gradient, hessian, _error = case.packed.derivatives(case.q, case.x, case.n)
         twist = rng.normal(size=(1, 12)) / 3.0
         step = STEP / (1.0 + np.abs(rates * case.speed[:, None]).max())
@@ -294,10 +293,10 @@ def test_rates_gradient_and_hessian_are_differences_of_pairs_solved_again(cases)
         np.testing.assert_allclose(total, expected, rtol=0.0, atol=1e-8 * scale)
 
 
-def test_hessian_of_every_kind_entry_by_entry(cases):
+def test_hessian_of_every_kind_entry_by_entry(pairs):
     i, j = np.tril_indices(12)
     twists = np.eye(12)[i] + (i != j)[:, None] * np.eye(12)[j]
-    for case in cases[:3]:
+    for case in pairs[:3]:
         rates, _gradient, hessian, _error = case.packed.derivatives(case.q, case.x, case.n)
         step = STEP / (1.0 + np.abs(rates * case.speed[:, None]).max())
         squares = np.zeros(i.size)
@@ -312,10 +311,10 @@ def test_hessian_of_every_kind_entry_by_entry(cases):
         np.testing.assert_array_equal(hessian, hessian.T)
 
 
-def test_swapping_the_bodies_swaps_everything(cases):
+def test_swapping_the_bodies_swaps_everything(pairs):
     parameters, poses = np.r_[2:4, 0:2], np.r_[7:14, 0:7]
     twists = np.r_[6:12, 0:6]
-    for case in cases:
+    for case in pairs:
         other = Packed(case.g, case.f)
         q, x = case.q[poses], case.x[parameters]
         status, out = other.solve(q, x, -case.n)
@@ -331,11 +330,11 @@ def test_swapping_the_bodies_swaps_everything(cases):
         assert worst((rates_2[parameters][:, poses] * scale)[None], (rates * scale)[None]) < 1e-12
 
 
-def test_an_edge_is_proper_where_the_gap_grows_along_it():
+def test_an_edge_is_proper_where_the_gap_grows_along_it(cases):
     # The gap of points of the edge beside the pair, each found again, against what the pair says of itself.
-    step, told = 1e-4, []
+    step, told, count = 1e-4, [], cases(27, 80)
     for kinds in ((FACE, EDGE), (EDGE, FACE)):
-        for case in random_cases(*kinds, 80):
+        for case in random_cases(*kinds, count):
             f, g = (Feature(EDGE_POINT, s.face, s.curve) if s.kind == EDGE else s for s in (case.f, case.g))
             column = 2 * kinds.index(EDGE)
             gaps = []
@@ -357,13 +356,13 @@ def test_an_edge_is_proper_where_the_gap_grows_along_it():
                 proper = bend > 0.0 and (farther > 0.0).all()
                 assert (out[PROPER] == 1.0) == proper
                 told.append(proper)
-    # Of 160: what is left out is flat, next to a center of curvature, or has no foot beside it.
-    assert len(told) > 140 and sum(told) > 40 and len(told) - sum(told) > 40
+    # Of twice the count: what is left out is flat, next to a center of curvature, or has no foot beside it.
+    assert len(told) > 1.75 * count and sum(told) > count / 2 and len(told) - sum(told) > count / 2
 
 
-def test_rigid_motion_of_both_bodies_changes_nothing(cases):
+def test_rigid_motion_of_both_bodies_changes_nothing(pairs):
     rng = np.random.default_rng(7)
-    for case in cases:
+    for case in pairs:
         rates, gradient, _hessian, _error = case.packed.derivatives(case.q, case.x, case.n)
         v, w = rng.normal(size=(2, 3))
         direction = np.zeros(14)

@@ -47,12 +47,12 @@ def intervals(rng, count):
 
 
 @pytest.mark.parametrize("name", ELEMENTARY)
-def test_every_operation_is_enclosed(name):
+def test_every_operation_is_enclosed(name, cases):
     u, v = ca.SX.sym("u"), ca.SX.sym("v")
     function = ca.Function("f", [u, v], [ca.SX.binary(CASADI[f"OP_{name}"], u, v)])
     rng = np.random.default_rng(tape.OPERATIONS.index(name))
     told_of_none = 0
-    for a, b in intervals(rng, 150):
+    for a, b in intervals(rng, cases(50, 150)):
         (lo, hi), told = elementary(name, a, b)
         assert not (math.isnan(lo) or math.isnan(hi)) and lo <= hi
         x, y = rng.uniform(*a, 60), rng.uniform(*b, 60)
@@ -143,8 +143,8 @@ def pieces(curve, rng, count, least=1e-8):
 
 
 @pytest.mark.parametrize("curve", CURVES, ids=repr)
-def test_boxes_of_curves(curve):
-    t0, t1 = pieces(curve, np.random.default_rng(3), 300)
+def test_boxes_of_curves(curve, cases):
+    t0, t1 = pieces(curve, np.random.default_rng(3), cases(100, 300))
     boxes = curve.bounds(t0, t1)
     slow, fast = curve.speed(t0, t1)
     for k in range(len(t0)):
@@ -156,14 +156,14 @@ def test_boxes_of_curves(curve):
 
 
 @pytest.mark.parametrize("k", range(len(FORMULAS)))
-def test_boxes_of_third_derivatives(k):
+def test_boxes_of_third_derivatives(k, cases):
     domain, expression = FORMULAS[k]
     curve = asm.FormulaCurve(expression, T, domain)
     third = expression
     for _ in range(3):
         third = ca.jacobian(third, T)
     function = ca.Function("f", [T], [third])
-    t0, t1 = pieces(curve, np.random.default_rng(4), 200)
+    t0, t1 = pieces(curve, np.random.default_rng(4), cases(70, 200))
     boxes = curve.bounds(t0, t1)[:, 3]
     for i in range(len(t0)):
         values = np.array(function.map(40)(np.clip(np.linspace(t0[i], t1[i], 40), t0[i], t1[i])[None])).T
@@ -181,8 +181,8 @@ def test_boxes_shrink_with_the_square_of_the_interval():
 
 
 @pytest.mark.parametrize("curve", CURVES, ids=repr)
-def test_arc_length_bounds(curve):
-    t0, t1 = pieces(curve, np.random.default_rng(5), 300)
+def test_arc_length_bounds(curve, cases):
+    t0, t1 = pieces(curve, np.random.default_rng(5), cases(100, 300))
     nodes, weights = np.polynomial.legendre.leggauss(24)
     bound = curve.arc_length_bound(t0, t1)
     own = curve.arc_lengths(t0, t1)
@@ -276,11 +276,11 @@ CHOICES += [lambda x, y: ca.logic_and(x, y) - x, lambda x, y: ca.logic_or(x, ca.
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_what_is_made_of_no_value_is_enclosed(seed):
+def test_what_is_made_of_no_value_is_enclosed(seed, cases):
     """fmin(x, NaN) is x, and no comparison with NaN holds: bounds know where a part of a formula may be none."""
     rng = np.random.default_rng(seed)
     looked = 0
-    for _ in range(150):
+    for _ in range(cases(50, 150)):
         inner = [PARTIAL[rng.integers(len(PARTIAL))](rng.normal() + rng.normal() * T) for _ in range(2)]
         first = CHOICES[rng.integers(len(CHOICES))](inner[0], rng.normal() + T)
         expression = CHOICES[rng.integers(len(CHOICES))](first, PARTIAL[rng.integers(len(PARTIAL))](inner[1] + T))

@@ -77,8 +77,8 @@ def test_no_contact_is_missed_doubled_or_made_up(f, g, cases):
     rng = np.random.default_rng([17, PAIRS.index((f, g))])
     errors, motions = Errors.none(), 0
     # More of them where few came near.
-    while motions < cases(3, MOTIONS) or (motions < MOTIONS and errors.contacts <= motions):
-        wander(rng, f, g, int(rng.integers(20, 50)), errors)
+    while motions < cases(2, MOTIONS) or (motions < MOTIONS and errors.contacts <= motions):
+        wander(rng, f, g, int(rng.integers(20, cases(26, 50))), errors)
         motions += 1
     assert (len(errors.missed), len(errors.doubled), len(errors.strange)) == (0, 0, 0)
     # Motions that came near, and were compared.
@@ -139,7 +139,7 @@ def test_a_wire_about_an_ellipsoid(name, cases):
     motions = cases(2, MOTIONS)
     for _ in range(motions):
         watch.forget()
-        for q in around(rng, wire, 30):
+        for q in around(rng, wire, cases(12, 30)):
             listed = watch.look(q)
             gaps, points = minima(wire, q[0], SEMI_AXES, q[1])
             # Feet are found to 1e-10; near a fold of both shapes less is known of where they are.

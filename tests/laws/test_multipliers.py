@@ -25,10 +25,10 @@ def pushing(jacobian, one_sided, residual, active, gradient, exchanges=EXCHANGES
 
 @pytest.mark.parametrize("rank", [2, 3, 6])
 @pytest.mark.parametrize("balanced", [True, False])
-def test_they_leave_as_little_as_by_another_method(rank, balanced):
+def test_they_leave_as_little_as_by_another_method(rank, balanced, cases):
     rng = np.random.default_rng(rank)
     for rows in (3, 12, 30):
-        for _ in range(20):
+        for _ in range(cases(8, 20)):
             # As of rows that hold a plane face: many, of a low rank. Some are two-sided, others too far away.
             jacobian = rng.normal(size=(rows, rank)) @ rng.normal(size=(rank, 6))
             one_sided = (rng.uniform(size=rows) < 0.8).astype(np.int64)

@@ -84,7 +84,7 @@ class Near:
 def test_rows_that_are_not_evaluated_are_open_and_nearly_what_they_would_be(name, minimum, cases):
     rng = np.random.default_rng(4)
     skipped = evaluated = 0
-    count = cases(5, 14)
+    count = cases(2, 14)
     for _ in range(count):
         near = Near(rng, SHAPES[name](), minimum)
         size = 10.0 ** rng.uniform(-3.0, -0.7)

@@ -9,10 +9,14 @@ from assembly.geometry.face import Face
 from assembly.proximity import contact_jacobian, extremal_pair, gap_gradient, gap_hessian
 
 DERIVATIVES = (contact_jacobian, gap_gradient, gap_hessian)
-# Every tenth of the 200 pairs.
-SOME = range(0, 200, 10)
 QUATERNIONS = np.array([3, 4, 5, 6, 10, 11, 12, 13])
 POSITIONS = np.array([0, 1, 2, 7, 8, 9])
+
+
+@pytest.fixture(scope="session")
+def some(group, cases):
+    """Fourteen of the pairs; with ``--long`` twenty."""
+    return range(0, len(group.f), cases(5, 10))
 
 
 def all_of(f, q_f, g, q_g, x):
@@ -27,8 +31,8 @@ def scaled(q, factor_f, factor_g):
 
 
 @pytest.mark.parametrize("factors", [(-1.0, 1.0), (1.0, -1.0), (2.5, 0.4), (-0.125, -8.0)])
-def test_length_and_sign_of_quaternions_mean_nothing(group, factors):
-    for i in SOME:
+def test_length_and_sign_of_quaternions_mean_nothing(group, some, factors):
+    for i in some:
         f, _, g, _ = group.arguments(i)
         q = scaled(group.q[i], *factors)
         start = group.x[i] + 1e-3 / group.speeds()[i]
@@ -47,8 +51,8 @@ def test_length_and_sign_of_quaternions_mean_nothing(group, factors):
             np.testing.assert_allclose(there, here, rtol=0.0, atol=1e-12 * (1.0 + np.abs(here).max()))
 
 
-def test_nothing_changes_along_a_quaternion(group):
-    for i in SOME:
+def test_nothing_changes_along_a_quaternion(group, some):
+    for i in some:
         jacobian, gradient, _ = all_of(*group.arguments(i), group.x[i])
         for k in (3, 10):
             e = group.q[i, k : k + 4]
@@ -62,8 +66,8 @@ def flipped(face):
     return Face(face.surface, reversed=not face.reversed)
 
 
-def test_reversing_f_turns_the_normal_and_the_sign_of_the_gap(group):
-    for i in SOME:
+def test_reversing_f_turns_the_normal_and_the_sign_of_the_gap(group, some):
+    for i in some:
         f, q_f, g, q_g = group.arguments(i)
         a, b = extremal_pair(f, q_f, g, q_g, group.x[i]), extremal_pair(flipped(f), q_f, g, q_g, group.x[i])
         np.testing.assert_allclose(b.parameters, a.parameters, rtol=0.0, atol=1e-12)
@@ -74,8 +78,8 @@ def test_reversing_f_turns_the_normal_and_the_sign_of_the_gap(group):
             np.testing.assert_allclose(two, sign * one, rtol=0.0, atol=1e-12 * (1.0 + np.abs(one).max()))
 
 
-def test_reversing_g_changes_nothing(group):
-    for i in SOME:
+def test_reversing_g_changes_nothing(group, some):
+    for i in some:
         f, q_f, g, q_g = group.arguments(i)
         a, b = extremal_pair(f, q_f, g, q_g, group.x[i]), extremal_pair(f, q_f, flipped(g), q_g, group.x[i])
         assert np.array_equal(a.parameters, b.parameters) and a.gap == b.gap
@@ -85,10 +89,10 @@ def test_reversing_g_changes_nothing(group):
             assert np.array_equal(one, two)
 
 
-def test_swapping_f_and_g(group):
+def test_swapping_f_and_g(group, some):
     """With opposed normals everything is the same in the other order; with equal ones the gap changes its sign."""
     seen = set()
-    for i in SOME:
+    for i in some:
         f, q_f, g, q_g = group.arguments(i)
         x = group.x[i]
         turned = x[[2, 3, 0, 1]]
@@ -115,13 +119,13 @@ def test_swapping_f_and_g(group):
 
 
 @pytest.mark.parametrize("unit", [1e-3, 1e3, 2.0**40])
-def test_units(group, unit):
+def test_units(group, some, unit):
     """The same scene in other units: parameters stay (the knots do), lengths and their rates follow."""
     length = np.ones(14)
     length[POSITIONS] = unit
     twist = np.ones(12)
     twist[[0, 1, 2, 6, 7, 8]] = unit
-    for i in SOME:
+    for i in some:
         f, q_f, g, q_g = group.arguments(i)
         large = [Face(s.surface.transformed(scale=unit), reversed=s.reversed) for s in (f, g)]
         q = group.q[i] * length
@@ -139,9 +143,9 @@ def test_units(group, unit):
             np.testing.assert_allclose(found, one, rtol=0.0, atol=1e-11 * (1.0 + np.abs(one).max()))
 
 
-def test_offset(group):
+def test_offset(group, some):
     """A scene 131072 lengths away is the same scene to the last bit, where the sums of positions are exact."""
-    for i in SOME:
+    for i in some:
         f, q_f, g, q_g = group.arguments(i)
         near = group.q[i].copy()
         near[POSITIONS] = np.round(near[POSITIONS] * 2.0**20) / 2.0**20

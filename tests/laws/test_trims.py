@@ -25,14 +25,14 @@ def piece_rows(face):
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_sides_are_those_of_another_winding_number(seed):
+def test_sides_are_those_of_another_winding_number(seed, cases):
     rng = np.random.default_rng(seed)
     face = random_face(rng, PLANE)
-    u, v = rng.uniform(-4.9, 4.9, (2, 3000))
+    u, v = rng.uniform(-4.9, 4.9, (2, cases(1000, 3000)))
     winding = sum(polygon_winding(dense(curve), u, v) for curve in face.boundary)
     # A chord of these polygons is less than 0.005 from its arc.
     clear = np.abs(face.trim_distance(u, v)) > 0.005
-    assert clear.sum() > 2900
+    assert clear.mean() > 2900 / 3000
     np.testing.assert_array_equal(face.locate(u, v)[clear], np.where(winding == 1, 1, -1)[clear])
 
 
@@ -57,10 +57,10 @@ def test_sides_and_distances_beside_the_curves(seed):
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_no_sample_is_nearer_than_the_nearest_point(seed):
+def test_no_sample_is_nearer_than_the_nearest_point(seed, cases):
     rng = np.random.default_rng(seed)
     face = random_face(rng, PLANE)
-    u, v = rng.uniform(-5, 5, (2, 400))
+    u, v = rng.uniform(-5, 5, (2, cases(130, 400)))
     near = face.nearest_on_boundary(u, v)
     np.testing.assert_array_equal(np.sign(near.distance), face.locate(u, v))
     foot = np.array([face.boundary[k].evaluate(t) for k, t in zip(near.curve, near.t, strict=True)])

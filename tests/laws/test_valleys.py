@@ -108,10 +108,10 @@ def test_a_patch_is_not_left():
     [asm.shapes.sphere(0.5), asm.shapes.box(0.5, 0.4, 0.3), asm.shapes.ellipsoid(0.5, 0.4, 0.3)],
     ids=["ball", "box", "ellipsoid"],
 )
-def test_no_valley_where_nothing_or_everything_is_level(shape):
+def test_no_valley_where_nothing_or_everything_is_level(shape, cases):
     table, pool, top, others, scale = packed_faces(shape)
     rng = np.random.default_rng(4)
-    for _ in range(20):
+    for _ in range(cases(7, 20)):
         turn, shift = tilted(rng, 0.1, scale)
         for other in others:
             x = lowest_start(table, pool, other, turn, shift)
