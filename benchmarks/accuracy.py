@@ -111,7 +111,7 @@ def _clearances(count: int) -> tuple[Array, int]:
 
 def rows(quick: bool) -> list[dict[str, Any]]:
     """A row a pair of shapes and gap, and a constraint: samples, converged, median and worst error."""
-    count = 5 if quick else 200
+    count = 2 if quick else 200
     shapes = list(_shapes().items())
     found = []
     for i, (one, f) in enumerate(shapes):

@@ -155,7 +155,7 @@ def run(quick: bool) -> dict[str, Any]:
         lines.setdefault(name, []).append(point)
         found[name] = (int(good.sum()), *point)
 
-    few = min(count, 4)
+    few = 1 if quick else min(count, 4)
     for tolerance in tolerances:
         take("ours", tolerance, ours, count)
         for name, kind in (("IPOPT, exact", "exact"), ("IPOPT, L-BFGS", "limited-memory")):

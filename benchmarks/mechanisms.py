@@ -322,7 +322,7 @@ def run(quick: bool) -> dict[str, Any]:
             *boxes(quick),
             *freedoms(quick),
             *dexterity(quick),
-            *contradictions(48 if quick else 1000),
+            *contradictions(12 if quick else 1000),
             *agreement(),
         ],
     }

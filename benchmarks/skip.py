@@ -134,7 +134,7 @@ def _ticks(quick: bool) -> list[dict[str, Any]]:
             chain.add(wire)
         trackers.append(chain.tracker(follow=chain.body("blue").point(*module.END)))
     begin = asm.Pose(trackers[0].q[2, :3], trackers[0].q[2, 3:]).apply(module.END)
-    seconds = np.empty((200 if quick else 5_000, 2))
+    seconds = np.empty((50 if quick else 5_000, 2))
     for k in range(len(seconds)):
         angle = 4e-3 * np.pi * k
         target = begin + 0.3 * np.array([np.cos(angle) - 1.0, np.sin(angle), 0.0])
@@ -180,7 +180,7 @@ def process(code: str) -> tuple[float, float, list[str]]:
 
 def _processes(quick: bool) -> list[dict[str, Any]]:
     bare = process("pass")
-    alone = [process("import assembly") for _ in range(2 if quick else 9)]
+    alone = [process("import assembly") for _ in range(1 if quick else 9)]
     figures = [
         figure("`import assembly`", "seconds", statistics.median(row[0] for row in alone)),
         figure("`import assembly`: heavy modules it leaves alone", "count", len(HEAVY) - len(alone[0][2]),

@@ -183,15 +183,15 @@ def manager_of_rings(steps: int) -> list[dict[str, Any]]:
 
 def run(quick: bool, ticks: int | None = None) -> dict[str, Any]:
     """Times, counts and violations; fewer ticks where it is told."""
-    count = 6 if quick else 50
+    count = 2 if quick else 50
     return {
         "about": ABOUT,
         "figures": [
-            *ticks_of_clips(ticks or (2_000 if quick else 100_000), None),
-            *ticks_of_clips(ticks or (2_000 if quick else 100_000), BUDGET),
-            *drift(20_000 if quick else ticks or 1_000_000),
+            *ticks_of_clips(ticks or (500 if quick else 100_000), None),
+            *ticks_of_clips(ticks or (500 if quick else 100_000), BUDGET),
+            *drift(4_000 if quick else ticks or 1_000_000),
             *kept_apart(count, "near", NEAR, count),
             *kept_apart(count, "out of reach", TAUT, count),
-            *manager_of_rings(500 if quick else 5_000),
+            *manager_of_rings(100 if quick else 5_000),
         ],
     }

@@ -211,7 +211,7 @@ def _clips(quick: bool) -> list[dict[str, Any]]:
 
 def run(quick: bool) -> dict[str, Any]:
     """Times, counts and violations."""
-    wires = linked_wires(8 if quick else 50)
+    wires = linked_wires(3 if quick else 50)
     scene, objective = wires.scene, wires.objective
     assert objective is not None
     near = wires.targets(0.3)

@@ -115,12 +115,12 @@ def test_circles_have_the_distance_of_another_search():
 
 
 @pytest.mark.parametrize(("f", "g"), PAIRS)
-def test_nothing_is_missed_or_doubled(f, g):
+def test_nothing_is_missed_or_doubled(f, g, cases):
     (a, _, extent), (b, _, _) = SHAPES[f], SHAPES[g]
     rng = np.random.default_rng(4)
     oracle = WireOracle([a, b])
     kinds = set()
-    for _ in range(200):
+    for _ in range(cases(70, 200)):
         # Raises where the sum over minima, saddles and maxima is wrong.
         kinds.update(oracle.extrema(poses(rng, 2, extent)).index)
     assert kinds == ({0, 1} if "ball" in (f, g) else {0, 1, 2})
@@ -137,11 +137,11 @@ def test_a_lost_and_a_doubled_extremum_are_noticed(monkeypatch):
 
 
 @pytest.mark.parametrize(("f", "g"), [("torus", "wide torus"), ("clip", "clip"), ("hook", "ring")])
-def test_minima_are_those_that_descents_reach(f, g):
+def test_minima_are_those_that_descents_reach(f, g, cases):
     (a, _, extent), (b, _, _) = SHAPES[f], SHAPES[g]
     rng = np.random.default_rng(6)
     oracle = WireOracle([a, b])
-    for _ in range(3):
+    for _ in range(cases(1, 3)):
         q = poses(rng, 2, 0.7 * extent)
         found = oracle.minima(q)
         curves = [_curve(wire, pose) for wire, pose in zip((a, b), q, strict=True)]
@@ -218,11 +218,11 @@ def test_gaps_are_those_of_each_pair():
         oracle.gaps(q[:3])
 
 
-def test_linking_numbers():
+def test_linking_numbers(cases):
     rng = np.random.default_rng(9)
     oracle = WireOracle([torus_wire(1.0, 0.1)] * 2)
     numbers = []
-    for _ in range(200):
+    for _ in range(cases(70, 200)):
         q = poses(rng, 2, 1.2)
         if oracle.deepest(q) < -0.19:
             continue

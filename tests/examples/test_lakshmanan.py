@@ -100,12 +100,12 @@ def test_splits_of_table_2(run):
     assert all(n <= most for n, most in zip(polished, (10, 10, 25, 20, 30, 45), strict=True)), polished
 
 
-def test_figure_12(run):
+def test_figure_12(run, cases):
     result = run.replanning
     assert result.free.sum() + result.near.sum() + result.hit.sum() == 500
     assert min(result.free.sum(), result.near.sum(), result.hit.sum()) > 5
     shapes = run.module.obstacles()
     # None missed: whatever dense sampling finds inside is among those that collide; sampling as in practice is not.
-    dense = run.module.sampled(result.curves, shapes, 4000)
+    dense = run.module.sampled(result.curves, shapes, cases(1000, 4000))
     assert not (dense & ~result.hit).any() and (result.hit & ~dense).sum() <= 2
     assert run.missed.sum() > 0

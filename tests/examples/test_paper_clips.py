@@ -40,8 +40,8 @@ def center_line(t):
 
 
 def nearest(pose_a, pose_b):
-    """Smallest distance of two center lines: samples 0.05 apart, and the ten closest stretches again, finer."""
-    t = np.linspace(0.0, 1.0, 2000)
+    """Smallest distance of two center lines: samples 0.1 apart, and the ten closest stretches again, finer."""
+    t = np.linspace(0.0, 1.0, 1000)
     line = center_line(t)
 
     def distances(s, t):
@@ -53,7 +53,7 @@ def nearest(pose_a, pose_b):
     # Every sample that is closer than those around it.
     inner = np.pad(rough, 1, constant_values=np.inf)
     around = np.min(
-        [inner[1 + i : 2001 + i, 1 + j : 2001 + j] for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j], axis=0
+        [inner[1 + i : 1001 + i, 1 + j : 1001 + j] for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j], axis=0
     )
     best = []
     closest = sorted(np.argwhere(rough <= around), key=lambda k: rough[tuple(k)])[:10]

@@ -2,51 +2,118 @@
 
 from __future__ import annotations
 
+import base64
+import json
+import os
+import select
 import shutil
 import struct
 import subprocess
 import sys
 import tempfile
 import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+# Network addresses do not resolve for it. It reads what it is told from file 3 and answers into file 4.
 FLAGS = (
     "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
     "--disable-component-update --disable-sync --disable-extensions --disable-dev-shm-usage --hide-scrollbars "
-    "--use-angle=swiftshader --enable-unsafe-swiftshader --virtual-time-budget=4000"
-).split()
+    "--use-angle=swiftshader --enable-unsafe-swiftshader --remote-debugging-pipe"
+).split() + ["--host-resolver-rules=MAP * ~NOTFOUND"]
 # The viewer's menu is no part of a picture.
 NO_MENU = "<style>.dg { display: none }</style></head>"
+# Virtual milliseconds that a page has before it is looked at, and seconds that an answer may take.
+BUDGET, PATIENCE = 2000, 120.0
 
 
-def _run(page: Path, fragment: str, script: str, *options: str) -> subprocess.CompletedProcess[str]:
-    """Open a page at a fragment, `#...`, with a script at its end; network addresses do not resolve for it."""
-    assert BROWSER is not None
-    with tempfile.TemporaryDirectory() as folder:
-        bare = Path(folder, "page.html")
+class Chromium:
+    """One process for all pages, which takes longer to start than to show a page."""
+
+    def __init__(self, folder: Path) -> None:
+        assert BROWSER is not None
+        self._folder = folder
+        self._count, self._rest, self._events = 0, b"", []
+        read, self._questions = os.pipe()
+        self._answers, write = os.pipe()
+        command = ["sh", "-c", f'exec "$0" "$@" 3</dev/fd/{read} 4>/dev/fd/{write}', BROWSER]
+        command += [*FLAGS, f"--user-data-dir={folder}"]
+        null = subprocess.DEVNULL
+        self._process = subprocess.Popen(command, pass_fds=(read, write), stdin=null, stdout=null, stderr=null)
+        os.close(read)
+        os.close(write)
+
+    def close(self) -> None:
+        """End the process."""
+        self._ask("Browser.close")
+        self._process.wait(PATIENCE)
+        os.close(self._questions)
+        os.close(self._answers)
+
+    def _next(self) -> dict[str, Any]:
+        """What it says next: an answer or an event."""
+        while b"\0" not in self._rest:
+            assert select.select([self._answers], [], [], PATIENCE)[0], f"no answer in {PATIENCE:g} seconds"
+            data = os.read(self._answers, 1 << 20)
+            assert data, "Chromium ended"
+            self._rest += data
+        message, _, self._rest = self._rest.partition(b"\0")
+        return json.loads(message)
+
+    def _ask(self, method: str, session: str | None = None, **parameters: Any) -> dict[str, Any]:
+        """The result of a method of Chromium's protocol."""
+        self._count += 1
+        question = {"id": self._count, "method": method, "params": parameters}
+        if session is not None:
+            question["sessionId"] = session
+        os.write(self._questions, json.dumps(question).encode() + b"\0")
+        self._events.clear()
+        while (answer := self._next()).get("id") != self._count:
+            self._events.append(answer.get("method"))
+        assert "error" not in answer, answer
+        return answer["result"]
+
+    @contextmanager
+    def _opened(self, page: Path, fragment: str, script: str, width: int, height: int, scale: float) -> Iterator[str]:
+        """The session of a page at a fragment, `#...`, with a script at its end, after its virtual time."""
+        bare = self._folder / "page.html"
         text = page.read_text(encoding="utf-8").replace("</head>", NO_MENU, 1)
         bare.write_text(text.replace("</body>", f"<script>{script}</script></body>"), encoding="utf-8")
-        command = [BROWSER, *FLAGS, f"--user-data-dir={folder}/profile", "--host-resolver-rules=MAP * ~NOTFOUND"]
-        command += [*options, bare.as_uri() + fragment]
-        return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+        target = self._ask("Target.createTarget", url="about:blank")["targetId"]
+        session = self._ask("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+        size = {"width": width, "height": height, "deviceScaleFactor": scale, "mobile": False}
+        self._ask("Emulation.setDeviceMetricsOverride", session, **size)
+        self._ask("Page.enable", session)
+        self._ask("Page.navigate", session, url=bare.as_uri() + fragment)
+        self._wait("Page.loadEventFired")
+        self._ask("Emulation.setVirtualTimePolicy", session, policy="pauseIfNetworkFetchesPending", budget=BUDGET)
+        self._wait("Emulation.virtualTimeBudgetExpired")
+        yield session
+        self._ask("Target.closeTarget", targetId=target)
 
+    def _wait(self, event: str) -> None:
+        """Until an event has come, which may have been before the answer to what was asked last."""
+        while event not in self._events:
+            self._events.append(self._next().get("method"))
 
-def photograph(
-    page: Path, picture: Path, width: int = 700, height: int = 500, scale: float = 1.0, fragment: str = ""
-) -> None:
-    """Write a PNG of a page."""
-    size = (f"--window-size={width},{height}", f"--force-device-scale-factor={scale}")
-    done = _run(page, fragment, "", *size, f"--screenshot={picture.absolute()}")
-    assert picture.is_file(), done.stderr
+    def photograph(
+        self, page: Path, picture: Path, width: int = 700, height: int = 500, scale: float = 1.0, fragment: str = ""
+    ) -> None:
+        """Write a PNG of a page."""
+        with self._opened(page, fragment, "", width, height, scale) as session:
+            # Larger files whose rows are quick to decode.
+            found = self._ask("Page.captureScreenshot", session, format="png", optimizeForSpeed=True)
+        picture.write_bytes(base64.b64decode(found["data"]))
 
-
-def title_after(page: Path, script: str, fragment: str = "") -> str:
-    """The title that a script gives a page within the time of a picture."""
-    done = _run(page, fragment, script, "--dump-dom")
-    return done.stdout.partition("<title>")[2].partition("</title>")[0]
+    def title_after(self, page: Path, script: str, fragment: str = "") -> str:
+        """The title that a script gives a page within the time of a picture."""
+        with self._opened(page, fragment, script, 700, 500, 1.0) as session:
+            return self._ask("Runtime.evaluate", session, expression="document.title")["result"]["value"]
 
 
 def decoded(picture: Path) -> np.ndarray:
@@ -89,4 +156,7 @@ def decoded(picture: Path) -> np.ndarray:
 if __name__ == "__main__":
     # python tests/view/chromium.py page.html picture.png [width height [scale [#frame=12]]]
     numbers = (*map(int, sys.argv[3:5]), *map(float, sys.argv[5:6]))
-    photograph(Path(sys.argv[1]), Path(sys.argv[2]), *numbers, fragment="".join(sys.argv[6:7]))
+    with tempfile.TemporaryDirectory() as place:
+        chromium = Chromium(Path(place))
+        chromium.photograph(Path(sys.argv[1]), Path(sys.argv[2]), *numbers, fragment="".join(sys.argv[6:7]))
+        chromium.close()

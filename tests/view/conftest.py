@@ -9,14 +9,17 @@ import pytest
 
 import assembly as asm
 from assembly.constraints.joints import Revolute, Spherical, Universal
-from tests.view.chromium import BROWSER, decoded, photograph
+from tests.view.chromium import BROWSER, Chromium, decoded
 
 
-@pytest.fixture
-def browser():
-    """Skip where there is no Chromium."""
+@pytest.fixture(scope="session")
+def browser(tmp_path_factory):
+    """A Chromium for all pages; skip where there is none."""
     if BROWSER is None:
         pytest.skip("no Chromium in the path")
+    chromium = Chromium(tmp_path_factory.mktemp("chromium"))
+    yield chromium
+    chromium.close()
 
 
 @pytest.fixture
@@ -24,7 +27,7 @@ def photo(browser, tmp_path):
     """Pixels (height, width, 3) of a page in Chromium."""
 
     def take(page: Path, width: int = 420, height: int = 300, fragment: str = "") -> np.ndarray:
-        photograph(page, tmp_path / "photo.png", width, height, fragment=fragment)
+        browser.photograph(page, tmp_path / "photo.png", width, height, fragment=fragment)
         return decoded(tmp_path / "photo.png")
 
     return take

@@ -13,7 +13,6 @@ from assembly.kinematics.ellipsoid import Ellipsoid
 from assembly.view import browser
 from assembly.view.commands import ROOT, commands, motion
 from assembly.view.picture import draw, film
-from tests.view.chromium import title_after
 from tests.view.test_page import drawn
 
 
@@ -205,7 +204,7 @@ const later = action => new Promise(done => setTimeout(() => { show(); action();
 
 def test_play_pause_slider_and_loop(balls, rolling, browser, tmp_path):
     asm.view.animate(balls, rolling, tmp_path / "roll.html", seconds=100.0)
-    log = json.loads(title_after(tmp_path / "roll.html", CONTROLS))
+    log = json.loads(browser.title_after(tmp_path / "roll.html", CONTROLS))
     playing, time, frame, loop = map(list, zip(*log, strict=True))
     assert playing == [True, False, False, False, True, True, True, True]
     # It plays, stands still when paused, goes where the slider is, and on from there.
@@ -224,7 +223,7 @@ setTimeout(() => { document.title = JSON.stringify([animator.playing, animator.t
 @pytest.mark.parametrize("loop", [False, True])
 def test_a_motion_ends_unless_it_loops(balls, rolling, browser, tmp_path, loop):
     asm.view.animate(balls, rolling, tmp_path / "roll.html", seconds=0.5, loop=loop)
-    playing, time = json.loads(title_after(tmp_path / "roll.html", ONCE))
+    playing, time = json.loads(browser.title_after(tmp_path / "roll.html", ONCE))
     assert playing == loop
     assert 0.0 <= time <= 0.5 and (loop or time == 0.5)
 
@@ -285,6 +284,6 @@ def test_a_window_plays_until_it_shows_something_else(balls, rolling, stopped, c
     (tmp_path / "moving.html").write_text(window.static_html(), encoding="utf-8")
     assert asm.view.show(balls).window is window.window
     (tmp_path / "still.html").write_text(window.static_html(), encoding="utf-8")
-    request.getfixturevalue("browser")
+    title_after = request.getfixturevalue("browser").title_after
     assert json.loads(title_after(tmp_path / "moving.html", LENGTH)) == [2.5, 4]
     assert json.loads(title_after(tmp_path / "still.html", LENGTH)) == [0, 0]

@@ -15,7 +15,6 @@ import assembly as asm
 from assembly.errors import InputError
 from assembly.tracking.log import LoggedEvent
 from assembly.view.picture import film
-from tests.view.chromium import title_after
 from tests.view.test_page import drawn
 
 
@@ -126,7 +125,7 @@ setTimeout(() => {
 def test_a_browser_shows_the_poses_and_the_events(balls, log, browser, tmp_path):
     page = tmp_path / "replay.html"
     assert asm.view.replay(balls, log, page, frames=101, direction=(0, -1, 0.2)) is None
-    errors, first, second = json.loads(unescape(title_after(page, LOOK, "#frame=50")))
+    errors, first, second = json.loads(unescape(browser.title_after(page, LOOK, "#frame=50")))
     assert errors == []
     # Frame 50 is the middle of the log, tick 200; the second event is in tick 350, between two frames.
     for (red, blue, frame, clock, events), tick, label, ahead in (
