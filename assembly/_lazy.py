@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Callable, Mapping
 from importlib import import_module
+
+# When the library was imported first, in seconds since the epoch: `assembly/__init__.py` imports this file.
+IMPORTED_AT = time.time()
 
 
 def lazy_names(

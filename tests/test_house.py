@@ -142,6 +142,19 @@ def test_the_stamp_of_the_cache_sees_all_imports(path):
 
 
 @pytest.mark.parametrize("path", KERNEL_FILES, ids=lambda p: p.relative_to(PACKAGE).as_posix())
+def test_kernels_import_by_statements_that_the_stamp_reads(path):
+    # Names from modules, at the top of the file; of other libraries nothing that an edit of this one changes.
+    tree = ast.parse(path.read_text())
+    imports = [node for node in ast.walk(tree) if isinstance(node, (ast.Import, ast.ImportFrom))]
+    assert all(node in tree.body for node in imports)
+    for node in imports:
+        if isinstance(node, ast.Import):
+            assert {alias.name.partition(".")[0] for alias in node.names} <= {"math", "numpy"}
+        elif node.module.partition(".")[0] == "assembly":
+            assert node.module == "assembly._kernel" or source_of(node.module), "only `from module import name`"
+
+
+@pytest.mark.parametrize("path", KERNEL_FILES, ids=lambda p: p.relative_to(PACKAGE).as_posix())
 def test_kernels_reach_no_objects(path):
     # An entry is compiled again after an edit of any file that its module reaches: these are kernels and constants.
     door = PACKAGE / "_kernel"

@@ -18,7 +18,7 @@ from assembly._kernel import kernel
 
 KERNEL = Path(__file__).resolve().parent.parent / "assembly" / "_kernel"
 FILES = {
-    "__init__.py": "",
+    "__init__.py": "from small import _lazy\n",
     "constants.py": "FACTOR = 2.0\n",
     "callee.py": """
 from small._kernel import kernel
@@ -95,8 +95,9 @@ class Package:
         for name, text in FILES.items():
             (self.folder / name).write_text(text)
         shutil.copytree(KERNEL, self.folder / "_kernel", ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copy(KERNEL.with_name("_lazy.py"), self.folder)
         for path in (self.folder / "_kernel").iterdir():
-            path.write_text(path.read_text().replace("from assembly._kernel", "from small._kernel"))
+            path.write_text(path.read_text().replace("from assembly.", "from small."))
         self.cache = folder / "cache"
         self._run_python = run_python
 
@@ -235,13 +236,78 @@ def test_an_edit_that_is_undone_finds_the_old_entry(compiled):
     assert compiled.call() == (8.0, 1, 0, compiled.found)
 
 
-def test_what_counts_is_what_was_imported(compiled):
-    # The file changes between the import and the first call: the old code must not be kept under the new name.
-    code = CALL.replace("answer =", "edit()\nanswer =")
-    path = compiled.folder / "constants.py"
-    begin = f"from pathlib import Path\nedit = lambda: Path({str(path)!r}).write_text('FACTOR = 5.0')\n"
-    assert compiled.run(begin + code).startswith("8.0|1|0|")
+# Code that writes a file of the package while a process runs.
+EDIT = """
+from pathlib import Path
+import small
+def edit(name, text):
+    (Path(small.__file__).parent / name).write_text(text)
+"""
+
+
+@pytest.mark.parametrize(
+    "before",
+    [
+        # After all is imported; and between the imports of a constant and of the kernel that holds it.
+        "from small.caller import outer; edit('constants.py', 'FACTOR = 5.0')",
+        "import small.constants; edit('constants.py', 'FACTOR = 5.0')",
+    ],
+)
+def test_of_a_file_that_changes_while_a_process_runs_nothing_is_kept_or_found(compiled, before):
+    assert compiled.run(EDIT + before + CALL).startswith("8.0|0|1|")
     assert compiled.call()[:3] == (20.0, 0, 1)
+
+
+def test_kernels_that_differ_in_what_a_factory_gives_them_have_entries_of_their_own(package):
+    (package.folder / "several.py").write_text("""
+from small._kernel import kernel
+from small.driver import twice
+def exactly(exact):
+    @kernel(exact=exact)
+    def rest(x, y):
+        return x * y - (x * y)
+    return rest
+def part(constant):
+    def step(x, y=constant):
+        return x + y
+    return kernel(step, inner=True)
+def step(x):
+    return x + 5.0
+first = twice(kernel(step, inner=True))
+def step(x):
+    return x + 7.0
+second = twice(kernel(step, inner=True))
+def pair(a, b, c):
+    @kernel
+    def of_three(x):
+        return a * x * x + b * x + c
+    return of_three
+""")
+    code = """
+from small._kernel import kernel
+from small.several import first, second, twice, pair, part, exactly
+print(first(1.0), second(1.0), twice(part(5.0))(1.0), twice(part(7.0))(1.0), pair(1, 2, 1)(2.0), pair(1, 2, 2)(2.0))
+print(exactly(True).stats.cache_path is not None, exactly(True)(0.1, 0.1))
+paths = {made._cache._stamp for made in (exactly(True), exactly(False))}
+print(len(paths))
+"""
+    for _ in range(2):
+        lines = package.run(code).splitlines()
+        assert lines[0] == "11.0 15.0 11.0 15.0 9.0 10.0"
+        assert lines[2] == "2"
+
+
+def test_kernels_that_call_each_other_can_be_made_by_a_factory(package):
+    (package.folder / "recursive.py").write_text("""
+from small._kernel import kernel
+def made():
+    @kernel
+    def even(n):
+        return True if n == 0 else not even(n - 1)
+    return even
+""")
+    code = "from small.recursive import made\nmade()(6)\nprint(made()(7))"
+    assert package.run(code).splitlines()[0] == "False"
 
 
 def test_settings_that_change_the_code_have_their_own_folder(compiled):
@@ -381,6 +447,110 @@ def test_a_kernel_tied_to_this_process_is_not_cached(package):
         output = package.run()
         assert output.startswith("8.0|0|1|")
         assert "outer uses an address or a large global array and is not cached" in output
+
+
+# Whatever calls an inner kernel: a user's function, one of those that an entry calls, a function of Numba's.
+AROUND = """
+from numba import njit
+from small._kernel import kernel
+from small._kernel.overloads import make_callable
+from small.nested import inside, outside
+make_callable()
+@njit
+def mine(x):
+    return outside(x) + 1.0
+@kernel
+def through_mine(x):
+    return -mine(x)
+@kernel
+def mapped(n):
+    total = 0.0
+    for y in map(outside, range(n)):
+        total += y
+    return total
+print(through_mine(3.0), mapped(3), mine(3.0))
+"""
+
+
+def test_an_inner_kernel_can_be_called_by_others_than_entries(package):
+    (package.folder / "nested.py").write_text("""
+from small._kernel import kernel
+@kernel(inner=True)
+def inside(x):
+    return x + 1.0
+@kernel(inner=True)
+def outside(x):
+    return inside(x) * 2.0
+""")
+    assert package.run(AROUND).splitlines()[0] == "-9.0 12.0 9.0"
+
+
+def test_what_is_changed_to_compile_is_changed_back(package):
+    code = """
+import gc
+from numba.core import event
+from small._kernel import kernel
+from small.caller import outer
+@kernel
+def broken(x):
+    return x.nothing
+timer = event.install_timer
+outer(1.0)
+print(gc.isenabled(), event.install_timer is timer)
+try:
+    broken(1.0)
+except Exception:
+    print(gc.isenabled(), event.install_timer is timer)
+gc.disable()
+outer(1)
+print(gc.isenabled())
+"""
+    assert package.run(code).split()[:5] == ["True", "True", "True", "True", "False"]
+
+
+def test_what_an_entry_calls_is_linked_as_its_own(package):
+    code = """
+from small.caller import outer
+outer(3.0)
+(compiled,) = outer.overloads.values()
+functions = {f.name: f.linkage.name for f in compiled.library.get_defined_functions()}
+names = compiled.fndesc
+own = {names.llvm_func_name, names.llvm_cpython_wrapper_name, names.llvm_cfunc_wrapper_name}
+print({linkage for name, linkage in functions.items() if name not in own} <= {"internal"}, own <= {*functions})
+"""
+    assert package.run(code).splitlines()[0] == "True True"
+
+
+def test_what_cannot_be_dropped_stops_nothing(compiled):
+    (first,) = [p for p in compiled.entries(compiled.found) if "outer" in p.name]
+    for k in range(5):
+        first.with_name(first.name[:-16] + f"{k:016d}").mkdir()
+    compiled.edit("caller.py", "from small._kernel", "\nfrom small._kernel")
+    assert compiled.call()[:3] == (8.0, 0, 1)
+
+
+def test_what_a_process_that_ended_left_is_dropped(compiled):
+    left, young = compiled.found / "unfinished-old", compiled.found / "unfinished-young"
+    for path in (left, young):
+        path.write_bytes(b"")
+    os.utime(left, (1000.0, 1000.0))
+    compiled.edit("caller.py", "from small._kernel", "\nfrom small._kernel")
+    compiled.call()
+    assert (left.exists(), young.exists()) == (False, True)
+
+
+def test_a_folder_that_cannot_be_written_to_is_read(folders, monkeypatch):
+    users = folders._user_folder() / folders._toolchain()
+    users.mkdir(parents=True)
+    monkeypatch.setattr(folders, "_writable_folder", lambda _: None)
+    assert folders.folders_to_read.__wrapped__() == (users,)
+
+
+def test_folders_do_not_depend_on_where_a_process_stands(folders, monkeypatch):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", "some/where")
+    assert folders._user_folder() == Path.cwd() / "some" / "where" / "assembly"
+    monkeypatch.setenv("NUMBA_CACHE_DIR", "~/kept")
+    assert folders._user_folder() == Path.home() / "kept" / "assembly"
 
 
 def test_compiling_is_logged_once_and_loading_is_not(package):

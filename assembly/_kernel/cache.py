@@ -14,8 +14,9 @@ import logging
 import os
 import pickle
 import tempfile
+import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from types import FunctionType
 from typing import Any
@@ -26,7 +27,8 @@ from numba.core.compiler import CompileResult
 from numba.core.runtime import rtsys
 from numba.core.sigutils import normalize_signature
 
-from assembly._kernel.sources import source_stamp
+from assembly._kernel.folders import entry_folder, folders_to_read
+from assembly._kernel.sources import closure_of, source_stamp
 from assembly._kernel.targets import Target, own_target, targets_that_run
 
 __all__ = ["EntryCache", "NoCache", "read_entry"]
@@ -36,17 +38,15 @@ _CHECKSUM = hashlib.sha256().digest_size
 _HASH_LENGTH = 16
 # So many states of the sources are kept of every signature, those used last: branches that one goes between.
 _STATES_KEPT = 4
+# Files of this name that are older than so many seconds were left by a process that was ended.
+_UNFINISHED, _ENDED = "unfinished-", 3600.0
 
 
 def _description(value: object) -> object:
-    """What a kernel made by a factory closes over: of functions their names, as the stamp has their sources."""
-    function = getattr(value, "py_func", value)
-    if isinstance(function, FunctionType):
-        cells = function.__closure__ or ()
-        # A function that calls itself closes over itself.
-        held = [cell.cell_contents for cell in cells if getattr(cell.cell_contents, "py_func", None) is not function]
-        return function.__module__, function.__qualname__, [_description(part) for part in held]
-    return [_description(part) for part in value] if isinstance(value, tuple) else serialize.dumps(value)
+    """What a kernel made by a factory closes over: functions by name, as the stamp has their sources."""
+    if isinstance(value, FunctionType):
+        return value.__module__, value.__qualname__
+    return (type(value), len(value)) if isinstance(value, tuple) else serialize.dumps(value)
 
 
 def read_entry(path: Path) -> bytes:
@@ -73,15 +73,14 @@ class EntryCache(caching._Cache):
     # What a loaded entry holds of its code for others to link to: nothing, until one does.
     _no_code = b""
 
-    def __init__(self, function: FunctionType, folder: Path, prepare: Callable[[], None]) -> None:
+    def __init__(self, function: FunctionType, prepare: Callable[[], None]) -> None:
         self._function = function
-        self._folder = folder
         self._prepare = prepare
         self._title = f"{function.__module__}.{function.__qualname__}".replace("<", "").replace(">", "")
 
     @property
     def cache_path(self) -> str:
-        return str(self._folder)
+        return str(entry_folder() or "")
 
     def enable(self) -> None:
         """Nothing to do: whether a kernel is cached is decided when it is made."""
@@ -90,12 +89,16 @@ class EntryCache(caching._Cache):
         """Nothing to do, as in `enable`."""
 
     def flush(self) -> None:
-        for path in self._folder.glob(f"{self._title}-*"):
-            path.unlink(missing_ok=True)
+        folder = entry_folder()
+        for path in folder.glob(f"{self._title}-*") if folder else ():
+            with contextlib.suppress(OSError):
+                path.unlink()
 
-    def path(self, sig: Any, target: Target) -> Path | None:
-        """Where the entry of a signature for a target is kept, if it can be."""
-        return None if self._stamp is None else self._folder / f"{self._variant(sig, target)}-{self._stamp}"
+    def paths(self, sig: Any, target: Target) -> list[Path]:
+        """Where the entry of a signature for a target may be."""
+        if self._stamp is None:
+            return []
+        return [folder / f"{self._variant(sig, target)}-{self._stamp}" for folder in folders_to_read()]
 
     @functools.cached_property
     def _stamp(self) -> str | None:
@@ -104,17 +107,16 @@ class EntryCache(caching._Cache):
 
     def _variant(self, sig: Any, target: Target) -> str:
         """What tells entries of one function apart: types of arguments, processor, what it closes over."""
-        key = repr((normalize_signature(sig), target, _description(self._function))).encode()
+        closed_over = [_description(value) for value in closure_of(self._function)]
+        key = repr((normalize_signature(sig), target, closed_over)).encode()
         return f"{self._title}-{hashlib.sha256(key).hexdigest()[:_HASH_LENGTH]}"
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         # What machine code calls is there then; all else that Numba's own cache has loaded is for who compiles.
         rtsys.initialize(target_context)
-        for target in targets_that_run():
-            path = self.path(sig, target)
+        for path in (path for target in targets_that_run() for path in self.paths(sig, target)):
             try:
-                if path is not None:
-                    return self._load(path, target_context)
+                return self._load(path, target_context)
             except FileNotFoundError:
                 continue
             except Exception as error:  # loading is a shortcut: nothing that goes wrong in it may stop a solve
@@ -123,7 +125,7 @@ class EntryCache(caching._Cache):
         else:
             if not EntryCache._announced:
                 EntryCache._announced = True
-                _LOG.warning("compiling kernels, which may take a minute, once; kept in %s", self._folder)
+                _LOG.warning("compiling kernels, which may take a minute, once; kept in %s", entry_folder())
         self._prepare()
         return None
 
@@ -150,34 +152,41 @@ class EntryCache(caching._Cache):
         if data.library.has_dynamic_globals:
             warnings.warn(f"{self._title} uses an address or a large global array and is not cached", stacklevel=2)
             return
-        payload = serialize.dumps(data._reduce())
-        path = self.path(sig, own_target())
-        if path is None:
+        folder = entry_folder()
+        if folder is None or self._stamp is None:
             return
+        variant = self._variant(sig, own_target())
+        payload = serialize.dumps(data._reduce())
         try:
-            self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-            handle, unfinished = tempfile.mkstemp(dir=self._folder)
-            try:
-                with os.fdopen(handle, "wb") as file:
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            with tempfile.NamedTemporaryFile(dir=folder, prefix=_UNFINISHED, delete=False) as file:
+                try:
                     file.write(hashlib.sha256(payload).digest() + payload)
-                os.replace(unfinished, path)
-            except OSError:
-                os.unlink(unfinished)
-                raise
+                    file.close()
+                    os.replace(file.name, folder / f"{variant}-{self._stamp}")
+                except BaseException:
+                    os.unlink(file.name)
+                    raise
+            _drop(_by_age(folder.glob(f"{variant}-*"))[_STATES_KEPT:])
+            _drop([one for one in _by_age(folder.glob(f"{_UNFINISHED}*")) if one[0] < time.time() - _ENDED])
         except OSError as error:
             _LOG.info("%s is not cached: %s", self._title, error)
-        self._drop_old_states(self._variant(sig, own_target()))
 
-    def _drop_old_states(self, variant: str) -> None:
-        """Keep what was compiled for a signature from the few states of the sources that were used last."""
-        used: list[tuple[float, Path]] = []
-        for path in self._folder.glob(f"{variant}-*"):
-            try:
-                used.append((path.stat().st_mtime, path))
-            except OSError:  # another process dropped it first
-                continue
-        for _, path in sorted(used, reverse=True)[_STATES_KEPT:]:
-            path.unlink(missing_ok=True)
+
+def _by_age(paths: Iterable[Path]) -> list[tuple[float, Path]]:
+    """Times of last use and files, the youngest first."""
+    used: list[tuple[float, Path]] = []
+    for path in paths:
+        with contextlib.suppress(OSError):  # another process dropped it first
+            used.append((path.stat().st_mtime, path))
+    return sorted(used, reverse=True)
+
+
+def _drop(used: Iterable[tuple[float, Path]]) -> None:
+    """Remove files, as far as this process may."""
+    for _, path in used:
+        with contextlib.suppress(OSError):
+            path.unlink()
 
 
 class NoCache(caching.NullCache):

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from numba import njit
@@ -12,7 +12,6 @@ from numba.core import config
 from numba.core.sigutils import normalize_signature
 
 from assembly._kernel.cache import EntryCache, NoCache
-from assembly._kernel.folders import entry_folder
 from assembly._kernel.linking import EntryCompiler
 from assembly._kernel.overloads import announce, make_callable
 from assembly._kernel.sources import PACKAGE, source_of, sources_of
@@ -87,19 +86,10 @@ def kernel(
     if config.DISABLE_JIT:
         return compiled
     compiled._cache = NoCache(make_callable)
-    path = source_of(compiled.py_func)
-    if PACKAGE in path.parents:
+    if compiled.py_func.__module__.partition(".")[0] == PACKAGE.name:
         ENTRIES[function] = Entry(compiled, (signatures,) if isinstance(signatures, str) else signatures)
-        folder = entry_folder()
-        if folder is not None and _can_be_read(path):
-            compiled._cache = EntryCache(compiled.py_func, folder, make_callable)
+        with suppress(OSError):  # there are no sources, or they cannot be read
+            sources_of(source_of(compiled.py_func))  # now, while this file is imported
+            compiled.py_func.kernel_settings = settings
+            compiled._cache = EntryCache(compiled.py_func, make_callable)
     return compiled
-
-
-def _can_be_read(path: Path) -> bool:
-    """Whether the sources of a module are there. They are read now, so that what counts is what is being imported."""
-    try:
-        sources_of(path)
-    except OSError:
-        return False
-    return True

@@ -17,24 +17,29 @@ import numba
 import numpy as np
 from numba.core import config
 
-__all__ = ["entry_folder"]
+__all__ = ["entry_folder", "folders_to_read"]
 
 _LOG = logging.getLogger("assembly")
 _NAME_LENGTH = 24
 _FOLDERS_KEPT = 4
 
 
+@functools.cache
 def _toolchain() -> str:
     """Hash of what compiles: versions whose entries cannot be exchanged, and settings that change the machine code."""
     versions = (sys.implementation.cache_tag, numba.__version__, llvmlite.__version__, np.__version__)
-    settings = (config.OPT, config.BOUNDSCHECK, config.LOOP_VECTORIZE, config.SLP_VECTORIZE)
-    return hashlib.sha256(repr((versions, settings)).encode()).hexdigest()[:_NAME_LENGTH]
+    names = (
+        *("OPT", "BOUNDSCHECK", "LOOP_VECTORIZE", "SLP_VECTORIZE", "DEBUGINFO_DEFAULT"),
+        *("USING_SVML", "DISABLE_INTEL_SVML", "LLVM_REFPRUNE_PASS", "LLVM_REFPRUNE_FLAGS"),
+    )
+    settings = [getattr(config, name, None) for name in names]
+    return hashlib.sha256(repr((versions, settings, sys.flags.optimize)).encode()).hexdigest()[:_NAME_LENGTH]
 
 
 def _user_folder() -> Path:
     """The user's cache."""
     base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA")
-    return Path(base or os.path.expanduser("~/.cache")) / "assembly"
+    return Path(base or "~/.cache").expanduser().absolute() / "assembly"
 
 
 def _temporary_folder() -> Path:
@@ -81,5 +86,13 @@ def _drop_old_folders(root: Path) -> None:
 
 @functools.cache
 def entry_folder() -> Path | None:
-    """The folder of this process's entries, or None: then kernels are compiled in every process."""
+    """The folder for what this process compiles, or None: then nothing is kept."""
     return _writable_folder(_toolchain())
+
+
+@functools.cache
+def folders_to_read() -> tuple[Path, ...]:
+    """The folders in which this process looks for entries: the user's, also where it cannot be written to, first."""
+    users, own = _user_folder() / _toolchain(), entry_folder()
+    found = [users] if users.is_dir() else []
+    return tuple(found if own is None or own in found else [*found, own])

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import gc
+import threading
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext
 from typing import Any
 
 from numba.core import event
@@ -31,8 +32,10 @@ class _InnerLibrary(JITCodeLibrary):
     """The code of a kernel that only kernels call: left as it is until an entry links it.
 
     Numba links every library with all it calls, optimizes it and makes machine code of it, once more at every level of
-    calls. Of inner kernels none of these is ever used: the entry that calls them is linked and optimized as a whole.
+    calls. For inner kernels that is work for nothing: the entry that calls them is linked and optimized as a whole.
     """
+
+    _whole: Any = None
 
     @property
     def codegen(self) -> Any:
@@ -45,15 +48,38 @@ class _InnerLibrary(JITCodeLibrary):
     def finalize(self) -> None:
         self._finalized = True
 
+    def own_module(self) -> Any:
+        """Its functions alone, for being linked more than once."""
+        return super()._get_module_for_linking()
 
-def _reached(library: Any, found: dict[Any, None]) -> dict[Any, None]:
-    """The libraries that one calls, and those that inner ones among them call."""
-    for called in library._linking_libraries:
-        if called not in found:
-            found[called] = None
-            if isinstance(called, _InnerLibrary):
-                _reached(called, found)
-    return found
+    def _get_module_for_linking(self) -> Any:
+        """The same with all it calls: what Numba's own libraries link, where a user's function calls the kernel."""
+        if self._whole is None:
+            self._whole = self.own_module().clone()
+            for called in _reached(self):
+                self._whole.link_in(called._get_module_for_linking(), preserve=True)
+        return self._whole
+
+
+class _OwnCode:
+    """Stands for an inner library where all that it calls is linked as well."""
+
+    def __init__(self, library: _InnerLibrary) -> None:
+        self._reload_init = library._reload_init
+        self._get_module_for_linking = library.own_module
+
+
+def _reached(library: Any) -> list[Any]:
+    """The libraries that one calls, and those that inner ones among them call, inner ones by their own code."""
+    found: dict[Any, None] = {}
+    waiting = [library]
+    while waiting:
+        for called in waiting.pop()._linking_libraries:
+            if called not in found:
+                found[called] = None
+                if isinstance(called, _InnerLibrary):
+                    waiting.append(called)
+    return [_OwnCode(called) if isinstance(called, _InnerLibrary) else called for called in found]
 
 
 class _EntryLibrary(JITCodeLibrary):
@@ -65,7 +91,7 @@ class _EntryLibrary(JITCodeLibrary):
 
     def finalize(self) -> None:
         self._entries = {function.name for function in self.get_defined_functions()}
-        self._linking_libraries = list(_reached(self, {}))
+        self._linking_libraries = _reached(self)
         super().finalize()
 
     def _optimize_final_module(self) -> None:
@@ -102,20 +128,20 @@ class EntryCompiler(Compiler):
 def _nothing_else() -> Iterator[None]:
     """Meanwhile no garbage is collected, of which there is little, and Numba times no nested compilation.
 
-    Numba starts two timers for each of them, which hear of every call of LLVM. Each of the two takes a tenth of the
-    time. Only one thread at a time is here, because Numba compiles under a lock.
+    Numba starts two timers for each of them, which hear of every call of LLVM. Numba compiles under a lock, so only one
+    thread at a time is here.
     """
-    collects, timer = gc.isenabled(), event.install_timer
+    collects, timer, here = gc.isenabled(), event.install_timer, threading.get_ident()
+
+    def install_timer(kind: str, callback: Callable[[float], None]) -> Any:
+        # Another thread asks for its timer before it waits for the lock.
+        return nullcontext() if threading.get_ident() == here else timer(kind, callback)
+
     gc.disable()
-    event.install_timer = _no_timer
+    event.install_timer = install_timer
     try:
         yield
     finally:
         event.install_timer = timer
         if collects:
             gc.enable()
-
-
-def _no_timer(_kind: str, _callback: Callable[[float], None]) -> AbstractContextManager[None]:
-    """Stands for Numba's `install_timer`."""
-    return nullcontext()

@@ -53,6 +53,7 @@ def _trust_indices() -> None:
 
 def announce(function: Callable[..., Any], settings: dict[str, Any]) -> None:
     """Remember a function that kernels may call, compiled by these settings; in Python it stays what it is."""
+    function.kernel_settings = settings  # type: ignore[attr-defined]  # a part of what an entry is made from
     _WAITING.append((function, settings))
 
 

@@ -1,7 +1,8 @@
 """The source files on which a kernel's machine code depends: its module's own, and those that this one imports.
 
-Numba's disk cache looks at a kernel's own file alone. Here every file that the module reaches by imports counts, so
-that an edit is seen by the entries that it may change, and by no others.
+Numba's disk cache looks at a kernel's own file alone. Here every file counts that the module reaches by import
+statements, so that an edit is seen by the entries that it may change, and by no others. Kernel files import by
+statements that are read here (a test of the house's rules says which).
 """
 
 from __future__ import annotations
@@ -11,9 +12,11 @@ import hashlib
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from types import FunctionType
+from types import CodeType, FunctionType
 
-__all__ = ["PACKAGE", "source_of", "source_stamp", "sources_of"]
+from assembly._lazy import IMPORTED_AT
+
+__all__ = ["PACKAGE", "closure_of", "source_of", "source_stamp", "sources_of"]
 
 PACKAGE = Path(__file__).resolve().parent.parent
 
@@ -27,7 +30,7 @@ def _file_of(module: str) -> Path | None:
     if first != PACKAGE.name:
         return None
     place = PACKAGE.joinpath(*rest)
-    candidates = (place.with_name(place.name + ".py"), place / "__init__.py")
+    candidates = (place / "__init__.py", place.with_name(place.name + ".py"))
     return next((path for path in candidates if path.is_file()), None)
 
 
@@ -37,15 +40,16 @@ def _imports(text: str) -> Iterator[str]:
     Python's own parser takes half a second for the package, this a hundredth of it; a test compares the two. What looks
     like an import and is none, in a docstring, can only add a file.
     """
-    lines = text.split("\n")
+    lines = text.splitlines()
     for k, line in enumerate(lines):
-        if line.lstrip().startswith(("from ", "import ")):
+        if line.lstrip().startswith(("from", "import")):
             statement = ""
             for part in lines[k:]:
-                statement = f"{statement.rstrip(chr(92))} {part.partition(chr(35))[0].strip()}".lstrip()
-                if not statement.endswith("\\") and statement.count("(") == statement.count(")"):
+                code = part.partition("#")[0].strip()
+                statement += " " + code.rstrip("\\")
+                if not code.endswith("\\") and statement.count("(") == statement.count(")"):
                     break
-            yield statement
+            yield statement.strip()
 
 
 def _names(listed: str) -> list[str]:
@@ -70,18 +74,14 @@ def _imported_files(text: str) -> set[Path]:
 
 @functools.cache
 def _read(path: Path) -> tuple[bytes, frozenset[Path]]:
-    """The hash of a file and the files that it imports, as it was when it was first read in this process."""
+    """The hash of a file and the files that it imports."""
     content = path.read_bytes()
-    return hashlib.sha256(content).digest(), frozenset(_imported_files(content.decode()))
+    return hashlib.sha256(content).digest(), frozenset(_imported_files(content.decode("utf-8-sig", "replace")))
 
 
 @functools.cache
 def sources_of(path: Path) -> frozenset[Path]:
-    """A file and all files of this package that it reaches by imports.
-
-    It is asked for when the file is imported: a file that is edited while a process runs is known by what the process
-    imported.
-    """
+    """A file and all files of this package that it reaches by imports."""
     reached: set[Path] = set()
     waiting = [path]
     while waiting:
@@ -92,37 +92,55 @@ def sources_of(path: Path) -> frozenset[Path]:
     return frozenset(reached)
 
 
-def _functions_in(value: object, found: list[FunctionType]) -> None:
-    """Add all functions in a value: itself, in a tuple, and in what these functions close over."""
-    if isinstance(value, tuple):
-        for part in value:
-            _functions_in(part, found)
-    function = getattr(value, "py_func", value)  # a kernel that is an entry is a Numba object with a function
-    if isinstance(function, FunctionType) and function not in found:
-        found.append(function)
-        for cell in function.__closure__ or ():
-            _functions_in(cell.cell_contents, found)
+def source_of(function: FunctionType) -> Path:
+    """The file in which a function is defined."""
+    return Path(function.__code__.co_filename).resolve()
+
+
+def closure_of(function: FunctionType) -> list[object]:
+    """A function and what it closes over, in a fixed order: values, functions (each once), what these close over."""
+    found: list[object] = []
+    waiting: list[object] = [function]
+    while waiting:
+        value = waiting.pop()
+        value = getattr(value, "py_func", value)  # an entry is an object of Numba's with a function
+        if isinstance(value, FunctionType) and any(value is other for other in found):
+            continue
+        found.append(value)
+        if isinstance(value, FunctionType):
+            waiting += [cell.cell_contents for cell in value.__closure__ or ()]
+        elif isinstance(value, tuple):
+            waiting += value
+    return found
 
 
 def source_stamp(function: FunctionType) -> str | None:
-    """Hash of all sources that a kernel is made from, and of its place there; None where one cannot be read.
+    """Hash of all sources that a kernel is made from; None where one cannot be read or changed while the process runs.
 
     A kernel made by a factory is made from the functions that it closes over, too, wherever these are defined.
     """
-    parts: list[FunctionType] = []
-    _functions_in(function, parts)
+    parts = [part for part in closure_of(function) if isinstance(part, FunctionType)]
     try:
         files = {file for part in parts for file in sources_of(source_of(part))}
+        # A file that changed since may have been imported before it did: nobody knows what text its code is of.
+        if any(file.stat().st_mtime > IMPORTED_AT for file in files):
+            return None
         hashes = sorted((file.as_posix(), _read(file)[0]) for file in files)
     except OSError:
         return None
     root = PACKAGE.parent.as_posix()
-    digest = hashlib.sha256(str(function.__code__.co_firstlineno).encode())
+    digest = hashlib.sha256()
     for name, content in hashes:
         digest.update(name.removeprefix(root).encode() + b"\0" + content)
+    for part in parts:
+        # What tells functions of one file apart.
+        settings = getattr(part, "kernel_settings", None)
+        digest.update(repr((settings, part.__defaults__, part.__kwdefaults__)).encode() + _code(part.__code__))
     return digest.hexdigest()
 
 
-def source_of(function: FunctionType) -> Path:
-    """The file in which a function is defined."""
-    return Path(function.__code__.co_filename).resolve()
+def _code(code: CodeType) -> bytes:
+    """Where a function stands in its file, its instructions and its constants."""
+    inner = b"".join(_code(part) for part in code.co_consts if isinstance(part, CodeType))
+    constants = [part for part in code.co_consts if not isinstance(part, CodeType)]
+    return repr((code.co_firstlineno, code.co_code, code.co_names, constants)).encode() + inner

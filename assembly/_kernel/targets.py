@@ -12,7 +12,7 @@ import platform
 import llvmlite.binding as llvm
 from numba.core.registry import cpu_target
 
-__all__ = ["PORTABLE_VARIABLES", "Target", "own_target", "portable_target", "targets_that_run"]
+__all__ = ["PORTABLE_VARIABLES", "Target", "own_target", "portable_target", "refuse_portable", "targets_that_run"]
 
 # Triple, processor and features, as Numba's code generator names what it compiles for.
 Target = tuple[str, str, str]
@@ -44,7 +44,18 @@ def portable_target() -> Target:
     return own_target()[0], _PROCESSOR, ""
 
 
+# What `targets_that_run` leaves out.
+_REFUSED: list[Target] = []
+
+
+def refuse_portable() -> None:
+    """Let this process run entries of its own target alone: what it has not is to be compiled, not borrowed."""
+    _REFUSED.append(portable_target())
+
+
 def targets_that_run() -> list[Target]:
     """The targets whose entries run here, best first: the one that this process compiles for, and the portable one."""
     own, portable = own_target(), portable_target()
-    return [own, portable] if _runs_portable_code() and portable != own else [own]
+    if portable == own or portable in _REFUSED or not _runs_portable_code():
+        return [own]
+    return [own, portable]

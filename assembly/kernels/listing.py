@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -53,29 +54,28 @@ class Item:
         return f"{self.module}.{entry.compiled.__qualname__}{which}"
 
     @property
-    def source_size(self) -> int:
-        """Size of the sources it is made from, in bytes: a measure of what there is to compile."""
-        return sum(path.stat().st_size for path in sources_of(source_of(self.entry.compiled.py_func)))
+    def sources(self) -> frozenset[Path]:
+        """The files that it is made from."""
+        return sources_of(source_of(self.entry.compiled.py_func))
 
-    def path(self, target: Target) -> Path | None:
-        """The compiled form for a target, if there is a sound one."""
+    def size(self, target: Target) -> int | None:
+        """Size of the compiled form for a target in bytes, if there is a sound one."""
         cache = self.entry.compiled._cache
-        path = cache.path(self.types, target) if isinstance(cache, EntryCache) else None
-        try:
-            return path if path is not None and read_entry(path) else None
-        except (OSError, ValueError):
-            return None
+        for path in cache.paths(self.types, target) if isinstance(cache, EntryCache) else ():
+            with suppress(OSError, ValueError):
+                return len(read_entry(path))
+        return None
 
-    def found(self) -> tuple[Path, Target] | None:
-        """What this machine would run, and what it was compiled for; None if it has to be compiled."""
-        paths = ((self.path(target), target) for target in targets_that_run())
-        return next(((path, target) for path, target in paths if path is not None), None)
+    def found(self) -> tuple[int, Target] | None:
+        """The size of what this machine would run, and what it was compiled for; None if it has to be compiled."""
+        sizes = ((self.size(target), target) for target in targets_that_run())
+        return next(((size, target) for size, target in sizes if size is not None), None)
 
 
 def _modules() -> Iterator[str]:
     """Names of the modules that make kernels."""
     for path in sorted(PACKAGE.rglob("*.py")):
-        if "from assembly._kernel import kernel" in path.read_text():
+        if "from assembly._kernel import kernel" in path.read_text(encoding="utf-8"):
             yield ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts)
 
 
