@@ -49,7 +49,7 @@ def subdivide(squares, tolerance, stack):
 
 @kernel
 def question_often(ra, qa, a, rb, qb, b, clearance, plane, times, out):
-    """As `is_separated` answers; as `minimum_distance` where the clearance is below zero, one kernel to compile less."""
+    """As `is_separated` answers; as `minimum_distance` where the clearance is below zero, which saves a kernel."""
     for _ in range(times):
         if clearance < 0.0 or compare_curves(a, b, clearance) == OPEN:
             curve_distance(ra, qa, rb, qb, 1e-10, clearance, 200_000, True, plane, out)
