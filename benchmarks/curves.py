@@ -15,14 +15,7 @@ from assembly.proximity import collides, is_separated, minimum_distance, minimum
 from assembly.proximity.bezier_capsules import capsule_tree
 from assembly.proximity.bezier_search import ANSWER
 from benchmarks.figures import figure
-from benchmarks.query_kernels import (
-    distance_often,
-    point_distance_often,
-    point_question_often,
-    question_often,
-    subdivide,
-    subdivide_often,
-)
+from benchmarks.query_kernels import point_question_often, question_often, subdivide, subdivide_often
 from benchmarks.timing import measure
 
 ABOUT = """\
@@ -106,8 +99,7 @@ def _pairs(name: str, count: int, repeats: int) -> list[dict[str, Any]]:
             collide.append(_seconds(partial(collides, a, b), repeats))
             (ra, qa), (rb, qb) = a.packed_pieces, b.packed_pieces
             u, v = capsule_tree(ra, qa), capsule_tree(rb, qb)
-            inner[0].append(_seconds(partial(distance_often, ra, qa, rb, qb, False, 8, out), repeats) / 8)
-            for series, clearance in ((inner[1], half), (inner[2], 0.0)):
+            for series, clearance in zip(inner, (-1.0, half, 0.0), strict=True):
                 call = partial(question_often, ra, qa, u, rb, qb, v, clearance, False, 8, out)
                 series.append(_seconds(call, repeats) / 8)
         fresh = NurbsCurve(a.control_points, a.knots, a.degree, a.weights)
@@ -162,9 +154,8 @@ def _points(degree: int, curves: int, repeats: int) -> list[dict[str, Any]]:
             )
             python.append(_seconds(partial(minimum_distance, curve, point), repeats))
         none, half, zero = np.full(count, -1.0), 0.5 * lower, np.zeros(count)
-        distance.append(_seconds(partial(point_distance_often, record, pool, points, none, 1, out), repeats) / count)
         tree = capsule_tree(record, pool)
-        for series, clearance in ((clear, half), (collide, zero)):
+        for series, clearance in ((distance, none), (clear, half), (collide, zero)):
             call = partial(point_question_often, record, pool, tree, points, clearance, 1, out)
             series.append(_seconds(call, repeats) / count)
         plain.append(_seconds(partial(subdivide_often, squares, 1, stack), repeats) / count)

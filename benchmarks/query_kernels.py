@@ -20,7 +20,9 @@ def subdivide(squares, tolerance, stack):
     rest halved.
     """
     m = squares.size
-    stack[0] = squares
+    # One by one: the check of shapes in an assignment of whole rows takes a second to compile.
+    for k in range(m):
+        stack[0, k] = squares[k]
     top = 1
     upper = np.sqrt(min(squares[0], squares[m - 1]))
     cuts = 0
@@ -46,32 +48,20 @@ def subdivide(squares, tolerance, stack):
 
 
 @kernel
-def distance_often(ra, qa, rb, qb, plane, times, out):
-    for _ in range(times):
-        curve_distance(ra, qa, rb, qb, 1e-10, -1.0, 200_000, True, plane, out)
-
-
-@kernel
 def question_often(ra, qa, a, rb, qb, b, clearance, plane, times, out):
-    """As `is_separated` answers."""
+    """As `is_separated` answers; as `minimum_distance` where the clearance is below zero, which saves a kernel."""
     for _ in range(times):
-        if compare_curves(a, b, clearance) == OPEN:
+        if clearance < 0.0 or compare_curves(a, b, clearance) == OPEN:
             curve_distance(ra, qa, rb, qb, 1e-10, clearance, 200_000, True, plane, out)
 
 
 @kernel
-def point_distance_often(record, pool, points, clearance, times, out):
-    for _ in range(times):
-        for i in range(points.shape[0]):
-            point_distance(record, pool, points[i, 0], points[i, 1], points[i, 2], 1e-10, clearance[i], 1_000_000, out)
-
-
-@kernel
 def point_question_often(record, pool, tree, points, clearance, times, out):
+    """The same of points."""
     for _ in range(times):
         for i in range(points.shape[0]):
             x, y, z = points[i, 0], points[i, 1], points[i, 2]
-            if compare_point(tree, x, y, z, clearance[i]) == OPEN:
+            if clearance[i] < 0.0 or compare_point(tree, x, y, z, clearance[i]) == OPEN:
                 point_distance(record, pool, x, y, z, 1e-10, clearance[i], 1_000_000, out)
 
 

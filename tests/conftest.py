@@ -11,6 +11,10 @@ from pathlib import Path
 import hypothesis
 import pytest
 
+# Before numpy is imported, here and in processes that tests start: on small matrices the threads of its library wait
+# for one another, busily, which takes more time than all else in some tests.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 ROOT = Path(__file__).resolve().parent.parent
 
 # The first example of a test may compile kernels, so no deadline; the same examples in every run,

@@ -17,6 +17,11 @@ from benchmarks.scenes import bicubic, torus_pairs
 from benchmarks.wires import Tally, linked_wires
 
 
+def slope(what):
+    """Whether a figure is an exponent that times were fitted with, or the difference of two times."""
+    return "exponent" in what or " beyond " in what
+
+
 @pytest.mark.parametrize(
     "name",
     [
@@ -47,7 +52,9 @@ def test_quick_runs(name):
     figures = result["figures"]
     assert len(report.lines(result)) == 2 + len(figures)
     assert len({row["what"] for row in figures}) == len(figures)
-    assert all(np.isfinite(row["measured"]) and row["measured"] >= 0.0 for row in figures if row["unit"] != "error")
+    assert all(np.isfinite(row["measured"]) for row in figures if row["unit"] != "error")
+    # Slopes and differences of the times of a quick run may have either sign: they are noise.
+    assert all(row["measured"] >= 0.0 for row in figures if row["unit"] != "error" and not slope(row["what"]))
     # Goals of a benchmark may be missed, and the page says so; what the library promises may not. A solve promises its
     # tolerance times the scene's size, and the absolute 1e-12 of these rows is a goal. Some rings out of reach stall.
     goals = ("solved to 1e-12", "largest violation of the solved", "targets out of reach: solved")

@@ -120,7 +120,7 @@ def test_nothing_is_missed_or_doubled(f, g, cases):
     rng = np.random.default_rng(4)
     oracle = WireOracle([a, b])
     kinds = set()
-    for _ in range(cases(70, 200)):
+    for _ in range(cases(40, 200)):
         # Raises where the sum over minima, saddles and maxima is wrong.
         kinds.update(oracle.extrema(poses(rng, 2, extent)).index)
     assert kinds == ({0, 1} if "ball" in (f, g) else {0, 1, 2})
@@ -222,7 +222,7 @@ def test_linking_numbers(cases):
     rng = np.random.default_rng(9)
     oracle = WireOracle([torus_wire(1.0, 0.1)] * 2)
     numbers = []
-    for _ in range(cases(70, 200)):
+    for _ in range(cases(40, 200)):
         q = poses(rng, 2, 1.2)
         if oracle.deepest(q) < -0.19:
             continue

@@ -87,7 +87,7 @@ def test_never_a_wrong_minimum(cases):
     rng = np.random.default_rng(8)
     simple, clips = pool(rng)
     every = simple + clips
-    pairs, count, wrong, unsolved = cases(70, 220), 0, [], []
+    pairs, count, wrong, unsolved = cases(40, 220), 0, [], []
     while count < pairs:
         f, g = (every[rng.integers(len(every))] for _ in range(2))
         q_f = np.concatenate([rng.uniform(-2.0, 2.0, 3), random_quaternion(rng)])

@@ -15,6 +15,7 @@ from assembly.step import StepError, StepWarning, reader
 from assembly.step.faces import read_face
 from assembly.step.occt import quiet, settings
 from assembly.step.profiles import Unreadable
+from tests.step import forked
 from tests.step.models import MODELS, O, box, cylinder, edge, faces, joined, oval, pushed, sheet, swollen, vase
 
 
@@ -324,7 +325,9 @@ def arrays_of(thing, seen=None):
     ],
     ids=["another's number", "itself", "nowhere", "not ended"],
 )
-def test_of_damaged_text_what_is_whole_is_read(tmp_path, pattern, other, why):
+def test_of_damaged_text_what_is_whole_is_read(tmp_path, monkeypatch, request, pattern, other, why):
+    if not request.config.getoption("--long"):
+        monkeypatch.setattr(reader, "subprocess", forked.processes)
     file = File()
     file.part(box(), "box")
     path = file.write(tmp_path / "box.step")

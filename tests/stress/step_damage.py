@@ -1,6 +1,7 @@
 """Damaged STEP files read one after the other, a line of outcome each: what `test_step_files.py` runs in a child.
 
-OCCT is compiled code that can take its process with it; a parent sees after which file.
+OCCT is compiled code that can take its process with it; a parent sees after which file. With the argument ``forked``
+the processes that the library starts for damaged files are forks of this one, which have imported OCCT.
 """
 
 from __future__ import annotations
@@ -12,7 +13,8 @@ import warnings
 
 import numpy as np
 
-from assembly.step import StepError, StepWarning, read_step
+from assembly.step import StepError, StepWarning, read_step, reader
+from tests.step import forked
 
 
 def outcome(path):
@@ -34,5 +36,7 @@ def outcome(path):
 
 
 if __name__ == "__main__":
+    if "forked" in sys.argv:
+        reader.subprocess = forked.processes
     for line in sys.stdin:
         print(json.dumps(outcome(json.loads(line))), flush=True)

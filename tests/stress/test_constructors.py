@@ -72,8 +72,12 @@ def finite(made):
             assert np.isfinite(value).all(), name
 
 
+# Examples of a maker, of which there are many: 20, in a long run 60.
+MOST = settings.default.max_examples * 2 // 5
+
+
 @pytest.mark.parametrize("name", MAKERS)
-@settings(max_examples=60, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much])
+@settings(max_examples=MOST, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much])
 @given(data=st.data())
 def test_makers(name, data):
     make, count = MAKERS[name]

@@ -76,13 +76,14 @@ DAMAGES = (truncated, swapped, overwritten, without_entities, redirected)
 class Reader:
     """A child that reads files, started again where one has ended it."""
 
-    def __init__(self):
+    def __init__(self, *arguments):
+        self.arguments = arguments
         self.process = None
 
     def read(self, path):
         if self.process is None:
             self.process = subprocess.Popen(
-                [sys.executable, "-m", "tests.stress.step_damage"],
+                [sys.executable, "-m", "tests.stress.step_damage", *self.arguments],
                 cwd=ROOT,
                 env={**os.environ, "PYTHONPATH": str(ROOT)},
                 stdin=subprocess.PIPE,
@@ -114,9 +115,16 @@ class Reader:
 
 
 @pytest.fixture(scope="module")
-def reader():
-    """A child for all damages: to start one, and to have it import OCCT, takes as long as to read a file."""
-    child = Reader()
+def reader(whole, times, tmp_path_factory):
+    """A child for all damages: to start one, and to have it import OCCT, takes a second.
+
+    So do the processes of the library that read damaged files, which are forks of the child but in long runs.
+    """
+    child = Reader(*(["forked"] if times == 1 else []))
+    # A whole file is read in the child itself, whose forks have then what they need.
+    path = tmp_path_factory.mktemp("first") / "whole.step"
+    path.write_text(whole[0])
+    assert child.read(path) == "read"
     yield child
     child.close()
 
@@ -140,7 +148,7 @@ def test_damaged_files_are_read_or_refused(damage, whole, reader, times, tmp_pat
     rng = np.random.default_rng(len(damage.__name__))
     path = tmp_path / "damaged.step"
     outcomes = Counter()
-    # Each is read in a process of its own, which imports OCCT. Of some at least one has to be read.
+    # Each is read in a process of its own. Of some at least one has to be read.
     mostly_whole = damage in (without_entities, redirected)
     for _ in range(5 * times if times > 1 or mostly_whole else 1):
         text = damage(rng, whole[rng.integers(len(whole))])
