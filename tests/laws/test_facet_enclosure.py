@@ -196,7 +196,7 @@ def test_every_pair_that_is_made_is_found(pair, cases):
     descent = Descent(BODIES[pair[0]], BODIES[pair[1]])
     size = [np.linalg.norm(np.ptp(np.stack([tree.low, tree.high]), axis=(0, 1))) for tree in descent.trees]
     spared = []
-    for _ in range(cases(80, 250)):
+    for _ in range(cases(40, 250)):
         (kf, xf, f, n), (kg, xg, g, m) = (sample(tree, rng) for tree in descent.trees)
         gap = rng.choice([-1.0, 0.0, 1.0]) * 10.0 ** rng.uniform(-6.0, -0.5) * min(size)
         turn, shift = placed(rng, f, n, g, m, gap)
