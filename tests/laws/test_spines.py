@@ -285,7 +285,7 @@ def test_first_looks_find_all_minima(names, cases):
     watch, oracle = Watch([WIRES[name] for name in names]), WireOracle([wires[name] for name in names])
     rng = np.random.default_rng(3)
     due = 0
-    count = cases(50, 150)
+    count = cases(30, 150)
     for _ in range(count):
         e = rng.normal(size=(2, 4))
         q = np.column_stack([np.zeros((2, 3)), e / np.linalg.norm(e, axis=1, keepdims=True)])
