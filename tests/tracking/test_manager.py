@@ -274,12 +274,12 @@ def test_more_places_are_made_when_they_are_wanting():
             assert all(matched(manager.contacts, expected, ["small", "large"]))
 
 
-def test_the_unit_of_length_does_not_matter():
+def test_the_unit_of_length_does_not_matter(cases):
     poses = motion(CLIPS, 5, 2.0, 0.3)
     mm = asm.Manager([asm.Body(name, CLIP) for name in "abc"], reach=0.3)
-    small = asm.shapes.paper_clip(length=0.033, width=0.008, wire_radius=0.0005)
+    small = asm.Face(asm.shapes.paper_clip(length=0.033, width=0.008, wire_radius=0.0005))
     m = asm.Manager([asm.Body(name, small) for name in "abc"], reach=0.0003)
-    for k in range(50):
+    for k in range(cases(25, 50)):
         q = poses(0.04 * k)
         mm.update(q)
         q[:, :3] *= 1e-3
