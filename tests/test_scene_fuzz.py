@@ -159,7 +159,7 @@ def check(path, document):
     assert path.read_bytes() == first
 
 
-@settings(max_examples=8 * COUNT // 3)
+@settings(max_examples=4 * COUNT // 3)
 @given(changed_documents())
 def test_a_changed_document_loads_or_raises_input_error(tmp_path_factory, document):
     check(tmp_path_factory.getbasetemp() / "fuzz.json", document)

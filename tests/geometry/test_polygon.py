@@ -159,7 +159,7 @@ def apart(face, found, count=60):
 @pytest.mark.parametrize("face", FACES.values(), ids=FACES)
 @pytest.mark.parametrize("tolerance", [0.1, 0.01])
 def test_facets_and_face_are_within_the_tolerance(face, tolerance, cases):
-    there, back = apart(face, facets(face, tolerance), cases(20, 60))
+    there, back = apart(face, facets(face, tolerance), cases(12, 60))
     # It is measured at the middles of triangles and edges; the farthest point of an arc is a little beside its middle.
     assert max(there, back) <= 1.01 * tolerance
 

@@ -17,4 +17,4 @@ KINDS = (
 @pytest.fixture(scope="session", params=range(len(KINDS)), ids=["-".join(kinds) for kinds in KINDS])
 def group(request, cases):
     """Random pairs; with ``--long`` 200, 1,000 over all parameters."""
-    return random_group(20 + request.param, *KINDS[request.param], cases(70, 200))
+    return random_group(20 + request.param, *KINDS[request.param], cases(50, 200))

@@ -82,7 +82,7 @@ class Looked:
 
 def test_steps_end_within_what_looks_allow(cases):
     rng = np.random.default_rng(8)
-    cuts, scenes = 0, cases(3, 10)
+    cuts, scenes = 0, cases(2, 10)
     for _ in range(scenes):
         looked = Looked(rng)
         n = 6 * int(looked.table[MOVING])

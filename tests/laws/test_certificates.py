@@ -21,4 +21,4 @@ def test_points_and_curves(kind, dimension, cases):
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("kinds", PAIRS, ids=" and ".join)
 def test_two_curves(kinds, dimension, cases):
-    assert faults(curve_queries(np.random.default_rng(2), kinds, dimension, cases(4, 10)), 25) == []
+    assert faults(curve_queries(np.random.default_rng(2), kinds, dimension, cases(2, 10)), 25) == []

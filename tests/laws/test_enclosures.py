@@ -282,7 +282,7 @@ def test_gjk_of_hulls(d, cases):
     rng = np.random.default_rng(d)
     out = np.empty(9)
     seen = set()
-    for _ in range(cases(100, 300)):
+    for _ in range(cases(60, 300)):
         m, n = rng.integers(1, 12, 2)
         a, b = np.zeros((m, 3)), np.zeros((n, 3))
         a[:, :d], b[:, :d] = rng.normal(size=(m, d)), rng.normal(size=(n, d)) + rng.choice([0.0, 2.0, 4.0])

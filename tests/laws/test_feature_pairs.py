@@ -257,7 +257,7 @@ def random_cases(kind_f, kind_g, count):
 
 @pytest.fixture(scope="module", params=KINDS, ids=[f"{NAMES[f]}-{NAMES[g]}" for f, g in KINDS])
 def pairs(request, cases):
-    return random_cases(*request.param, cases(13, 40))
+    return random_cases(*request.param, cases(9, 40))
 
 
 def test_pairs_are_found_from_nearby(pairs):

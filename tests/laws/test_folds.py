@@ -190,7 +190,7 @@ def test_contacts_of_rings_that_are_deep_in_each_other_are_listed(reach, depth, 
     rng = np.random.default_rng(3)
     rings = Watch([asm.shapes.torus(MAJOR, MINOR)] * 2)
     oracle = WireOracle([torus_wire(MAJOR, MINOR)] * 2)
-    listed, count = 0, cases(120, 600)
+    listed, count = 0, cases(70, 600)
     for _ in range(count):
         e = rng.normal(size=4)
         q = np.array([[0.0, 0.0, 0.0, *IDENTITY], [*rng.uniform(-1.8, 1.8, 3), *e / np.linalg.norm(e)]])

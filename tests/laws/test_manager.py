@@ -77,7 +77,7 @@ def test_no_contact_is_missed_doubled_or_made_up(f, g, cases):
     rng = np.random.default_rng([17, PAIRS.index((f, g))])
     errors, motions = Errors.none(), 0
     # More of them where few came near.
-    while motions < cases(2, MOTIONS) or (motions < MOTIONS and errors.contacts <= motions):
+    while motions < cases(1, MOTIONS) or (motions < MOTIONS and errors.contacts <= motions):
         wander(rng, f, g, int(rng.integers(20, cases(26, 50))), errors)
         motions += 1
     assert (len(errors.missed), len(errors.doubled), len(errors.strange)) == (0, 0, 0)
@@ -136,7 +136,7 @@ def test_a_wire_about_an_ellipsoid(name, cases):
     rng = np.random.default_rng(23)
     wire, surface, _ = SHAPES[name]
     watch, due = Watch([surface, asm.shapes.ellipsoid(*SEMI_AXES)]), 0
-    motions = cases(2, MOTIONS)
+    motions = cases(1, MOTIONS)
     for _ in range(motions):
         watch.forget()
         for q in around(rng, wire, cases(12, 30)):

@@ -227,7 +227,7 @@ def test_what_is_told_of_boxes_holds_now_and_after_motions(cases):
     rng = np.random.default_rng(7)
     told = np.zeros(4, dtype=int)
     moved = 0
-    count = cases(500, 1500)
+    count = cases(300, 1500)
     for _ in range(count):
         two = Two(rng)
         least, what, margin = two.told()
@@ -285,7 +285,7 @@ def test_first_looks_find_all_minima(names, cases):
     watch, oracle = Watch([WIRES[name] for name in names]), WireOracle([wires[name] for name in names])
     rng = np.random.default_rng(3)
     due = 0
-    count = cases(50, 150)
+    count = cases(30, 150)
     for _ in range(count):
         e = rng.normal(size=(2, 4))
         q = np.column_stack([np.zeros((2, 3)), e / np.linalg.norm(e, axis=1, keepdims=True)])
@@ -380,7 +380,7 @@ def test_contacts_that_are_born_where_the_curvature_jumps_are_within_what_looks_
     oracle = WireOracle([path_wire(path, 0.1) for path in (bent, rod)])
     rng = np.random.default_rng(0)
     packed, born = watch._packed, 0
-    count = cases(250, 1500)
+    count = cases(150, 1500)
     for _ in range(count):
         high = 0.2 + 10.0 ** rng.uniform(-3.6, -2.5)
         turn = Rotation.from_rotvec((0.0, 0.0, np.arcsin(np.sqrt(rng.uniform(0.3, 0.7) * high / 0.5))))

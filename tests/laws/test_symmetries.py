@@ -15,8 +15,13 @@ POSITIONS = np.array([0, 1, 2, 7, 8, 9])
 
 @pytest.fixture(scope="session")
 def some(group, cases):
-    """Fourteen of the pairs; with ``--long`` twenty."""
-    return range(0, len(group.f), cases(5, 10))
+    """Nine of the pairs, with ``--long`` twenty; of a third of them the normals are equal, of the others opposed."""
+    _, *f, _, g_u, g_v = group.pairs.frames(group.x, group.q)
+    normals = [face.sign[:, None] * np.cross(*t) for face, t in ((group.pairs.f, f), (group.pairs.g, (g_u, g_v)))]
+    along = (normals[0] * normals[1]).sum(axis=1)
+    opposed, equal = np.flatnonzero(along < 0.0)[: cases(6, 14)], np.flatnonzero(along > 0.0)[: cases(3, 6)]
+    assert opposed.size == cases(6, 14) and equal.size == cases(3, 6)
+    return [*opposed, *equal]
 
 
 def all_of(f, q_f, g, q_g, x):

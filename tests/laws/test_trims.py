@@ -28,7 +28,7 @@ def piece_rows(face):
 def test_sides_are_those_of_another_winding_number(seed, cases):
     rng = np.random.default_rng(seed)
     face = random_face(rng, PLANE)
-    u, v = rng.uniform(-4.9, 4.9, (2, cases(1000, 3000)))
+    u, v = rng.uniform(-4.9, 4.9, (2, cases(500, 3000)))
     winding = sum(polygon_winding(dense(curve), u, v) for curve in face.boundary)
     # A chord of these polygons is less than 0.005 from its arc.
     clear = np.abs(face.trim_distance(u, v)) > 0.005
@@ -60,7 +60,7 @@ def test_sides_and_distances_beside_the_curves(seed):
 def test_no_sample_is_nearer_than_the_nearest_point(seed, cases):
     rng = np.random.default_rng(seed)
     face = random_face(rng, PLANE)
-    u, v = rng.uniform(-5, 5, (2, cases(130, 400)))
+    u, v = rng.uniform(-5, 5, (2, cases(70, 400)))
     near = face.nearest_on_boundary(u, v)
     np.testing.assert_array_equal(np.sign(near.distance), face.locate(u, v))
     foot = np.array([face.boundary[k].evaluate(t) for k, t in zip(near.curve, near.t, strict=True)])

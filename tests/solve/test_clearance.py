@@ -15,6 +15,8 @@ from benchmarks.scenes import MAJOR, MINOR
 from benchmarks.wire_oracle import WireOracle
 
 SCENES = 50
+# One face, whose tree is found once.
+RING = asm.Face(asm.shapes.torus(MAJOR, MINOR))
 # Gaps hold to 1e-12 of the scene's size, which is a few lengths here; the oracle's are good to 1e-14.
 HOLDS = 1e-11
 # Stationary is what is so to 1e-10 of the size: a gap that carries a force may be open by as much.
@@ -25,7 +27,7 @@ MOST = 0.88
 
 @pytest.fixture(scope="module")
 def near(cases):
-    return with_clearance(NEAR, cases(13, SCENES))
+    return with_clearance(NEAR, cases(7, SCENES))
 
 
 def with_clearance(distance, count):
@@ -49,7 +51,7 @@ def test_linked_rings_end_clear_and_linked(near):
 
 
 def test_linked_rings_out_of_reach_end_clear_and_linked(cases):
-    taut = with_clearance(TAUT, cases(13, SCENES))
+    taut = with_clearance(TAUT, cases(7, SCENES))
     solved, count = 0, len(taut.q)
     for k in range(count):
         solution, deepest, linked = ended(taut, k)
@@ -60,7 +62,7 @@ def test_linked_rings_out_of_reach_end_clear_and_linked(cases):
     assert solved >= int(MOST * count)
 
 
-@pytest.mark.parametrize("k", range(0, 10, 3))
+@pytest.mark.parametrize("k", range(0, 7, 3))
 def test_rings_stay_linked_step_by_step(near, k):
     # The path of the iterates: every solve of a step starts where the one before ended.
     scenes, drag = near, near.drag
@@ -76,9 +78,8 @@ def test_rings_stay_linked_step_by_step(near, k):
 
 def two_rings(minimum, place, target):
     """Two linked rings, the first one fixed, a point of the second one drawn to a target."""
-    ring = asm.shapes.torus(MAJOR, MINOR)
-    first = asm.Body("first", ring, fixed=True)
-    second = asm.Body("second", ring, place, (np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0))
+    first = asm.Body("first", RING, fixed=True)
+    second = asm.Body("second", RING, place, (np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0))
     scene = asm.Assembly([first, second])
     scene.constrain(asm.Clearance(minimum=minimum))
     scene.minimize(asm.PointDistance(second.point(MAJOR, 0.0, 0.0), target))
@@ -99,7 +100,7 @@ def test_the_gap_is_at_least_the_minimum(minimum):
 def test_no_pull_draws_rings_through_each_other(cases):
     # Where rings touch along an arc, contacts are born and merge at folds; rounding decides when.
     rng = np.random.default_rng(0)
-    solved, count = 0, cases(8, 60)
+    solved, count = 0, cases(4, 60)
     for shift in 1e-6 * rng.normal(size=(count, 3)):
         scene, oracle = two_rings(0.0, (1.0, 0.05, 0.1) + shift, (9.0, 0.3, 0.2) - shift)
         solution = scene.solve()
@@ -112,11 +113,11 @@ def test_no_pull_draws_rings_through_each_other(cases):
 
 def test_a_contact_and_a_clearance_that_asks_for_a_gap(cases):
     # Elsewhere: where the contact stands, or is on its way to, the clearance asks for nothing.
-    ring, oracle = asm.Face(asm.shapes.torus(MAJOR, MINOR)), WireOracle([torus_wire(MAJOR, MINOR)] * 2)
+    oracle = WireOracle([torus_wire(MAJOR, MINOR)] * 2)
     for k in range(cases(5, 12)):
         rng = np.random.default_rng([5, k])
         place, turn = rng.uniform(-1.5, 1.5, 3), Rotation.random(rng=rng).as_quat(scalar_first=True)
-        first, second = asm.Body("first", ring, fixed=True), asm.Body("second", ring, place, turn)
+        first, second = asm.Body("first", RING, fixed=True), asm.Body("second", RING, place, turn)
         scene = asm.Assembly([first, second])
         scene.constrain(asm.Contact(first, second), asm.Clearance(minimum=0.05))
         solution = scene.solve()
@@ -179,7 +180,7 @@ def test_pairs_that_are_excluded_may_overlap_and_no_others(exclude):
 def test_three_cubes_that_are_drawn_into_each_other_come_to_lie_side_by_side(cases):
     # Flush faces: which corners are listed is decided by rounding, of 60 such starts 53 are SOLVED.
     rng = np.random.default_rng(0)
-    solved, count = 0, cases(4, 20)
+    solved, count = 0, cases(2, 20)
     for _ in range(count):
         scene = boxes(())
         q = scene.q.copy()

@@ -17,7 +17,7 @@ from benchmarks.hands import NEAR, linked_rings
 from benchmarks.wire_oracle import WireOracle
 
 BALL = asm.shapes.sphere(1.0)
-RING = asm.shapes.torus(1.0, 0.1)
+RING = asm.Face(asm.shapes.torus(1.0, 0.1))
 
 
 def pile():

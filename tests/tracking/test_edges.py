@@ -35,7 +35,7 @@ def drawn(rng, ticks, order):
 @pytest.mark.parametrize("order", [1, -1])
 def test_plates_do_not_go_through_each_other(ticks, order, cases):
     rng = np.random.default_rng(8)
-    held, count = 0, cases(5, 40)
+    held, count = 0, cases(3, 40)
     for _ in range(count):
         tracker, hand = drawn(rng, ticks, order)
         deepest = 0.0

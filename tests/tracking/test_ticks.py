@@ -12,13 +12,13 @@ from benchmarks.running import example
 from benchmarks.tracking import hand_of
 
 
-def test_the_same_hand_makes_the_same_ticks():
+def test_the_same_hand_makes_the_same_ticks(cases):
     module = example("follow_the_hand")
     poses, chain = [], module.paper_clips()
     for _ in range(2):
         tracker = chain.tracker(follow=chain.body("blue").point(*module.END))
         begin = asm.Pose(tracker.q[2, :3], tracker.q[2, 3:]).apply(module.END)
-        for k in range(200):
+        for k in range(cases(100, 200)):
             step = tracker.step(begin + 0.02 * k * np.array([-1.0, 0.5, 0.2]))
         poses.append(step.q.tobytes())
     assert poses[0] == poses[1]
