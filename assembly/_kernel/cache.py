@@ -120,12 +120,10 @@ class EntryCache(caching._Cache):
             except FileNotFoundError:
                 continue
             except Exception as error:  # loading is a shortcut: nothing that goes wrong in it may stop a solve
-                _LOG.warning("compiling %s again: its cache entry %s is damaged (%s)", self._title, path, error)
-                break
-        else:
-            if not EntryCache._announced:
-                EntryCache._announced = True
-                _LOG.warning("compiling kernels, which may take a minute, once; kept in %s", entry_folder())
+                _LOG.warning("the compiled form of %s is damaged: %s (%s)", self._title, path, error)
+        if not EntryCache._announced:
+            EntryCache._announced = True
+            _LOG.warning("compiling kernels, which may take a minute, once; kept in %s", entry_folder())
         self._prepare()
         return None
 
@@ -163,6 +161,7 @@ class EntryCache(caching._Cache):
                 try:
                     file.write(hashlib.sha256(payload).digest() + payload)
                     file.close()
+                    os.chmod(file.name, 0o644)  # others may read it, as where one user compiles for all
                     os.replace(file.name, folder / f"{variant}-{self._stamp}")
                 except BaseException:
                     os.unlink(file.name)

@@ -142,5 +142,10 @@ def source_stamp(function: FunctionType) -> str | None:
 def _code(code: CodeType) -> bytes:
     """Where a function stands in its file, its instructions and its constants."""
     inner = b"".join(_code(part) for part in code.co_consts if isinstance(part, CodeType))
-    constants = [part for part in code.co_consts if not isinstance(part, CodeType)]
+    # The order of a set of strings is another one in every process.
+    constants = [
+        sorted(map(repr, part)) if isinstance(part, frozenset) else part
+        for part in code.co_consts
+        if not isinstance(part, CodeType)
+    ]
     return repr((code.co_firstlineno, code.co_code, code.co_names, constants)).encode() + inner
