@@ -64,11 +64,12 @@ def listed_entries() -> list[Entry]:
 
 def makes_kernels(path):
     """Whether a file asks for the decorator, and not for addresses of kernels alone."""
-    return any(
+    text = path.read_text(encoding="utf-8")
+    return "assembly._kernel import" in text and any(
         isinstance(node, ast.ImportFrom)
         and node.module == "assembly._kernel"
         and any(n.name == "kernel" for n in node.names)
-        for node in ast.walk(ast.parse(path.read_text()))
+        for node in ast.walk(ast.parse(text))
     )
 
 

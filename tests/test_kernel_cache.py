@@ -195,23 +195,29 @@ def all_filled(tmp_path_factory, run_python) -> Package:
 
 
 @pytest.mark.parametrize(
-    ("name", "old", "new", "answers"),
+    ("edits", "answers"),
     [
-        ("alone.py", "-x", "-2.0 * x", (-6.0, None, None, None, None)),
-        ("caller.py", "FACTOR *", "10.0 * FACTOR *", (None, None, 80.0, None, None)),
-        # A callee in another file, an inlined one, a constant.
-        ("callee.py", "x + 1.0", "x + 2.0", (None, 5.0, 10.0, None, None)),
-        ("callee.py", "    return x\n", "    return -x\n", (None, 4.0, -8.0, None, None)),
-        ("constants.py", "2.0", "3.0", (None, None, 12.0, None, None)),
-        # The driver's file knows nothing of the parts: a kernel that it makes depends on what it closes over, too.
-        ("parts.py", "x + 5.0", "x + 6.0", (None, None, None, 15.0, 17.0)),
-        ("driver.py", "part(part(x))", "part(x)", (None, None, None, 8.0, 10.0)),
-        ("_kernel/linking.py", '"""How kernels', '"""  How kernels', ANSWERS),
+        # Three that have nothing to do with each other. The driver's file knows nothing of the parts: a kernel that it
+        # makes depends on what it closes over, too.
+        (
+            [("alone.py", "-x", "-2.0 * x"), ("caller.py", "FACTOR *", "10.0 *"), ("parts.py", "x + 5.0", "x + 6.0")],
+            (-6.0, None, 40.0, 15.0, 17.0),
+        ),
+        ([("callee.py", "x + 1.0", "x + 2.0")], (None, 5.0, 10.0, None, None)),
+        # An inlined callee, and a driver.
+        (
+            [("callee.py", "    return x\n", "    return -x\n"), ("driver.py", "part(part(x))", "part(x)")],
+            (None, 4.0, -8.0, 8.0, 10.0),
+        ),
+        ([("constants.py", "2.0", "3.0")], (None, None, 12.0, None, None)),
+        ([("_kernel/linking.py", '"""How kernels', '"""  How kernels')], ANSWERS),
     ],
+    ids=["three files", "a callee", "an inlined callee and a driver", "a constant", "the decorator"],
 )
-def test_an_edit_compiles_the_callers_and_only_these(package, all_filled, name, old, new, answers):
+def test_an_edit_compiles_the_callers_and_only_these(package, all_filled, edits, answers):
     shutil.copytree(all_filled.cache, package.cache)
-    package.edit(name, old, new)
+    for edit in edits:
+        package.edit(*edit)
     expected = [
         [kernel, str(before), "found"] if now is None else [kernel, str(now), "compiled"]
         for kernel, before, now in zip(NAMES, ANSWERS, answers, strict=True)
@@ -412,9 +418,9 @@ def test_a_package_without_sources_is_not_cached(package):
     subprocess.run([sys.executable, "-m", "compileall", "-q", "-b", str(package.folder)], check=True)
     for source in package.folder.rglob("*.py"):
         source.unlink()
-    for _ in range(2):
-        assert package.call()[:3] == (8.0, 0, 1)
-    assert package.entries(package.cache / "assembly" / package.call()[3].name) == []
+    answer, hits, misses, folder = package.call()
+    assert (answer, hits, misses) == (8.0, 0, 1)
+    assert package.entries(folder) == []
 
 
 def test_cache_that_vanishes_or_fills_up_while_in_use(package):
