@@ -17,8 +17,12 @@ def test_second_process_loads_what_the_first_compiled(package):
     # Two kernels, one signature each: the inlined helper has no entry of its own.
     assert [p.name.split("-")[0] for p in package.entries(folder)] == ["small.callee.inner", "small.caller.outer"]
     before = [p.stat().st_ino for p in package.entries(folder)]
+    for path in package.entries(folder):
+        os.utime(path, (1000.0, 1000.0))
     assert package.call() == (8.0, 1, 0, folder)
     assert [p.stat().st_ino for p in package.entries(folder)] == before
+    # The one that was loaded was used now; the other one is a part of it.
+    assert [p.stat().st_mtime > 1000.0 for p in package.entries(folder)] == [False, True]
 
 
 # What a process says of each kernel: its name, its answer, whether it was compiled.
