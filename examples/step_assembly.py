@@ -1,7 +1,7 @@
 """Parts come from a STEP file and lie about anywhere; holes and faces put them together, and a STEP file is written.
 
 A corner bracket is bolted to a plate. Holes, bolts and nuts share axes; faces lie flush, named as the file names them.
-The parts are drawn here, so that it takes no other file, but OCCT: pip install "assembly[step]".
+The parts are drawn here, so that it takes no other file, but OCCT: pip install "assembly-solver[step]".
 Prints what is left to move and where the parts are; writes step_assembly.step, and step_assembly.html for a browser.
 """
 

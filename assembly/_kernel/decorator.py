@@ -91,5 +91,5 @@ def kernel(
         with suppress(OSError):  # there are no sources, or they cannot be read
             sources_of(source_of(compiled.py_func))  # now, while this file is imported
             compiled.py_func.kernel_settings = settings
-            compiled._cache = EntryCache(compiled.py_func, make_callable)
+            compiled._cache = EntryCache(compiled.py_func, make_callable, compiled)
     return compiled

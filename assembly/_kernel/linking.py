@@ -12,6 +12,8 @@ from numba.core import event
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 
+from assembly._kernel.progress import counted, progress
+
 __all__ = ["EntryCompiler", "InnerCompiler"]
 
 
@@ -109,6 +111,12 @@ class InnerCompiler(Compiler):
         library.enable_object_caching()
         super().__init__(typing_context, target_context, library, *rest)
 
+    def compile_extra(self, func: Callable[..., Any]) -> Any:
+        """Compile a function, and all that it calls and that is not compiled yet."""
+        compiled = super().compile_extra(func)
+        counted(func)
+        return compiled
+
 
 class EntryCompiler(Compiler):
     """Numba's compiler, for entries."""
@@ -118,9 +126,9 @@ class EntryCompiler(Compiler):
         library.enable_object_caching()
         super().__init__(typing_context, target_context, library, *rest)
 
-    def compile_extra(self, func: Callable[..., Any]) -> Any:
+    def compile_extra(self, func: Any) -> Any:
         """Compile a function and all that it calls."""
-        with _nothing_else():
+        with _nothing_else(), progress(func):
             return super().compile_extra(func)
 
 

@@ -12,7 +12,15 @@ import platform
 import llvmlite.binding as llvm
 from numba.core.registry import cpu_target
 
-__all__ = ["PORTABLE_VARIABLES", "Target", "own_target", "portable_target", "refuse_portable", "targets_that_run"]
+__all__ = [
+    "PORTABLE_VARIABLES",
+    "Target",
+    "own_target",
+    "portable_target",
+    "refuse_portable",
+    "targets_that_run",
+    "why_portable_code_does_not_run",
+]
 
 # Triple, processor and features, as Numba's code generator names what it compiles for.
 Target = tuple[str, str, str]
@@ -28,9 +36,11 @@ PORTABLE_VARIABLES = {"NUMBA_CPU_NAME": _PROCESSOR, "NUMBA_CPU_FEATURES": ""}
 
 
 @functools.cache
-def _runs_portable_code() -> bool:
-    features = llvm.get_host_cpu_features()
-    return _PROCESSOR == "generic" or all(features.get(name) for name in _X86_64_V3)
+def why_portable_code_does_not_run() -> str:
+    """What this processor lacks for portable code, in words; empty where it lacks nothing."""
+    features = llvm.get_host_cpu_features() if _PROCESSOR != "generic" else {}
+    lacking = [name for name in _X86_64_V3 if _PROCESSOR != "generic" and not features.get(name)]
+    return f"this processor is without {', '.join(lacking)}" if lacking else ""
 
 
 def own_target() -> Target:
@@ -56,6 +66,6 @@ def refuse_portable() -> None:
 def targets_that_run() -> list[Target]:
     """The targets whose entries run here, best first: the one that this process compiles for, and the portable one."""
     own, portable = own_target(), portable_target()
-    if portable == own or portable in _REFUSED or not _runs_portable_code():
+    if portable == own or portable in _REFUSED or why_portable_code_does_not_run():
         return [own]
     return [own, portable]

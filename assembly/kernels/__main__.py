@@ -12,8 +12,8 @@ from assembly.kernels.ahead import compile_all, default_workers
 from assembly.kernels.listing import Item, all_items
 
 ABOUT = """\
-Lists the compiled kernels of this installation: their sizes, the processors that they are for, the folder that they are
-in. A kernel that is not there is compiled when it is first needed; --compile makes all of them ahead.
+Lists the compiled kernels of this installation: their sizes, the processors that they are for, where they are kept. A
+kernel that is not there is compiled when it is first needed; --compile makes all of them ahead.
 ASSEMBLY_KERNELS=portable in the environment makes ones for every processor of this machine's kind (of x86-64: every one
 with AVX2 and FMA)."""
 
@@ -28,7 +28,7 @@ def _parser() -> argparse.ArgumentParser:
 
 def _folders() -> str:
     """Where kernels are looked for."""
-    return ", ".join(map(str, folders_to_read())) or "no folder"
+    return ", ".join(str(folder.path) for folder in folders_to_read()) or "no folder"
 
 
 def _show(items: list[Item]) -> None:
@@ -40,9 +40,8 @@ def _show(items: list[Item]) -> None:
         if found is None:
             print(f"{item.name:{width}}         -  not compiled")
             continue
-        size, target = found
-        total, count = total + size, count + 1
-        print(f"{item.name:{width}}  {size / 1e3:5.0f} kB  for {target[1]}")
+        total, count = total + found.size, count + 1
+        print(f"{item.name:{width}}  {found.size / 1e3:5.0f} kB  for {found.target[1]}, {found.origin}")
     print(f"{count} of {len(items)} are compiled, {total / 1e6:.1f} MB, in {_folders()}")
 
 
@@ -52,7 +51,7 @@ def _compile(items: list[Item], workers: int, portable: bool, native: bool) -> i
     def missing() -> list[Item]:
         if portable or native:
             target = portable_target() if portable else own_target()
-            return [item for item in items if item.size(target) is None]
+            return [item for item in items if item.compiled_for(target) is None]
         return [item for item in items if item.found() is None]
 
     wanting = missing()

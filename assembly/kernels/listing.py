@@ -11,10 +11,33 @@ from typing import Any
 
 from assembly._kernel.cache import EntryCache, read_entry
 from assembly._kernel.decorator import ENTRIES, Entry
+from assembly._kernel.folders import folders_to_read
 from assembly._kernel.sources import PACKAGE, source_of, sources_of
 from assembly._kernel.targets import Target, targets_that_run
 
-__all__ = ["Item", "all_items"]
+__all__ = ["Compiled", "Item", "all_items"]
+
+
+@dataclass(frozen=True)
+class Compiled:
+    """A compiled form on disk.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    size : int
+        Without its checksum, in bytes.
+    target : tuple of str
+        Triple, processor and features that it is for.
+    origin : str
+        Who keeps it, in words.
+    """
+
+    path: Path
+    size: int
+    target: Target
+    origin: str
 
 
 @dataclass(frozen=True)
@@ -58,18 +81,19 @@ class Item:
         """The files that it is made from."""
         return sources_of(source_of(self.entry.compiled.py_func))
 
-    def size(self, target: Target) -> int | None:
-        """Size of the compiled form for a target in bytes, if there is a sound one."""
+    def compiled_for(self, target: Target) -> Compiled | None:
+        """The compiled form for a target, if there is a sound one."""
         cache = self.entry.compiled._cache
-        for path in cache.paths(self.types, target) if isinstance(cache, EntryCache) else ():
+        paths = cache.paths(self.types, target) if isinstance(cache, EntryCache) else []
+        for path, folder in zip(paths, folders_to_read(), strict=False):
             with suppress(OSError, ValueError):
-                return len(read_entry(path))
+                return Compiled(path, len(read_entry(path)), target, folder.origin)
         return None
 
-    def found(self) -> tuple[int, Target] | None:
-        """The size of what this machine would run, and what it was compiled for; None if it has to be compiled."""
-        sizes = ((self.size(target), target) for target in targets_that_run())
-        return next(((size, target) for size, target in sizes if size is not None), None)
+    def found(self) -> Compiled | None:
+        """What this machine would run; None if it has to be compiled."""
+        forms = (self.compiled_for(target) for target in targets_that_run())
+        return next((form for form in forms if form is not None), None)
 
 
 def _modules() -> Iterator[str]:

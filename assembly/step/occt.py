@@ -63,7 +63,7 @@ def occt() -> Any:
     try:
         import_module("OCP")
     except ImportError as error:
-        raise ImportError('STEP files are read and written by OCCT: pip install "assembly[step]"') from error
+        raise ImportError('STEP files are read and written by OCCT: pip install "assembly-solver[step]"') from error
     names: dict[str, Any] = {}
     for module in _MODULES:
         names.update(vars(import_module(f"OCP.{module}")))

@@ -273,7 +273,7 @@ def read_step(path: str | PathLike[str], *, unit: str = "mm", strict: bool = Tru
     FileNotFoundError
         No such file.
     ImportError
-        OCCT is not installed: pip install "assembly[step]".
+        OCCT is not installed: pip install "assembly-solver[step]".
 
     Warns
     -----

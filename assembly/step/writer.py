@@ -116,7 +116,7 @@ def write_step(
     StepError
         Nothing to write, faces that cannot be written, a path that cannot be written to.
     ImportError
-        OCCT is not installed: pip install "assembly[step]".
+        OCCT is not installed: pip install "assembly-solver[step]".
     """
     scale = checked_unit(unit)
     placed = _placed(what)

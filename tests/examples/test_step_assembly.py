@@ -24,7 +24,7 @@ PARTS = {
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
-    pytest.importorskip("OCP", reason='STEP files need OCCT: pip install "assembly[step]"')
+    pytest.importorskip("OCP", reason='STEP files need OCCT: pip install "assembly-solver[step]"')
     folder = tmp_path_factory.mktemp("step_assembly")
     result = run_example("step_assembly", folder, also=["step_assembly.step"])
     result.file = folder / "step_assembly.step"
@@ -80,4 +80,7 @@ try:
 except SystemExit as end:
     print(end)
 """
-    assert run_python(code).splitlines()[-1] == 'STEP files are read and written by OCCT: pip install "assembly[step]"'
+    assert (
+        run_python(code).splitlines()[-1]
+        == 'STEP files are read and written by OCCT: pip install "assembly-solver[step]"'
+    )

@@ -26,8 +26,10 @@ SMALL = ("assembly.proximity.spine_curve.point_of", "assembly.geometry.curve_tab
 # The command, for these alone.
 COMMAND = f"""
 import sys
+from assembly._kernel import folders
 from assembly.kernels import __main__ as commands
 from assembly.kernels.listing import all_items
+folders._installed = lambda: []  # nothing that a build or an installation brought
 commands.all_items = lambda: [item for item in all_items() if item.name in {SMALL}]
 if __name__ == "__main__":
     sys.exit(commands.main(sys.argv[1:]))
@@ -35,9 +37,11 @@ if __name__ == "__main__":
 # What a new process makes of them: whether they are for its own processor, whether one of them was compiled or found.
 USE = f"""
 import numpy as np
+from assembly._kernel import folders
 from assembly._kernel.targets import own_target
 from assembly.kernels.listing import all_items
-print(*(item.found()[1] == own_target() for item in all_items() if item.name in {SMALL}))
+folders._installed = lambda: []
+print(*(item.found().target == own_target() for item in all_items() if item.name in {SMALL}))
 from assembly.geometry.curve_tables import swept_area
 swept_area(np.zeros(1), np.zeros((0, 2), np.int64), 0.0, 0.0, np.zeros(1), np.zeros(1))
 print(swept_area.stats.cache_misses.total(), swept_area.stats.cache_hits.total())
@@ -114,7 +118,7 @@ def test_an_old_processor_takes_no_portable_kernels(monkeypatch):
     features = llvm.get_host_cpu_features()
     for missing in ("fma", "avx2", "popcnt"):
         monkeypatch.setattr(llvm, "get_host_cpu_features", lambda missing=missing: {**features, missing: False})
-        assert not targets._runs_portable_code.__wrapped__()
+        assert targets.why_portable_code_does_not_run.__wrapped__() == f"this processor is without {missing}"
 
 
 def test_a_damaged_entry_counts_as_missing(tmp_path, monkeypatch):
@@ -123,7 +127,8 @@ def test_a_damaged_entry_counts_as_missing(tmp_path, monkeypatch):
     path.write_bytes(b"no checksum" * 9)
     assert item.found() is None
     path.write_bytes(hashlib.sha256(b"sound").digest() + b"sound")
-    assert item.found() == (5, own_target())
+    found = item.found()
+    assert (found.path, found.size, found.target) == (path, 5, own_target())
 
 
 @pytest.mark.skipif(not Path("/proc/self/status").is_file(), reason="processes cannot be looked at here")
@@ -190,7 +195,7 @@ def test_what_it_cannot_do_is_said(arguments, kind, message, monkeypatch, capsys
 
 def test_kernels_that_cannot_be_kept_are_said(monkeypatch, capsys):
     monkeypatch.setattr(commands, "compile_all", lambda *_: None)  # as on a disk that is full
-    monkeypatch.setattr(Item, "size", lambda *_: None)
+    monkeypatch.setattr(Item, "compiled_for", lambda *_: None)
     assert commands.main(["--compile"]) == 1
     assert f"{len(all_items())} kernels were compiled but could not be kept" in capsys.readouterr().err
 

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 
-pytest.importorskip("OCP", reason='STEP files need OCCT: pip install "assembly[step]"')
+pytest.importorskip("OCP", reason='STEP files need OCCT: pip install "assembly-solver[step]"')
 
 # Only where OCCT is there, which the line above asks.
 from assembly.step.occt import occt, parts  # noqa: E402

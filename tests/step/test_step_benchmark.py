@@ -11,7 +11,7 @@ from benchmarks.figures import met
 
 
 def test_a_quick_run_reaches_its_goals(monkeypatch):
-    pytest.importorskip("OCP", reason='STEP files need OCCT: pip install "assembly[step]"')
+    pytest.importorskip("OCP", reason='STEP files need OCCT: pip install "assembly-solver[step]"')
     # The files of others are measured in whole runs.
     monkeypatch.delenv("ASSEMBLY_CAD_DATA", raising=False)
     result = json.loads(json.dumps(step.run(True)))

@@ -18,7 +18,7 @@ for call in (
         print(error)
 """
     said = [line for line in run_python(code).splitlines() if "pip" in line]
-    assert said == 2 * ['STEP files are read and written by OCCT: pip install "assembly[step]"']
+    assert said == 2 * ['STEP files are read and written by OCCT: pip install "assembly-solver[step]"']
 
 
 def test_names_do_not_load_occt(run_python):

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-pytest.importorskip("OCP", reason='STEP files need OCCT: pip install "assembly[step]"')
+pytest.importorskip("OCP", reason='STEP files need OCCT: pip install "assembly-solver[step]"')
 
 # These import OCCT, whose absence is said above.
 from tests.step.models import MODELS  # noqa: E402
