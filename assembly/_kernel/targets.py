@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 import platform
+import re
 
 import llvmlite.binding as llvm
 from numba.core.registry import cpu_target
@@ -45,8 +46,9 @@ def why_portable_code_does_not_run() -> str:
 
 def own_target() -> Target:
     """What this process compiles for."""
-    target: Target = cpu_target.target_context.codegen().magic_tuple()
-    return target
+    triple, processor, features = cpu_target.target_context.codegen().magic_tuple()
+    # The release of macOS stands in its triples; code runs in the others, too.
+    return re.sub(r"(darwin|macosx)[\d.]+$", r"\1", triple), processor, features
 
 
 def portable_target() -> Target:
