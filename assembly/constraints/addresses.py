@@ -3,12 +3,32 @@
 from __future__ import annotations
 
 from assembly._address import address_of
+from assembly.constraints.contact_rows import contact_rows
+from assembly.constraints.contact_terms import contact_terms
+from assembly.constraints.tapes import run_scene_tape
 from assembly.constraints.trim_rows import trim_rows, trim_terms
+from assembly.proximity.free_pair import coordinate_lengths, has_stayed, is_extremal
 from assembly.proximity.nearest_query import find_deepest, find_nearest
 from assembly.proximity.solid_contact import search_solids, track_solids
+from assembly.proximity.start import start_surfaces
 from assembly.proximity.watch import look
 
-__all__ = ["deepest", "solids", "trims", "watch"]
+__all__ = ["contacts", "deepest", "solids", "surfaces", "tapes", "trims", "watch"]
+
+
+def contacts() -> tuple[int, int]:
+    """Of `contact_rows` and `contact_terms`."""
+    return address_of(contact_rows), address_of(contact_terms)
+
+
+def surfaces() -> tuple[int, int, int]:
+    """Of `start_surfaces`, `coordinate_lengths` and `is_extremal`."""
+    return address_of(start_surfaces), address_of(coordinate_lengths), address_of(is_extremal)
+
+
+def tapes() -> int:
+    """Of `run_scene_tape`."""
+    return address_of(run_scene_tape)
 
 
 def solids() -> tuple[int, int, int]:
@@ -26,6 +46,6 @@ def trims() -> tuple[int, int]:
     return address_of(trim_rows), address_of(trim_terms)
 
 
-def watch() -> int:
-    """Of `look`."""
-    return address_of(look)
+def watch() -> tuple[int, int]:
+    """Of `look` and `has_stayed`."""
+    return address_of(look), address_of(has_stayed)

@@ -13,6 +13,7 @@ from assembly._kernel import kernel
 from assembly.constraints.layout import (
     BODY_F,
     BODY_G,
+    CONTACTS,
     DEEPEST_AT,
     FIRST_GUARD,
     FREE_COLUMN,
@@ -26,6 +27,7 @@ from assembly.constraints.layout import (
     SEARCH_AT,
     SHELL_F,
     SHELL_G,
+    START_AT,
     SURFACE_F,
     SURFACE_G,
     TRACK_AT,
@@ -35,7 +37,6 @@ from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.extremal import CLOSE, CONVERGED, LEFT_PATCH, SINGULAR, solve_pair
 from assembly.proximity.free_pair import free_rows
 from assembly.proximity.solid_contact import CONTACT_RECORD, FOLD, IDLE, PAIR_GAP, PROPER, SLACK, STAYS, TRACK
-from assembly.proximity.start import global_start
 from assembly.proximity.velocity import GAP, RATES, RECORD, gradient_row, store_record
 
 # A clearance's contact of solids that are hardly in each other may be given up where its pair ends: then MAY_GO - k
@@ -71,12 +72,17 @@ def track_contact(table, pool, row, q, start, patience, records, k):
 
 
 @kernel(inner=True)
-def restart_contact(table, pool, row, q, records, k):
-    """As `track_contact`, from a global start."""
-    i = table[row + BODY_F]
-    j = table[row + BODY_G]
-    relative, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
-    status, x, _gap = global_start(table, pool, table[row + SURFACE_F], table[row + SURFACE_G], relative, shift, 1.0)
+def start_row(table, pool, row, q, tracked, r):
+    """The pair of the surfaces of a row wherever it is, into tracked[r]. A status."""
+    f, g = table[row + SURFACE_F], table[row + SURFACE_G]
+    return call_address(table[START_AT], (table, pool, f, g, table[row + BODY_F], table[row + BODY_G], q, tracked, r))
+
+
+@kernel(inner=True)
+def restart_contact(table, pool, row, q, tracked, records, k):
+    """As `track_contact`, from a global start; tracked[k] is free for it."""
+    status = start_row(table, pool, row, q, tracked, k)
+    x = (tracked[k, 0], tracked[k, 1], tracked[k, 2], tracked[k, 3])
     if status == CONVERGED or status == SINGULAR:
         status, x, _distance = track_contact(table, pool, row, q, x, math.inf, records, k)
     return status, x
@@ -261,7 +267,7 @@ def row_of_pair(table, pool, r, start, patience, loose, point):
                 return lost_guard(table, pool, r, start, point, False, False)
             # A one-sided contact is of the nearest pair, whichever that is now.
             held = status == LEFT_PATCH and distance > 0.0
-            status, x = restart_contact(table, pool, row, q, records, r)
+            status, x = restart_contact(table, pool, row, q, tracked, records, r)
             if status != CONVERGED and status != SINGULAR:
                 if not held:
                     return False
@@ -307,3 +313,19 @@ def contact_row(table, pool, r, start, patience, loose, point):
         # How far they may go is behind the least gap.
         records[r, SLACK] = min(UNSEEN * residual[r], ASTRAY * pool[table[row + MINIMUM] + 1])
     return True
+
+
+@kernel(
+    signatures=(
+        "(i8[::1], f8[::1], f8[:, ::1], f8, i8[::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], "
+        "f8[::1], f8[:, ::1])"
+    ),
+)
+def contact_rows(table, pool, start, patience, free, lengths, vectors, q, tracked, records, residual, jacobian):
+    """All rows of contacts, and their gradients. Returns the contact whose pair was lost, or -1."""
+    loose = (free, lengths, vectors)
+    point = (q, tracked, records, residual, jacobian)
+    for r in range(table[CONTACTS]):
+        if not contact_row(table, pool, r, start, patience, loose, point):
+            return r
+    return -1

@@ -20,12 +20,11 @@ from assembly.constraints.layout import (
     ROW,
     ROW_TABLE,
     SHELL_F,
+    STAYED_AT,
     SURFACE_F,
     SURFACE_G,
     WATCH,
 )
-from assembly.geometry.spline import surface_point
-from assembly.geometry.vec import dot, sub
 from assembly.proximity.allowances import STILL, largest_part, part_used, went
 from assembly.proximity.solid_contact import FOLD, SLACK, TRACK
 from assembly.proximity.watch import USED
@@ -122,14 +121,6 @@ def look_around(table, pool, memory, point, how):
 
 
 @kernel(inner=True)
-def moved_along(table, pool, surface, tracked, was, r, i):
-    """How far a point of contact r on a surface is from where it was; its parameters are in columns i and i + 1."""
-    p = surface_point(table, pool, surface, tracked[r, i], tracked[r, i + 1])[0]
-    d = sub(p, surface_point(table, pool, surface, was[r, i], was[r, i + 1])[0])
-    return math.sqrt(dot(d, d))
-
-
-@kernel(inner=True)
 def look_again(table, pool, memory, point, how, free, scratch):
     """The watch's look at a point that is evaluated; whether rows changed.
 
@@ -151,9 +142,8 @@ def look_again(table, pool, memory, point, how, free, scratch):
         number = np.int64(memory[place + PLACE_NUMBER]) if memory[place] >= 0.0 else 0
         if free[r] >= 0 and number == table[table[ROW_TABLE] + ROW * r + GUARD_NUMBER]:
             row = table[ROW_TABLE] + ROW * r
-            if moved_along(table, pool, table[row + SURFACE_F], tracked, scratch, r, 0) <= neglect and (
-                moved_along(table, pool, table[row + SURFACE_G], tracked, scratch, r, 2) <= neglect
-            ):
+            f, g = table[row + SURFACE_F], table[row + SURFACE_G]
+            if call_address(table[STAYED_AT], (table, pool, f, g, tracked, scratch, r, neglect)) == 1:
                 for i in range(TRACK):
                     tracked[r, i] = scratch[r, i]
             else:
