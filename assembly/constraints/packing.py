@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.constraints import addresses, layout
+from assembly.constraints.blocks import FACTORIZE_AT, SOLVE_AT
 from assembly.constraints.clearance import Clearance
 from assembly.constraints.constraint import Constraint, Coordinate, structure_changes
 from assembly.constraints.contact import Contact, side_faces
@@ -282,8 +283,11 @@ class Packed:
         return [(int(pair), int(number)) for pair, number in places.tolist()]
 
     def _take_addresses(self) -> None:
-        """Where the kernels are that only contacts, trims, clearances or expressions ask for."""
+        """Where the kernels are that only contacts, trims, clearances, expressions or many bodies ask for."""
         table = self.table
+        if table[layout.BLOCK_RECORD]:
+            record = table[table[layout.BLOCK_RECORD] :]
+            record[[FACTORIZE_AT, SOLVE_AT]] = addresses.blocks()
         if self.pair_rows:
             table[[layout.CONTACT_ROWS_AT, layout.CONTACT_TERMS_AT]] = addresses.contacts()
         if any(self.whole) or any(is_of_surfaces(pair) for pairs in self.guarded for pair in pairs):
@@ -293,7 +297,7 @@ class Packed:
         if self.trims:
             table[[layout.TRIM_ROWS_AT, layout.TRIM_TERMS_AT]] = addresses.trims()
         if self.guards:
-            table[[layout.LOOK_AT, layout.STAYED_AT]] = addresses.watch()
+            table[[layout.LOOK_AT, layout.STAYED_AT, layout.PARTS_AT, layout.WENT_AT]] = addresses.watch()
             table[table[layout.WATCH] + watch_memory.TRACK_SOLIDS] = table[layout.TRACK_AT]
         if table[table[layout.TAPE_ROOM]] > 0:
             table[layout.RUN_TAPE_AT] = addresses.tapes()

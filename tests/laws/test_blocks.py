@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly._kernel import kernel
 from assembly.constraints import layout, packing
+from assembly.constraints.block_factor import factorize_blocks, forward_blocks, greatest_diagonal, substitute_blocks
 from assembly.constraints.blocks import BLOCKS, COUNT, FACTORED, FIRST, block_row
 from assembly.constraints.elimination import block_record
-from assembly.solve.block_factor import factorize_blocks, forward_blocks, greatest_diagonal, substitute_blocks
 from tests.laws.loop_point import LoopPoint
 
 
