@@ -216,5 +216,5 @@ def measure_parts(table, pool, watch, memory, first, end, q):
 
 @kernel(signatures="(i8[::1], f8[::1], i8, i8, f8[:, ::1], f8[:, ::1], f8)")
 def went_beyond(table, pool, watch, p, before, after, most):
-    """Whether a point of one body of pair p may have gone farther than `most` between two poses. By its address, too."""
+    """Whether a point of one body of pair p may have gone farther than `most` between two poses. By address, too."""
     return 1 if went(table, pool, watch, p, before, after) > most else 0
