@@ -5,7 +5,7 @@ from __future__ import annotations
 from assembly._address import address_of
 from assembly.constraints.block_factor import factorize_blocks, solve_blocks
 from assembly.constraints.contact_rows import contact_rows
-from assembly.constraints.contact_terms import contact_terms
+from assembly.constraints.free_terms import free_terms
 from assembly.constraints.tapes import run_scene_tape
 from assembly.constraints.trim_rows import trim_rows, trim_terms
 from assembly.proximity.allowances import measure_parts, went_beyond
@@ -23,14 +23,16 @@ def blocks() -> tuple[int, int]:
     return address_of(factorize_blocks), address_of(solve_blocks)
 
 
-def contacts() -> tuple[int, int]:
-    """Of `contact_rows` and `contact_terms`."""
-    return address_of(contact_rows), address_of(contact_terms)
+def contacts() -> int:
+    """Of `contact_rows`."""
+    return address_of(contact_rows)
 
 
-def surfaces() -> tuple[int, int, int]:
-    """Of `start_surfaces`, `coordinate_lengths` and `is_extremal`."""
-    return address_of(start_surfaces), address_of(coordinate_lengths), address_of(is_extremal)
+def surfaces() -> tuple[int, int, int, int]:
+    """Of `start_surfaces`, `coordinate_lengths`, `free_terms` and `is_extremal`."""
+    entries = start_surfaces, coordinate_lengths, free_terms, is_extremal
+    start, lengths, terms, extremal = map(address_of, entries)
+    return start, lengths, terms, extremal
 
 
 def tapes() -> int:

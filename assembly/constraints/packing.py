@@ -289,9 +289,9 @@ class Packed:
             record = table[table[layout.BLOCK_RECORD] :]
             record[[FACTORIZE_AT, SOLVE_AT]] = addresses.blocks()
         if self.pair_rows:
-            table[[layout.CONTACT_ROWS_AT, layout.CONTACT_TERMS_AT]] = addresses.contacts()
+            table[layout.CONTACT_ROWS_AT] = addresses.contacts()
         if any(self.whole) or any(is_of_surfaces(pair) for pairs in self.guarded for pair in pairs):
-            table[[layout.START_AT, layout.LENGTHS_AT, layout.EXTREMAL_AT]] = addresses.surfaces()
+            table[layout.START_AT : layout.EXTREMAL_AT + 1] = addresses.surfaces()
         if self.shells:
             table[[layout.TRACK_AT, layout.SEARCH_AT, layout.NEAREST_AT]] = addresses.solids()
         if self.trims:

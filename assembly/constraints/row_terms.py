@@ -10,11 +10,11 @@ from assembly._address import call_address
 from assembly._kernel import kernel
 from assembly.constraints.blocks import add_patch, block_row, clear_patch, is_blocked
 from assembly.constraints.layout import (
-    CONTACT_TERMS_AT,
     CONTACTS,
     COORDINATE,
     EXTRA_COLUMN,
     FREE_COLUMN,
+    FREE_TERMS_AT,
     JOINT_ROW,
     KIND,
     PARAMETERS,
@@ -32,6 +32,7 @@ from assembly.constraints.layout import (
 )
 from assembly.constraints.primitives import add_coordinate_hessian
 from assembly.constraints.tapes import add_tape_hessian
+from assembly.proximity.velocity import add_gap_terms
 
 
 @kernel(inline=True)
@@ -105,25 +106,30 @@ def add_row_terms(table, pool, loose, room, shape, point, y, weights, hessian):
 
     The rows of tangency of a free pair go with its row.
     """
-    q, tracked, records, residual, jacobian = point
+    q, tracked, records, _residual, jacobian = point
     bases, order = shape[0], shape[2]
     blocked = is_blocked(order)
     pairs = table[CONTACTS]
-    if pairs > 0:
-        call_address(
-            table[CONTACT_TERMS_AT],
-            (
-                table, pool, loose[0], loose[1], loose[2], loose[3], bases, order[0], order[1], order[2], order[3],
-                q, tracked, records, residual, jacobian, y, weights, hessian,
-            ),
-        )  # fmt: skip
+    free, lengths, vectors, block = loose[0], loose[1], loose[2], loose[3]
+    for r in range(pairs):
+        if free[r] >= 0:
+            call_address(
+                table[FREE_TERMS_AT],
+                (table, pool, r, free, lengths, vectors, block, q, tracked, jacobian, y, weights, hessian),
+            )
+        elif blocked and (y[r] != 0.0 or weights[r] != 0.0):
+            f, g = clear_patch(order, bases[r, 0], bases[r, 1])
+            add_gap_terms(records, r, jacobian, r, y[r], weights[r], order[2][1:], f, g)
+            add_patch(order, bases[r, 0], bases[r, 1], hessian)
+        elif y[r] != 0.0 or weights[r] != 0.0:
+            add_gap_terms(records, r, jacobian, r, y[r], weights[r], hessian, bases[r, 0], bases[r, 1])
     for r in range(pairs, pairs + table[TRIMS]):
         if weights[r] != 0.0:
             add_gram(bases, jacobian, r, weights[r], hessian)
         if y[r] != 0.0:
             call_address(
                 table[TRIM_TERMS_AT],
-                (table, pool, r, loose[0], loose[1], bases, tracked, records, jacobian, y[r], hessian),
+                (table, pool, r, free, lengths, bases, tracked, records, jacobian, y[r], hessian),
             )
     for r in range(pairs + table[TRIMS], table[ROWS]):
         if weights[r] != 0.0 and blocked:
