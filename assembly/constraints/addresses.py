@@ -5,7 +5,7 @@ from __future__ import annotations
 from assembly._address import address_of
 from assembly.constraints.block_factor import factorize_blocks, solve_blocks
 from assembly.constraints.contact_rows import contact_rows
-from assembly.constraints.free_terms import free_terms
+from assembly.constraints.free_contacts import free_row, free_terms
 from assembly.constraints.tapes import run_scene_tape
 from assembly.constraints.trim_rows import trim_rows, trim_terms
 from assembly.proximity.allowances import measure_parts, went_beyond
@@ -28,11 +28,9 @@ def contacts() -> int:
     return address_of(contact_rows)
 
 
-def surfaces() -> tuple[int, int, int, int]:
-    """Of `start_surfaces`, `coordinate_lengths`, `free_terms` and `is_extremal`."""
-    entries = start_surfaces, coordinate_lengths, free_terms, is_extremal
-    start, lengths, terms, extremal = map(address_of, entries)
-    return start, lengths, terms, extremal
+def surfaces() -> list[int]:
+    """Of `start_surfaces`, `coordinate_lengths`, `free_row`, `free_terms` and `is_extremal`."""
+    return [address_of(entry) for entry in (start_surfaces, coordinate_lengths, free_row, free_terms, is_extremal)]
 
 
 def tapes() -> int:

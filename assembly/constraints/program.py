@@ -15,6 +15,7 @@ from assembly.constraints.layout import (
     CONTACTS,
     COORDINATE,
     EXTRA_COLUMN,
+    FREE_ROW_AT,
     JOINT_RECORD,
     JOINT_ROW,
     JOINT_TABLE,
@@ -83,15 +84,18 @@ def evaluate(table, pool, start, patience, loose, room, point):
     """
     q, tracked, records, residual, jacobian = point
     pairs = table[CONTACTS]
+    free = loose[0]
+    for r in range(pairs):
+        if free[r] >= 0:
+            one = (table, pool, r, start, free, loose[1], loose[2], q, tracked, records, residual, jacobian)
+            call_address(table[FREE_ROW_AT], one)
     if pairs > 0:
-        lost = call_address(
-            table[CONTACT_ROWS_AT],
-            (table, pool, start, patience, loose[0], loose[1], loose[2], q, tracked, records, residual, jacobian),
-        )
+        others = (table, pool, start, patience, free, q, tracked, records, residual, jacobian)
+        lost = call_address(table[CONTACT_ROWS_AT], others)
         if lost >= 0:
             return lost
     if table[TRIMS] > 0:
-        call_address(table[TRIM_ROWS_AT], (table, pool, loose[0], loose[1], q, tracked, records, residual, jacobian))
+        call_address(table[TRIM_ROWS_AT], (table, pool, free, loose[1], q, tracked, records, residual, jacobian))
     for k in range(pairs, table[TRACKED]):
         # Of an angle that no row has, only an input of a dexterity, this is all that is known.
         copy_tracked(start, k, tracked)

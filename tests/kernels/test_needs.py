@@ -11,7 +11,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent.parent
 LOOP = {"solve_program"}
 CONTACTS = {"contact_rows"}
-SURFACES = {"start_surfaces", "coordinate_lengths", "free_terms", "is_extremal"}
+SURFACES = {"start_surfaces", "coordinate_lengths", "free_row", "free_terms", "is_extremal"}
 SOLIDS = {"track_solids", "search_solids", "find_nearest"}
 CLEARANCES = {"look", "has_stayed", "measure_parts", "went_beyond"}
 # What is asked for by what a solve does before and after its loop: bodies are looked at for crossings, say.

@@ -1,10 +1,58 @@
-"""What a free pair's rows (`proximity/free_pair.py`) add to a Hessian; `row_terms.py` calls this by its address."""
+"""Rows of contacts whose coordinates are unknowns (`proximity/free_pair.py`), and what they add to a Hessian.
+
+Both kernels are called by their addresses.
+"""
 
 from __future__ import annotations
 
 from assembly._kernel import kernel
-from assembly.constraints.layout import BODY_F, BODY_G, MOVING, ROW, ROW_TABLE, ROWS, SLOTS, SURFACE_F, SURFACE_G
-from assembly.proximity.free_pair import VARIABLES, free_hessian
+from assembly.constraints.contact_rows import copy_tracked
+from assembly.constraints.layout import (
+    BODY_F,
+    BODY_G,
+    MINIMUM,
+    MOVING,
+    ROW,
+    ROW_TABLE,
+    ROWS,
+    SLOTS,
+    SURFACE_F,
+    SURFACE_G,
+)
+from assembly.proximity.free_pair import VARIABLES, free_hessian, free_rows
+from assembly.proximity.solid_contact import PAIR_GAP, SLACK
+
+
+@kernel(
+    signatures=(
+        "(i8[::1], f8[::1], i8, f8[:, ::1], i8[::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], "
+        "f8[::1], f8[:, ::1])"
+    ),
+)
+def free_row(table, pool, r, start, free, lengths, vectors, q, tracked, records, residual, jacobian):
+    """Row r, of a contact at the coordinates in start[r]; its four rows of tangency follow the rows of the program."""
+    row = table[ROW_TABLE] + ROW * r
+    copy_tracked(start, r, tracked)
+    free_rows(
+        table,
+        pool,
+        table[row + SURFACE_F],
+        table[row + SURFACE_G],
+        table[row + BODY_F],
+        table[row + BODY_G],
+        q,
+        (start[r, 0], start[r, 1], start[r, 2], start[r, 3]),
+        (lengths[r, 0], lengths[r, 1], lengths[r, 2], lengths[r, 3]),
+        vectors,
+        residual,
+        jacobian,
+        r,
+        table[ROWS] + 4 * free[r],
+    )
+    tracked[r, PAIR_GAP] = residual[r]
+    residual[r] -= pool[table[row + MINIMUM]]
+    records[r, SLACK] = 0.0
+    return 0
 
 
 @kernel(
