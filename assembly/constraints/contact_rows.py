@@ -78,9 +78,11 @@ def start_row(table, pool, row, q, tracked, r):
 
 @kernel(inner=True)
 def restart_contact(table, pool, row, q, tracked, records, k):
-    """As `track_contact`, from a global start; tracked[k] is free for it."""
+    """As `track_contact`, from a global start; tracked[k] is written meanwhile."""
+    was = (tracked[k, 0], tracked[k, 1], tracked[k, 2], tracked[k, 3])
     status = start_row(table, pool, row, q, tracked, k)
     x = (tracked[k, 0], tracked[k, 1], tracked[k, 2], tracked[k, 3])
+    tracked[k, 0], tracked[k, 1], tracked[k, 2], tracked[k, 3] = was
     if status == CONVERGED or status == SINGULAR:
         status, x, _distance = track_contact(table, pool, row, q, x, math.inf, records, k)
     return status, x
