@@ -14,7 +14,6 @@ CONTACTS = {"contact_rows"}
 SURFACES = {"start_surfaces", "coordinate_lengths", "free_row", "free_terms", "is_extremal"}
 SOLIDS = {"track_solids", "search_solids", "find_nearest"}
 CLEARANCES = {"look", "has_stayed", "measure_parts", "went_beyond"}
-# What is asked for by what a solve does before and after its loop: bodies are looked at for crossings, say.
 SCENES = {
     "joints": (
         """
@@ -80,7 +79,7 @@ scene.minimize(asm.PointDistance(other.point(0, 0, 0), target=(1, 0, 0)))
 }
 SOLVE = """
 import assembly as asm
-from assembly._kernel import ENTRIES
+from assembly._kernel.decorator import ENTRIES
 ground = asm.Body("ground", fixed=True)
 {}
 assert scene.solve().success
