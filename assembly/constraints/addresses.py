@@ -3,12 +3,39 @@
 from __future__ import annotations
 
 from assembly._address import address_of
+from assembly.constraints.block_factor import factorize_blocks, solve_blocks
+from assembly.constraints.contact_rows import contact_rows
+from assembly.constraints.free_contacts import free_row, free_terms
+from assembly.constraints.tapes import run_scene_tape
 from assembly.constraints.trim_rows import trim_rows, trim_terms
+from assembly.proximity.allowances import measure_parts, went_beyond
+from assembly.proximity.free_pair import coordinate_lengths, has_stayed, is_extremal
 from assembly.proximity.nearest_query import find_deepest, find_nearest
 from assembly.proximity.solid_contact import search_solids, track_solids
+from assembly.proximity.start import start_surfaces
 from assembly.proximity.watch import look
 
-__all__ = ["deepest", "solids", "trims", "watch"]
+__all__ = ["blocks", "contacts", "deepest", "solids", "surfaces", "tapes", "trims", "watch"]
+
+
+def blocks() -> tuple[int, int]:
+    """Of `factorize_blocks` and `solve_blocks`."""
+    return address_of(factorize_blocks), address_of(solve_blocks)
+
+
+def contacts() -> int:
+    """Of `contact_rows`."""
+    return address_of(contact_rows)
+
+
+def surfaces() -> list[int]:
+    """Of `start_surfaces`, `coordinate_lengths`, `free_row`, `free_terms` and `is_extremal`."""
+    return [address_of(entry) for entry in (start_surfaces, coordinate_lengths, free_row, free_terms, is_extremal)]
+
+
+def tapes() -> int:
+    """Of `run_scene_tape`."""
+    return address_of(run_scene_tape)
 
 
 def solids() -> tuple[int, int, int]:
@@ -26,6 +53,6 @@ def trims() -> tuple[int, int]:
     return address_of(trim_rows), address_of(trim_terms)
 
 
-def watch() -> int:
-    """Of `look`."""
-    return address_of(look)
+def watch() -> tuple[int, int, int, int]:
+    """Of `look`, `has_stayed`, `measure_parts` and `went_beyond`."""
+    return address_of(look), address_of(has_stayed), address_of(measure_parts), address_of(went_beyond)

@@ -12,6 +12,8 @@ stand in the order of the factor:
     panel (N + 1), across (.)                     rows of the factor and their columns, ascending
     meeting (N + 1), meeting_row (.), meeting_at (.)   of every column the rows above that have it, and at which place
 
+and, as numbers in its header, the addresses of the two kernels that make the factor and solve by it.
+
 A block is turned as the upper triangle of the unknowns has it, block e in rows 6 e.. of an array of six columns.
 Where a pair at a fold has unknowns of its own, everything is dense in an envelope as in a small scene (`sparsity.py`).
 """
@@ -21,7 +23,7 @@ from __future__ import annotations
 from assembly._kernel import kernel
 
 COUNT, BLOCKS, FACTORED, PLACE, FIRST, COLUMN, SEAT, PANEL, ACROSS = 0, 1, 2, 3, 4, 5, 6, 7, 8
-MEETING, MEETING_ROW, MEETING_AT, BLOCK_HEADER = 9, 10, 11, 12
+MEETING, MEETING_ROW, MEETING_AT, FACTORIZE_AT, SOLVE_AT, BLOCK_HEADER = 9, 10, 11, 12, 13, 14
 
 
 @kernel(inline=True)

@@ -13,6 +13,7 @@ from assembly._kernel import kernel
 from assembly.constraints.layout import (
     BODY_F,
     BODY_G,
+    CONTACTS,
     DEEPEST_AT,
     FIRST_GUARD,
     FREE_COLUMN,
@@ -22,10 +23,10 @@ from assembly.constraints.layout import (
     ONE_SIDED,
     ROW,
     ROW_TABLE,
-    ROWS,
     SEARCH_AT,
     SHELL_F,
     SHELL_G,
+    START_AT,
     SURFACE_F,
     SURFACE_G,
     TRACK_AT,
@@ -33,9 +34,7 @@ from assembly.constraints.layout import (
 from assembly.geometry.vec import dot, sub
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.extremal import CLOSE, CONVERGED, LEFT_PATCH, SINGULAR, solve_pair
-from assembly.proximity.free_pair import free_rows
 from assembly.proximity.solid_contact import CONTACT_RECORD, FOLD, IDLE, PAIR_GAP, PROPER, SLACK, STAYS, TRACK
-from assembly.proximity.start import global_start
 from assembly.proximity.velocity import GAP, RATES, RECORD, gradient_row, store_record
 
 # A clearance's contact of solids that are hardly in each other may be given up where its pair ends: then MAY_GO - k
@@ -71,12 +70,19 @@ def track_contact(table, pool, row, q, start, patience, records, k):
 
 
 @kernel(inner=True)
-def restart_contact(table, pool, row, q, records, k):
-    """As `track_contact`, from a global start."""
-    i = table[row + BODY_F]
-    j = table[row + BODY_G]
-    relative, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
-    status, x, _gap = global_start(table, pool, table[row + SURFACE_F], table[row + SURFACE_G], relative, shift, 1.0)
+def start_row(table, pool, row, q, tracked, r):
+    """The pair of the surfaces of a row wherever it is, into tracked[r]. A status."""
+    f, g = table[row + SURFACE_F], table[row + SURFACE_G]
+    return call_address(table[START_AT], (table, pool, f, g, table[row + BODY_F], table[row + BODY_G], q, tracked, r))
+
+
+@kernel(inner=True)
+def restart_contact(table, pool, row, q, tracked, records, k):
+    """As `track_contact`, from a global start; tracked[k] is written meanwhile."""
+    was = (tracked[k, 0], tracked[k, 1], tracked[k, 2], tracked[k, 3])
+    status = start_row(table, pool, row, q, tracked, k)
+    x = (tracked[k, 0], tracked[k, 1], tracked[k, 2], tracked[k, 3])
+    tracked[k, 0], tracked[k, 1], tracked[k, 2], tracked[k, 3] = was
     if status == CONVERGED or status == SINGULAR:
         status, x, _distance = track_contact(table, pool, row, q, x, math.inf, records, k)
     return status, x
@@ -214,75 +220,45 @@ def solids_row(table, pool, r, start, patience, point):
 
 
 @kernel(inner=True)
-def free_contact(table, pool, r, x, loose, point):
-    """Row r, of a contact whose coordinates x are unknowns, and its four rows of tangency."""
-    q, _tracked, _records, residual, jacobian = point
-    free, lengths = loose[0], loose[1]
-    row = table[ROW_TABLE] + ROW * r
-    free_rows(
-        table,
-        pool,
-        table[row + SURFACE_F],
-        table[row + SURFACE_G],
-        table[row + BODY_F],
-        table[row + BODY_G],
-        q,
-        x,
-        (lengths[r, 0], lengths[r, 1], lengths[r, 2], lengths[r, 3]),
-        loose[2],
-        residual,
-        jacobian,
-        r,
-        table[ROWS] + 4 * free[r],
-    )
-    residual[r] -= pool[table[row + MINIMUM]]
-
-
-@kernel(inner=True)
-def row_of_pair(table, pool, r, start, patience, loose, point):
+def row_of_pair(table, pool, r, start, patience, point):
     """Row r, of contact r, by its pair. Returns whether it was found.
 
-    A tracked contact is carried from `start` to its extremal pair, by steps that turn no normal by more than
-    `patience`. A free one (free[r] >= 0, its place among the free ones) is evaluated at `start` itself, and its four
-    rows of tangency follow the rows of the program. A one-sided row that loses its pair takes the
-    nearest one there is.
+    A contact is carried from `start` to its extremal pair, by steps that turn no normal by more than `patience`. A
+    one-sided row that loses its pair takes the nearest one there is.
     """
     q, tracked, records, residual, jacobian = point
     row = table[ROW_TABLE] + ROW * r
     if table[row + SHELL_F] >= 0:
         return solids_row(table, pool, r, start, patience, point)
     x = (start[r, 0], start[r, 1], start[r, 2], start[r, 3])
-    if loose[0][r] < 0:
-        status, x, distance = track_contact(table, pool, row, q, x, patience, records, r)
+    status, x, distance = track_contact(table, pool, row, q, x, patience, records, r)
+    if status != CONVERGED and status != SINGULAR:
+        if table[row + ONE_SIDED] == 0:
+            return False
+        if is_guard(table, r):
+            return lost_guard(table, pool, r, start, point, False, False)
+        # A one-sided contact is of the nearest pair, whichever that is now.
+        held = status == LEFT_PATCH and distance > 0.0
+        status, x = restart_contact(table, pool, row, q, tracked, records, r)
         if status != CONVERGED and status != SINGULAR:
-            if table[row + ONE_SIDED] == 0:
+            if not held:
                 return False
-            if is_guard(table, r):
-                return lost_guard(table, pool, r, start, point, False, False)
-            # A one-sided contact is of the nearest pair, whichever that is now.
-            held = status == LEFT_PATCH and distance > 0.0
-            status, x = restart_contact(table, pool, row, q, records, r)
-            if status != CONVERGED and status != SINGULAR:
-                if not held:
-                    return False
-                for i in range(CONTACT_RECORD):
-                    records[r, i] = 0.0
-                records[r, GAP] = distance
-                records[r, PROPER] = 1.0
-                records[r, FOLD] = 1.0
-            elif not records[r, GAP] > 0.0:
-                return False
-        residual[r] = records[r, GAP] - pool[table[row + MINIMUM]]
-        gradient_row(records, r, jacobian, r)
-    else:
-        free_contact(table, pool, r, x, loose, point)
+            for i in range(CONTACT_RECORD):
+                records[r, i] = 0.0
+            records[r, GAP] = distance
+            records[r, PROPER] = 1.0
+            records[r, FOLD] = 1.0
+        elif not records[r, GAP] > 0.0:
+            return False
+    residual[r] = records[r, GAP] - pool[table[row + MINIMUM]]
+    gradient_row(records, r, jacobian, r)
     tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3] = x
     tracked[r, PAIR_GAP] = residual[r] + pool[table[row + MINIMUM]]
     return True
 
 
 @kernel(inline=True)
-def contact_row(table, pool, r, start, patience, loose, point):
+def contact_row(table, pool, r, start, patience, point):
     """Row r, of contact r, from `start` on. Returns whether its pair was found, or need not be.
 
     A row of a clearance that stays open is as `solve/carry.py` left it.
@@ -297,9 +273,9 @@ def contact_row(table, pool, r, start, patience, loose, point):
         tracked[r, IDLE] = 0.0
         residual[r] = start[r, PAIR_GAP] - pool[table[row + MINIMUM]]
         return True
-    if not row_of_pair(table, pool, r, start, patience, loose, point):
+    if not row_of_pair(table, pool, r, start, patience, point):
         return False
-    tracks = loose[0][r] < 0 and not math.isnan(tracked[r, 0])
+    tracks = not math.isnan(tracked[r, 0])
     # Features of solids switch as they move: their rows are followed.
     open_far = is_guard(table, r) and table[row + SHELL_F] < 0 and residual[r] > FAR
     records[r, SLACK] = 0.0
@@ -307,3 +283,15 @@ def contact_row(table, pool, r, start, patience, loose, point):
         # How far they may go is behind the least gap.
         records[r, SLACK] = min(UNSEEN * residual[r], ASTRAY * pool[table[row + MINIMUM] + 1])
     return True
+
+
+@kernel(
+    signatures=("(i8[::1], f8[::1], f8[:, ::1], f8, i8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1])"),
+)
+def contact_rows(table, pool, start, patience, free, q, tracked, records, residual, jacobian):
+    """All rows of contacts but those of free pairs, and their gradients. Returns one whose pair was lost, or -1."""
+    point = (q, tracked, records, residual, jacobian)
+    for r in range(table[CONTACTS]):
+        if free[r] < 0 and not contact_row(table, pool, r, start, patience, point):
+            return r
+    return -1

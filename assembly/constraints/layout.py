@@ -30,7 +30,11 @@ FIRST_GUARD, GUARDS, WATCH, LOOK_AT = 26, 27, 28, 29
 # What tells the time in nanoseconds (0: nothing does).
 CLOCK_AT = 30
 # The record of the blocks that the Hessian of a large scene has (`blocks.py`), and its length; 0: it is dense.
-BLOCK_RECORD, BLOCK_LENGTH, HEADER = 31, 32, 33
+BLOCK_RECORD, BLOCK_LENGTH = 31, 32
+# Addresses again: of what evaluates rows of contacts; of what contacts of two surfaces need besides, what clearances do;
+# of what runs tapes.
+CONTACT_ROWS_AT, START_AT, LENGTHS_AT, FREE_ROW_AT, FREE_TERMS_AT, EXTREMAL_AT = 33, 34, 35, 36, 37, 38
+STAYED_AT, PARTS_AT, WENT_AT, RUN_TAPE_AT, HEADER = 39, 40, 41, 42, 43
 # A row: kind, its two bodies (-1: none), whether it is one-sided (residual >= 0), whether it prescribes a freedom, and
 # whether its residual is a length. Row k is that of contact k.
 ROW = 14

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.constraints import addresses, layout
+from assembly.constraints.blocks import FACTORIZE_AT, SOLVE_AT
 from assembly.constraints.clearance import Clearance
 from assembly.constraints.constraint import Constraint, Coordinate, structure_changes
 from assembly.constraints.contact import Contact, side_faces
@@ -28,7 +29,7 @@ from assembly.constraints.scene_writer import SceneWriter
 from assembly.constraints.term_packing import TermPacking, natural_unit
 from assembly.constraints.trim_contact import TrimContact
 from assembly.constraints.turns import Turns
-from assembly.constraints.watch_packing import LAST_REACH, guarded_pairs, pack_watch, place_count
+from assembly.constraints.watch_packing import LAST_REACH, guarded_pairs, is_of_surfaces, pack_watch, place_count
 from assembly.errors import FARTHEST, InputError
 from assembly.geometry.surface import NurbsSurface
 from assembly.kinematics.body import Body, BodyFace
@@ -282,15 +283,24 @@ class Packed:
         return [(int(pair), int(number)) for pair, number in places.tolist()]
 
     def _take_addresses(self) -> None:
-        """Where the kernels are that only contacts of solids, trims or clearances ask for."""
+        """Where the kernels are that only contacts, trims, clearances, expressions or many bodies ask for."""
         table = self.table
+        if table[layout.BLOCK_RECORD]:
+            record = table[table[layout.BLOCK_RECORD] :]
+            record[[FACTORIZE_AT, SOLVE_AT]] = addresses.blocks()
+        if self.pair_rows:
+            table[layout.CONTACT_ROWS_AT] = addresses.contacts()
+        if any(self.whole) or any(is_of_surfaces(pair) for pairs in self.guarded for pair in pairs):
+            table[layout.START_AT : layout.EXTREMAL_AT + 1] = addresses.surfaces()
         if self.shells:
             table[[layout.TRACK_AT, layout.SEARCH_AT, layout.NEAREST_AT]] = addresses.solids()
         if self.trims:
             table[[layout.TRIM_ROWS_AT, layout.TRIM_TERMS_AT]] = addresses.trims()
         if self.guards:
-            table[layout.LOOK_AT] = addresses.watch()
+            table[[layout.LOOK_AT, layout.STAYED_AT, layout.PARTS_AT, layout.WENT_AT]] = addresses.watch()
             table[table[layout.WATCH] + watch_memory.TRACK_SOLIDS] = table[layout.TRACK_AT]
+        if table[table[layout.TAPE_ROOM]] > 0:
+            table[layout.RUN_TAPE_AT] = addresses.tapes()
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         # Addresses are those of one process; a copy, or what another process wrote, takes its own.

@@ -7,43 +7,34 @@ Rows of contacts are in `contact_rows.py`, second derivatives in `row_terms.py`.
 
 from __future__ import annotations
 
-import math
-
 from assembly._address import call_address
 from assembly._kernel import kernel
-from assembly.constraints.contact_rows import contact_row, copy_tracked
+from assembly.constraints.contact_rows import copy_tracked
 from assembly.constraints.layout import (
+    CONTACT_ROWS_AT,
     CONTACTS,
     COORDINATE,
     EXTRA_COLUMN,
+    FREE_ROW_AT,
     JOINT_RECORD,
     JOINT_ROW,
     JOINT_TABLE,
     JOINTS,
     KIND,
-    ONE_SIDED,
     PARAMETERS,
-    REFERENCE,
     ROW,
     ROW_TABLE,
     ROWS,
-    SCALE,
     SECOND,
-    TAPE_BODIES,
-    TAPE_FIRST,
-    TAPE_LIST,
     TAPE_RECORD,
-    TAPE_ROW_AT,
-    TAPE_SCALE,
     TAPE_TABLE,
-    TAPE_VALUES,
     TAPES,
     TRACKED,
     TRIM_ROWS_AT,
     TRIMS,
 )
 from assembly.constraints.primitives import coordinate, place_frames, write_gradient
-from assembly.geometry.tape import run_tape
+from assembly.constraints.tapes import tape_rows
 
 
 @kernel(inner=True)
@@ -85,43 +76,6 @@ def joint_row(table, pool, r, start, tracked, records, residual, jacobian):
 
 
 @kernel(inner=True)
-def place_tape(table, pool, tape, q, room):
-    """The poses of a tape's bodies, in the user's units, to the front of its room. Returns where its inputs end."""
-    size = pool[SCALE]
-    for b in range(table[tape + TAPE_BODIES]):
-        body = table[table[tape + TAPE_LIST] + b]
-        for i in range(3):
-            room[7 * b + i] = q[body, i] * size + pool[REFERENCE + i]
-        for i in range(3, 7):
-            room[7 * b + i] = q[body, i]
-    return 7 * table[tape + TAPE_BODIES]
-
-
-@kernel(inner=True)
-def tape_rows(table, pool, tape, q, room, residual, jacobian):
-    """All rows of a tape; a value or a slope that is not finite is an infinite violation, of one side too."""
-    inputs, outputs, work = room
-    place_tape(table, pool, tape, q, inputs)
-    run_tape(table, pool, table[tape + TAPE_FIRST], inputs, work, outputs)
-    m = table[tape + TAPE_VALUES]
-    count = table[tape + TAPE_BODIES]
-    each = 1.0 / pool[table[tape + TAPE_SCALE]]
-    size = pool[SCALE]
-    for v in range(m):
-        r = table[tape + TAPE_ROW_AT] + v
-        nowhere = -math.inf if table[table[ROW_TABLE] + ROW * r + ONE_SIDED] == 1 else math.inf
-        residual[r] = outputs[v] * each if math.isfinite(outputs[v]) else nowhere
-        for b in range(count):
-            at = m + 6 * (count * v + b)
-            column = 6 * b if b < 2 else EXTRA_COLUMN + 6 * (b - 2)
-            for i in range(3):
-                jacobian[r, column + i] = outputs[at + i] * each * size
-                jacobian[r, column + 3 + i] = outputs[at + 3 + i] * each
-                if not (math.isfinite(outputs[at + i]) and math.isfinite(outputs[at + 3 + i])):
-                    residual[r] = nowhere
-
-
-@kernel(inner=True)
 def evaluate(table, pool, start, patience, loose, room, point):
     """Evaluate all rows at the point's poses. Returns the contact whose pair was lost, or -1.
 
@@ -130,11 +84,18 @@ def evaluate(table, pool, start, patience, loose, room, point):
     """
     q, tracked, records, residual, jacobian = point
     pairs = table[CONTACTS]
+    free = loose[0]
     for r in range(pairs):
-        if not contact_row(table, pool, r, start, patience, loose, point):
-            return r
+        if free[r] >= 0:
+            one = (table, pool, r, start, free, loose[1], loose[2], q, tracked, records, residual, jacobian)
+            call_address(table[FREE_ROW_AT], one)
+    if pairs > 0:
+        others = (table, pool, start, patience, free, q, tracked, records, residual, jacobian)
+        lost = call_address(table[CONTACT_ROWS_AT], others)
+        if lost >= 0:
+            return lost
     if table[TRIMS] > 0:
-        call_address(table[TRIM_ROWS_AT], (table, pool, loose[0], loose[1], q, tracked, records, residual, jacobian))
+        call_address(table[TRIM_ROWS_AT], (table, pool, free, loose[1], q, tracked, records, residual, jacobian))
     for k in range(pairs, table[TRACKED]):
         # Of an angle that no row has, only an input of a dexterity, this is all that is known.
         copy_tracked(start, k, tracked)

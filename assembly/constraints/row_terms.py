@@ -8,32 +8,22 @@ from __future__ import annotations
 
 from assembly._address import call_address
 from assembly._kernel import kernel
-from assembly.constraints.blocks import add_patch, block_row, clear_patch, is_blocked, spot
+from assembly.constraints.blocks import add_patch, block_row, clear_patch, is_blocked
 from assembly.constraints.layout import (
-    BODY_F,
-    BODY_G,
     CONTACTS,
     COORDINATE,
     EXTRA_COLUMN,
     FREE_COLUMN,
+    FREE_TERMS_AT,
     JOINT_ROW,
     KIND,
-    MOVING,
     PARAMETERS,
     ROW,
     ROW_TABLE,
     ROWS,
-    SCALE,
     SECOND,
-    SLOTS,
-    SURFACE_F,
-    SURFACE_G,
-    TAPE_BODIES,
-    TAPE_LIST,
     TAPE_RECORD,
     TAPE_ROW_AT,
-    TAPE_SCALE,
-    TAPE_SECOND,
     TAPE_TABLE,
     TAPE_VALUES,
     TAPES,
@@ -41,9 +31,7 @@ from assembly.constraints.layout import (
     TRIMS,
 )
 from assembly.constraints.primitives import add_coordinate_hessian
-from assembly.constraints.program import place_tape
-from assembly.geometry.tape import run_tape
-from assembly.proximity.free_pair import VARIABLES, free_hessian
+from assembly.constraints.tapes import add_tape_hessian
 from assembly.proximity.velocity import add_gap_terms
 
 
@@ -105,69 +93,6 @@ def add_square(order, bases, jacobian, r, weight, hessian):
 
 
 @kernel(inner=True)
-def add_free_terms(table, pool, r, loose, point, y, weights, hessian):
-    """As `add_row_terms`, for the row of a free pair and its rows of tangency."""
-    q, tracked, _records, _residual, jacobian = point
-    free, lengths, vectors, block = loose[0], loose[1], loose[2], loose[3]
-    row = table[ROW_TABLE] + ROW * r
-    f = 6 * table[table[SLOTS] + table[row + BODY_F]]
-    g = 6 * table[table[SLOTS] + table[row + BODY_G]]
-    e = table[ROWS] + 4 * free[r]
-    u = 6 * table[MOVING] + 4 * free[r]
-    free_hessian(
-        table,
-        pool,
-        table[row + SURFACE_F],
-        table[row + SURFACE_G],
-        table[row + BODY_F],
-        table[row + BODY_G],
-        q,
-        (tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3]),
-        (lengths[r, 0], lengths[r, 1], lengths[r, 2], lengths[r, 3]),
-        (y[r], y[e], y[e + 1], y[e + 2], y[e + 3]),
-        vectors,
-        block,
-    )
-    for i in range(VARIABLES):
-        base = f if i < 6 else (g - 6 if i < 12 else u - 12)
-        if i < 12 and (f if i < 6 else g) < 0:
-            continue
-        for j in range(VARIABLES):
-            other = f if j < 6 else (g - 6 if j < 12 else u - 12)
-            if j < 12 and (f if j < 6 else g) < 0:
-                continue
-            value = block[i, j] + weights[r] * jacobian[r, i] * jacobian[r, j]
-            for l in range(4):
-                value += weights[e + l] * jacobian[e + l, i] * jacobian[e + l, j]
-            hessian[base + i, other + j] += value
-
-
-@kernel(inner=True)
-def add_tape_hessian(table, pool, tape, q, room, order, y, hessian):
-    """Upper triangle of hessian += second derivative of y . rows, for the rows of a tape."""
-    inputs, outputs, work = room
-    m = table[tape + TAPE_VALUES]
-    count = table[tape + TAPE_BODIES]
-    each = 1.0 / pool[table[tape + TAPE_SCALE]]
-    size = pool[SCALE]
-    end = place_tape(table, pool, tape, q, inputs)
-    for v in range(m):
-        inputs[end + v] = y[table[tape + TAPE_ROW_AT] + v] * each
-    run_tape(table, pool, table[tape + TAPE_SECOND], inputs, work, outputs)
-    for b in range(count):
-        at = 6 * table[table[SLOTS] + table[table[tape + TAPE_LIST] + b]]
-        for c in range(count):
-            other = 6 * table[table[SLOTS] + table[table[tape + TAPE_LIST] + c]]
-            if at < 0 or other < at:
-                continue
-            row, column = spot(order, at, other)
-            for i in range(6):
-                for j in range(6):
-                    factor = (size if i < 3 else 1.0) * (size if j < 3 else 1.0)
-                    hessian[row + i, column + j] += factor * outputs[6 * count * (6 * b + i) + 6 * c + j]
-
-
-@kernel(inner=True)
 def add_coordinate_blocks(kind, component, records, k, y, order, hessian, f, g):
     """As `add_coordinate_hessian`, for a Hessian by blocks."""
     at_f, at_g = clear_patch(order, f, g)
@@ -181,13 +106,17 @@ def add_row_terms(table, pool, loose, room, shape, point, y, weights, hessian):
 
     The rows of tangency of a free pair go with its row.
     """
-    q, _tracked, records, _residual, jacobian = point
+    q, tracked, records, _residual, jacobian = point
     bases, order = shape[0], shape[2]
     blocked = is_blocked(order)
     pairs = table[CONTACTS]
+    free, lengths, vectors, block = loose[0], loose[1], loose[2], loose[3]
     for r in range(pairs):
-        if loose[0][r] >= 0:
-            add_free_terms(table, pool, r, loose, point, y, weights, hessian)
+        if free[r] >= 0:
+            call_address(
+                table[FREE_TERMS_AT],
+                (table, pool, r, free, lengths, vectors, block, q, tracked, jacobian, y, weights, hessian),
+            )
         elif blocked and (y[r] != 0.0 or weights[r] != 0.0):
             f, g = clear_patch(order, bases[r, 0], bases[r, 1])
             add_gap_terms(records, r, jacobian, r, y[r], weights[r], order[2][1:], f, g)
@@ -200,7 +129,7 @@ def add_row_terms(table, pool, loose, room, shape, point, y, weights, hessian):
         if y[r] != 0.0:
             call_address(
                 table[TRIM_TERMS_AT],
-                (table, pool, r, loose[0], loose[1], bases, point[1], records, jacobian, y[r], hessian),
+                (table, pool, r, free, lengths, bases, tracked, records, jacobian, y[r], hessian),
             )
     for r in range(pairs + table[TRIMS], table[ROWS]):
         if weights[r] != 0.0 and blocked:

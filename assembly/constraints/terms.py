@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 
+from assembly._address import call_address
 from assembly._kernel import kernel
 from assembly.constraints.blocks import block_row, is_blocked, spot
-from assembly.constraints.layout import SCALE, SLOTS, TERM_TABLE, TERMS
-from assembly.constraints.program import place_tape
+from assembly.constraints.layout import RUN_TAPE_AT, SCALE, SLOTS, TERM_TABLE, TERMS
 from assembly.constraints.sparsity import clear_upper
-from assembly.geometry.tape import run_tape
+from assembly.constraints.tapes import place_tape
 from assembly.geometry.vec import add, cross, dot, matvec, quaternion_product, sub
 from assembly.kinematics.motion import position, rotation
 
@@ -92,7 +92,7 @@ def tape_term(table, pool, term, q, order, room, entries, gradient, hessian):
     # A term's tape has the record of a row's tape, one value.
     tape = table[term + TERM_TAPE]
     end = place_tape(table, pool, tape, q, inputs)
-    run_tape(table, pool, table[tape], inputs, work, outputs)
+    call_address(table[RUN_TAPE_AT], (table, pool, table[tape], inputs, work, outputs))
     value = weight * outputs[0]
     count = table[tape + 3]
     bodies = table[tape + 4]
@@ -105,7 +105,7 @@ def tape_term(table, pool, term, q, order, room, entries, gradient, hessian):
                 gradient[s + i] += weight * size * outputs[1 + 6 * b + i]
                 gradient[s + 3 + i] += weight * outputs[4 + 6 * b + i]
     inputs[end] = weight
-    run_tape(table, pool, table[tape + 1], inputs, work, outputs)
+    call_address(table[RUN_TAPE_AT], (table, pool, table[tape + 1], inputs, work, outputs))
     for b in range(count):
         at = 6 * table[table[SLOTS] + table[bodies + b]]
         for c in range(count):

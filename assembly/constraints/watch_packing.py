@@ -20,7 +20,7 @@ from assembly.proximity.solid import is_one_smooth
 from assembly.proximity.spine_packing import pack_spine
 from assembly.proximity.tree_packing import pack_tree
 
-__all__ = ["LAST_REACH", "guarded_pairs", "pack_watch", "place_count"]
+__all__ = ["LAST_REACH", "guarded_pairs", "is_of_surfaces", "pack_watch", "place_count"]
 
 Pair = tuple[Body, Body]
 # Of a watch, in parts of the scene's size: how far its looks reach at least, and at most.
@@ -58,6 +58,11 @@ def place_count(clearance: Clearance, pairs: Sequence[Pair]) -> int:
         return 0
     bodies = len({id(body) for pair in pairs for body in pair})
     return clearance.places or min(4 + 2 * len(pairs), 8 + 4 * bodies)
+
+
+def is_of_surfaces(pair: Pair) -> bool:
+    """Whether contacts of two bodies are of two surfaces; else they are of solids."""
+    return all(is_one_smooth(side_faces(body)) for body in pair)
 
 
 def pack_watch(
@@ -127,7 +132,7 @@ class _PairPacking:
         _, minimum = writer.add(pool=[least / writer.scale, flank, offset_f, offset_g, *far])
         given: list[int] = []
         spines = [-1, -1]
-        if is_one_smooth(f) and is_one_smooth(g):
+        if is_of_surfaces(pair):
             shape = [writer.surface(self._surfaces, f[0]), writer.surface(self._surfaces, g[0]), -1, -1]
             given = self._contacts_of(pair)
             spines = self._spines_of(f[0], g[0])

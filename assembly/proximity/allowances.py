@@ -200,3 +200,21 @@ def largest_part(table, pool, watch, memory, q):
         memory[at + PAIR_MEMORY * p] = part_used(table, pool, watch, memory, p, q)
     best = used_most(table, watch, memory)
     return best, memory[at + PAIR_MEMORY * best]
+
+
+@kernel(signatures="(i8[::1], f8[::1], i8, f8[::1], i8, i8, f8[:, ::1])")
+def measure_parts(table, pool, watch, memory, first, end, q):
+    """Keep which parts of their allowances the pairs from first to before `end` used at poses q.
+
+    Returns the pair that had used most, of all, when it was last measured. A solve calls this by its address.
+    """
+    at = memory_places(table, watch)[0] + PART
+    for p in range(first, end):
+        memory[at + PAIR_MEMORY * p] = part_used(table, pool, watch, memory, p, q)
+    return used_most(table, watch, memory)
+
+
+@kernel(signatures="(i8[::1], f8[::1], i8, i8, f8[:, ::1], f8[:, ::1], f8)")
+def went_beyond(table, pool, watch, p, before, after, most):
+    """Whether a point of one body of pair p may have gone farther than `most` between two poses. By address, too."""
+    return 1 if went(table, pool, watch, p, before, after) > most else 0

@@ -19,7 +19,8 @@ import math
 from assembly._kernel import kernel
 from assembly.geometry.spline import SIGN, surface_point, third_derivatives
 from assembly.geometry.vec import add, blend, cross, dot, matvec, scale, sub
-from assembly.kinematics.motion import position, rotation
+from assembly.kinematics.motion import position, relative_pose, rotation
+from assembly.proximity.extremal import pair_frame
 
 VARIABLES = 16
 # Variations of d, f_u, f_v, g_u, g_v, N, n: (7, 3, 16).
@@ -58,7 +59,7 @@ def column(a, k):
     return (a[0, k], a[1, k], a[2, k])
 
 
-@kernel(inner=True)
+@kernel(signatures="(i8[::1], f8[::1], i8, i8, UniTuple(f8, 4), f8[:, ::1], i8)")
 def coordinate_lengths(table, pool, f, g, x, lengths, k):
     """The lengths s_i into lengths[k]: |f_u|, |f_v|, |g_u|, |g_v|."""
     a = surface_point(table, pool, f, x[0], x[1])
@@ -67,6 +68,34 @@ def coordinate_lengths(table, pool, f, g, x, lengths, k):
     lengths[k, 1] = math.sqrt(dot(a[2], a[2]))
     lengths[k, 2] = math.sqrt(dot(b[1], b[1]))
     lengths[k, 3] = math.sqrt(dot(b[2], b[2]))
+    return 0
+
+
+@kernel(signatures="(i8[::1], f8[::1], i8, i8, i8, i8, f8[:, ::1], f8[:, ::1], i8, f8)")
+def is_extremal(table, pool, f, g, i, j, q, tracked, r, tolerance):
+    """Whether the coordinates in tracked[r] are those of an extremal pair, by the frame of tracked pairs."""
+    turn, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
+    x = (tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3])
+    frame = pair_frame(table, pool, f, g, turn, shift, x)
+    residual = frame[9]
+    tilt = max(abs(residual[2]), abs(residual[3]))
+    holds = frame[11] and tilt <= 1e-9 and max(abs(residual[0]), abs(residual[1])) <= tolerance
+    return 1 if holds else 0
+
+
+@kernel(inner=True)
+def moved_along(table, pool, surface, tracked, was, r, i):
+    """How far the point on a surface is from where it was; its parameters are in columns i and i + 1 of row r."""
+    p = surface_point(table, pool, surface, tracked[r, i], tracked[r, i + 1])[0]
+    d = sub(p, surface_point(table, pool, surface, was[r, i], was[r, i + 1])[0])
+    return math.sqrt(dot(d, d))
+
+
+@kernel(signatures="(i8[::1], f8[::1], i8, i8, f8[:, ::1], f8[:, ::1], i8, f8)")
+def has_stayed(table, pool, f, g, tracked, was, r, most):
+    """Whether neither point of pair r went farther along its surface than so much."""
+    stayed = moved_along(table, pool, f, tracked, was, r, 0) <= most
+    return 1 if stayed and moved_along(table, pool, g, tracked, was, r, 2) <= most else 0
 
 
 @kernel(inner=True)

@@ -258,6 +258,15 @@ def global_start(table, pool, f, g, rotation, shift, size):
     return best[2], best[3], best[1]
 
 
+@kernel(signatures="(i8[::1], f8[::1], i8, i8, i8, i8, f8[:, ::1], f8[:, ::1], i8)")
+def start_surfaces(table, pool, f, g, i, j, q, tracked, r):
+    """A global start for surfaces f and g of bodies i and j of a scene, into tracked[r]. A status."""
+    turn, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
+    status, x, _gap = global_start(table, pool, f, g, turn, shift, 1.0)
+    tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3] = x
+    return status
+
+
 @kernel(signatures="(i8[::1], f8[::1], i8, i8, f8[:, ::1], UniTuple(f8, 4), f8, f8[::1])")
 def find_pair(table, pool, f, g, q, x, size, out):
     """One pair for Python: from x, or a global start where x is NaN.

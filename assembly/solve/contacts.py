@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 
+from assembly._address import call_address
 from assembly._kernel import kernel
-from assembly.constraints.contact_rows import is_guard, search_row
+from assembly.constraints.contact_rows import is_guard, search_row, start_row
 from assembly.constraints.layout import (
     BODY_F,
     BODY_G,
     CONTACTS,
+    EXTREMAL_AT,
+    LENGTHS_AT,
     ONE_SIDED,
     ROW,
     ROW_TABLE,
@@ -21,12 +24,9 @@ from assembly.constraints.layout import (
     TRIM_PAIR,
     TRIMS,
 )
-from assembly.kinematics.motion import relative_pose, rotation
-from assembly.proximity.extremal import CONVERGED, SINGULAR, pair_frame
-from assembly.proximity.free_pair import coordinate_lengths
+from assembly.proximity.extremal import CONVERGED, SINGULAR
 from assembly.proximity.pole import limits
 from assembly.proximity.solid_contact import FEATURE_F, FOLD, TRACK
-from assembly.proximity.start import global_start
 
 # A parameter along which a point moves less, from end to end and over the scene's size, is one at a pole.
 POLAR = 1e-6
@@ -47,7 +47,7 @@ def free_pair(table, pool, row, k, contacts, free, lengths):
     x = (contacts[k, 0], contacts[k, 1], contacts[k, 2], contacts[k, 3])
     if table[row + SHELL_F] >= 0:
         return False
-    coordinate_lengths(table, pool, table[row + SURFACE_F], table[row + SURFACE_G], x, lengths, k)
+    call_address(table[LENGTHS_AT], (table, pool, table[row + SURFACE_F], table[row + SURFACE_G], x, lengths, k))
     for i in range(4):
         # Over the whole domain, because a parameter has a unit of its own.
         low, high, _closed = limits(table, pool, table[row + SURFACE_F + i // 2], i % 2)
@@ -68,15 +68,11 @@ def start_contacts(table, pool, q, contacts, free, lengths):
         # What a clearance has lost its watch looks for.
         if not math.isnan(contacts[k, 0]) or table[row + BODY_F] < 0 or is_guard(table, k):
             continue
-        i = table[row + BODY_F]
-        j = table[row + BODY_G]
         if table[row + SHELL_F] >= 0:
             if not search_row(table, pool, row, q, contacts, k, True):
                 return k
             continue
-        turn, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
-        status, x, _gap = global_start(table, pool, table[row + SURFACE_F], table[row + SURFACE_G], turn, shift, 1.0)
-        contacts[k, 0], contacts[k, 1], contacts[k, 2], contacts[k, 3] = x
+        status = start_row(table, pool, row, q, contacts, k)
         for l in range(FEATURE_F, TRACK):
             contacts[k, l] = 0.0
         if status != CONVERGED and status != SINGULAR:
@@ -121,13 +117,8 @@ def free_pairs_hold(table, pool, q, contacts, free, tolerance):
         row = table[ROW_TABLE] + ROW * k
         if free[k] < 0:
             continue
-        i = table[row + BODY_F]
-        j = table[row + BODY_G]
-        turn, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
-        x = (contacts[k, 0], contacts[k, 1], contacts[k, 2], contacts[k, 3])
-        frame = pair_frame(table, pool, table[row + SURFACE_F], table[row + SURFACE_G], turn, shift, x)
-        residual = frame[9]
-        tilt = max(abs(residual[2]), abs(residual[3]))
-        if not frame[11] or not tilt <= 1e-9 or not max(abs(residual[0]), abs(residual[1])) <= tolerance:
+        f, g = table[row + SURFACE_F], table[row + SURFACE_G]
+        i, j = table[row + BODY_F], table[row + BODY_G]
+        if call_address(table[EXTREMAL_AT], (table, pool, f, g, i, j, q, contacts, k, tolerance)) == 0:
             return False
     return True

@@ -17,16 +17,17 @@ from assembly.constraints.layout import (
     GUARDS,
     LOOK_AT,
     MINIMUM,
+    PARTS_AT,
     ROW,
     ROW_TABLE,
     SHELL_F,
+    STAYED_AT,
     SURFACE_F,
     SURFACE_G,
     WATCH,
+    WENT_AT,
 )
-from assembly.geometry.spline import surface_point
-from assembly.geometry.vec import dot, sub
-from assembly.proximity.allowances import STILL, largest_part, part_used, went
+from assembly.proximity.allowances import STILL
 from assembly.proximity.solid_contact import FOLD, SLACK, TRACK
 from assembly.proximity.watch import USED
 from assembly.proximity.watch_memory import (
@@ -122,14 +123,6 @@ def look_around(table, pool, memory, point, how):
 
 
 @kernel(inner=True)
-def moved_along(table, pool, surface, tracked, was, r, i):
-    """How far a point of contact r on a surface is from where it was; its parameters are in columns i and i + 1."""
-    p = surface_point(table, pool, surface, tracked[r, i], tracked[r, i + 1])[0]
-    d = sub(p, surface_point(table, pool, surface, was[r, i], was[r, i + 1])[0])
-    return math.sqrt(dot(d, d))
-
-
-@kernel(inner=True)
 def look_again(table, pool, memory, point, how, free, scratch):
     """The watch's look at a point that is evaluated; whether rows changed.
 
@@ -151,9 +144,8 @@ def look_again(table, pool, memory, point, how, free, scratch):
         number = np.int64(memory[place + PLACE_NUMBER]) if memory[place] >= 0.0 else 0
         if free[r] >= 0 and number == table[table[ROW_TABLE] + ROW * r + GUARD_NUMBER]:
             row = table[ROW_TABLE] + ROW * r
-            if moved_along(table, pool, table[row + SURFACE_F], tracked, scratch, r, 0) <= neglect and (
-                moved_along(table, pool, table[row + SURFACE_G], tracked, scratch, r, 2) <= neglect
-            ):
+            f, g = table[row + SURFACE_F], table[row + SURFACE_G]
+            if call_address(table[STAYED_AT], (table, pool, f, g, tracked, scratch, r, neglect)) == 1:
                 for i in range(TRACK):
                     tracked[r, i] = scratch[r, i]
             else:
@@ -185,6 +177,14 @@ def go_back(table, memory, numbers):
 
 
 @kernel(inner=True)
+def measure(table, pool, memory, first, end, q):
+    """Measure what pairs from first to before `end` used of their allowances. The largest part that is known."""
+    watch = table[WATCH]
+    most = call_address(table[PARTS_AT], (table, pool, watch, memory, first, end, q))
+    return memory[memory_places(table, watch)[0] + PAIR_MEMORY * most + PART]
+
+
+@kernel(inner=True)
 def allowed_share(table, pool, memory, here, trial, step, share):
     """How much of a step the watch allows, at most `share`, and whether it is all of that.
 
@@ -192,10 +192,9 @@ def allowed_share(table, pool, memory, here, trial, step, share):
     of which pairs more is known by another look.
     """
     move(table, here[0], step, share, trial[0])
-    _pair, end = largest_part(table, pool, table[WATCH], memory, trial[0])
-    if end <= 1.0:
-        return share, True
     watch = table[WATCH]
+    if measure(table, pool, memory, 0, table[watch + PAIRS], trial[0]) <= 1.0:
+        return share, True
     at = memory_places(table, watch)[0]
     allowed = 1.0
     for p in range(table[watch + PAIRS]):
@@ -203,7 +202,11 @@ def allowed_share(table, pool, memory, here, trial, step, share):
         o = at + PAIR_MEMORY * p
         end = memory[o + PART]
         memory[o + CUT_SHORT] = end * memory[o + ALLOWANCE]
-        begin = part_used(table, pool, watch, memory, p, here[0]) if end > USED else end
+        begin = end
+        if end > USED:
+            measure(table, pool, memory, p, p + 1, here[0])
+            begin = memory[o + PART]
+            memory[o + PART] = end
         if end > max(begin, 1.0):
             allowed = min(allowed, max(0.95 - begin, 0.05) / (end - begin))
         flank = pool[table[table[watch + PAIR_TABLE] + PAIR_RECORD * p + PAIR_MINIMUM] + 1]
@@ -217,7 +220,7 @@ def allowed_share(table, pool, memory, here, trial, step, share):
 @kernel(inner=True)
 def is_too_far(table, pool, memory, point):
     """Whether the poses of a point are farther than the watch allows."""
-    return largest_part(table, pool, table[WATCH], memory, point[0])[1] > 1.0
+    return measure(table, pool, memory, 0, table[table[WATCH] + PAIRS], point[0]) > 1.0
 
 
 @kernel(inner=True)
@@ -233,6 +236,7 @@ def ends_unseen(table, pool, memory, before, after):
         r = table[FIRST_GUARD] + k
         p = np.int64(memory[places + PLACE_MEMORY * k])
         if p >= 0 and math.isnan(after[1][r, 0]) and not math.isnan(before[1][r, 0]) and is_of_solids(table, r):
-            if went(table, pool, watch, p, before[0], after[0]) > max(before[3][r], SLIGHTLY):
+            most = max(before[3][r], SLIGHTLY)
+            if call_address(table[WENT_AT], (table, pool, watch, p, before[0], after[0], most)) == 1:
                 return True
     return False

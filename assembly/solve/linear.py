@@ -10,10 +10,11 @@ from __future__ import annotations
 
 import math
 
+from assembly._address import call_address
 from assembly._kernel import kernel
-from assembly.constraints.blocks import is_blocked
+from assembly.constraints.block_factor import greatest_diagonal
+from assembly.constraints.blocks import FACTORIZE_AT, SOLVE_AT, is_blocked
 from assembly.constraints.sparsity import listed_folds, place_upper
-from assembly.solve.block_factor import factorize_blocks, forward_blocks, greatest_diagonal, substitute_blocks
 
 
 @kernel(inline=True)
@@ -90,9 +91,7 @@ def forward_step(matrix, n, order, b):
     places, vector, blocks = order[0], order[2][0], order[3]
     place, ends = places[1], places[2]
     if is_blocked(order):
-        forward_blocks(blocks, matrix[0], b, vector)
-        for i in range(n):
-            b[i] = vector[i]
+        call_address(blocks[SOLVE_AT], (blocks, matrix[0], b, vector, 1))
         return
     if listed_folds(order) == 0:
         forward(matrix, n, ends, b)
@@ -110,7 +109,7 @@ def solve_step(matrix, n, order, b):
     places, vector, blocks = order[0], order[2][0], order[3]
     place, ends = places[1], places[2]
     if is_blocked(order):
-        substitute_blocks(blocks, matrix[0], b, vector)
+        call_address(blocks[SOLVE_AT], (blocks, matrix[0], b, vector, 0))
         return
     if listed_folds(order) == 0:
         substitute(matrix, n, ends, b)
@@ -137,7 +136,8 @@ def factorize_shifted(lagrangian, n, order, shift, matrix):
     while shift <= 1e8 * scale:
         if blocked:
             # What says where unknowns of pairs stand, and the vector, are free here.
-            if factorize_blocks(lagrangian, order[3], shift, matrix[0], order[0][1], order[2][0]):
+            parts = (lagrangian, order[3], shift, matrix[0], order[0][1], order[2][0])
+            if call_address(order[3][FACTORIZE_AT], parts) == 1:
                 return shift
             shift = max(8.0 * shift, 1e-6)
             continue

@@ -7,17 +7,11 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly._kernel import kernel
 from assembly.constraints import layout, packing
+from assembly.constraints.block_factor import factorize_blocks, forward_blocks, greatest_diagonal, substitute_blocks
 from assembly.constraints.blocks import BLOCKS, COUNT, FACTORED, FIRST, block_row
 from assembly.constraints.elimination import block_record
-from assembly.solve.block_factor import factorize_blocks, forward_blocks, greatest_diagonal, substitute_blocks
 from tests.laws.loop_point import LoopPoint
-
-
-@kernel
-def factorize(lagrangian, blocks, shift, panels, seats, turned):
-    return factorize_blocks(lagrangian, blocks, shift, panels, seats, turned)
 
 
 def random_groups(rng, count, shape):
@@ -68,7 +62,7 @@ def test_the_step_is_that_of_the_dense_matrix(shape, count):
     shift = 0.25
     # The factor writes every place it reads.
     panels, seats, turned = np.full(36 * blocks[FACTORED], np.nan), np.empty(n, np.int64), np.full(36, np.nan)
-    assert factorize(upper, blocks, shift, panels, seats, turned)
+    assert factorize_blocks(upper, blocks, shift, panels, seats, turned)
     assert np.isfinite(panels).all()
     whole = dense + shift * np.eye(n)
     x = rng.normal(size=n)
@@ -86,8 +80,8 @@ def test_the_step_is_that_of_the_dense_matrix(shape, count):
     assert not greatest_diagonal(broken, blocks) < np.inf
     # One direction downward is enough.
     least = np.linalg.eigvalsh(dense)[0]
-    assert factorize(upper, blocks, -0.999 * least, panels, seats, turned)
-    assert not factorize(upper, blocks, -1.001 * least, panels, seats, turned)
+    assert factorize_blocks(upper, blocks, -0.999 * least, panels, seats, turned)
+    assert not factorize_blocks(upper, blocks, -1.001 * least, panels, seats, turned)
 
 
 def test_trees_have_no_fill_and_grids_little():

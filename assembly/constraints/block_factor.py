@@ -139,9 +139,12 @@ def finish_panel(panels, o, count):
     return True
 
 
-@kernel(inner=True)
+@kernel(signatures="(f8[:, ::1], i8[::1], f8, f8[::1], i8[::1], f8[::1])")
 def factorize_blocks(lagrangian, blocks, shift, panels, seats, turned):
-    """The factor U of lagrangian + shift I = U^T U into the panels, diagonals inverted; False where there is none."""
+    """The factor U of lagrangian + shift I = U^T U into the panels, diagonals inverted. Returns 1, or 0: there is none.
+
+    Called by its address, as few scenes are large.
+    """
     for i in range(blocks[COUNT]):
         first = blocks[blocks[PANEL] + i]
         count = blocks[blocks[PANEL] + i + 1] - first
@@ -161,8 +164,8 @@ def factorize_blocks(lagrangian, blocks, shift, panels, seats, turned):
                 subtract_blocks(panels, at, turned, 36 * p, run)
                 p += run
         if not finish_panel(panels, o, count):
-            return False
-    return True
+            return 0
+    return 1
 
 
 @kernel(inner=True)
@@ -213,3 +216,15 @@ def substitute_blocks(blocks, panels, b, x):
         p = 6 * blocks[blocks[PLACE] + k]
         for i in range(6):
             b[6 * k + i] = x[p + i]
+
+
+@kernel(signatures="(i8[::1], f8[::1], f8[::1], f8[::1], i8)")
+def solve_blocks(blocks, panels, b, x, half):
+    """Solve U^T U x = b in place of b; if `half` is 1, U^T x = b, in the order of the factor. By its address, too."""
+    if half == 0:
+        substitute_blocks(blocks, panels, b, x)
+        return 0
+    forward_blocks(blocks, panels, b, x)
+    for i in range(b.size):
+        b[i] = x[i]
+    return 0
