@@ -31,7 +31,7 @@ FIRST_GUARD, GUARDS, WATCH, LOOK_AT = 26, 27, 28, 29
 CLOCK_AT = 30
 # The record of the blocks that the Hessian of a large scene has (`blocks.py`), and its length; 0: it is dense.
 BLOCK_RECORD, BLOCK_LENGTH = 31, 32
-# Addresses again: of what evaluates rows of contacts; of what contacts of two surfaces need besides, what clearances do;
+# Addresses again: of what evaluates rows of contacts; of what contacts of two surfaces need besides, and clearances;
 # of what runs tapes.
 CONTACT_ROWS_AT, START_AT, LENGTHS_AT, FREE_ROW_AT, FREE_TERMS_AT, EXTREMAL_AT = 33, 34, 35, 36, 37, 38
 STAYED_AT, PARTS_AT, WENT_AT, RUN_TAPE_AT, HEADER = 39, 40, 41, 42, 43

@@ -14,6 +14,9 @@ CONTACTS = {"contact_rows"}
 SURFACES = {"start_surfaces", "coordinate_lengths", "free_row", "free_terms", "is_extremal"}
 SOLIDS = {"track_solids", "search_solids", "find_nearest"}
 CLEARANCES = {"look", "has_stayed", "measure_parts", "went_beyond"}
+BLOCKS, TAPES, TRIMS = {"factorize_blocks", "solve_blocks"}, {"run_scene_tape"}, {"trim_rows", "trim_terms"}
+# All that solves call; shapes ask for others, before.
+SOLVES = LOOP | CONTACTS | SURFACES | SOLIDS | CLEARANCES | BLOCKS | TAPES | TRIMS | {"find_deepest"}
 SCENES = {
     "joints": (
         """
@@ -36,7 +39,7 @@ for k in range(40):
     scene.constrain(asm.Revolute(links[k].frame(at=(k > 0, 0, 0)), links[k + 1].frame(), f"hinge {k}"))
 scene.minimize(asm.PointDistance(links[-1].point(1, 0, 0), target=(30, 5, 0)))
 """,
-        LOOP | {"factorize_blocks", "solve_blocks"},
+        LOOP | BLOCKS,
     ),
     "an expression": (
         """
@@ -46,7 +49,7 @@ drop = asm.Body("drop", position=(1, 2, 3))
 scene = asm.Assembly([drop])
 scene.constrain(asm.Expression(ca.Function("bowl", [q], [q[2] - q[0] ** 2 - q[1] ** 2]), [drop]))
 """,
-        LOOP | {"run_scene_tape"},
+        LOOP | TAPES,
     ),
     "two balls": (
         """
@@ -96,4 +99,15 @@ def all_compiled() -> None:
 @pytest.mark.parametrize("name", SCENES)
 def test_a_scene_asks_for_the_kernels_of_what_it_has_in_it(all_compiled, run_python, name):
     scene, needs = SCENES[name]
-    assert set(run_python(SOLVE.format(scene)).split()) == needs
+    asked = set(run_python(SOLVE.format(scene)).split())
+    assert asked & SOLVES == needs
+    assert "asm.shapes" in scene or asked == needs
+
+
+def test_without_a_dexterity_the_loop_is_that_without_it(all_compiled, run_python):
+    scene, _needs = SCENES["joints"]
+    code = """
+from assembly.solve.augmented_lagrangian import solve_program
+print(*(types[-1] for types in solve_program.overloads))
+"""
+    assert run_python(SOLVE.format(scene) + code).split() == ["solve_program", "none"]
