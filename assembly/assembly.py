@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly._read_only import read_only
 from assembly.constraints.constraint import Constraint, structure_changes
 from assembly.constraints.expression import Expression
 from assembly.constraints.objectives import Objective
@@ -156,14 +157,14 @@ class Assembly:
 
     @property
     def q(self) -> Array:
-        """Where the bodies stand, (n, 7)."""
+        """Where the bodies stand, (n, 7), read-only; set the pose of a body instead."""
         poses = [body.pose for body in self._bodies]
         before, q = self._stood
         # Poses do not change, bodies get others: those of the last call are compared in a fraction of the time.
         if len(before) != len(poses) or not all(map(is_, before, poses)):
             q = np.array([pose.row for pose in poses]).reshape(-1, 7)
             self._stood = poses, q
-        return q.copy()
+        return read_only(q)
 
     def packed(self) -> Packed:
         """The scene as the compiled loop reads it; made at first use."""

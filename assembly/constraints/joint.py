@@ -42,7 +42,6 @@ def _frame(name: str, side: Any, takes_point: bool) -> Frame:
 
 def _opposed(frame: Frame) -> Frame:
     axes = frame.axes * np.array([1.0, -1.0, -1.0])
-    axes.flags.writeable = False
     return Frame(frame.body, frame.origin, axes)
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly._read_only import ReadOnlyArrays
 from assembly.errors import InputError, KnownSettings, check_coordinates, checked_color, vector
 from assembly.geometry.face import Face
 from assembly.geometry.surface import NurbsSurface
@@ -32,7 +33,7 @@ def _frozen(array: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Point:
+class Point(ReadOnlyArrays):
     """A point of a body, in body coordinates (3,)."""
 
     body: Body
@@ -44,7 +45,7 @@ class Point:
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
+class Frame(ReadOnlyArrays):
     """A frame on a body: origin (3,) and axes (3, 3), the columns x, y, z, in body coordinates."""
 
     body: Body
@@ -167,7 +168,7 @@ class Body(KnownSettings):
 
     @property
     def q(self) -> Array:
-        """The row x y z qw qx qy qz of the body's pose, (7,)."""
+        """The row x y z qw qx qy qz of the body's pose, (7,), read-only; set `pose` instead."""
         return self.pose.q
 
     @property

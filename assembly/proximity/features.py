@@ -14,6 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly._read_only import ReadOnlyArrays
 from assembly.errors import InputError, check_coordinates
 from assembly.geometry.face import Face
 from assembly.geometry.surface import NurbsSurface
@@ -78,8 +79,8 @@ class Feature:
         return self.name
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class FeaturePair:
+@dataclass(frozen=True, eq=False)
+class FeaturePair(ReadOnlyArrays):
     """The closest features of two bodies a and b, and their points.
 
     Attributes

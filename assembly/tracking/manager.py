@@ -10,6 +10,7 @@ from math import inf, nan
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly._read_only import ReadOnlyArrays
 from assembly.constraints.clearance import Clearance
 from assembly.constraints.packing import Packed
 from assembly.errors import InputError, number
@@ -29,8 +30,8 @@ _STATES = tuple(PairState)
 MOST_REACH = 0.2
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class ListedContact:
+@dataclass(frozen=True, eq=False)
+class ListedContact(ReadOnlyArrays):
     """An extremal pair of points of two bodies that is tracked.
 
     Attributes

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._read_only import read_only
 from assembly.proximity.events import Event, events_of
 from assembly.proximity.watch_memory import EVENT_COUNT
 from assembly.solve.settings import COUNT, CURVED, DUAL, HISTORY, OBJECTIVE, VIOLATION
@@ -35,7 +36,7 @@ class TrackStatus(Enum):
 
 
 class Step:
-    """What a tick did. Tables are computed when they are read.
+    """What a tick did. Tables are computed when they are read; arrays are read-only.
 
     One that is LATE at the pose of the step before has that one's figures as well: violation, iterations, objective.
 
@@ -79,7 +80,7 @@ class Step:
     @cached_property
     def q(self) -> Array:
         """Configuration, (n, 7)."""
-        return self._state[: self._tracker._packed.contacts_at].reshape(-1, 7).copy()
+        return read_only(self._state[: self._tracker._packed.contacts_at].reshape(-1, 7).copy())
 
     def _result(self, place: int) -> float:
         return float(self._state[self._tracker._packed.results_at + place])
@@ -120,7 +121,7 @@ class Step:
     @cached_property
     def wrench(self) -> Array:
         """Force and torque on the hand, (6,)."""
-        return self._tracker._wrench(self.q, self._target)
+        return read_only(self._tracker._wrench(self.q, self._target))
 
     @property
     def force(self) -> Array:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly._address import clock_address
+from assembly._read_only import read_only
 from assembly.assembly import Assembly
 from assembly.constraints.constraint import structure_changes
 from assembly.constraints.layout import CLOCK_AT, WATCH
@@ -202,8 +203,8 @@ class Tracker:
 
     @property
     def q(self) -> Array:
-        """Where the bodies stand now, (n, 7)."""
-        return self._before[: self._packed.contacts_at].reshape(-1, 7).copy()
+        """Where the bodies stand now, (n, 7), read-only."""
+        return read_only(self._before[: self._packed.contacts_at].reshape(-1, 7).copy())
 
     def step(self, target: ArrayLike | Pose) -> Step:
         """Follow the hand for a tick. Never raises: see `Step.status`.
