@@ -7,7 +7,7 @@ from functools import partial
 from operator import is_
 from os import PathLike
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -69,6 +69,20 @@ class Assembly:
         self._stood: tuple[list[Pose], Array] = [], np.empty((0, 7))
         for body in items("bodies", bodies, "bodies, at least one"):
             self.add(body)
+
+    def __copy__(self) -> Self:
+        """A scene of the same bodies, constraints and terms, whose lists are its own."""
+        other = object.__new__(type(self))
+        other.__dict__.update(self.__dict__)
+        other._bodies, other._constraints, other._objectives = (
+            self._bodies[:],
+            self._constraints[:],
+            self._objectives[:],
+        )
+        other._named, other._taken = dict(self._named), set(self._taken)
+        # Packed anew: what a solve of the one has changed there the other does not know.
+        other._packed = other._scene = None
+        return other
 
     @property
     def bodies(self) -> tuple[Body, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -107,6 +108,13 @@ class Body(KnownSettings):
         check_coordinates("position", self._pose.position.tolist())
         self._faces = self._named(shape)
         self.color = color
+
+    def __copy__(self) -> Self:
+        """A body of the same name, with faces of its own that stand on the same surfaces."""
+        other = object.__new__(type(self))
+        other.__dict__.update(self.__dict__)
+        other._faces = tuple(BodyFace(other, side.face, side.name) for side in self._faces)
+        return other
 
     @property
     def name(self) -> str:

@@ -14,6 +14,7 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly._copies import InOneProcess
 from assembly._read_only import ReadOnlyArrays, read_only
 from assembly.errors import InputError, integer, number, positive
 
@@ -265,7 +266,7 @@ class TrackLog(ReadOnlyArrays):
         return "\n".join(lines)
 
 
-class Recorder:
+class Recorder(InOneProcess):
     """Arrays for a number of ticks, filled one tick after the other; `log` makes the log of what was filled.
 
     Parameters
@@ -280,6 +281,8 @@ class Recorder:
     budget : float, optional
         Seconds a tick may take.
     """
+
+    _instead = "keep its `log()`"
 
     def __init__(
         self, times: ArrayLike, bodies: int, statuses: type[Enum], *, stride: int = 1, budget: float | None = None
