@@ -74,12 +74,8 @@ class Assembly:
         """A scene of the same bodies, constraints and terms, whose lists are its own."""
         other = object.__new__(type(self))
         other.__dict__.update(self.__dict__)
-        other._bodies, other._constraints, other._objectives = (
-            self._bodies[:],
-            self._constraints[:],
-            self._objectives[:],
-        )
-        other._named, other._taken = dict(self._named), set(self._taken)
+        for name in ("_bodies", "_named", "_constraints", "_taken", "_objectives"):
+            setattr(other, name, self.__dict__[name].copy())
         # Packed anew: what a solve of the one has changed there the other does not know.
         other._packed = other._scene = None
         return other

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly._read_only import ReadOnlyArrays
-from assembly.errors import InputError, integer, is_masked, number, real_array, vector
+from assembly.errors import InputError, check_encodable, integer, is_masked, number, real_array, vector
 from assembly.geometry import bezier
 from assembly.geometry.bezier_packing import pack_pieces
 from assembly.geometry.bezier_pieces import evaluate_pieces
@@ -46,6 +46,8 @@ def checked_name(name: str | None) -> str | None:
     """A name or nothing."""
     if name is not None and not isinstance(name, str):
         raise TypeError(f"name is {name!r}; expected a string or None")
+    if name is not None:
+        check_encodable("name", name)
     return name
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly._read_only import ReadOnlyArrays
-from assembly.errors import InputError, KnownSettings, check_coordinates, checked_color, vector
+from assembly.errors import InputError, KnownSettings, check_coordinates, checked_color, text, vector
 from assembly.geometry.face import Face
 from assembly.geometry.surface import NurbsSurface
 from assembly.kinematics.pose import Pose, direction, length
@@ -97,11 +97,9 @@ class Body(KnownSettings):
         fixed: bool = False,
         color: Sequence[float] | None = None,
     ) -> None:
-        if not isinstance(name, str) or not name.strip():
-            raise InputError(f"name is {name!r}; expected a nonempty string")
         if not isinstance(fixed, (bool, np.bool_)):
             raise InputError(f"fixed is {fixed!r}; expected True or False")
-        self._name = name
+        self._name = text("name", name)
         self._fixed = bool(fixed)
         # Pose takes what is like an array, which its fields do not say: they are tuples once it is made.
         self._pose = Pose(position, quaternion)  # type: ignore[arg-type]
@@ -165,7 +163,8 @@ class Body(KnownSettings):
             if not isinstance(part, (NurbsSurface, Face)):
                 raise TypeError(f"shape of body {self.name!r} holds {part!r}; expected NurbsSurface or Face")
             face = part if isinstance(part, Face) else Face(part)
-            name = face.name or ("surface" if len(parts) == 1 else f"face {k + 1}")
+            # Names of surfaces and faces may be set anew.
+            name = text(f"shape[{k}].name", face.name or ("surface" if len(parts) == 1 else f"face {k + 1}"))
             if any(name == other.name for other in faces):
                 raise InputError(f"shape of body {self.name!r} has two faces named {name!r}; expected distinct names")
             faces.append(BodyFace(self, face, name))
