@@ -7,11 +7,12 @@ from functools import partial
 from operator import is_
 from os import PathLike
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly._read_only import read_only
 from assembly.constraints.constraint import Constraint, structure_changes
 from assembly.constraints.expression import Expression
 from assembly.constraints.objectives import Objective
@@ -68,6 +69,16 @@ class Assembly:
         self._stood: tuple[list[Pose], Array] = [], np.empty((0, 7))
         for body in items("bodies", bodies, "bodies, at least one"):
             self.add(body)
+
+    def __copy__(self) -> Self:
+        """A scene of the same bodies, constraints and terms, whose lists are its own."""
+        other = object.__new__(type(self))
+        other.__dict__.update(self.__dict__)
+        for name in ("_bodies", "_named", "_constraints", "_taken", "_objectives"):
+            setattr(other, name, self.__dict__[name].copy())
+        # Packed anew: what a solve of the one has changed there the other does not know.
+        other._packed = other._scene = None
+        return other
 
     @property
     def bodies(self) -> tuple[Body, ...]:
@@ -156,14 +167,14 @@ class Assembly:
 
     @property
     def q(self) -> Array:
-        """Where the bodies stand, (n, 7)."""
+        """Where the bodies stand, (n, 7), read-only; set the pose of a body instead."""
         poses = [body.pose for body in self._bodies]
         before, q = self._stood
         # Poses do not change, bodies get others: those of the last call are compared in a fraction of the time.
         if len(before) != len(poses) or not all(map(is_, before, poses)):
             q = np.array([pose.row for pose in poses]).reshape(-1, 7)
             self._stood = poses, q
-        return q.copy()
+        return read_only(q)
 
     def packed(self) -> Packed:
         """The scene as the compiled loop reads it; made at first use."""

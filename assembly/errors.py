@@ -20,6 +20,7 @@ __all__ = [
     "KnownSettings",
     "bounded",
     "check_coordinates",
+    "check_encodable",
     "checked_color",
     "extent",
     "integer",
@@ -28,6 +29,7 @@ __all__ = [
     "number",
     "positive",
     "real_array",
+    "text",
     "vector",
 ]
 
@@ -168,6 +170,25 @@ def items(name: str, value: Any, expected: str) -> tuple[Any, ...]:
         return tuple(value)
     except TypeError:
         raise TypeError(f"{name} is {_shown(value)}; expected {expected}") from None
+
+
+def text(name: str, value: Any) -> str:
+    """A nonempty string that files and pages can hold."""
+    if not isinstance(value, str) or not value.strip():
+        raise InputError(f"{name} is {_shown(value)}; expected a nonempty string")
+    check_encodable(name, value)
+    return value
+
+
+def check_encodable(name: str, value: str) -> None:
+    """Raise where a string has half of a pair of surrogates alone, which is no character."""
+    try:
+        value.encode()
+    except UnicodeEncodeError as error:
+        raise InputError(
+            f"{name} is {_shown(value)} with {value[error.start]!r} at {error.start}; "
+            "expected characters that UTF-8 has"
+        ) from None
 
 
 def integer(name: str, value: Any, low: int, high: int) -> int:

@@ -97,14 +97,14 @@ def _pairs(name: str, count: int, repeats: int) -> list[dict[str, Any]]:
             assert is_separated(a, b, half) and not collides(a, b)
             separate.append(_seconds(partial(is_separated, a, b, half), repeats))
             collide.append(_seconds(partial(collides, a, b), repeats))
-            (ra, qa), (rb, qb) = a.packed_pieces, b.packed_pieces
+            (ra, qa), (rb, qb) = a._packed_pieces, b._packed_pieces
             u, v = capsule_tree(ra, qa), capsule_tree(rb, qb)
             for series, clearance in zip(inner, (-1.0, half, 0.0), strict=True):
                 call = partial(question_often, ra, qa, u, rb, qb, v, clearance, False, 8, out)
                 series.append(_seconds(call, repeats) / 8)
         fresh = NurbsCurve(a.control_points, a.knots, a.degree, a.weights)
         pack.append(_packing(fresh))
-        trees.append(_seconds(partial(capsule_tree, *a.packed_pieces), repeats))
+        trees.append(_seconds(partial(capsule_tree, *a._packed_pieces), repeats))
     median = float(np.median(spent))
     parts = [float(np.median(series)) / median for series in (separate, collide)]
     whole, half_way, meeting = (float(np.median(series)) for series in inner)
@@ -126,7 +126,7 @@ def _packing(curve: NurbsCurve) -> float:
     from time import perf_counter
 
     start = perf_counter()
-    _ = curve.packed_pieces
+    _ = curve._packed_pieces
     return perf_counter() - start
 
 
@@ -144,7 +144,7 @@ def _points(degree: int, curves: int, repeats: int) -> list[dict[str, Any]]:
     for _ in range(curves):
         curve = random_bezier(rng, degree)
         points = rng.random((count, 3))
-        record, pool = curve.packed_pieces
+        record, pool = curve._packed_pieces
         squares = np.stack([squared_distance(curve.control_points, p, products) for p in points])
         lower, upper, _parameters = minimum_distances(points, curve)
         for i, point in enumerate(points):

@@ -160,7 +160,7 @@ def _closes(scene: asm.Assembly) -> bool:
     """Whether it is solved to 1e-12 of its size from poses a little off."""
     scale = scene.packed().scale
     rng = np.random.default_rng(5)
-    q = scene.q
+    q = scene.q.copy()
     for k, body in enumerate(scene.bodies):
         if not body.fixed:
             off = asm.Pose.from_axis_angle(rng.normal(size=3), 0.02, 0.02 * scale * rng.uniform(-1.0, 1.0, 3))

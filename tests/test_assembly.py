@@ -520,12 +520,15 @@ def test_results_print_what_a_user_asks_first(reached):
     assert repr(reached).startswith("Solution(SOLVED, ")
 
 
-def test_q_is_where_bodies_stand_now_and_belongs_to_the_caller():
+def test_q_is_where_bodies_stand_now_and_cannot_be_written_to():
     scene = asm.Assembly([asm.Body("a", asm.shapes.sphere(1.0)), asm.Body("b", asm.shapes.sphere(1.0), (3, 0, 0))])
     q = scene.q
-    q[:] = 7.0
+    with pytest.raises(ValueError, match="read-only"):
+        q[:] = 7.0
     assert scene.q.tolist() == [[0, 0, 0, 1, 0, 0, 0], [3, 0, 0, 1, 0, 0, 0]]
     scene.body("b").pose = asm.Pose((0, 4, 0))
     assert scene.q[1].tolist() == [0, 4, 0, 1, 0, 0, 0]
+    # What was given before stays as it was.
+    assert q[1].tolist() == [3, 0, 0, 1, 0, 0, 0]
     scene.add(asm.Body("c", asm.shapes.sphere(1.0), (0, 0, 5)))
     assert scene.q.shape == (3, 7) and scene.q[2, 2] == 5.0

@@ -387,3 +387,35 @@ def test_weights_and_references_cannot_be_changed(name):
         setattr(asm.Posture(), name, 2.0)
     with pytest.raises(ValueError, match="read-only"):
         asm.Posture(q_of([0, 0, 0, 1, 0, 0, 0])).reference[0] = 1.0
+
+
+HALF = "half \ud800 of a pair"
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: asm.Body(HALF),
+        lambda: asm.Face(asm.shapes.plane(1, 1), name=HALF),
+        lambda: asm.NurbsSurface(PATCH, KNOTS, (1, 1), name=HALF),
+        lambda: asm.NurbsCurve.polyline([(0, 0), (1, 1)], name=HALF),
+        lambda: asm.Revolute(asm.Body("a"), asm.Body("b"), HALF),
+        lambda: asm.Clearance(name=HALF),
+    ],
+)
+def test_names_that_no_file_can_hold_are_refused(make):
+    with pytest.raises(InputError, match=r"name is 'half .ud800 of a pair' with '.ud800' at 5; expected"):
+        make()
+
+
+def test_a_name_of_a_face_that_was_set_anew_is_checked_by_its_body(tmp_path):
+    face = asm.Face(asm.shapes.sphere(1.0))
+    for name, said in ((HALF, "with"), (5, "expected a nonempty string")):
+        face.name = name
+        with pytest.raises(InputError, match=rf"shape\[0\].name is .* {said}"):
+            asm.Body("a", face)
+    scene = asm.Assembly([asm.Body("a", asm.shapes.sphere(1.0))])
+    with pytest.raises(InputError, match="title is 'half"):
+        asm.view.save_html(tmp_path / "page.html", scene, title=HALF)
+    # A name in another encoding than UTF-8, as a system may have it.
+    asm.view.save_html(tmp_path / "caf\udce9.html", scene)

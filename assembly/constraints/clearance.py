@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from assembly.constraints.constraint import Constraint
+from assembly.constraints.tracked_sizes import check_size
 from assembly.errors import InputError, bounded, items, number
 from assembly.kinematics.body import Body
 
@@ -50,7 +51,9 @@ class Clearance(Constraint):
     Raises
     ------
     InputError, TypeError
-        Fewer than two bodies, bodies without shape, a pair that is not of the bodies, numbers out of range.
+        Fewer than two bodies, bodies without shape, a pair that is not of the bodies, numbers out of range; bodies of
+        sizes or of surfaces whose parameters have spans that doubles do not carry (1e-75 to 1e75, 1e-60 to 1e60): of
+        all bodies of an assembly it is looked at when the assembly is solved.
     """
 
     # Whether corners over faces are listed besides extrema, for steps to see.
@@ -73,6 +76,7 @@ class Clearance(Constraint):
                     raise TypeError(f"bodies[{k}] is {body!r}; expected a Body")
                 if not body.faces:
                     raise InputError(f"bodies[{k}] is {body.name!r}, a body without a shape; expected one with a face")
+                check_size(f"bodies[{k}], {body.name!r},", body)
             if len(chosen) < 2:
                 raise InputError(f"bodies has {len(chosen)} of them; expected two or more, or None for all")
         super().__init__(chosen or (), "clearance" if chosen is None and name is None else name, "clearance")
@@ -120,6 +124,9 @@ class Clearance(Constraint):
     def pairs(self, bodies: Sequence[Body]) -> list[tuple[Body, Body]]:
         """The pairs that are kept apart, of bodies of which one moves, among those of an assembly."""
         chosen = [body for body in (bodies if self._all else self.bodies) if body.faces]
+        if self._all:
+            for body in chosen:
+                check_size(f"body {body.name!r} of {self.name!r}", body)
         return [
             (a, b)
             for k, a in enumerate(chosen)

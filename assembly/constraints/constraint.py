@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from assembly.constraints.primitives import ANGLE, COINCIDENT, DISTANCE, SLIDE
-from assembly.errors import FARTHEST, InputError, KnownSettings, number
+from assembly.errors import FARTHEST, InputError, KnownSettings, number, text
 from assembly.kinematics.body import Body, Frame
 
 if TYPE_CHECKING:
@@ -76,10 +76,8 @@ class Constraint(KnownSettings):
         for k, body in enumerate(bodies):
             if any(body is other for other in bodies[:k]):
                 raise InputError(f"body {body.name!r} is named twice; expected distinct bodies")
-        if name is not None and (not isinstance(name, str) or not name.strip()):
-            raise InputError(f"name is {name!r}; expected a nonempty string")
         self._bodies = bodies
-        self._name = f"{kind} {'-'.join(body.name for body in bodies)}".lstrip() if name is None else name
+        self._name = f"{kind} {'-'.join(body.name for body in bodies)}".lstrip() if name is None else text("name", name)
 
     @property
     def name(self) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from assembly.constraints.constraint import Constraint
+from assembly.constraints.tracked_sizes import check_parameters
 from assembly.errors import InputError
 from assembly.geometry.face import Face
 from assembly.geometry.smooth_faces import has_creases
@@ -35,7 +36,8 @@ class Contact(Constraint):
     Raises
     ------
     InputError, TypeError
-        A body without a shape, a body with itself, or something that is no body.
+        A body without a shape, a body with itself, or something that is no body; surfaces whose parameters have spans
+        below 1e-60 or above 1e60.
     """
 
     def __init__(
@@ -52,6 +54,7 @@ class Contact(Constraint):
                 raise TypeError(f"{label} is {side!r}; expected a Body or one of its faces")
             if isinstance(side, Body) and not side.faces:
                 raise InputError(f"{label} is body {side.name!r} without a shape; expected a body with a face")
+            check_parameters(f"{label}, {side!r},", side_faces(side))
         self._a = a
         self._b = b
         if self.body_a is self.body_b:

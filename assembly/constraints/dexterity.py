@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly._read_only import read_only
 from assembly.constraints.constraint import Freedom
 from assembly.constraints.joint import Joint
 from assembly.constraints.objectives import Objective
@@ -166,8 +167,8 @@ class Dexterity(Objective):
 
     @property
     def direction(self) -> Array | None:
-        """Unit direction of the force; None for other measures."""
-        return None if self._direction is None else self._direction.copy()
+        """Unit direction of the force, read-only; None for other measures."""
+        return None if self._direction is None else read_only(self._direction)
 
     def __repr__(self) -> str:
         inputs = ", ".join(f"{freedom.joint.name!r}.{freedom.name}" for freedom in self._tip_task.inputs)

@@ -6,12 +6,13 @@ as the outward normals of two faces do that lie on each other.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, ClassVar, Literal, Self, overload
 
 import numpy as np
 
+from assembly._copies import OwnState
 from assembly.constraints.constraint import Bounds, Constraint, Coordinate, Equation, FramePair, Freedom, words
 from assembly.constraints.primitives import COINCIDENT, SLIDE, SWING
 from assembly.errors import InputError, bounded
@@ -42,11 +43,10 @@ def _frame(name: str, side: Any, takes_point: bool) -> Frame:
 
 def _opposed(frame: Frame) -> Frame:
     axes = frame.axes * np.array([1.0, -1.0, -1.0])
-    axes.flags.writeable = False
     return Frame(frame.body, frame.origin, axes)
 
 
-class Joint(Constraint):
+class Joint(OwnState, Constraint):
     """A joint between two bodies; see its subclasses.
 
     What it asks for is in `equations`, what it leaves free in `freedoms`. A freedom is driven where it has a value,
@@ -104,6 +104,9 @@ class Joint(Constraint):
             )
             for freedom, limits_name in zip(self._free, limits_names, strict=True)
         }
+
+    def _shared(self) -> Iterable[object]:
+        return *self._bodies, self._frame_a, self._frame_b
 
     @property
     def frame_a(self) -> Frame:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly._read_only import read_only
 from assembly.errors import KnownSettings, check_coordinates, extent, positive, vector
 from assembly.kinematics.body import Body, Frame, Point
 from assembly.kinematics.pose import Pose, axes_quaternion, multiply, pose_rows
@@ -61,8 +62,8 @@ class PointDistance(Objective):
 
     @property
     def target(self) -> Array:
-        """Where the point is drawn to, world coordinates (3,); a copy."""
-        return self._target.copy()
+        """Where the point is drawn to, world coordinates (3,), read-only: set it anew."""
+        return read_only(self._target)
 
     @target.setter
     def target(self, value: ArrayLike) -> None:
@@ -91,13 +92,11 @@ class Posture(Objective):
     def __init__(self, reference: ArrayLike | None = None, weight: float = 1.0) -> None:
         super().__init__((), weight)
         self._reference = None if reference is None else pose_rows("reference", reference)
-        if self._reference is not None:
-            self._reference.flags.writeable = False
 
     @property
     def reference(self) -> Array | None:
         """Poses to stay close to, (n, 7), read-only; None where each solve starts."""
-        return self._reference
+        return None if self._reference is None else read_only(self._reference)
 
     def __repr__(self) -> str:
         return f"Posture(weight={self.weight:g})"
@@ -161,8 +160,8 @@ class FrameDistance(Objective):
 
     @property
     def body_quaternion(self) -> Array:
-        """The quaternion of the body whose frame is at the target."""
-        return self._body_quaternion
+        """The quaternion of the body whose frame is at the target, read-only."""
+        return read_only(self._body_quaternion)
 
     def __repr__(self) -> str:
         return f"FrameDistance({self._frame!r}, target={self._pose!r}, length={self._length:g}, weight={self.weight:g})"

@@ -15,7 +15,8 @@ from typing import Any, Literal, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.errors import InputError, integer, is_masked, number, real_array, vector
+from assembly._read_only import ReadOnlyArrays
+from assembly.errors import InputError, check_encodable, integer, is_masked, number, real_array, vector
 from assembly.geometry import bezier
 from assembly.geometry.bezier_packing import pack_pieces
 from assembly.geometry.bezier_pieces import evaluate_pieces
@@ -45,6 +46,8 @@ def checked_name(name: str | None) -> str | None:
     """A name or nothing."""
     if name is not None and not isinstance(name, str):
         raise TypeError(f"name is {name!r}; expected a string or None")
+    if name is not None:
+        check_encodable("name", name)
     return name
 
 
@@ -87,7 +90,7 @@ def checked_table_degree(curve: NurbsCurve) -> None:
         )
 
 
-class NurbsCurve:
+class NurbsCurve(ReadOnlyArrays):
     """A rational B-spline curve.
 
     Parameters
@@ -226,7 +229,7 @@ class NurbsCurve:
         )
 
     @cached_property
-    def packed_pieces(self) -> tuple[NDArray[np.int64], Array]:
+    def _packed_pieces(self) -> tuple[NDArray[np.int64], Array]:
         """Bezier pieces as certified queries read them (`geometry/bezier_pieces.py`); not to be changed."""
         return pack_pieces(self)
 
@@ -285,7 +288,7 @@ class NurbsCurve:
         if self.degree <= bezier.MAX_DEGREE:
             bad = evaluate_curve(*self._packed, row, order, out)
         else:
-            bad = evaluate_pieces(*self.packed_pieces, row, self.closed, order, out)
+            bad = evaluate_pieces(*self._packed_pieces, row, self.closed, order, out)
         if bad >= 0:
             low, high = self.domain
             raise InputError(f"t is {row[bad]}; expected a parameter in the domain [{low:g}, {high:g}]")

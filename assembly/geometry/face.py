@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly._read_only import ReadOnlyArrays
 from assembly.errors import InputError, checked_color, items
 from assembly.geometry.boundary import Boundary, LoopLike, make_boundary
 from assembly.geometry.curve import NurbsCurve, checked_name, flat, parameters
@@ -25,7 +26,7 @@ __all__ = ["BoundaryPoint", "Face"]
 
 
 @dataclass(frozen=True, eq=False)
-class BoundaryPoint:
+class BoundaryPoint(ReadOnlyArrays):
     """Nearest points of a boundary: signed distance (positive inside), curve, its parameter, and (u, v)."""
 
     distance: NDArray[np.float64]

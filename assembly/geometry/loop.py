@@ -11,6 +11,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._read_only import ReadOnlyArrays, read_only
 from assembly.errors import InputError, items, number, vector
 from assembly.geometry.curve import NurbsCurve
 from assembly.geometry.curve_packing import signed_area
@@ -64,7 +65,7 @@ def moved(curve: NurbsCurve, shift: Array) -> NurbsCurve:
     return NurbsCurve(curve.control_points + shift, curve.knots, curve.degree, curve.weights, name=curve.name)
 
 
-class Loop:
+class Loop(ReadOnlyArrays):
     """A closed chain of curves in (u, v), head to tail.
 
     Parameters
@@ -191,7 +192,7 @@ class Loop:
         for k in np.flatnonzero(differs).tolist():
             parts[k] = _with_ends(parts[k], corners[k], after[k])
         self.curves = tuple(parts)
-        self.turn = snapped
+        self.turn = read_only(snapped)
 
     def _box(self) -> tuple[Array, Array]:
         points = np.concatenate([curve.control_points for curve in self.curves])
@@ -211,5 +212,5 @@ class Loop:
         turned = object.__new__(Loop)
         turned.tolerance, turned.period, turned.size = self.tolerance, self.period, self.size
         turned.curves = tuple(curve.reversed() for curve in self.curves[::-1])
-        turned.turn = -self.turn
+        turned.turn = read_only(-self.turn)
         return turned

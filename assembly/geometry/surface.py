@@ -15,6 +15,7 @@ from typing import Any, Literal, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly._read_only import ReadOnlyArrays
 from assembly.errors import InputError, integer, number, real_array
 from assembly.geometry import bezier
 from assembly.geometry.cells import surface_cells
@@ -39,7 +40,7 @@ def _pair(name: str, value: Any) -> tuple[Any, Any]:
     return value[0], value[1]
 
 
-class NurbsSurface:
+class NurbsSurface(ReadOnlyArrays):
     """A rational tensor-product B-spline surface. Its outward normal is Su x Sv.
 
     Parameters

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.errors import InputError, KnownSettings, check_coordinates, checked_color, vector
+from assembly._read_only import ReadOnlyArrays
+from assembly.errors import InputError, KnownSettings, check_coordinates, checked_color, text, vector
 from assembly.geometry.face import Face
 from assembly.geometry.surface import NurbsSurface
 from assembly.kinematics.pose import Pose, direction, length
@@ -32,7 +34,7 @@ def _frozen(array: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Point:
+class Point(ReadOnlyArrays):
     """A point of a body, in body coordinates (3,)."""
 
     body: Body
@@ -44,7 +46,7 @@ class Point:
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
+class Frame(ReadOnlyArrays):
     """A frame on a body: origin (3,) and axes (3, 3), the columns x, y, z, in body coordinates."""
 
     body: Body
@@ -95,17 +97,22 @@ class Body(KnownSettings):
         fixed: bool = False,
         color: Sequence[float] | None = None,
     ) -> None:
-        if not isinstance(name, str) or not name.strip():
-            raise InputError(f"name is {name!r}; expected a nonempty string")
         if not isinstance(fixed, (bool, np.bool_)):
             raise InputError(f"fixed is {fixed!r}; expected True or False")
-        self._name = name
+        self._name = text("name", name)
         self._fixed = bool(fixed)
         # Pose takes what is like an array, which its fields do not say: they are tuples once it is made.
         self._pose = Pose(position, quaternion)  # type: ignore[arg-type]
         check_coordinates("position", self._pose.position.tolist())
         self._faces = self._named(shape)
         self.color = color
+
+    def __copy__(self) -> Self:
+        """A body of the same name, with faces of its own that stand on the same surfaces."""
+        other = object.__new__(type(self))
+        other.__dict__.update(self.__dict__)
+        other._faces = tuple(BodyFace(other, side.face, side.name) for side in self._faces)
+        return other
 
     @property
     def name(self) -> str:
@@ -156,7 +163,8 @@ class Body(KnownSettings):
             if not isinstance(part, (NurbsSurface, Face)):
                 raise TypeError(f"shape of body {self.name!r} holds {part!r}; expected NurbsSurface or Face")
             face = part if isinstance(part, Face) else Face(part)
-            name = face.name or ("surface" if len(parts) == 1 else f"face {k + 1}")
+            # Names of surfaces and faces may be set anew.
+            name = text(f"shape[{k}].name", face.name or ("surface" if len(parts) == 1 else f"face {k + 1}"))
             if any(name == other.name for other in faces):
                 raise InputError(f"shape of body {self.name!r} has two faces named {name!r}; expected distinct names")
             faces.append(BodyFace(self, face, name))
@@ -167,7 +175,7 @@ class Body(KnownSettings):
 
     @property
     def q(self) -> Array:
-        """The row x y z qw qx qy qz of the body's pose, (7,)."""
+        """The row x y z qw qx qy qz of the body's pose, (7,), read-only; set `pose` instead."""
         return self.pose.q
 
     @property

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._read_only import ReadOnlyArrays
 from assembly.errors import InputError, positive, real_array, vector
 
 __all__ = ["Ellipsoid"]
@@ -21,7 +22,7 @@ _ORTHONORMAL = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
-class Ellipsoid:
+class Ellipsoid(ReadOnlyArrays):
     """A solid ellipsoid in the world, to look at.
 
     Parameters

@@ -16,6 +16,7 @@ from math import hypot
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly._read_only import ReadOnlyArrays, read_only
 from assembly.errors import InputError, check_coordinates, number, real_array, vector
 
 __all__ = [
@@ -193,7 +194,7 @@ def retract(q: ArrayLike, twist: ArrayLike) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Pose:
+class Pose(ReadOnlyArrays):
     """A rigid placement, body to world: p_w = R(quaternion) p_b + position.
 
     Parameters
@@ -227,8 +228,8 @@ class Pose:
 
     @property
     def q(self) -> Array:
-        """The row x y z qw qx qy qz, (7,)."""
-        return np.array(self.row)
+        """The row x y z qw qx qy qz, (7,), read-only."""
+        return read_only(np.array(self.row))
 
     @cached_property
     def row(self) -> tuple[float, ...]:
@@ -237,11 +238,11 @@ class Pose:
 
     @property
     def matrix(self) -> Array:
-        """Homogeneous (4, 4) matrix."""
+        """Homogeneous (4, 4) matrix, read-only."""
         m = np.eye(4)
         m[:3, :3] = rotation_matrix(self.quaternion)
         m[:3, 3] = self.position
-        return m
+        return read_only(m)
 
     def apply(self, points: ArrayLike) -> Array:
         """World coordinates of body points (..., 3)."""

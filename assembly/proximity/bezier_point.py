@@ -50,6 +50,7 @@ from assembly.proximity.bezier_search import (
     SPENT,
     UNDECIDED,
     UPPER,
+    in_span,
 )
 from assembly.proximity.bezier_square import (
     CUTS,
@@ -260,11 +261,10 @@ def nearest_on_curve(record, pool, px, py, pz, tolerance, clearance, budget, wor
     if let_go > 0.0 and upper > clearance:
         lower = max(min(math.sqrt(let_go) * (1.0 - 8.0 * UNIT) - away, upper), 0.0)
     w, c, _d, _h, _dw = curve_at(record, pool, best_span, best)
-    at = record[BREAKS] + best_span
     out[LOWER] = lower
     out[UPPER] = upper
     out[PARAMETER_B] = 0.0
-    out[PARAMETER_A] = pool[at] * (1.0 - best) + pool[at + 1] * best
+    out[PARAMETER_A] = in_span(pool, record[BREAKS] + best_span, best)
     for j in range(3):
         out[POINT_A + j] = c[j] + pool[CENTER + j]
     out[POINT_B] = px

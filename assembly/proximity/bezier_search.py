@@ -208,7 +208,15 @@ def parameter(record, pool, ints, nodes, k, o, x):
     """The curve's parameter of a place on a node."""
     at = record[BREAKS] + ints[NODE_INTS * k + FIRST]
     u = nodes[o + BEGIN] + x * (nodes[o + END] - nodes[o + BEGIN])
-    return pool[at] * (1.0 - u) + pool[at + 1] * u
+    return in_span(pool, at, u)
+
+
+@kernel(inline=True)
+def in_span(pool, at, u):
+    """The parameter of a place from 0 to 1 on the span that begins at pool[at]; rounding does not lead out of it."""
+    low = pool[at]
+    high = pool[at + 1]
+    return min(max(low * (1.0 - u) + high * u, low), high)
 
 
 @kernel(inner=True, exact=True)

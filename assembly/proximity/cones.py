@@ -59,7 +59,7 @@ def around_vectors(vectors: Array, slack: Array, vanish: NDArray[np.bool_]) -> t
     high = np.where(counts[..., None], unit, -1.0).max(axis=1)
     axis = _unit(0.5 * (low + high))
     # How far the true direction may be off, and how far the vector's own is.
-    sine = np.minimum(np.where(counts, slack[:, None] / np.maximum(length, 1e-300), 0.0), 1.0)
+    sine = np.where(counts, np.minimum(slack[:, None], length) / np.maximum(length, 1e-300), 0.0)
     angle = np.where(counts, between(unit, axis[:, None]) + np.arcsin(sine), 0.0)
     half = angle.max(axis=1) + 2.0 * _ROUNDING
     sure = counts.any(axis=1) & (half < _CONVEX) & (np.where(counts, length, 1.0) > 0.0).all(axis=1)

@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly._read_only import ReadOnlyArrays, read_only
 from assembly.errors import InputError, integer, number, positive, real_array, vector
 from assembly.geometry.face import Face
 from assembly.geometry.spline import BREAKS_U, BREAKS_V, CELLS, COEFFICIENTS, SURFACE_RECORD
@@ -48,7 +49,7 @@ _STATUSES = tuple(ControlStatus)
 
 
 @dataclass(frozen=True, eq=False)
-class ControlRun:
+class ControlRun(ReadOnlyArrays):
     """Witness points over time; row k is the state after k steps.
 
     Attributes
@@ -199,8 +200,8 @@ class Controller:
 
     @property
     def parameters(self) -> Array:
-        """Where the witness points are: (2,), or (4,) with a patch as the target."""
-        return np.array(self._x[: 4 if self._second >= 0 else 2])
+        """Where the witness points are: (2,), or (4,) with a patch as the target; read-only."""
+        return read_only(np.array(self._x[: 4 if self._second >= 0 else 2]))
 
     def step(self, q: ArrayLike | None = None, q_target: ArrayLike | None = None, dt: float = 1.0) -> ControlRun:
         """One step of `dt` seconds, at whose end the bodies stand at these poses; the state there.

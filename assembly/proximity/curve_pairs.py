@@ -16,6 +16,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly._read_only import ReadOnlyArrays
 from assembly.errors import InputError, vector
 from assembly.geometry.curve import NurbsCurve
 from assembly.geometry.face import Face
@@ -39,7 +40,7 @@ SAMPLES = 17
 
 
 @dataclass(frozen=True, eq=False)
-class CurvePair:
+class CurvePair(ReadOnlyArrays):
     """An extremal pair of points of a surface and a curve.
 
     Attributes

@@ -13,6 +13,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly._read_only import read_only
 from assembly.errors import InputError, integer, number, positive, real_array
 from assembly.geometry import bezier_ranges, formula
 from assembly.geometry.curve import NurbsCurve
@@ -179,8 +180,8 @@ def _answer(
     answer.__dict__.update(
         lower=values[en.STATE - 1],
         upper=values[en.UPPER],
-        parameters=np.array(parameters),
-        points=points if dimension == 3 else points[:, :dimension],
+        parameters=read_only(np.array(parameters)),
+        points=read_only(points[:, :dimension]),
         status=STATUSES[why],
         evaluations=int(values[en.COUNT]),
     )

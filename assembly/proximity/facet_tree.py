@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._read_only import ReadOnlyArrays, read_only
 from assembly.errors import InputError, integer, positive
 from assembly.geometry.face import Face
 from assembly.proximity.cones import FULL, around_cones
@@ -59,7 +60,7 @@ class Nodes(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class FacetTree:
+class FacetTree(ReadOnlyArrays):
     """Facets, edges and vertices of a body in a tree. Made by `FacetTree.of`.
 
     Elements are patches first, then parts of edges, then vertices.
@@ -140,8 +141,8 @@ class FacetTree:
 
     @property
     def triangles(self) -> Array:
-        """The facets (m, 3, 3), two a patch, counterclockwise in (u, v)."""
-        return self.corners[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3, 3)
+        """The facets (m, 3, 3), two a patch, counterclockwise in (u, v); read-only."""
+        return read_only(self.corners[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3, 3))
 
     def check_enclosure(self, samples: int = 1000, seed: int = 0) -> float:
         """The largest excess of random points and normals over what encloses them; it holds where it is not positive.

@@ -14,6 +14,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly._copies import OwnState
+from assembly._read_only import ReadOnlyArrays
 from assembly.errors import InputError, check_coordinates
 from assembly.geometry.face import Face
 from assembly.geometry.surface import NurbsSurface
@@ -78,8 +80,8 @@ class Feature:
         return self.name
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class FeaturePair:
+@dataclass(frozen=True, eq=False)
+class FeaturePair(ReadOnlyArrays):
     """The closest features of two bodies a and b, and their points.
 
     Attributes
@@ -234,7 +236,7 @@ def closest_features(a: Shape, b: Shape, q_a: ArrayLike | None = None, q_b: Arra
     return _pair((features_of(faces[0]), features_of(faces[1])), codes, out, status)
 
 
-class FeatureTracker:
+class FeatureTracker(OwnState):
     """The closest features of two bodies that move, each step from the last one.
 
     A step that is small against the bodies' own size switches from faces to edges to vertices and back as the closest
@@ -262,6 +264,9 @@ class FeatureTracker:
         self._out = np.empty(PAIR)
         self._out[SWITCHES] = 0.0
         self.searches = 0
+
+    def _shared(self) -> Iterable[object]:
+        return self._shapes, self._packed, self._names
 
     @property
     def switches(self) -> int:

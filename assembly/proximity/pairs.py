@@ -13,6 +13,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly._read_only import ReadOnlyArrays
 from assembly.errors import InputError, integer, real_array, vector
 from assembly.geometry.face import Face
 from assembly.geometry.spline import BREAKS_U, BREAKS_V, CELLS, COEFFICIENTS, SURFACE_RECORD
@@ -47,7 +48,7 @@ _STATUSES = tuple(PairStatus)
 
 
 @dataclass(frozen=True, eq=False)
-class ContactPair:
+class ContactPair(ReadOnlyArrays):
     """An extremal pair of points of two surfaces f and g.
 
     Attributes

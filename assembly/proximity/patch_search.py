@@ -12,7 +12,7 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly.geometry.bezier_pieces import CENTER, ERROR, REACH, UNIT, WEIGHT_RATIO
 from assembly.proximity.bezier_nodes import length
-from assembly.proximity.bezier_search import CONVERGED, bound_to_beat, ended, longer, pop, push
+from assembly.proximity.bezier_search import CONVERGED, bound_to_beat, ended, in_span, longer, pop, push
 from assembly.proximity.formula_nodes import describe_formula, formula_parameter, is_dot, split_formula, start_formula
 from assembly.proximity.patch_newton import load_points, nearest_in_patches, proven_in_patches
 from assembly.proximity.patch_nodes import (
@@ -110,8 +110,7 @@ def keep_patch_points(ra, qa, ia, a, ka, rb, qb, ib, b, kb, na, nb, curve, w, u,
 @kernel(inline=True)
 def between(pool, at, low, high, x):
     """The parameter of a place on a node of one direction."""
-    u = low + x * (high - low)
-    return pool[at] * (1.0 - u) + pool[at + 1] * u
+    return in_span(pool, at, low + x * (high - low))
 
 
 @kernel(

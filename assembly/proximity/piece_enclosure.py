@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly._read_only import ReadOnlyArrays
 from assembly.errors import InputError, number, real_array
 from assembly.geometry import bezier_ranges
 from assembly.geometry.curve import NurbsCurve
@@ -20,7 +21,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Enclosure:
+class Enclosure(ReadOnlyArrays):
     """Convex sets that hold the piece of a curve over an interval, rounding included.
 
     Attributes

@@ -214,7 +214,7 @@ def minimum_distances(
     codes = np.empty(len(rows), dtype=np.int64)
     space = np.zeros((len(rows), 3))
     space[:, :d] = rows
-    record, pool = curve.packed_pieces
+    record, pool = curve._packed_pieces
     point_distances(record, pool, space, tolerance, budget, codes, out)
     for i in np.flatnonzero(codes == UNFINISHED):
         from_pairs(curve, rows[i], tolerance, -1.0, budget, True, out[i])

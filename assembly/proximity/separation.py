@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._read_only import ReadOnlyArrays, read_only
+
 __all__ = ["Separation", "SeparationStatus"]
 
 
@@ -31,7 +33,7 @@ class SeparationStatus(Enum):
 
 
 @dataclass(frozen=True, eq=False)
-class Separation:
+class Separation(ReadOnlyArrays):
     """Bounds of the distance of two shapes.
 
     Attributes
@@ -63,8 +65,8 @@ class Separation:
                 raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
             row, dimension, curves = written
             value = row[2 : 2 + curves] if name == "parameters" else row[4:10].reshape(2, 3)[:, :dimension]
-            self.__dict__[name] = value
-            return value
+            self.__dict__[name] = read_only(value)
+            return self.__dict__[name]
 
     @property
     def converged(self) -> bool:

@@ -54,7 +54,7 @@ def _capsules(curve: NurbsCurve) -> Array:
     """The tree of capsules that is kept with a curve."""
     kept: Array | None = curve.__dict__.get("_capsules")
     if kept is None:
-        kept = curve.__dict__["_capsules"] = capsule_tree(*curve.packed_pieces)
+        kept = curve.__dict__["_capsules"] = capsule_tree(*curve._packed_pieces)
     return kept
 
 
@@ -79,12 +79,12 @@ def quick_answer(a: Any, b: Any, tolerance: float, clearance: float, budget: int
     if type(b) is NurbsCurve:
         if d != b.control_points.shape[1]:
             return -1
-        record, pool = b.packed_pieces
-        return int(curve_distance(*a.packed_pieces, record, pool, tolerance, clearance, budget, polish, d == 2, out))
+        record, pool = b._packed_pieces
+        return int(curve_distance(*a._packed_pieces, record, pool, tolerance, clearance, budget, polish, d == 2, out))
     place = coordinates(b, d)
     if place is None or not polish:
         return -1
-    record, pool = a.packed_pieces
+    record, pool = a._packed_pieces
     x, y, z = place
     code = int(point_distance(record, pool, x, y, z, tolerance, clearance, budget, out))
     return code if code != UNFINISHED else from_pairs(a, b, tolerance, clearance, budget, polish, out)
@@ -95,7 +95,7 @@ def from_pairs(
 ) -> int:
     """The search for pairs of curves, one of which is a point."""
     record, pool = pack_point(point)
-    return int(curve_distance(*a.packed_pieces, record, pool, tolerance, clearance, budget, polish, False, out))
+    return int(curve_distance(*a._packed_pieces, record, pool, tolerance, clearance, budget, polish, False, out))
 
 
 def spline_distance(a: Any, b: Any, tolerance: float, clearance: float, budget: int, polish: bool) -> Separation:

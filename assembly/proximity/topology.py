@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._read_only import ReadOnlyArrays
 from assembly.errors import InputError, positive
 from assembly.geometry.curve import NurbsCurve
 from assembly.geometry.curve_parts import CORNER
@@ -67,7 +68,7 @@ class Edge:
 
 
 @dataclass(frozen=True, eq=False)
-class Vertex:
+class Vertex(ReadOnlyArrays):
     """Where edges end.
 
     Attributes

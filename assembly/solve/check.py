@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._read_only import ReadOnlyArrays
 from assembly.kinematics.body import BodyFace
 from assembly.kinematics.pose import rotate
 from assembly.proximity.pairs import ContactPair, PairStatus, extremal_pair
@@ -83,7 +84,7 @@ class Sides:
 
 
 @dataclass(frozen=True, eq=False)
-class Audit:
+class Audit(ReadOnlyArrays):
     """What was found at a pose.
 
     Attributes

@@ -18,6 +18,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._read_only import ReadOnlyArrays
 from assembly.constraints.packing import Packed
 from assembly.errors import integer, positive
 from assembly.solve.conflicts import conflicting_sets
@@ -37,7 +38,7 @@ MOST_MOTIONS = 12
 
 
 @dataclass(frozen=True, eq=False)
-class Mobility:
+class Mobility(ReadOnlyArrays):
     """What a scene's constraints leave free at a pose; `scene.mobility()` makes it, print it for a table.
 
     Attributes

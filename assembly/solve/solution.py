@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._read_only import ReadOnlyArrays, read_only
 from assembly.constraints.constraint import Constraint
 from assembly.constraints.contact import Contact
 from assembly.constraints.joint import Joint
@@ -87,8 +88,8 @@ class Iteration(tuple[float, ...]):
     COLUMNS = ("objective", "feasibility", "stationarity", "penalty", "regularization", "step", "radius")
 
 
-class Solution:
-    """The result of a solve. Its tables are computed when they are read.
+class Solution(ReadOnlyArrays):
+    """The result of a solve. Its tables are computed when they are read; its arrays are read-only.
 
     Attributes
     ----------
@@ -144,7 +145,7 @@ class Solution:
     @cached_property
     def q(self) -> Array:
         """Configuration, (n, 7)."""
-        return self._state[: self._packed.contacts_at].reshape(-1, 7).copy()
+        return read_only(self._state[: self._packed.contacts_at].reshape(-1, 7).copy())
 
     @property
     def _parameters(self) -> Array:
@@ -195,7 +196,7 @@ class Solution:
     @property
     def history(self) -> Array:
         """A row an iteration, columns `Iteration.COLUMNS`; none where a contact was lost at the start."""
-        return self._rows[: 0 if self._is_lost and self.iterations == 0 else self.iterations + 1]
+        return read_only(self._rows[: 0 if self._is_lost and self.iterations == 0 else self.iterations + 1])
 
     @property
     def success(self) -> bool:
@@ -228,7 +229,7 @@ class Solution:
         forces = self._state[packed.multipliers_at : packed.residuals_at] * packed.unit
         forces = np.where(packed.lengths, forces / packed.scale, forces)
         return {
-            constraint.name: forces[rows]
+            constraint.name: read_only(forces[rows])
             for constraint, rows in zip(self._scene.constraints, packed.spans, strict=True)
         }
 

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly._read_only import ReadOnlyArrays, read_only
 from assembly.constraints.clearance import Clearance
 from assembly.constraints.constraint import Constraint, Freedom
 from assembly.constraints.joint import Joint
@@ -43,7 +44,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Wrench:
+class Wrench(ReadOnlyArrays):
     """A force and a torque on a body.
 
     Parameters
@@ -76,8 +77,8 @@ class Wrench:
 
     @property
     def vector(self) -> Array:
-        """Force, then torque about the body's origin, world axes, (6,): rate of work = vector . twist."""
-        return np.concatenate([self.force, self.torque])
+        """Force, then torque about the body's origin, world axes, (6,), read-only: rate of work = vector . twist."""
+        return read_only(np.concatenate([self.force, self.torque]))
 
     def at(self, point: ArrayLike) -> Array:
         """Force, then torque about a point of the world, world axes, (6,)."""

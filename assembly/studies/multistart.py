@@ -35,7 +35,7 @@ def solve_all(scene: Assembly, starts: int, seed: int, options: Mapping[str, Any
     found: list[Solution] = []
     with _postures_from(packed, scene.q):
         for start in range(count):
-            q = scene.q
+            q = scene.q.copy()
             if start > 0:
                 q[moving, :3] += packed.scale * rng.uniform(-1.0, 1.0, (len(moving), 3))
                 turns = rng.normal(size=(len(moving), 4))

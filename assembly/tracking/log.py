@@ -14,6 +14,8 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly._copies import InOneProcess
+from assembly._read_only import ReadOnlyArrays, read_only
 from assembly.errors import InputError, integer, number, positive
 
 __all__ = ["Happening", "LoggedEvent", "Recorder", "TrackLog"]
@@ -57,7 +59,7 @@ def kind_name(event: Happening) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class TrackLog:
+class TrackLog(ReadOnlyArrays):
     """Ticks of a tracker, in the order they came.
 
     Parameters
@@ -151,7 +153,7 @@ class TrackLog:
     @property
     def late(self) -> Integers:
         """Ticks that took longer than the budget; none where there is no budget."""
-        return self.later_than(np.inf if self.budget is None else self.budget)
+        return read_only(self.later_than(np.inf if self.budget is None else self.budget))
 
     def later_than(self, seconds: float) -> Integers:
         """Ticks that took longer than so many seconds."""
@@ -264,7 +266,7 @@ class TrackLog:
         return "\n".join(lines)
 
 
-class Recorder:
+class Recorder(InOneProcess):
     """Arrays for a number of ticks, filled one tick after the other; `log` makes the log of what was filled.
 
     Parameters
@@ -279,6 +281,8 @@ class Recorder:
     budget : float, optional
         Seconds a tick may take.
     """
+
+    _instead = "keep its `log()`"
 
     def __init__(
         self, times: ArrayLike, bodies: int, statuses: type[Enum], *, stride: int = 1, budget: float | None = None

@@ -10,6 +10,8 @@ from math import inf, nan
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly._copies import OwnState
+from assembly._read_only import ReadOnlyArrays
 from assembly.constraints.clearance import Clearance
 from assembly.constraints.packing import Packed
 from assembly.errors import InputError, number
@@ -29,8 +31,8 @@ _STATES = tuple(PairState)
 MOST_REACH = 0.2
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class ListedContact:
+@dataclass(frozen=True, eq=False)
+class ListedContact(ReadOnlyArrays):
     """An extremal pair of points of two bodies that is tracked.
 
     Attributes
@@ -70,7 +72,7 @@ class _Everything(Clearance):
         return list(combinations(self.bodies, 2))
 
 
-class Manager:
+class Manager(OwnState):
     """The global stage without a solve: pairs of bodies from far to near to tracked contacts (paper 001, section 5).
 
     Every `update` says where bodies stand. A contact that is listed is carried along by the contact velocity
@@ -170,6 +172,9 @@ class Manager:
             memory[places_at:events_at].reshape(-1, watch_memory.PLACE_MEMORY),
             memory[events_at:],
         )
+
+    def _shared(self) -> Iterable[object]:
+        return self._bodies
 
     @property
     def bodies(self) -> tuple[Body, ...]:

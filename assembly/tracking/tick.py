@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from enum import Enum
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._read_only import ReadOnlyArrays, read_only
 from assembly.proximity.events import Event, events_of
 from assembly.proximity.watch_memory import EVENT_COUNT
 from assembly.solve.settings import COUNT, CURVED, DUAL, HISTORY, OBJECTIVE, VIOLATION
 from assembly.solve.solution import Solution, Status
-
-if TYPE_CHECKING:
-    from assembly.tracking.tracker import Tracker
+from assembly.tracking.followed import Followed
 
 __all__ = ["Step", "TrackStatus"]
 
@@ -34,8 +32,8 @@ class TrackStatus(Enum):
     CHANGED = "a constraint gained or lost a row since the tracker was made; nothing moved, make another one"
 
 
-class Step:
-    """What a tick did. Tables are computed when they are read.
+class Step(ReadOnlyArrays):
+    """What a tick did. Tables are computed when they are read; arrays are read-only.
 
     One that is LATE at the pose of the step before has that one's figures as well: violation, iterations, objective.
 
@@ -62,14 +60,14 @@ class Step:
 
     def __init__(
         self,
-        tracker: Tracker,
+        followed: Followed,
         state: Array,
         status: TrackStatus,
         target: Array,
         seen: float,
         seconds: float,
     ) -> None:
-        self._tracker = tracker
+        self._followed = followed
         self._state = state
         self._target = target
         self.status = status
@@ -79,10 +77,10 @@ class Step:
     @cached_property
     def q(self) -> Array:
         """Configuration, (n, 7)."""
-        return self._state[: self._tracker._packed.contacts_at].reshape(-1, 7).copy()
+        return read_only(self._state[: self._followed.packed.contacts_at].reshape(-1, 7).copy())
 
     def _result(self, place: int) -> float:
-        return float(self._state[self._tracker._packed.results_at + place])
+        return float(self._state[self._followed.packed.results_at + place])
 
     @property
     def feasibility(self) -> float:
@@ -97,7 +95,7 @@ class Step:
     @property
     def objective(self) -> float:
         """The objective, the energy of the hand's spring among it."""
-        return self._result(OBJECTIVE) * self._tracker._packed.unit
+        return self._result(OBJECTIVE) * self._followed.packed.unit
 
     @property
     def iterations(self) -> int:
@@ -112,15 +110,15 @@ class Step:
     @cached_property
     def events(self) -> tuple[Event, ...]:
         """What became of contacts since the step before, in the memory of its state."""
-        tracker, packed = self._tracker, self._tracker._packed
+        followed, packed = self._followed, self._followed.packed
         if not packed.guards or self._state[packed.memory_at + EVENT_COUNT] == self._seen:
             return ()
-        return events_of(self._state[packed.memory_at :], tracker._names, packed.scale, int(self._seen))
+        return events_of(self._state[packed.memory_at :], followed.names, packed.scale, int(self._seen))
 
     @cached_property
     def wrench(self) -> Array:
         """Force and torque on the hand, (6,)."""
-        return self._tracker._wrench(self.q, self._target)
+        return read_only(self._followed.wrench(self.q, self._target))
 
     @property
     def force(self) -> Array:
@@ -130,11 +128,11 @@ class Step:
     @cached_property
     def solution(self) -> Solution:
         """The pose as a solution."""
-        tracker = self._tracker
+        followed = self._followed
         status = Status.SOLVED if self.status is TrackStatus.FOLLOWED else Status.ITERATION_LIMIT
         # A solution writes what it tracks; the tracker goes back to the state of its last step.
         state = self._state.copy()
-        return Solution(tracker._scene, tracker._packed, state, status, self.seconds, np.empty((0, HISTORY)))
+        return Solution(followed.scene, followed.packed, state, status, self.seconds, np.empty((0, HISTORY)))
 
     def __repr__(self) -> str:
         return f"Step({self.status.name}, feasibility={self.feasibility:.1e}, {1e6 * self.seconds:.0f} us)"

@@ -20,6 +20,7 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly._read_only import ReadOnlyArrays
 from assembly.errors import InputError, number, positive, real_array
 from assembly.kinematics.pose import UNIT_ROUNDING, UNIT_TOLERANCE, Pose
 
@@ -44,7 +45,7 @@ class Speed(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Trace:
+class Trace(ReadOnlyArrays):
     """A hand's motion: points or poses at times.
 
     Parameters

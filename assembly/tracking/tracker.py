@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly._address import clock_address
+from assembly._copies import InOneProcess
+from assembly._read_only import read_only
 from assembly.assembly import Assembly
 from assembly.constraints.constraint import structure_changes
 from assembly.constraints.layout import CLOCK_AT, WATCH
@@ -16,7 +18,7 @@ from assembly.constraints.objectives import FrameDistance, PointDistance
 from assembly.constraints.packing import structure_of
 from assembly.errors import FARTHEST, InputError, integer, number, positive
 from assembly.kinematics.body import Body, Frame, Point
-from assembly.kinematics.pose import Pose, axes_quaternion, rotation_matrix
+from assembly.kinematics.pose import Pose, axes_quaternion
 from assembly.proximity.solid_contact import STAYS, TRACK
 from assembly.proximity.watch_memory import CLOCK, CORNERS, EVENT_COUNT
 from assembly.solve.augmented_lagrangian import solve_program
@@ -43,6 +45,7 @@ from assembly.solve.settings import (
     VIOLATION,
 )
 from assembly.solve.solution import Scene, Solution
+from assembly.tracking.followed import Followed
 from assembly.tracking.log import TrackLog
 from assembly.tracking.tick import Step, TrackStatus
 from assembly.tracking.trace import Trace
@@ -60,7 +63,7 @@ _STATUSES = {SOLVED: TrackStatus.FOLLOWED, OUT_OF_TIME: TrackStatus.LATE}
 _CODES = {status: k for k, status in enumerate(TrackStatus)}
 
 
-class Tracker:
+class Tracker(InOneProcess):
     """Follows a hand that holds a point or a frame of a body: made by `Assembly.tracker`.
 
     Every tick is a few steps of the loop that `solve` runs, from the pose and the multipliers of the tick before. The
@@ -94,6 +97,8 @@ class Tracker:
     InputError, TypeError
         Arguments out of range, or a start from which the constraints cannot be solved.
     """
+
+    _instead = "keep `tracker.scene` and `tracker.q` and make another one from them"
 
     def __init__(
         self,
@@ -164,7 +169,8 @@ class Tracker:
                 raise InputError("budget is given, but this interpreter has no clock for compiled code; expected None")
         self._history = np.zeros((1, HISTORY))
         packed = self._packed
-        self._names = [(a.name, b.name) for pairs in packed.guarded for a, b in pairs]
+        names = [(a.name, b.name) for pairs in packed.guarded for a, b in pairs]
+        self._followed = Followed(self._scene, packed, names, self._hand, self._place)
         # Behind the state of a solve are the rows of the last tick; steps have no copy of those.
         self._size = first._state.size
         recalled = recall_size(packed.count, packed.pair_rows)
@@ -202,8 +208,8 @@ class Tracker:
 
     @property
     def q(self) -> Array:
-        """Where the bodies stand now, (n, 7)."""
-        return self._before[: self._packed.contacts_at].reshape(-1, 7).copy()
+        """Where the bodies stand now, (n, 7), read-only."""
+        return read_only(self._before[: self._packed.contacts_at].reshape(-1, 7).copy())
 
     def step(self, target: ArrayLike | Pose) -> Step:
         """Follow the hand for a tick. Never raises: see `Step.status`.
@@ -219,7 +225,7 @@ class Tracker:
         row = None if changed else self._aimed(target)
         if row is None:
             status = TrackStatus.CHANGED if changed else TrackStatus.BAD_TARGET
-            return Step(self, self._before, status, self._where(), self._seen, perf_counter() - begin)
+            return Step(self._followed, self._before, status, self._where(), self._seen, perf_counter() - begin)
         view, at = self._view, packed.results_at
         carried = view[at + CARRIED] > 0.0
         code = solve_program(*self._arguments)
@@ -227,7 +233,7 @@ class Tracker:
             # The next tick goes on from a pose that does not hold yet; here the last one stands.
             stands = self._before[at + VIOLATION] <= self._tolerance
             status = TrackStatus.LATE if stands else TrackStatus.VIOLATED
-            return Step(self, self._before, status, row, self._seen, perf_counter() - begin)
+            return Step(self._followed, self._before, status, row, self._seen, perf_counter() - begin)
         status = _STATUSES.get(code, TrackStatus.APPROACHING)
         if not view[at + VIOLATION] <= self._tolerance:
             status = TrackStatus.VIOLATED
@@ -250,7 +256,7 @@ class Tracker:
             self._seen = view[packed.memory_at + EVENT_COUNT]
         # What steps keep nobody writes to.
         self._before = self._pose.copy()
-        return Step(self, self._before, status, row, seen, perf_counter() - begin)
+        return Step(self._followed, self._before, status, row, seen, perf_counter() - begin)
 
     def _has_changed(self) -> bool:
         """Whether a constraint of the scene, and not of another one, gained or lost a row."""
@@ -296,20 +302,6 @@ class Tracker:
             left, front, low = self._reference
             pool[at], pool[at + 1], pool[at + 2] = (x - left) / size, (y - front) / size, (z - low) / size
         return row
-
-    def _wrench(self, q: Array, target: Array) -> Array:
-        """Force and torque of the spring on the hand."""
-        hand = self._hand
-        pose = Pose(q[self._place, :3], q[self._place, 3:])
-        stiffness = 2.0 * hand.weight
-        if isinstance(hand, PointDistance):
-            return np.append(stiffness * (pose.apply(hand.point.coordinates) - target), np.zeros(3))
-        frame = hand.frame
-        force = stiffness * (pose.apply(frame.origin) - target[:3])
-        turn = rotation_matrix(pose.quaternion) @ frame.axes @ rotation_matrix(target[3:]).T
-        # Twice the skew part of a rotation is its sine along its axis.
-        sine = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
-        return np.append(force, stiffness * hand.length**2 * sine)
 
     def run(self, trace: Trace, *, paced: bool = False, stride: int = 1) -> TrackLog:
         """Follow a recorded hand, a tick a sample.

@@ -15,7 +15,7 @@ from pathlib import Path
 from numpy.typing import ArrayLike
 
 from assembly.assembly import Assembly
-from assembly.errors import InputError
+from assembly.errors import InputError, check_encodable
 from assembly.kinematics.ellipsoid import Ellipsoid
 from assembly.solve.solution import Solution
 from assembly.view.commands import Command, commands, packed
@@ -101,7 +101,10 @@ def write_page(path: str | PathLike[str], title: str | None, drawing: Iterable[C
     lines = ",\n".join(f'"{b64encode(packed(command)).decode("ascii")}"' for command in drawing)
     if title is not None and not isinstance(title, str):
         raise InputError(f"title is {title!r}; expected a string or None")
-    heading = escape(Path(path).stem if title is None else title)
+    if title is not None:
+        check_encodable("title", title)
+    # The name of a file may be none that UTF-8 has.
+    heading = escape(Path(path).stem.encode(errors="replace").decode() if title is None else title)
     page = _PAGE.format(title=heading, viewer=_viewer(), commands=lines, player=controls)
     Path(path).write_text(page, encoding="utf-8")
 

@@ -26,7 +26,7 @@ class Tree:
     """A random node of a curve's tree, some halvings down."""
 
     def __init__(self, curve, rng, depth):
-        self.record, self.pool = curve.packed_pieces
+        self.record, self.pool = curve._packed_pieces
         self.stride = bn.node_stride(self.record)
         self.nodes = np.full(self.stride * (2 * depth + 40), np.nan)
         self.ints = np.zeros(bn.NODE_INTS * (2 * depth + 40), dtype=np.int64)
@@ -86,7 +86,7 @@ def test_models_of_pieces(kind):
 def test_packed_curves_are_what_was_given(kind):
     """In exact arithmetic, at the ends and the middle of every span; the error that the record states."""
     curve = random_curve(np.random.default_rng(2), kind, 3)
-    record, pool = curve.packed_pieces
+    record, pool = curve._packed_pieces
     n = curve.degree
     net = pool[record[6] : record[6] + 4 * (n + 1) * record[1]].reshape(record[1], n + 1, 4)
     knots = [Fraction(t) for t in curve.knots.tolist()]
@@ -179,7 +179,7 @@ def test_capsules(kind, cases):
     for trial in range(cases(4, 12)):
         dimension = 2 + trial % 2
         curve, other = (random_curve(rng, kind, dimension, 3.0) for _ in range(2))
-        tree, far = (bc.capsule_tree(*c.packed_pieces) for c in (curve, other))
+        tree, far = (bc.capsule_tree(*c._packed_pieces) for c in (curve, other))
         leaves = int(tree[bc.LEAVES])
         rows = tree.reshape(-1, bc.STRIDE)
         places = np.zeros((len(x), 3))

@@ -409,3 +409,17 @@ def test_bad_input_of_the_other_verbs():
 
 def test_no_points_have_no_distances():
     assert [part.shape for part in minimum_distances(np.zeros((0, 3)), bezier(1))] == [(0,)] * 3
+
+
+def test_parameters_of_nearest_points_are_in_the_domain():
+    # Near an end of a curve their sum was rounded to beyond it, for one of these points; evaluation raised there.
+    rng = np.random.default_rng(3)
+    for _ in range(2000):
+        low = rng.uniform(-3.0, 3.0)
+        degree = int(rng.integers(1, 6))
+        points = rng.normal(size=(degree + 1, 3))
+        knots = np.repeat([low, low + rng.uniform(0.1, 3.0)], degree + 1)
+        curve = asm.NurbsCurve(points, knots, degree)
+        near = minimum_distance(curve, points[-1] + 10.0 ** rng.uniform(-16.0, -6.0) * rng.normal(size=3))
+        assert knots[0] <= near.parameters[0] <= knots[-1]
+        assert np.abs(curve.evaluate(near.parameters[0]) - near.points[0]).max() < 1e-12

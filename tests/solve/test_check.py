@@ -56,7 +56,7 @@ def test_a_ball_wider_than_the_hole_crosses_the_ring_it_touches_from_within(radi
     q = np.array([ring.q, ball.q])
     q[1, 0] = 0.8 - radius
     near = asm.Body("near", shapes.sphere(0.3), position=(0.45, 0.0, 0.0))
-    start = asm.proximity.extremal_pair(ring.faces[0], ring.q, near.faces[0], near.q).parameters
+    start = asm.proximity.extremal_pair(ring.faces[0], ring.q, near.faces[0], near.q).parameters.copy()
     start[2:] *= radius / 0.3  # parameters of a ball are lengths
     pair = sides.find(q, start)
     # Touching, nothing but rounding moves the pair.

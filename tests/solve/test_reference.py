@@ -142,7 +142,7 @@ def pulled():
 
 def held_to_a_reference():
     scene = wires()
-    reference = scene.q
+    reference = scene.q.copy()
     reference[:, :3] += [0.05, -0.02, 0.03]
     scene.minimize(asm.Posture(reference, weight=2.0))
     return scene

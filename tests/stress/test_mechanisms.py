@@ -61,7 +61,7 @@ def test_squares_that_are_folded_all_but_flat(cells, seed):
     """From poses 2 percent off flat ones: rows depend on each other where they end, which is not far from flat."""
     scene = parallelograms(cells)
     rng = np.random.default_rng(seed)
-    q = scene.q
+    q = scene.q.copy()
     size = scene.packed().scale
     for k in range(1, len(q)):
         off = asm.Pose.from_axis_angle(rng.normal(size=3), 0.02, 0.02 * size * rng.uniform(-1.0, 1.0, 3))

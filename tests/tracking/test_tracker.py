@@ -233,7 +233,7 @@ def test_the_sign_of_quaternions_does_not_matter():
     runs = []
     for sign in (1.0, -1.0):
         scene, tip = arm()
-        q = scene.q
+        q = scene.q.copy()
         q[:, 3:] *= sign
         tracker = scene.tracker(tip, q0=q)
         runs.append([tracker.step(target) for target in circling([1.8, 0.0, 0.0], 0.2, 200)])
