@@ -50,7 +50,7 @@ def test_clips_start_clear_and_touch_when_solved():
 
 def test_rings_of_the_chain_are_linked_with_the_next_alone():
     chain = ring_chain()
-    q = chain.scene.q
+    q = chain.scene.q.copy()
     assert q.shape == (12, 7) and chain.deepest(q) > MINOR
     links = iter(chain.links(q))
     for i in range(12):
