@@ -10,9 +10,9 @@ factorization of that matrix tells its inertia; d is raised until it exists. dx 
 along which a line search runs (`search.py`); multipliers follow every step. -mu I makes redundant rows harmless.
 
 A contact whose pair comes to a fold gets its coordinates as unknowns (`proximity/free_pair.py`) for the rest of the
-solve. Scattered bodies are gathered first (`gather.py`); an objective that asks them to move little is measured from
-there. Bodies that sank into each other go back (`retreat.py`). Where rows cannot all hold, the same step with f = 0,
-y = 0, mu = 1 minimizes |c|^2 / 2, and the loop says INFEASIBLE at its stationary point.
+solve. Scattered bodies are gathered first (`gather.py`). Bodies that sank into each other go back (`retreat.py`). Where
+rows cannot all hold, the same step with f = 0, y = 0, mu = 1 minimizes |c|^2 / 2, and the loop says INFEASIBLE at its
+stationary point. What the last factorization tells of second order is kept for the end (`inertia.py`).
 """
 
 from __future__ import annotations
@@ -48,6 +48,7 @@ from assembly.solve.budget import HALF, begin_tick, is_cut, is_spent, may_end, s
 from assembly.solve.contacts import free_folds, is_of_surfaces
 from assembly.solve.ending import finish, return_to
 from assembly.solve.guards import allowed_share, look_again, numbers_of, place_guards
+from assembly.solve.inertia import note_factor
 from assembly.solve.multipliers import choose_multipliers, forget_objective, least_multipliers, weigh_rows
 from assembly.solve.report import is_clear, keep, log
 from assembly.solve.restoration import LEAST_SHARE, SHARE, SOFTNESS, begin_way, step_back
@@ -266,10 +267,10 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         # Rows of vectors depend on one another: their multipliers drift where nothing keeps them short.
         vectors = table[VECTOR_TRIMS] == 1
         shortened = iteration > 0 and (alpha < 1.0 or vectors)
-        # Of contacts that touch, which of them push is not known from their gaps.
-        touches = watched and not tick and violation <= TOUCHING
-        # At the start both are the same; later a tenth of the last residual is good.
-        good = max(math.inf if iteration == 0 else 0.1 * last_dual, settings[STATIONARITY] if touches else 0.0)
+        # Which rows push is not known at a first start, nor of contacts. A tenth of the last residual is good.
+        first = iteration == 0 and mu > floor and violation <= feasible
+        touches = first or (watched and not tick and violation <= TOUCHING)
+        good = max(0.0 if first else 0.1 * last_dual, settings[STATIONARITY] if touches else 0.0)
         dual = choose_multipliers(
             shape, rows, here, shortened, vectors, touches, good, active, gradient, lines[0], gram, y, better_y
         )
@@ -391,8 +392,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         if used < 0.0:
             status = STALLED
             continue
-        if iteration == 0:
-            results[FIRST_SHIFT] = shift
+        note_factor(settings, results, iteration, shift, dual, restoring, is_fresh, rows, one_sided, active, y)
         last_violation = violation
         last_dual = dual
         measured = False

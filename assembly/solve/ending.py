@@ -7,11 +7,10 @@ import math
 from assembly._kernel import kernel
 from assembly.constraints.layout import ROWS, SCALE, WATCH
 from assembly.constraints.program import evaluate
-from assembly.constraints.row_terms import add_row_terms
 from assembly.proximity.watch import EVERYTHING, any_crossed
 from assembly.solve.guards import clear_guards, go_back, look_around, place_guards
-from assembly.solve.linear import factorize_shifted
-from assembly.solve.multipliers import multipliers_at, weigh_rows
+from assembly.solve.inertia import test_end
+from assembly.solve.multipliers import multipliers_at
 from assembly.solve.recall import leave
 from assembly.solve.report import bring_back, is_clear, judge, write_pose, write_rows
 from assembly.solve.room import results_of
@@ -20,12 +19,10 @@ from assembly.solve.settings import (
     ANY_POSE,
     CARRIED,
     CONTACT_LOST,
-    CURVED,
     HELD,
     IMPROPER,
     INFEASIBLE,
     ITERATION_LIMIT,
-    PENALTY_FLOOR,
     RECALL,
     SECOND_ORDER,
     SOLVED,
@@ -64,7 +61,7 @@ def finish(program, settings, state, tips, here, trial, by_row, at_end, held, nu
     pose.
     """
     table, pool, shape, loose, room = program
-    gradient, lines, lagrangian, matrix = system
+    gradient, lines, lagrangian, _matrix = system
     y, better_y, active, forces = by_row[2], by_row[3], by_row[4], by_row[5]
     status, value, violation, dual, feasible, rows, holds = at_end
     results = results_of(table, state)
@@ -95,11 +92,7 @@ def finish(program, settings, state, tips, here, trial, by_row, at_end, held, nu
             status = STALLED
     results[IMPROPER] = write_rows(table, here, y, loose, tick, pool[SCALE], state)
     if settings[SECOND_ORDER] == 1.0 and results[HELD] + results[CARRIED] == 0.0 and status != CONTACT_LOST:
-        goal(table, pool, shape, rows, loose, room, tips, here, 1, gradient, lagrangian)
-        weigh_rows(rows, shape[1], here[3], y, settings[PENALTY_FLOOR], forces, active)
-        add_row_terms(table, pool, loose, room, shape, here, y, active, lagrangian)
-        least = factorize_shifted(lagrangian, gradient.size, shape[2], 0.0, matrix)
-        results[CURVED] = 1.0 if least == 0.0 else -1.0
+        status = test_end(program, settings, results, status, tips, here, rows, y, active, forces, system)
     if settings[RECALL] > 0.0:
         # With clearances what a tick ends with depends on rounding where wires wedge: there, rows are evaluated afresh.
         good = status == SOLVED if watched else status != CONTACT_LOST

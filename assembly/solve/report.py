@@ -36,11 +36,12 @@ def log(history, iteration, figures):
 
 @kernel(inner=True)
 def write_pose(table, pool, q, state):
-    """Poses of the moving bodies into the state, in the user's coordinates."""
+    """Poses of the moving bodies into the state, in the user's coordinates; what did not move keeps its bits."""
     for b in range(table[BODIES]):
         if table[table[SLOTS] + b] >= 0:
             for k in range(3):
-                state[7 * b + k] = q[b, k] * pool[SCALE] + pool[REFERENCE + k]
+                if q[b, k] != (state[7 * b + k] - pool[REFERENCE + k]) / pool[SCALE]:
+                    state[7 * b + k] = q[b, k] * pool[SCALE] + pool[REFERENCE + k]
             for k in range(3, 7):
                 state[7 * b + k] = q[b, k]
 

@@ -114,6 +114,16 @@ def spread_rows(table, free, count, packed, out):
 
 
 @kernel(inner=True, allocates=True)
+def new_point(table):
+    """Room for a point of the loop, with as many rows as there can be."""
+    pairs = table[CONTACTS]
+    most = table[ROWS] + 4 * pairs
+    records = np.ones((pairs + table[JOINTS] + table[VECTOR_TRIMS], CONTACT_RECORD))
+    packed = np.zeros((most, EXTRA_COLUMN + 6 * table[EXTRA]))
+    return np.empty((table[BODIES], 7)), np.empty((table[TRACKED], TRACK)), records, np.zeros(most), packed
+
+
+@kernel(inner=True, allocates=True)
 def point_at(table, pool, state, free):
     """A point of the loop at a state: whether all its rows are evaluated (-1, or the contact that is lost), how many
     contacts are at folds, the point, and what pairs and tapes need.
@@ -122,13 +132,9 @@ def point_at(table, pool, state, free):
     """
     pairs = table[CONTACTS]
     tracks = table[TRACKED]
-    most = table[ROWS] + 4 * pairs
-    q = np.empty((table[BODIES], 7))
-    tracked = np.empty((tracks, TRACK))
     start = np.empty((tracks, TRACK))
-    records = np.ones((pairs + table[JOINTS] + table[VECTOR_TRIMS], CONTACT_RECORD))
-    packed = np.zeros((most, EXTRA_COLUMN + 6 * table[EXTRA]))
-    point = (q, tracked, records, np.zeros(most), packed)
+    point = new_point(table)
+    q, tracked, records, residual, _packed = point
     o = table[TAPE_ROOM]
     room = (np.empty(table[o]), np.empty(table[o + 1]), np.empty(table[o + 2]))
     loose = (
@@ -149,7 +155,7 @@ def point_at(table, pool, state, free):
     lost = start_contacts(table, pool, q, tracked, free, loose[1])
     if lost < 0:
         # Every contact counts here, also one that pushes nothing.
-        active = np.ones(most)
+        active = np.ones(residual.size)
         count = free_folds(table, pool, records, tracked, active, free, loose[1], -1.0, -1, False)
         before = -1
         while count != before:
