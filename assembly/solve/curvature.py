@@ -99,6 +99,7 @@ def walk_within(table, pool, state, step, share, residual, tips, integers, doubl
     shape = shape_of(table, table[ROWS] + 4 * pairs, 6 * table[MOVING] + 4 * pairs, table[:0], integers, doubles)
     arrange(table, free, shape, rows, n)
     trial = new_point(table)
+    trial[0][:] = here[0]
     lagrangian, matrix = np.zeros((n, n)), np.empty((n, n))
     active, forces, way = np.zeros(rows), np.zeros(rows), step.copy()
     before = math.inf

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from enum import StrEnum
-from itertools import combinations
+from itertools import combinations, islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from assembly.constraints.layout import MOVING
 from assembly.constraints.packing import Packed
 from assembly.solve.look import DEPENDENT, Look, null_space
+from assembly.solve.rank import orthonormal
 
 __all__ = ["SecondOrder", "Verdict", "Way", "judge"]
 
@@ -32,6 +33,8 @@ SAMPLES, MIXTURES = (1e-2, 3e-2, 1e-1), 4
 FACES, WITHIN = 8, 1e-9
 # Ways of negative curvature that are followed; what it is capped at, because kinks look steeper than anything.
 WAYS, STEEPEST = 3, 10.0
+# Curvatures that are the same: of their directions a basis is taken that rounding does not choose. Digits of these.
+ALIKE, DIGITS = 1e-6, 6
 # Steps toward multipliers of which the form is not negative: of one combination of rows halvings of its range; how much
 # of a combination counts.
 HALVINGS, RANGE, CLIMBS, BENDS = 70, 1e6, 40, 1e-6
@@ -94,13 +97,13 @@ def judge_look(look: Look, sample: bool) -> Verdict:
         bends = _bends(look, pushing, basis)
         depends = bool(bends)
         if depends:
-            form = _least_negative(form, bends)
+            form = _least_negative(look, form, bends)
             values, vectors = np.linalg.eigh(form)
     if values[0] > flat:
         return Verdict(SecondOrder.MINIMUM)
-    cone = look.jacobian[look.touching & ~pushing] @ basis
-    cone = cone[np.linalg.norm(cone, axis=1) > DEPENDENT]
-    ways = [Way(basis @ d, max(curvature, -STEEPEST)) for d, curvature in _downward(form, values, vectors, cone, flat)]
+    cone = look.jacobian[look.touching & ~pushing]
+    cone = cone[np.linalg.norm(cone @ basis, axis=1) > DEPENDENT]
+    ways = list(_downward(form, basis, cone, flat)) if values[0] < -flat else []
     if ways:
         # Where rows depend on each other a way may exist to first order only, and then leads nowhere.
         return Verdict(SecondOrder.UNDECIDED if depends else SecondOrder.SADDLE, ways)
@@ -111,87 +114,121 @@ def judge_look(look: Look, sample: bool) -> Verdict:
         return Verdict(SecondOrder.MINIMUM)
     if not sample:
         return Verdict(SecondOrder.NOT_ISOLATED)
-    return _sampled(look, basis @ zeros, look.jacobian[look.touching & ~pushing])
+    return _sampled(look, _canonical(basis @ zeros), cone)
 
 
 def _symmetric(matrix: Array) -> Array:
     return 0.5 * (matrix + matrix.T)
 
 
-def _bends(look: Look, pushing: NDArray[np.bool_], basis: Array) -> list[Array]:
-    """What changes of open multipliers add to the form: one for each combination of rows that vanishes.
+@dataclass(frozen=True, eq=False)
+class _Bend:
+    """A combination z of rows that vanishes, z^T J = 0, and what it adds to the form: Z^T (z . c'') Z.
 
-    With z^T J = 0 the form Z^T (z . c'') Z along a motion says how much the rows cannot be kept along it.
+    Along a motion that says how much the rows cannot be kept along it.
     """
+
+    forces: Array
+    form: Array
+
+    def share_left(self, look: Look, forces: Array, sign: float = 1.0) -> float:
+        """How much of the combination multipliers may get before one of a one-sided row pulls."""
+        change = sign * self.forces[look.one_sided]
+        grows = change > BENDS
+        return float((np.maximum(-forces[look.one_sided][grows], 0.0) / change[grows]).min(initial=RANGE))
+
+
+def _bends(look: Look, pushing: NDArray[np.bool_], basis: Array) -> list[_Bend]:
+    """What open multipliers of the rows that push may change of the form."""
     rows = np.flatnonzero(pushing)
     lengths = np.linalg.norm(look.jacobian[rows], axis=1)
     scales = np.where(lengths > DEPENDENT, 1.0 / np.maximum(lengths, DEPENDENT), 1.0)
     scaled = np.where((lengths > DEPENDENT)[:, None], look.jacobian[rows] * scales[:, None], 0.0)
     left, values, _ = np.linalg.svd(scaled, full_matrices=True)
-    bends: list[Array] = []
+    bends: list[_Bend] = []
     for z in left[:, int(np.count_nonzero(values > DEPENDENT)) :].T:
-        forces = look.forces.copy()
-        forces[rows] += z * scales
-        other = look.under(forces)
+        forces = np.zeros(len(look.forces))
+        forces[rows] = z * scales
+        other = look.under(look.forces + forces)
         if other is not None:
-            bend = _symmetric(basis.T @ (other.hessian - look.hessian) @ basis)
-            if np.abs(bend).max() > BENDS:
-                bends.append(bend)
+            form = _symmetric(basis.T @ (other.hessian - look.hessian) @ basis)
+            if np.abs(form).max() > BENDS:
+                bends.append(_Bend(forces, form))
     return bends
 
 
-def _least_negative(form: Array, bends: list[Array]) -> Array:
-    """The form, with multiples of the bends added, whose least eigenvalue is greatest: it is concave in them."""
+def _least_negative(look: Look, form: Array, bends: list[_Bend]) -> Array:
+    """The form with those multipliers of which its least eigenvalue, which is concave in them, is greatest."""
     if len(bends) == 1:
-        return _along(form, bends[0])
+        return _along(look, form, bends[0])
+    forces = look.forces
     best, highest = form, -np.inf
     for _ in range(CLIMBS):
         values, vectors = np.linalg.eigh(form)
         least = float(values[0])
         if least > highest:
             best, highest = form, least
-        slopes = np.array([vectors[:, 0] @ bend @ vectors[:, 0] for bend in bends])
+        slopes = np.array([vectors[:, 0] @ bend.form @ vectors[:, 0] for bend in bends])
         square = float(slopes @ slopes)
         if least > 0.0 or square < BENDS**2:
             break
         # As far as makes this direction positive by as much as it was negative.
-        for slope, bend in zip(slopes, bends, strict=True):
-            form = form + (0.1 - 2.0 * least) * slope / square * bend
+        wanted = (0.1 - 2.0 * least) / square
+        whole = _Bend(_mixed(slopes, [b.forces for b in bends]), _mixed(slopes, [b.form for b in bends]))
+        share = min(wanted, whole.share_left(look, forces))
+        form = form + share * whole.form
+        forces = forces + share * whole.forces
     return best
 
 
-def _along(form: Array, bend: Array) -> Array:
-    """The same of one bend, by bisection on the slope of the least eigenvalue."""
-    low, high = -RANGE, RANGE
+def _mixed(shares: Array, parts: list[Array]) -> Array:
+    mixed: Array = np.tensordot(shares, np.array(parts), axes=1)
+    return mixed
+
+
+def _along(look: Look, form: Array, bend: _Bend) -> Array:
+    """The same of one combination, by bisection on the slope of the least eigenvalue."""
+    low, high = -bend.share_left(look, look.forces, -1.0), bend.share_left(look, look.forces)
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        vector = np.linalg.eigh(form + middle * bend)[1][:, 0]
-        low, high = (middle, high) if vector @ bend @ vector > 0.0 else (low, middle)
-    best: Array = form + 0.5 * (low + high) * bend
+        vector = np.linalg.eigh(form + middle * bend.form)[1][:, 0]
+        low, high = (middle, high) if vector @ bend.form @ vector > 0.0 else (low, middle)
+    best: Array = form + 0.5 * (low + high) * bend.form
     return best
 
 
-def _downward(form: Array, values: Array, vectors: Array, cone: Array, flat: float) -> Iterator[tuple[Array, float]]:
-    """Unit directions d with cone d >= 0 along which the form is negative; of few rows those on all faces of the cone.
+def _downward(form: Array, basis: Array, cone: Array, flat: float) -> Iterator[Way]:
+    """Directions that break no row of the cone along which the form is negative; of few rows those on all its faces.
 
     A least direction of the form within the cone is one on a face: an eigenvector of the form on the motions that keep
     some of the rows.
     """
-    if not values[0] < -flat:
-        return
-    for number, kept in enumerate(s for k in range(len(cone) + 1) for s in combinations(range(len(cone)), k)):
-        if number >= 2**FACES:
-            return
-        face = null_space(cone[list(kept)], len(form)) if kept else np.eye(len(form))
+    kept_rows = (kept for k in range(len(cone) + 1) for kept in combinations(range(len(cone)), k))
+    for kept in islice(kept_rows, 2**FACES):
+        face = null_space(cone[list(kept)] @ basis, len(form)) if kept else np.eye(len(form))
         if not face.shape[1]:
             continue
-        lows, lines = np.linalg.eigh(face.T @ form @ face) if kept else (values, vectors)
-        for low, line in zip(lows[:WAYS], lines.T, strict=False):
-            if low >= -flat:
-                break
-            for d in (face @ line, -(face @ line)):
-                if (cone @ d >= -WITHIN).all():
-                    yield d, float(low)
+        values, vectors = np.linalg.eigh(face.T @ form @ face)
+        downward = values < -flat
+        for curvature, alike in _alike(values[downward], vectors[:, downward]):
+            for direction in _canonical(basis @ face @ alike).T:
+                for d in (direction, -direction):
+                    if (cone @ d >= -WITHIN).all():
+                        yield Way(np.round(d, DIGITS), max(curvature, -STEEPEST))
+
+
+def _alike(values: Array, vectors: Array) -> Iterator[tuple[float, Array]]:
+    """The first few values, those that are the same up to rounding at a time, with their vectors (columns)."""
+    at = 0
+    while at < min(len(values), WAYS):
+        count = int(np.count_nonzero(values[at:] <= values[at] + ALIKE * abs(values[at])))
+        yield float(values[at]), vectors[:, at : at + count]
+        at += count
+
+
+def _canonical(directions: Array) -> Array:
+    """An orthonormal basis of a span (columns) that does not depend on how it is given."""
+    return orthonormal(directions.T).T
 
 
 def _sampled(look: Look, zeros: Array, cone: Array) -> Verdict:
@@ -208,7 +245,7 @@ def _sampled(look: Look, zeros: Array, cone: Array) -> Verdict:
         for share in SAMPLES:
             there = look.neighbor(line, share)
             if there is not None and there.rise < 0.0:
-                ways.append(Way(line))
+                ways.append(Way(np.round(line, DIGITS)))
             if there is None or there.rise != 0.0:
                 level = False
                 break
