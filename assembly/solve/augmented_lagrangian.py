@@ -44,6 +44,7 @@ from assembly.proximity.watch import (
     SPARING,
     any_crossed,
 )
+from assembly.solve.arrival import has_arrived, rounding_at
 from assembly.solve.budget import HALF, begin_tick, is_cut, is_spent, may_end, set_deadline
 from assembly.solve.contacts import free_folds, is_of_surfaces
 from assembly.solve.ending import finish, return_to
@@ -54,7 +55,7 @@ from assembly.solve.report import is_clear, keep, log
 from assembly.solve.restoration import LEAST_SHARE, SHARE, SOFTNESS, begin_way, step_back
 from assembly.solve.retreat import BEGINNINGS, LEFT, LONGER, SHORTER, begin_again, has_sunk
 from assembly.solve.room import carve_all, results_of, room_needed
-from assembly.solve.rows import turned, violation_of
+from assembly.solve.rows import violation_of
 from assembly.solve.search import SHORTEST, goal, search
 from assembly.solve.settings import (
     ANY_POSE,
@@ -64,7 +65,6 @@ from assembly.solve.settings import (
     COUNT,
     CULPRIT,
     DUAL,
-    FEASIBILITY,
     FIRST_SHIFT,
     FREE_BELOW,
     FREE_TRIMS,
@@ -73,13 +73,11 @@ from assembly.solve.settings import (
     ITERATION_LIMIT,
     ITERATIONS,
     LAST_LOOK,
-    MOST_ROUNDING,
     OBJECTIVE,
     OUT_OF_TIME,
     PENALTY,
     PENALTY_FLOOR,
     RADIUS,
-    ROUNDING,
     RUNNING,
     SCATTER,
     SOLVED,
@@ -141,16 +139,14 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
     here, trial, held = points
     y, better_y, active, forces, foreseen = by_row[2], by_row[3], by_row[4], by_row[5], by_row[6]
     weights = (active, forces, foreseen)
-    reach = read_state(table, pool, state, here, trial, y, better_y)
+    read_state(table, pool, state, here, trial, y, better_y)
     bases, one_sided, order, _of_rows = shape
     free = loose[0]
     # What stays as it is for the whole solve.
     program = (table, pool, shape, loose, room)
     gradient, lines, lagrangian, _factor = system
 
-    reach = max(reach, turned(table, pool, here[1]))
-    # What rounding of the user's coordinates, and of angles over many turns, alone can violate.
-    feasible = max(settings[FEASIBILITY], min(ROUNDING * reach, MOST_ROUNDING))
+    feasible = rounding_at(table, pool, settings, here)
     tick = settings[TICK] == 1.0
     # A tick goes on with the last one, if that one's time was spent.
     begin, done, looks = begin_tick(table, settings, results, memory)
@@ -292,8 +288,8 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         retreats = sunk and holds and ended == RUNNING and iteration < limit
         looks_last = watched and settings[LAST_LOOK] == 1.0
         # Where every last look finds other contacts, the limit ends it.
-        arrived = violation <= feasible and dual <= settings[STATIONARITY] and not retreats
-        if arrived and not (looks_last and iteration > limit):
+        arrived = has_arrived(program, settings, results, here, violation, last_violation, feasible, dual)
+        if arrived and not retreats and not (looks_last and iteration > limit):
             # A contact that ends right here is lost and found again, however often it is looked for.
             if looks_last and iteration != looked_at:
                 changed = look_again(table, pool, memory, here, EVERYTHING, free, loose[4])

@@ -91,7 +91,7 @@ def finish(program, settings, state, tips, here, trial, by_row, at_end, held, nu
         elif status == SOLVED and not good:
             status = STALLED
     results[IMPROPER] = write_rows(table, here, y, loose, tick, pool[SCALE], state)
-    if settings[SECOND_ORDER] == 1.0 and results[HELD] + results[CARRIED] == 0.0 and status != CONTACT_LOST:
+    if settings[SECOND_ORDER] > 0.0 and results[HELD] + results[CARRIED] == 0.0 and status != CONTACT_LOST:
         status = test_end(program, settings, results, status, tips, here, rows, y, active, forces, system)
     if settings[RECALL] > 0.0:
         # With clearances what a tick ends with depends on rounding where wires wedge: there, rows are evaluated afresh.

@@ -26,6 +26,8 @@ from assembly.solve.step import LEAST_SHIFT
 
 # A factorization tells of the end with a shift up to this, at a point where the dual residual was no more than that.
 SMALL_SHIFT, NEAR_END = 1e-7, 1e-3
+# One that needed more than this near an end tells of negative curvature, any other one of nothing.
+CLEAR_SHIFT, DOWNWARD, UNKNOWN = 1e-3, -2.0, -1.0
 # A one-sided row with a multiplier below this does not push. Nor do multipliers bend anything that are all below it.
 IDLE = 1e-7
 
@@ -44,7 +46,8 @@ def pushing_sum(rows, one_sided, weights, least):
 def note_factor(settings, results, iteration, shift, dual, restoring, is_fresh, rows, one_sided, active, y):
     """Keep what the factorization of a step told: its shift, for the first step of a tick, and whether it is convex.
 
-    One that is leaves one and a sum that tells which one-sided rows it had, any other one -1.
+    One that is leaves one and a sum that tells which one-sided rows it had; one that tells of negative curvature is
+    DOWNWARD: near an end a step tries a shift no larger than the dual residual first.
     """
     if iteration == 0:
         results[FIRST_SHIFT] = shift
@@ -56,7 +59,7 @@ def note_factor(settings, results, iteration, shift, dual, restoring, is_fresh, 
     if shift <= SMALL_SHIFT and dual <= NEAR_END and bends and not restoring:
         results[CURVED] = 1.0 + pushing_sum(rows, one_sided, active, 0.0)
     else:
-        results[CURVED] = -1.0
+        results[CURVED] = DOWNWARD if shift >= CLEAR_SHIFT > dual and not restoring else UNKNOWN
 
 
 @kernel(inner=True)
@@ -96,7 +99,7 @@ def test_end(program, settings, results, status, tips, here, rows, y, active, fo
         return status
     mu = settings[PENALTY_FLOOR]
     if not tick:
-        if results[CURVED] == 0.0 and settings[PENALTY] > mu:
+        if results[CURVED] == DOWNWARD or (results[CURVED] == 0.0 and settings[PENALTY] > mu):
             return UNSURE
         if told_convex(results, rows, shape[1], here[3], y, forces):
             return status

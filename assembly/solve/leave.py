@@ -13,14 +13,18 @@ from assembly.solve.look import Look, Neighbor
 from assembly.solve.second_order import SecondOrder, Way, judge
 from assembly.solve.settings import (
     COUNT,
+    DUAL,
     GATHER,
     ITERATION_LIMIT,
     ITERATIONS,
     OBJECTIVE,
     PENALTY,
     PENALTY_FLOOR,
+    REACHED,
+    SECOND_ORDER,
     SOLVED,
     STALLED,
+    STATIONARITY,
     UNSURE,
 )
 
@@ -32,6 +36,8 @@ FIRST, SHY, GROWTH, LONGEST = 0.02, 1e-3, 3.0, 1.0
 # A step that leads to no lower pose is shortened by this, down to here; lower is what gives this part of what the
 # curvature promises.
 SHORTENED, SHORTEST, PROMISE = 0.25, 1e-4, 0.1
+# What of the way down to a pose is not given back by the loop that goes on from there.
+KEPT = 0.5
 # Ways that are tried from one saddle.
 MOST_WAYS = 6
 
@@ -83,17 +89,20 @@ def settle(packed: Packed, settings: Array, outcome: Outcome, run: Run) -> Outco
     while outcome.code == UNSURE:
         spent = int(outcome.state[at + COUNT])
         verdict, look = judge(packed, outcome.state, sample=first and spent == 0)
-        kind = verdict.kind
-        if look is None or not verdict.ways:
-            return outcome._replace(code=SOLVED, order=kind)
-        onward[ITERATIONS] = settings[ITERATIONS] - spent - 1
-        if onward[ITERATIONS] < 0.0:
-            return outcome._replace(code=ITERATION_LIMIT, order=SecondOrder.SADDLE)
-        left = _left(look, verdict.ways, lambda state: run(onward, state))
+        left: Outcome | None = None
+        if look is not None and verdict.ways:
+            onward[ITERATIONS] = settings[ITERATIONS] - spent - 1
+            if onward[ITERATIONS] < 0.0:
+                return outcome._replace(code=ITERATION_LIMIT, order=SecondOrder.SADDLE)
+            left = _left(look, verdict.ways, lambda state: run(onward, state))
+        if left is None and not outcome.state[at + DUAL] <= settings[STATIONARITY]:
+            # It was taken for a saddle on the way to it.
+            onward[ITERATIONS], onward[SECOND_ORDER] = max(settings[ITERATIONS] - spent - 1, 0.0), REACHED
+            left = run(onward, outcome.state.copy())
         if left is None:
             # A saddle for certain is no solution; what rows that depend on each other say of motions may be none.
-            code = STALLED if kind is SecondOrder.SADDLE else SOLVED
-            return outcome._replace(code=code, order=kind)
+            code = STALLED if verdict.kind is SecondOrder.SADDLE else SOLVED
+            return outcome._replace(code=code, order=verdict.kind)
         left.state[at + COUNT] += spent + 1
         outcome = left._replace(history=np.concatenate([outcome.history[: spent + 1], left.history]))
     return outcome
@@ -107,10 +116,8 @@ def _left(look: Look, ways: list[Way], run: Callable[[Array], Outcome]) -> Outco
         if lower is None:
             continue
         outcome = run(lower.state)
-        ends = outcome.code in (SOLVED, UNSURE)
-        if ends and not outcome.state[look.packed.results_at + OBJECTIVE] < look.value - look.noise:
-            continue
-        if ends:
+        if outcome.code not in (SOLVED, UNSURE):
+            left = left or outcome
+        elif outcome.state[look.packed.results_at + OBJECTIVE] < look.value + KEPT * lower.rise:
             return outcome
-        left = left or outcome
     return left

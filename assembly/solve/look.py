@@ -139,7 +139,7 @@ class Look:
     def neighbor(self, way: Array, share: float) -> Neighbor | None:
         """Where a share of a step leads, put back onto the rows; None where nothing near there holds."""
         state, residual = self.state.copy(), np.zeros(len(self.residual))
-        value = walk(self.table, self.packed.pool, state, way, share, residual, self.packed.tips)
+        value = walk(self.table, self.packed.pool, state, np.ascontiguousarray(way), share, residual, self.packed.tips)
         if not np.isfinite(value):
             return None
         # What rows are off, within rounding, changes the objective by their forces.

@@ -74,7 +74,7 @@ class Verdict:
 
 
 def judge(packed: Packed, state: Array, sample: bool) -> tuple[Verdict, Look | None]:
-    """What the stationary point of a state is; with `sample` motions of no curvature are followed to see."""
+    """What the stationary point of a state, or one near it, is; with `sample` motions of no curvature are followed."""
     if 6 * packed.table[MOVING] + 4 * packed.pair_rows > MOST_UNKNOWNS:
         return Verdict(SecondOrder.UNDECIDED), None
     look = Look.at(packed, state)
@@ -82,9 +82,7 @@ def judge(packed: Packed, state: Array, sample: bool) -> tuple[Verdict, Look | N
 
 
 def judge_look(look: Look, sample: bool) -> Verdict:
-    """The same of a look; undecided where the objective is another one than that of the solve by now."""
-    if not look.is_stationary:
-        return Verdict(SecondOrder.UNDECIDED)
+    """The same of a look."""
     pushing = look.pushing
     basis = null_space(look.jacobian[pushing], len(look.gradient))
     if not basis.shape[1]:

@@ -14,6 +14,8 @@ FEASIBILITY, STATIONARITY, ITERATIONS, PENALTY, PENALTY_FLOOR, RADIUS, GATHER, F
 # that the last one left (0: nowhere). Whether nothing is asked for but that constraints hold: the least move is a wish.
 # Whether a tick whose time is spent where its pose does not hold leaves that pose for the next one to go on from.
 LAST_LOOK, TICK, BUDGET, SECOND_ORDER, RECALL, ANY_POSE, CARRIES, SETTINGS = 8, 9, 10, 11, 12, 13, 14, 15
+# Whether the end is tested for a minimum (TESTED: and saddles are left before they are reached to the last digit).
+TESTED, REACHED = 1.0, 2.0
 # Results at the end of the state.
 STATUS, COUNT, OBJECTIVE, VIOLATION, DUAL, CULPRIT, IMPROPER, SCATTER = 0, 1, 2, 3, 4, 5, 6, 7
 # Of a tick: whether it ended at a pose that held before; whether its end is a minimum (0: not tested, 1; -1: no), and

@@ -222,8 +222,12 @@ class Solution:
         if self._order is None and self.success:
             from assembly.solve.second_order import SecondOrder, judge
 
-            asked = self._packed.table[IMPLICIT] == 0
-            self._order = judge(self._packed, self._state, sample=False)[0].kind if asked else SecondOrder.NO_OBJECTIVE
+            self._order = SecondOrder.NO_OBJECTIVE
+            if self._packed.table[IMPLICIT] == 0:
+                verdict, look = judge(self._packed, self._state, sample=False)
+                # Targets may be others by now.
+                judged = look is not None and look.is_stationary
+                self._order = verdict.kind if judged else SecondOrder.UNDECIDED
         return self._order
 
     @cached_property
