@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from assembly.constraints.packing import Packed
 from assembly.solve.look import Look, Neighbor
-from assembly.solve.second_order import SecondOrder, Way, judge
+from assembly.solve.second_order import SecondOrder, Way, judge, judge_kink
 from assembly.solve.settings import (
     COUNT,
     DUAL,
@@ -26,6 +26,7 @@ from assembly.solve.settings import (
     STALLED,
     STATIONARITY,
     UNSURE,
+    VIOLATION,
 )
 
 __all__ = ["Outcome", "settle"]
@@ -38,6 +39,8 @@ FIRST, SHY, GROWTH, LONGEST = 0.02, 1e-3, 3.0, 1.0
 SHORTENED, SHORTEST, PROMISE = 0.25, 1e-4, 0.1
 # What of the way down to a pose is not given back by the loop that goes on from there.
 KEPT = 0.5
+# Rows that hold at a kink.
+HOLDS = 1e-11
 # Ways that are tried from one saddle.
 MOST_WAYS = 6
 
@@ -86,26 +89,37 @@ def settle(packed: Packed, settings: Array, outcome: Outcome, run: Run) -> Outco
     # What follows begins on its rows: a soft penalty would let it fall back to where it was.
     onward[GATHER], onward[PENALTY] = 0.0, settings[PENALTY_FLOOR]
     at = packed.results_at
-    while outcome.code == UNSURE:
+    while outcome.code == UNSURE or _is_at_kink(packed, outcome):
         spent = int(outcome.state[at + COUNT])
-        verdict, look = judge(packed, outcome.state, sample=first and spent == 0)
+        stands = outcome.code == UNSURE
+        sample = first and spent == 0
+        verdict, look = judge(packed, outcome.state, sample) if stands else judge_kink(packed, outcome.state)
         left: Outcome | None = None
         if look is not None and verdict.ways:
             onward[ITERATIONS] = settings[ITERATIONS] - spent - 1
             if onward[ITERATIONS] < 0.0:
                 return outcome._replace(code=ITERATION_LIMIT, order=SecondOrder.SADDLE)
             left = _left(look, verdict.ways, lambda state: run(onward, state))
-        if left is None and not outcome.state[at + DUAL] <= settings[STATIONARITY]:
+        if left is None and stands and not outcome.state[at + DUAL] <= settings[STATIONARITY]:
             # It was taken for a saddle on the way to it.
             onward[ITERATIONS], onward[SECOND_ORDER] = max(settings[ITERATIONS] - spent - 1, 0.0), REACHED
             left = run(onward, outcome.state.copy())
         if left is None:
             # A saddle for certain is no solution; what rows that depend on each other say of motions may be none.
-            code = STALLED if verdict.kind is SecondOrder.SADDLE else SOLVED
-            return outcome._replace(code=code, order=verdict.kind)
+            is_solved = stands and verdict.kind is not SecondOrder.SADDLE
+            return outcome._replace(code=SOLVED if is_solved else STALLED, order=verdict.kind)
         left.state[at + COUNT] += spent + 1
         outcome = left._replace(history=np.concatenate([outcome.history[: spent + 1], left.history]))
     return outcome
+
+
+def _is_at_kink(packed: Packed, outcome: Outcome) -> bool:
+    """Whether a solve ended where it began, at a pose that holds, because the objective has no derivatives there."""
+    if outcome.code != STALLED:
+        return False
+    results = outcome.state[packed.results_at :]
+    begins = results[COUNT] == 0.0 and results[VIOLATION] <= HOLDS * packed.scale
+    return bool(begins and np.isfinite(results[OBJECTIVE]) and not np.isfinite(results[DUAL]))
 
 
 def _left(look: Look, ways: list[Way], run: Callable[[Array], Outcome]) -> Outcome | None:

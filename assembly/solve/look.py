@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,12 +76,20 @@ class Look:
     def at(cls, packed: Packed, state: Array) -> Look | None:
         """A look with the multipliers of the state; None where a contact has no pair or anything is not finite."""
         given = state[packed.multipliers_at : packed.residuals_at]
-        table = packed.table_at(state)
-        look = cls._with(packed, table, state, given)
-        if look is None:
+        look = cls._with(packed, packed.table_at(state), state, given)
+        if look is None or not look._is_finite:
             return None
         forces = look._balanced()
         return look if np.array_equal(forces, look.forces) else look.under(forces)
+
+    @classmethod
+    def at_kink(cls, packed: Packed, state: Array) -> Look | None:
+        """A look where the objective has a value but perhaps no derivatives; they count as zero."""
+        look = cls._with(packed, packed.table_at(state), state, np.zeros(packed.rows))
+        if look is None:
+            return None
+        look = replace(look, gradient=np.zeros_like(look.gradient), hessian=np.zeros_like(look.hessian))
+        return look if look._is_finite else None
 
     @classmethod
     def _with(cls, packed: Packed, table: NDArray[np.int64], state: Array, given: Array) -> Look | None:
@@ -94,16 +102,20 @@ class Look:
         if folds < 0:
             return None
         m, n = packed.rows + 4 * folds, 6 * int(table[layout.MOVING]) + 4 * folds
-        if not np.isfinite(out[: 1 + m + n + m * n + n * n]).all():
-            return None
         residual, gradient, jacobian, hessian = np.split(out[1:], np.cumsum([m, n, m * n, n * n]))[:4]
         one_sided = np.concatenate([packed.one_sided, np.zeros(m - packed.rows, dtype=bool)])
         shaped = (jacobian.reshape(m, n), hessian.reshape(n, n))
         return cls(packed, table, state, forces[:m], float(out[0]), residual, gradient, *shaped, one_sided)
 
+    @property
+    def _is_finite(self) -> bool:
+        arrays = (self.value, self.residual, self.gradient, self.jacobian, self.hessian)
+        return all(bool(np.isfinite(array).all()) for array in arrays)
+
     def under(self, forces: Array) -> Look | None:
         """The same with other multipliers."""
-        return self._with(self.packed, self.table, self.state, forces)
+        look = self._with(self.packed, self.table, self.state, forces)
+        return look if look is not None and look._is_finite else None
 
     @property
     def touching(self) -> Flags:

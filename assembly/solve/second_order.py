@@ -22,7 +22,7 @@ from assembly.constraints.packing import Packed
 from assembly.solve.look import DEPENDENT, Look, null_space
 from assembly.solve.rank import orthonormal
 
-__all__ = ["SecondOrder", "Verdict", "Way", "judge"]
+__all__ = ["SecondOrder", "Verdict", "Way", "judge", "judge_kink"]
 
 Array = NDArray[np.float64]
 # Curvature over the largest that counts as none; where Hessians are differences.
@@ -113,6 +113,15 @@ def judge_look(look: Look, sample: bool) -> Verdict:
     if not sample:
         return Verdict(SecondOrder.NOT_ISOLATED)
     return _sampled(look, _canonical(basis @ zeros), cone)
+
+
+def judge_kink(packed: Packed, state: Array) -> tuple[Verdict, Look | None]:
+    """Ways down from a pose that holds and at which the objective has no derivatives: all motions are sampled."""
+    look = Look.at_kink(packed, state)
+    if look is None:
+        return Verdict(SecondOrder.UNDECIDED), None
+    basis = null_space(look.jacobian[~look.one_sided], len(look.gradient))
+    return _sampled(look, _canonical(basis), look.jacobian[look.one_sided & look.touching]), look
 
 
 def _symmetric(matrix: Array) -> Array:
