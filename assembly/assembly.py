@@ -197,9 +197,10 @@ class Assembly:
         starts: Mapping[str, ArrayLike] | None = None,
         **options: Any,
     ) -> Solution:
-        """Find the pose where every constraint holds and the objective is stationary.
+        """Find the pose where every constraint holds and the objective has a local minimum.
 
-        Without an objective the least move is sought; where that is not found, any pose does at which all holds.
+        Without an objective the least move is sought; where that is not found, any pose does at which all holds. What
+        holds as it stands is not moved.
 
         Parameters
         ----------

@@ -24,11 +24,9 @@ from assembly.constraints.layout import (
     JOINTS,
     KIND,
     MOVING,
-    REFERENCE,
     ROW,
     ROW_TABLE,
     ROWS,
-    SCALE,
     SECOND,
     SECOND_BODY_F,
     SECOND_BODY_G,
@@ -51,19 +49,10 @@ from assembly.constraints.terms import objective
 from assembly.proximity.free_pair import VARIABLES, VECTORS
 from assembly.proximity.solid_contact import CONTACT_RECORD, TRACK
 from assembly.solve.contacts import free_folds, start_contacts
+from assembly.solve.report import scaled_poses
 from assembly.solve.rows import arrange, shape_of, size_of_shape
 from assembly.solve.search import goal
 from assembly.solve.settings import FREE_BELOW
-
-
-@kernel(inner=True)
-def scaled_poses(table, pool, state, q):
-    """Poses of a state as the program has them."""
-    for b in range(table[BODIES]):
-        for k in range(3):
-            q[b, k] = (state[7 * b + k] - pool[REFERENCE + k]) / pool[SCALE]
-        for k in range(3, 7):
-            q[b, k] = state[7 * b + k]
 
 
 @kernel(inner=True)

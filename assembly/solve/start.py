@@ -10,6 +10,7 @@ from assembly._kernel import kernel
 from assembly.constraints.layout import (
     BODIES,
     CONTACTS,
+    IMPLICIT,
     MOVING,
     REFERENCE,
     ROWS,
@@ -114,6 +115,8 @@ def put_together(program, here, by_row):
     if watched:
         look_around(table, pool, memory, here, AS_NEEDED)
         place_guards(table, memory, here, y, better_y, free, False)
+    if table[IMPLICIT] == 1:
+        recenter(table, pool, here[0])
     for r in range(table[ROWS]):
         y[r] = 0.0
         better_y[r] = 0.0

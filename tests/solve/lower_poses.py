@@ -210,17 +210,12 @@ def lowest_neighbor(model, q, rng, tries):
     d = free.shape[1]
     ways = list(rng.normal(size=(tries, d)))
     step, unit = 2e-3, np.eye(d)
-    if d <= 6:
-        single = [(at(step * e), at(-step * e)) for e in unit]
-        bend = np.array(
-            [
-                [
-                    (sum(single[i]) - 2 * value) if i == j else at(step * (unit[i] + unit[j])) - single[i][0] - single[j][0] + value
-                    for j in range(d)
-                ]
-                for i in range(d)
-            ]
-        )
+    single = np.array([(at(step * e), at(-step * e)) for e in unit[: d if d <= 6 else 0]])
+    if len(single) and np.isfinite(single).all():
+        bend = np.diag(0.5 * (single.sum(axis=1) - 2.0 * value))
+        for i in range(d):
+            for j in range(i):
+                bend[i, j] = at(step * (unit[i] + unit[j])) - single[i, 0] - single[j, 0] + value
         if np.isfinite(bend).all():
             least = np.linalg.eigh(bend + bend.T)[1][:, :2].T
             ways += [*least, *-least]
@@ -247,6 +242,7 @@ KINDS = {
     "prismatic": asm.Prismatic,
     "cylindrical": asm.Cylindrical,
 }
+ROOT = np.sqrt(0.5)
 LIMITS = [(0.0, None), (None, 0.0), (0.0, 1.5), (-1.5, 0.0), (-0.5, 0.5), (-1.0, 2.0)]
 
 
@@ -285,7 +281,9 @@ def chain(rng, exact):
         (a, own_a), (b, own_b) = frame_of(bodies, k, at, za), frame_of(bodies, k + 1, np.zeros(3), zb)
         limits = (None, None)
         if kind in ("revolute", "prismatic") and rng.random() < 0.35:
-            limits = LIMITS[rng.integers(6)] if exact else tuple(sorted(rng.uniform(-2.5, 2.5, 2)) + np.array([0.0, 0.2]))
+            limits = (
+                LIMITS[rng.integers(6)] if exact else tuple(sorted(rng.uniform(-2.5, 2.5, 2)) + np.array([0.0, 0.2]))
+            )
         settings = {"limits": limits} if kind in ("revolute", "prismatic") else {}
         constraints.append(KINDS[kind](a, b, f"joint {k}", **settings))
         rows.append(Joint(kind, own_a, own_b, limits))
@@ -337,8 +335,10 @@ def standing(rng, exact):
     radii = rng.choice([0.5, 0.8, 1.3], 3, replace=False)
     e = unit_quaternion(rng)
     if exact:
-        e = np.array([[1, 0, 0, 0], [np.sqrt(0.5), np.sqrt(0.5), 0, 0], [np.sqrt(0.5), 0, np.sqrt(0.5), 0]])[rng.integers(3)]
-    height = np.sqrt(((radii * matrix(e)[2]) ** 2).sum())
+        e = np.array([[1, 0, 0, 0], [np.sqrt(0.5), np.sqrt(0.5), 0, 0], [np.sqrt(0.5), 0, np.sqrt(0.5), 0]])[
+            rng.integers(3)
+        ]
+    height = np.sqrt(((radii * matrix(np.array(e))[2]) ** 2).sum())
     egg = asm.Body("egg", asm.shapes.ellipsoid(*radii), position=(0.0, 0.0, height), quaternion=e)
     bodies = [asm.Body("floor", asm.shapes.plane(60.0, 60.0), fixed=True), egg]
     one_sided = rng.random() < 0.6
