@@ -26,6 +26,7 @@ from assembly.proximity.pairs import inside
 from assembly.proximity.solid_contact import TRACK
 from assembly.solve.attempts import attempt, load
 from assembly.solve.options import Options
+from assembly.solve.postures import postures_from
 from assembly.solve.settings import ANY_POSE, GATHER, ITERATIONS
 from assembly.solve.solution import Scene, Solution, Status
 
@@ -207,9 +208,10 @@ class Assembly:
         starts: Mapping[str, ArrayLike] | None = None,
         **options: Any,
     ) -> Solution:
-        """Find the pose where every constraint holds and the objective is stationary.
+        """Find the pose where every constraint holds and the objective has a local minimum.
 
-        Without an objective the least move is sought; where that is not found, any pose does at which all holds.
+        Without an objective the least move is sought; where that is not found, any pose does at which all holds. What
+        holds as it stands is not moved.
 
         Parameters
         ----------
@@ -245,14 +247,14 @@ class Assembly:
         ):
             from assembly.studies.separation import separated
 
+            spent = solution.seconds
             begin = perf_counter()
-            poses = separated(self, self.q if q0 is None else pose_rows("q0", q0, len(self._bodies)), options)
-            spent = solution.seconds + perf_counter() - begin
-            for apart in poses:
-                solution = self._solved(settings, apart, starts, spent)
-                if solution.success:
-                    break
-                spent = solution.seconds
+            q = self.q if q0 is None else pose_rows("q0", q0, len(self._bodies))
+            poses = separated(self, q, options)
+            # All ways are measured from where the user's bodies were, and the least one is the answer.
+            ways = [solution, *(self._solved(settings, apart, starts, q) for apart in poses)]
+            solution = min((way for way in ways if way.success), key=lambda way: way.objective, default=ways[-1])
+            solution.seconds = spent + perf_counter() - begin
         if verbose:
             print(solution.iteration_table())
         return solution
@@ -262,19 +264,27 @@ class Assembly:
         settings: Array,
         q0: ArrayLike | Solution | None,
         starts: Mapping[str, ArrayLike] | None,
-        spent: float = 0.0,
+        reference: Array | None = None,
     ) -> Solution:
-        """A solve from q0, with as many places for contacts of clearances as it turns out to need."""
+        """A solve from q0, with as many places for contacts of clearances as it turns out to need.
+
+        Postures are measured from q0, or from a reference (n, 7).
+        """
+        spent = 0.0
         while True:
             packed = self.packed()
             start = partial(self._start, packed, q0, starts)
             load(packed, start)
             begin = perf_counter()
-            code, state, history = attempt(packed, settings, start)
+            if reference is None:
+                code, state, history, order = attempt(packed, settings, start)
+            else:
+                with postures_from(packed, reference):
+                    code, state, history, order = attempt(packed, settings, start)
             spent += perf_counter() - begin
             if not packed.is_crowded(state) or self._crowding >= MOST_CROWDING or isinstance(q0, Solution):
                 assert self._scene is not None
-                return Solution(self._scene, packed, state, _STATUSES[code], spent, history)
+                return Solution(self._scene, packed, state, _STATUSES[code], spent, history, order)
             self._crowding *= 2
             self._packed = None
 

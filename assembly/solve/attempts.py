@@ -10,8 +10,19 @@ from numpy.typing import NDArray
 from assembly.constraints.layout import DEEPEST_AT
 from assembly.constraints.packing import Packed
 from assembly.solve.augmented_lagrangian import solve_program
+from assembly.solve.leave import Outcome, settle
 from assembly.solve.options import Options
-from assembly.solve.settings import CONTACT_LOST, FREE_TRIMS, GATHER, HISTORY, ITERATIONS, SCATTER
+from assembly.solve.postures import following_none
+from assembly.solve.settings import (
+    CONTACT_LOST,
+    FREE_TRIMS,
+    GATHER,
+    HISTORY,
+    ITERATIONS,
+    SCATTER,
+    SOLVED,
+    UNSURE,
+)
 
 __all__ = ["attempt", "load"]
 
@@ -29,31 +40,42 @@ def load(packed: Packed, start: Callable[[], Array]) -> None:
         _loaded.add(packed.tips)
 
 
-def attempt(packed: Packed, settings: Array, start: Callable[[], Array]) -> tuple[int, Array, Array]:
-    """Outcome, state and history of a solve from the states that `start` makes."""
-    state = start()
-    history = np.empty((min(int(settings[ITERATIONS]), MOST_HISTORY) + 1, HISTORY))
+def attempt(packed: Packed, settings: Array, start: Callable[[], Array]) -> Outcome:
+    """The outcome of a solve from the states that `start` makes."""
     # The loop writes contacts of clearances into its table: every solve has its own, also in another thread.
-    arguments = (packed.table.copy() if packed.guards else packed.table, packed.pool)
-    tips = packed.tips
-    code = solve_program(*arguments, settings, state, history, tips)
-    if code == CONTACT_LOST and packed.seek_penetration():
+    table = packed.table.copy() if packed.guards else packed.table
+    outcome = _run(packed, table, settings, start())
+    if outcome.code == SOLVED:
+        return outcome
+    if outcome.code == CONTACT_LOST and packed.seek_penetration():
         # Perhaps solids cross at the start.
-        arguments[0][DEEPEST_AT] = packed.table[DEEPEST_AT]
-        state = start()
-        code = solve_program(*arguments, settings, state, history, tips)
-    if code != 0 and packed.trims:
+        table[DEEPEST_AT] = packed.table[DEEPEST_AT]
+        outcome = _run(packed, table, settings, start())
+    if not _holds(outcome) and packed.trims:
         # With the coordinates of contacts as unknowns trims have exact second derivatives, except at poles.
         settings = settings.copy()
         settings[FREE_TRIMS] = 1.0
-        other, rows = start(), np.empty_like(history)
-        if solve_program(*arguments, settings, other, rows, tips) == 0:
-            code, state, history = 0, other, rows
-    if code != 0 and settings[GATHER] == 0.0 and state[packed.results_at + SCATTER] == 1.0:
+        other = _run(packed, table, settings, start())
+        outcome = other if _holds(other) else outcome
+    if not _holds(outcome) and settings[GATHER] == 0.0 and outcome.state[packed.results_at + SCATTER] == 1.0:
         # What the start itself did not lead to may be reached from gathered bodies.
         settings = settings.copy()
         settings[GATHER] = 1.0
-        other, rows = start(), np.empty_like(history)
-        if solve_program(*arguments, settings, other, rows, tips) == 0:
-            code, state, history = 0, other, rows
-    return code, state, history
+        other = _run(packed, table, settings, start())
+        outcome = other if _holds(other) else outcome
+    return settle(packed, settings, outcome, lambda onward, state: _go_on(packed, onward, state))
+
+
+def _holds(outcome: Outcome) -> bool:
+    """Whether rows hold and the objective is stationary, whatever it is of second order."""
+    return outcome.code in (SOLVED, UNSURE)
+
+
+def _run(packed: Packed, table: NDArray[np.int64], settings: Array, state: Array) -> Outcome:
+    history = np.empty((min(int(settings[ITERATIONS]), MOST_HISTORY) + 1, HISTORY))
+    return Outcome(solve_program(table, packed.pool, settings, state, history, packed.tips), state, history)
+
+
+def _go_on(packed: Packed, settings: Array, state: Array) -> Outcome:
+    """The loop from a state that a solve has led to, with postures measured from where they were."""
+    return _run(packed, following_none(packed), settings, state)

@@ -10,9 +10,9 @@ factorization of that matrix tells its inertia; d is raised until it exists. dx 
 along which a line search runs (`search.py`); multipliers follow every step. -mu I makes redundant rows harmless.
 
 A contact whose pair comes to a fold gets its coordinates as unknowns (`proximity/free_pair.py`) for the rest of the
-solve. Scattered bodies are gathered first (`gather.py`); an objective that asks them to move little is measured from
-there. Bodies that sank into each other go back (`retreat.py`). Where rows cannot all hold, the same step with f = 0,
-y = 0, mu = 1 minimizes |c|^2 / 2, and the loop says INFEASIBLE at its stationary point.
+solve. Scattered bodies are gathered first (`gather.py`). Bodies that sank into each other go back (`retreat.py`). Where
+rows cannot all hold, the same step with f = 0, y = 0, mu = 1 minimizes |c|^2 / 2, and the loop says INFEASIBLE at its
+stationary point. What the last factorization tells of second order is kept for the end (`inertia.py`).
 """
 
 from __future__ import annotations
@@ -44,16 +44,18 @@ from assembly.proximity.watch import (
     SPARING,
     any_crossed,
 )
+from assembly.solve.arrival import has_arrived, rounding_at
 from assembly.solve.budget import HALF, begin_tick, is_cut, is_spent, may_end, set_deadline
 from assembly.solve.contacts import free_folds, is_of_surfaces
 from assembly.solve.ending import finish, return_to
 from assembly.solve.guards import allowed_share, look_again, numbers_of, place_guards
+from assembly.solve.inertia import note_factor
 from assembly.solve.multipliers import choose_multipliers, forget_objective, least_multipliers, weigh_rows
 from assembly.solve.report import is_clear, keep, log
 from assembly.solve.restoration import LEAST_SHARE, SHARE, SOFTNESS, begin_way, step_back
 from assembly.solve.retreat import BEGINNINGS, LEFT, LONGER, SHORTER, begin_again, has_sunk
 from assembly.solve.room import carve_all, results_of, room_needed
-from assembly.solve.rows import turned, violation_of
+from assembly.solve.rows import violation_of
 from assembly.solve.search import SHORTEST, goal, search
 from assembly.solve.settings import (
     ANY_POSE,
@@ -63,7 +65,6 @@ from assembly.solve.settings import (
     COUNT,
     CULPRIT,
     DUAL,
-    FEASIBILITY,
     FIRST_SHIFT,
     FREE_BELOW,
     FREE_TRIMS,
@@ -72,13 +73,11 @@ from assembly.solve.settings import (
     ITERATION_LIMIT,
     ITERATIONS,
     LAST_LOOK,
-    MOST_ROUNDING,
     OBJECTIVE,
     OUT_OF_TIME,
     PENALTY,
     PENALTY_FLOOR,
     RADIUS,
-    ROUNDING,
     RUNNING,
     SCATTER,
     SOLVED,
@@ -140,16 +139,14 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
     here, trial, held = points
     y, better_y, active, forces, foreseen = by_row[2], by_row[3], by_row[4], by_row[5], by_row[6]
     weights = (active, forces, foreseen)
-    reach = read_state(table, pool, state, here, trial, y, better_y)
+    read_state(table, pool, state, here, trial, y, better_y)
     bases, one_sided, order, _of_rows = shape
     free = loose[0]
     # What stays as it is for the whole solve.
     program = (table, pool, shape, loose, room)
     gradient, lines, lagrangian, _factor = system
 
-    reach = max(reach, turned(table, pool, here[1]))
-    # What rounding of the user's coordinates, and of angles over many turns, alone can violate.
-    feasible = max(settings[FEASIBILITY], min(ROUNDING * reach, MOST_ROUNDING))
+    feasible = rounding_at(table, pool, settings, here)
     tick = settings[TICK] == 1.0
     # A tick goes on with the last one, if that one's time was spent.
     begin, done, looks = begin_tick(table, settings, results, memory)
@@ -266,10 +263,10 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         # Rows of vectors depend on one another: their multipliers drift where nothing keeps them short.
         vectors = table[VECTOR_TRIMS] == 1
         shortened = iteration > 0 and (alpha < 1.0 or vectors)
-        # Of contacts that touch, which of them push is not known from their gaps.
-        touches = watched and not tick and violation <= TOUCHING
-        # At the start both are the same; later a tenth of the last residual is good.
-        good = max(math.inf if iteration == 0 else 0.1 * last_dual, settings[STATIONARITY] if touches else 0.0)
+        # Which rows push is not known at a first start, nor of contacts. A tenth of the last residual is good.
+        first = iteration == 0 and mu > floor and violation <= feasible
+        touches = first or (watched and not tick and violation <= TOUCHING)
+        good = max(0.0 if first else 0.1 * last_dual, settings[STATIONARITY] if touches else 0.0)
         dual = choose_multipliers(
             shape, rows, here, shortened, vectors, touches, good, active, gradient, lines[0], gram, y, better_y
         )
@@ -291,8 +288,8 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         retreats = sunk and holds and ended == RUNNING and iteration < limit
         looks_last = watched and settings[LAST_LOOK] == 1.0
         # Where every last look finds other contacts, the limit ends it.
-        arrived = violation <= feasible and dual <= settings[STATIONARITY] and not retreats
-        if arrived and not (looks_last and iteration > limit):
+        arrived = has_arrived(program, settings, results, here, violation, last_violation, feasible, dual)
+        if arrived and not retreats and not (looks_last and iteration > limit):
             # A contact that ends right here is lost and found again, however often it is looked for.
             if looks_last and iteration != looked_at:
                 changed = look_again(table, pool, memory, here, EVERYTHING, free, loose[4])
@@ -391,8 +388,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         if used < 0.0:
             status = STALLED
             continue
-        if iteration == 0:
-            results[FIRST_SHIFT] = shift
+        note_factor(settings, results, iteration, shift, dual, restoring, is_fresh, rows, one_sided, active, y)
         last_violation = violation
         last_dual = dual
         measured = False

@@ -5,28 +5,28 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly.constraints.layout import ROWS, SCALE, WATCH
+from assembly.constraints.layout import IMPLICIT, ROWS, SCALE, WATCH
 from assembly.constraints.program import evaluate
-from assembly.constraints.row_terms import add_row_terms
+from assembly.constraints.terms import recenter
 from assembly.proximity.watch import EVERYTHING, any_crossed
 from assembly.solve.guards import clear_guards, go_back, look_around, place_guards
-from assembly.solve.linear import factorize_shifted
-from assembly.solve.multipliers import multipliers_at, weigh_rows
+from assembly.solve.inertia import test_end
+from assembly.solve.multipliers import multipliers_at
 from assembly.solve.recall import leave
-from assembly.solve.report import bring_back, is_clear, judge, write_pose, write_rows
+from assembly.solve.report import bring_back, is_clear, judge, scaled_poses, write_pose, write_rows
 from assembly.solve.room import results_of
 from assembly.solve.search import goal
 from assembly.solve.settings import (
     ANY_POSE,
     CARRIED,
     CONTACT_LOST,
-    CURVED,
+    GATHER,
     HELD,
     IMPROPER,
     INFEASIBLE,
     ITERATION_LIMIT,
-    PENALTY_FLOOR,
     RECALL,
+    SCATTER,
     SECOND_ORDER,
     SOLVED,
     STALLED,
@@ -64,7 +64,7 @@ def finish(program, settings, state, tips, here, trial, by_row, at_end, held, nu
     pose.
     """
     table, pool, shape, loose, room = program
-    gradient, lines, lagrangian, matrix = system
+    gradient, lines, lagrangian, _matrix = system
     y, better_y, active, forces = by_row[2], by_row[3], by_row[4], by_row[5]
     status, value, violation, dual, feasible, rows, holds = at_end
     results = results_of(table, state)
@@ -77,6 +77,11 @@ def finish(program, settings, state, tips, here, trial, by_row, at_end, held, nu
     if holds and ((tick and not violation <= feasible and results[CARRIED] == 0.0) or crosses):
         return_to(table, pool, held, numbers, loose, rows, here, y, better_y, tick)
         results[HELD] = 1.0
+    gathered = table[IMPLICIT] == 1 and settings[GATHER] == 1.0 and results[SCATTER] == 1.0
+    if gathered:
+        # The way from where bodies were gathered was as short as could be; it is measured from where they were given.
+        scaled_poses(table, pool, state, trial[0])
+        recenter(table, pool, trial[0])
     write_pose(table, pool, here[0], state)
     if status != CONTACT_LOST and not (tick and results[HELD] == 0.0):
         # A tick that went well ends at a pose that was just evaluated.
@@ -91,15 +96,13 @@ def finish(program, settings, state, tips, here, trial, by_row, at_end, held, nu
             status = SOLVED
             value = goal(table, pool, shape, rows, loose, room, tips, trial, 1, gradient, lagrangian)
             dual = multipliers_at(shape, rows, trial, active, gradient, lines[0], gram, y)
-        elif status == SOLVED and not good:
+        elif gathered:
+            value = goal(table, pool, shape, rows, loose, room, tips, trial, 0, gradient, lagrangian)
+        if status == SOLVED and not good:
             status = STALLED
     results[IMPROPER] = write_rows(table, here, y, loose, tick, pool[SCALE], state)
-    if settings[SECOND_ORDER] == 1.0 and results[HELD] + results[CARRIED] == 0.0 and status != CONTACT_LOST:
-        goal(table, pool, shape, rows, loose, room, tips, here, 1, gradient, lagrangian)
-        weigh_rows(rows, shape[1], here[3], y, settings[PENALTY_FLOOR], forces, active)
-        add_row_terms(table, pool, loose, room, shape, here, y, active, lagrangian)
-        least = factorize_shifted(lagrangian, gradient.size, shape[2], 0.0, matrix)
-        results[CURVED] = 1.0 if least == 0.0 else -1.0
+    if settings[SECOND_ORDER] > 0.0 and results[HELD] + results[CARRIED] == 0.0 and status != CONTACT_LOST:
+        status = test_end(program, settings, results, status, tips, here, rows, y, active, forces, system)
     if settings[RECALL] > 0.0:
         # With clearances what a tick ends with depends on rounding where wires wedge: there, rows are evaluated afresh.
         good = status == SOLVED if watched else status != CONTACT_LOST

@@ -16,6 +16,7 @@ from assembly.solve.settings import (
     PENALTY,
     PENALTY_FLOOR,
     RADIUS,
+    SECOND_ORDER,
     SETTINGS,
     STATIONARITY,
 )
@@ -84,4 +85,5 @@ class Options:
         out[PENALTY_FLOOR] = self.penalty_floor
         out[RADIUS] = self.radius
         out[LAST_LOOK] = 1.0
+        out[SECOND_ORDER] = 1.0
         return out

@@ -35,12 +35,23 @@ def log(history, iteration, figures):
 
 
 @kernel(inner=True)
+def scaled_poses(table, pool, state, q):
+    """Poses of a state as the program has them."""
+    for b in range(table[BODIES]):
+        for k in range(3):
+            q[b, k] = (state[7 * b + k] - pool[REFERENCE + k]) / pool[SCALE]
+        for k in range(3, 7):
+            q[b, k] = state[7 * b + k]
+
+
+@kernel(inner=True)
 def write_pose(table, pool, q, state):
-    """Poses of the moving bodies into the state, in the user's coordinates."""
+    """Poses of the moving bodies into the state, in the user's coordinates; what did not move keeps its bits."""
     for b in range(table[BODIES]):
         if table[table[SLOTS] + b] >= 0:
             for k in range(3):
-                state[7 * b + k] = q[b, k] * pool[SCALE] + pool[REFERENCE + k]
+                if q[b, k] != (state[7 * b + k] - pool[REFERENCE + k]) / pool[SCALE]:
+                    state[7 * b + k] = q[b, k] * pool[SCALE] + pool[REFERENCE + k]
             for k in range(3, 7):
                 state[7 * b + k] = q[b, k]
 
@@ -88,11 +99,7 @@ def judge(table, pool, state, loose, room, shape, rows, here, trial, bound, lax)
     violation, tangency counted by gaps if `lax`.
     """
     q = trial[0]
-    for b in range(table[BODIES]):
-        for k in range(3):
-            q[b, k] = (state[7 * b + k] - pool[REFERENCE + k]) / pool[SCALE]
-        for k in range(3, 7):
-            q[b, k] = state[7 * b + k]
+    scaled_poses(table, pool, state, q)
     lost = evaluate(table, pool, here[1], BEND, loose, room, trial)
     if lost >= 0:
         return False, math.inf

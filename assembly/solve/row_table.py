@@ -24,11 +24,9 @@ from assembly.constraints.layout import (
     JOINTS,
     KIND,
     MOVING,
-    REFERENCE,
     ROW,
     ROW_TABLE,
     ROWS,
-    SCALE,
     SECOND,
     SECOND_BODY_F,
     SECOND_BODY_G,
@@ -51,19 +49,10 @@ from assembly.constraints.terms import objective
 from assembly.proximity.free_pair import VARIABLES, VECTORS
 from assembly.proximity.solid_contact import CONTACT_RECORD, TRACK
 from assembly.solve.contacts import free_folds, start_contacts
+from assembly.solve.report import scaled_poses
 from assembly.solve.rows import arrange, shape_of, size_of_shape
 from assembly.solve.search import goal
 from assembly.solve.settings import FREE_BELOW
-
-
-@kernel(inner=True)
-def scaled_poses(table, pool, state, q):
-    """Poses of a state as the program has them."""
-    for b in range(table[BODIES]):
-        for k in range(3):
-            q[b, k] = (state[7 * b + k] - pool[REFERENCE + k]) / pool[SCALE]
-        for k in range(3, 7):
-            q[b, k] = state[7 * b + k]
 
 
 @kernel(inner=True)
@@ -114,6 +103,16 @@ def spread_rows(table, free, count, packed, out):
 
 
 @kernel(inner=True, allocates=True)
+def new_point(table):
+    """Room for a point of the loop, with as many rows as there can be."""
+    pairs = table[CONTACTS]
+    most = table[ROWS] + 4 * pairs
+    records = np.ones((pairs + table[JOINTS] + table[VECTOR_TRIMS], CONTACT_RECORD))
+    packed = np.zeros((most, EXTRA_COLUMN + 6 * table[EXTRA]))
+    return np.empty((table[BODIES], 7)), np.empty((table[TRACKED], TRACK)), records, np.zeros(most), packed
+
+
+@kernel(inner=True, allocates=True)
 def point_at(table, pool, state, free):
     """A point of the loop at a state: whether all its rows are evaluated (-1, or the contact that is lost), how many
     contacts are at folds, the point, and what pairs and tapes need.
@@ -122,13 +121,9 @@ def point_at(table, pool, state, free):
     """
     pairs = table[CONTACTS]
     tracks = table[TRACKED]
-    most = table[ROWS] + 4 * pairs
-    q = np.empty((table[BODIES], 7))
-    tracked = np.empty((tracks, TRACK))
     start = np.empty((tracks, TRACK))
-    records = np.ones((pairs + table[JOINTS] + table[VECTOR_TRIMS], CONTACT_RECORD))
-    packed = np.zeros((most, EXTRA_COLUMN + 6 * table[EXTRA]))
-    point = (q, tracked, records, np.zeros(most), packed)
+    point = new_point(table)
+    q, tracked, records, residual, _packed = point
     o = table[TAPE_ROOM]
     room = (np.empty(table[o]), np.empty(table[o + 1]), np.empty(table[o + 2]))
     loose = (
@@ -149,7 +144,7 @@ def point_at(table, pool, state, free):
     lost = start_contacts(table, pool, q, tracked, free, loose[1])
     if lost < 0:
         # Every contact counts here, also one that pushes nothing.
-        active = np.ones(most)
+        active = np.ones(residual.size)
         count = free_folds(table, pool, records, tracked, active, free, loose[1], -1.0, -1, False)
         before = -1
         while count != before:

@@ -13,7 +13,7 @@ from assembly._read_only import ReadOnlyArrays, read_only
 from assembly.constraints.constraint import Constraint
 from assembly.constraints.contact import Contact
 from assembly.constraints.joint import Joint
-from assembly.constraints.layout import TERM_TABLE, TERMS
+from assembly.constraints.layout import IMPLICIT, TERM_TABLE, TERMS
 from assembly.constraints.packing import Packed
 from assembly.constraints.terms import POINT_DISTANCE, POSTURE, POSTURE_PARAMETERS, TERM
 from assembly.errors import InputError
@@ -27,6 +27,7 @@ from assembly.solve.settings import COUNT, CULPRIT, DUAL, IMPROPER, OBJECTIVE, V
 if TYPE_CHECKING:
     from assembly.kinematics.body import BodyFace
     from assembly.solve.mobility import Mobility
+    from assembly.solve.second_order import SecondOrder
     from assembly.solve.statics import Wrench
 
 __all__ = ["Iteration", "Scene", "Solution", "Status"]
@@ -39,7 +40,7 @@ MOST_COUNTED = 200
 class Status(Enum):
     """How a solve ended; the value says what to do."""
 
-    SOLVED = "every constraint holds and the objective, if there is one, is stationary"
+    SOLVED = "every constraint holds and the objective, if there is one, is at a local minimum"
     INFEASIBLE = "the constraints cannot all hold near this start; the pose violates them least: drop or move one"
     STALLED = "no further progress; look at the worst violation, start elsewhere or loosen the tolerance"
     ITERATION_LIMIT = "out of iterations; raise max_iterations or start nearer"
@@ -98,13 +99,18 @@ class Solution(ReadOnlyArrays):
     status : Status
     success : bool
         True only where the constraints, evaluated afresh at `q`, hold to the tolerance, and the objective, if there is
-        one, is stationary.
+        one, is stationary and no pose beside `q` was found to be lower. Without an objective it says that constraints
+        hold near the start: the least move is a preference.
     objective : float
         In the user's units.
     feasibility : float
         Largest violation of a constraint, in the user's units, evaluated at `q`. Of a contact that has no extremal pair
         there it is the distance of the points in `contacts`. Infinite only where an `Expression` or a derivative of it
         has no finite value, and so is the objective of one.
+    second_order : SecondOrder
+        What the end is: `minimum`, `not isolated` (along some motions the objective does not change to second order),
+        `undecided`, `saddle` (not SOLVED: lower poses are beside it, which no step was left for), `no objective`. None
+        of a solve that failed otherwise.
     stationarity : float
         Largest component of the Lagrangian's gradient, scaled; of the objective's where a contact was lost.
     violations : dict of name -> float
@@ -131,7 +137,14 @@ class Solution(ReadOnlyArrays):
     """
 
     def __init__(
-        self, scene: Scene, packed: Packed, state: Array, status: Status, seconds: float, history: Array
+        self,
+        scene: Scene,
+        packed: Packed,
+        state: Array,
+        status: Status,
+        seconds: float,
+        history: Array,
+        order: SecondOrder | None = None,
     ) -> None:
         self._scene = scene
         self._packed = packed
@@ -139,6 +152,7 @@ class Solution(ReadOnlyArrays):
         self._rows = history
         self.status = status
         self.seconds = seconds
+        self._order = order
         # Flat contacts alone need it again, for the center of their pressure.
         self._wishes = packed.pool[scene.wished(packed)] if scene.contacts else None
 
@@ -202,6 +216,20 @@ class Solution(ReadOnlyArrays):
     def success(self) -> bool:
         """Whether the status is SOLVED."""
         return self.status is Status.SOLVED
+
+    @property
+    def second_order(self) -> SecondOrder | None:
+        """What the end of a solve is; looked at when it is read, unless the solve had to."""
+        if self._order is None and self.success:
+            from assembly.solve.second_order import SecondOrder, judge
+
+            self._order = SecondOrder.NO_OBJECTIVE
+            if self._packed.table[IMPLICIT] == 0:
+                verdict, look = judge(self._packed, self._state, sample=False)
+                # Targets may be others by now.
+                judged = look is not None and look.is_stationary
+                self._order = verdict.kind if judged else SecondOrder.UNDECIDED
+        return self._order
 
     @cached_property
     def violations(self) -> dict[str, float]:

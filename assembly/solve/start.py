@@ -45,17 +45,15 @@ from assembly.solve.settings import (
 
 @kernel(inline=True)
 def read_state(table, pool, state, here, trial, y, better_y):
-    """Poses, tracked values and multipliers of a state, scaled; returns how far out the user's coordinates are."""
+    """Poses, tracked values and multipliers of a state, scaled."""
     size = pool[SCALE]
     tracks = table[TRACKED]
     o_tracked = 7 * table[BODIES]
     o_y = o_tracked + TRACK * tracks
-    reach = 0.0
     for b in range(table[BODIES]):
         for k in range(7):
             value = state[7 * b + k]
             if k < 3:
-                reach = max(reach, abs(value) / size)
                 value = (value - pool[REFERENCE + k]) / size
             here[0][b, k] = value
             trial[0][b, k] = value
@@ -70,7 +68,6 @@ def read_state(table, pool, state, here, trial, y, better_y):
         here[3][r] = math.inf
         y[r] = state[o_y + r]
         better_y[r] = y[r]
-    return reach
 
 
 @kernel(inline=True)

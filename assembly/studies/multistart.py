@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.constraints.layout import TERM_TABLE, TERMS
-from assembly.constraints.packing import Packed
-from assembly.constraints.terms import POSTURE, POSTURE_POSITION, TERM, TERM_BODY, TERM_FOLLOWS, TERM_KIND
-from assembly.constraints.terms import TERM_PARAMETERS as PARAMETERS
 from assembly.errors import integer
+from assembly.solve.postures import postures_from
 from assembly.solve.solution import Solution
 
 if TYPE_CHECKING:
@@ -33,7 +29,7 @@ def solve_all(scene: Assembly, starts: int, seed: int, options: Mapping[str, Any
     packed = scene.packed()
     moving = [k for k, body in enumerate(scene.bodies) if not body.fixed]
     found: list[Solution] = []
-    with _postures_from(packed, scene.q):
+    with postures_from(packed, scene.q):
         for start in range(count):
             q = scene.q.copy()
             if start > 0:
@@ -54,22 +50,3 @@ def _is_same(q: Array, other: Array, size: float) -> bool:
     # |e - f| is half the angle between them, where it is small.
     signs = np.where((q[:, 3:] * other[:, 3:]).sum(axis=1, keepdims=True) < 0.0, -1.0, 1.0)
     return bool(np.linalg.norm(q[:, 3:] - signs * other[:, 3:], axis=1).max() <= 0.5 * SAME)
-
-
-@contextmanager
-def _postures_from(packed: Packed, q: Array) -> Iterator[None]:
-    """Postures that would follow the start of each solve are measured from poses (n, 7) meanwhile."""
-    table, pool = packed.table, packed.pool
-    terms = range(table[TERM_TABLE], table[TERM_TABLE] + TERM * table[TERMS], TERM)
-    following = [at for at in terms if table[at + TERM_KIND] == POSTURE and table[at + TERM_FOLLOWS] == 1]
-    try:
-        for at in following:
-            table[at + TERM_FOLLOWS] = 0
-            place = table[at + PARAMETERS] + POSTURE_POSITION
-            row = q[table[at + TERM_BODY]]
-            pool[place : place + 3] = (row[:3] - packed.reference) / packed.scale
-            pool[place + 3 : place + 7] = row[3:]
-        yield
-    finally:
-        for at in following:
-            table[at + TERM_FOLLOWS] = 1

@@ -136,7 +136,7 @@ def test_a_plain_solve_pays_for_nothing(monkeypatch):
 
 def test_print_is_a_short_table():
     text = str(bricard().solve())
-    assert text.startswith("SOLVED: every constraint holds and the objective, if there is one, is stationary\n")
+    assert text.startswith("SOLVED: every constraint holds and the objective, if there is one, is at a local minimum\n")
     assert "   1 degree of freedom\n" in text and " iterations   " in text
     assert text.count(" violation ") == 5 and "ground  " in text and "fixed" in text
     assert "0 degrees of freedom" in str(driven_four_bar().solve())

@@ -1,0 +1,58 @@
+"""Whether a solve has arrived: rows hold where bodies are now, and the Lagrangian is stationary."""
+
+from __future__ import annotations
+
+from assembly._kernel import kernel
+from assembly.constraints.layout import BODIES, IMPLICIT, REFERENCE, SCALE
+from assembly.solve.inertia import DOWNWARD
+from assembly.solve.rows import turned
+from assembly.solve.settings import (
+    CURVED,
+    FEASIBILITY,
+    MOST_ROUNDING,
+    ROUNDING,
+    SECOND_ORDER,
+    STATIONARITY,
+    TESTED,
+    TICK,
+)
+
+# A saddle is left from where the dual residual is no more: the last step toward one is of no use.
+NEAR_SADDLE = 1e-4
+# What a step must gain of violations that rounding of far coordinates may explain.
+GAIN = 0.5
+
+
+@kernel(inner=True)
+def reach_of(table, pool, q):
+    """How far out the user's coordinates are, over the size."""
+    reach = 0.0
+    for b in range(table[BODIES]):
+        for k in range(3):
+            reach = max(reach, abs(q[b, k] + pool[REFERENCE + k] / pool[SCALE]))
+    return reach
+
+
+@kernel(inner=True)
+def rounding_at(table, pool, settings, here):
+    """The violation that is none: what is asked for, or what rounding of coordinates and of whole turns violates."""
+    reach = max(reach_of(table, pool, here[0]), turned(table, pool, here[1]))
+    return max(settings[FEASIBILITY], min(ROUNDING * reach, MOST_ROUNDING))
+
+
+@kernel(inner=True)
+def has_arrived(program, settings, results, here, violation, last_violation, feasible, dual):
+    """Whether rows hold and the Lagrangian is stationary, or all but so at a saddle that is to be left.
+
+    Of a start that was far out rows held to its rounding. They are to hold to that of where bodies are now, unless
+    steps gain nothing more.
+    """
+    if not violation <= feasible:
+        return False
+    table, pool = program[0], program[1]
+    leaves = settings[SECOND_ORDER] == TESTED and settings[TICK] == 0.0 and table[IMPLICIT] == 0
+    leaves = leaves and results[CURVED] == DOWNWARD
+    if not dual <= (max(NEAR_SADDLE, settings[STATIONARITY]) if leaves else settings[STATIONARITY]):
+        return False
+    gains = violation > settings[FEASIBILITY] and not violation > GAIN * last_violation
+    return not gains or violation <= rounding_at(table, pool, settings, here)

@@ -1,0 +1,144 @@
+"""The second derivatives of a scene at a state, dense, and poses beside it that hold: what ends are judged by.
+
+Unknowns are those of the loop: twists of the moving bodies in the order of the table's slots, lengths over the scene's
+size, then four coordinates of every contact whose pair is at a fold. Rows are those of the program, then four of
+tangency a fold. All else that is asked of second order is done with these, outside (`second_order.py`).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from assembly._carve import carve
+from assembly._kernel import kernel
+from assembly.constraints.layout import BODIES, CONTACTS, MOVING, ROWS, TRACKED
+from assembly.constraints.program import evaluate
+from assembly.constraints.row_terms import add_row_terms
+from assembly.proximity.extremal import BEND
+from assembly.proximity.solid_contact import TRACK
+from assembly.solve.carry import carry
+from assembly.solve.multipliers import toward_rows
+from assembly.solve.report import write_pose
+from assembly.solve.row_table import new_point, point_at
+from assembly.solve.rows import add_row, arrange, move, shape_of, size_of_shape
+from assembly.solve.search import goal
+from assembly.solve.tangency import off_rows
+
+# Rows that hold; so many steps lead back onto them, none longer than this.
+HOLDS, EXACT, STEPS, LONGEST = 1e-11, 1e-14, 12, 1.0
+# The weight of rows in these steps, and of the steps' own squares; a step that gains less than this factor is the last.
+MU, SOFTNESS, GAIN = 1e-6, 1e-2, 0.1
+
+
+@kernel(inner=True)
+def write_tracked(table, tracked, state):
+    """Tracked values of a point into a state."""
+    for k in range(table[TRACKED]):
+        for i in range(TRACK):
+            state[7 * table[BODIES] + TRACK * k + i] = tracked[k, i]
+
+
+@kernel(inner=True, allocates=True)
+def write_curvature(table, pool, state, forces, out, tips, integers, doubles):
+    """The same as `curvature_at`, with what it works in."""
+    pairs = table[CONTACTS]
+    free = np.empty(pairs, np.int64)
+    lost, count, point, loose, room = point_at(table, pool, state, free)
+    if lost >= 0:
+        return -1
+    write_tracked(table, point[1], state)
+    rows, n = table[ROWS] + 4 * count, 6 * table[MOVING] + 4 * count
+    shape = shape_of(table, table[ROWS] + 4 * pairs, 6 * table[MOVING] + 4 * pairs, table[:0], integers, doubles)
+    arrange(table, free, shape, rows, n)
+    jacobian = carve(out, 1 + rows + n, (rows, n))
+    hessian = carve(out, 1 + rows + n + rows * n, (n, n))
+    slopes = np.zeros(n)
+    for i in range(out.size):
+        out[i] = 0.0
+    out[0] = goal(table, pool, shape, rows, loose, room, tips, point, 1, slopes, hessian)
+    add_row_terms(table, pool, loose, room, shape, point, forces, np.zeros(rows), hessian)
+    for r in range(rows):
+        out[1 + r] = point[3][r]
+        add_row(shape[0], point[4], r, 1.0, jacobian[r])
+    for i in range(n):
+        out[1 + rows + i] = slopes[i]
+        for j in range(i):
+            hessian[i, j] = hessian[j, i]
+    return count
+
+
+@kernel(
+    signatures=(
+        "(i8[::1], f8[::1], f8[::1], f8[::1], f8[::1], i8)",
+        "(i8[::1], f8[::1], f8[::1], f8[::1], f8[::1], none)",
+    ),
+)
+def curvature_at(table, pool, state, forces, out, tips):
+    """Evaluate a state; tracked values found are written into it. Returns how many folds there are, or -1: no pair.
+
+    With m rows and n unknowns, these included: out gets the objective's value, residuals (m), the objective's gradient
+    (n), the rows' Jacobian (m, n), and the Hessian of objective + forces . rows (n, n). `tips` is None where no term
+    of the objective is a dexterity.
+    """
+    pairs = table[CONTACTS]
+    integers, doubles = size_of_shape(table, table[ROWS] + 4 * pairs, 6 * table[MOVING] + 4 * pairs)
+    return write_curvature(table, pool, state, forces, out, tips, np.empty(integers, np.int64), np.empty(doubles))
+
+
+@kernel(inner=True, allocates=True)
+def walk_within(table, pool, state, step, share, residual, tips, integers, doubles):
+    """The same as `walk`, with what it works in."""
+    pairs = table[CONTACTS]
+    free = np.empty(pairs, np.int64)
+    lost, count, here, loose, room = point_at(table, pool, state, free)
+    rows, n = table[ROWS] + 4 * count, 6 * table[MOVING] + 4 * count
+    if lost >= 0 or n != step.size:
+        return math.inf
+    shape = shape_of(table, table[ROWS] + 4 * pairs, 6 * table[MOVING] + 4 * pairs, table[:0], integers, doubles)
+    arrange(table, free, shape, rows, n)
+    trial = new_point(table)
+    trial[0][:] = here[0]
+    lagrangian, matrix = np.zeros((n, n)), np.empty((n, n))
+    active, forces, way = np.zeros(rows), np.zeros(rows), step.copy()
+    before = math.inf
+    for _ in range(STEPS):
+        move(table, here[0], way, share, trial[0])
+        carry(table, pool, shape[0], loose, here, trial, way, share)
+        if evaluate(table, pool, loose[4], BEND, loose, room, trial) >= 0:
+            return math.inf
+        here, trial = trial, here
+        share = 1.0
+        off = off_rows(table, loose, shape[1], here, False)
+        if off <= EXACT or (off <= HOLDS and off > GAIN * before):
+            write_pose(table, pool, here[0], state)
+            write_tracked(table, here[1], state)
+            for r in range(rows):
+                residual[r] = here[3][r]
+            return goal(table, pool, shape, rows, loose, room, tips, here, 0, way, lagrangian)
+        before = off
+        if not math.isfinite(off):
+            break
+        toward_rows(
+            shape, table[ROWS], rows, here[3], here[4], MU, active, SOFTNESS, EXACT, lagrangian, matrix, n, forces, way
+        )
+        if not np.max(np.abs(way)) <= LONGEST:
+            break
+    return math.inf
+
+
+@kernel(
+    signatures=(
+        "(i8[::1], f8[::1], f8[::1], f8[::1], f8, f8[::1], i8)",
+        "(i8[::1], f8[::1], f8[::1], f8[::1], f8, f8[::1], none)",
+    ),
+)
+def walk(table, pool, state, step, share, residual, tips):
+    """Move a state by a share of a step, and by least steps back onto the rows. Returns the objective's value there.
+
+    Infinite, with the state as it was, where no pose near it holds. The residuals left, within rounding, are written.
+    """
+    pairs = table[CONTACTS]
+    integers, doubles = size_of_shape(table, table[ROWS] + 4 * pairs, 6 * table[MOVING] + 4 * pairs)
+    return walk_within(table, pool, state, step, share, residual, tips, np.empty(integers, np.int64), np.empty(doubles))

@@ -1,0 +1,137 @@
+"""Saddles and maxima left: to a pose that is seen to be lower, and on from there with the loop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.constraints.packing import Packed
+from assembly.solve.look import Look, Neighbor
+from assembly.solve.second_order import SecondOrder, Way, judge, judge_kink
+from assembly.solve.settings import (
+    COUNT,
+    DUAL,
+    GATHER,
+    ITERATION_LIMIT,
+    ITERATIONS,
+    OBJECTIVE,
+    PENALTY,
+    PENALTY_FLOOR,
+    REACHED,
+    SECOND_ORDER,
+    SOLVED,
+    STALLED,
+    STATIONARITY,
+    UNSURE,
+    VIOLATION,
+)
+
+__all__ = ["Outcome", "settle"]
+
+Array = NDArray[np.float64]
+# The first step along a way, of a scene with clearances, and by what it grows while poses become lower; the longest.
+FIRST, SHY, GROWTH, LONGEST = 0.02, 1e-3, 3.0, 1.0
+# A step that leads to no lower pose is shortened by this, down to here; lower is what gives this part of what the
+# curvature promises.
+SHORTENED, SHORTEST, PROMISE = 0.25, 1e-4, 0.1
+# What of the way down to a pose is not given back by the loop that goes on from there.
+KEPT = 0.5
+# Rows that hold at a kink.
+HOLDS = 1e-11
+# Ways that are tried from one saddle.
+MOST_WAYS = 6
+
+
+class Outcome(NamedTuple):
+    """How the loop ended, the state and the history it left; of what was looked at, what the end is."""
+
+    code: int
+    state: Array
+    history: Array
+    order: SecondOrder | None = None
+
+
+Run = Callable[[Array, Array], Outcome]
+
+
+def lower_neighbor(look: Look, way: Way) -> Neighbor | None:
+    """A pose that holds and is lower, as far along a way as they become lower; None where there is none."""
+    shy = look.packed.guards > 0
+    share = SHY if shy else FIRST
+    best: Neighbor | None = None
+    while SHORTEST <= share <= LONGEST:
+        there = look.neighbor(way.direction, share)
+        rise = there.rise if there is not None else np.inf
+        promised = 0.5 * PROMISE * way.curvature * share**2 if best is None else best.rise
+        if not rise < min(promised, 0.0):
+            if best is not None:
+                break
+            share *= SHORTENED
+            continue
+        best = there
+        if shy:
+            break
+        share *= GROWTH
+    return best
+
+
+def settle(packed: Packed, settings: Array, outcome: Outcome, run: Run) -> Outcome:
+    """An outcome whose end is no saddle that can be left, from one of which no factorization told.
+
+    `run` is the loop with settings from a state. A saddle left counts as a step; where steps are spent, or no lower
+    pose is found, the saddle is returned, and is not SOLVED.
+    """
+    first = settings[PENALTY] > settings[PENALTY_FLOOR]
+    onward = settings.copy()
+    # What follows begins on its rows: a soft penalty would let it fall back to where it was.
+    onward[GATHER], onward[PENALTY] = 0.0, settings[PENALTY_FLOOR]
+    at = packed.results_at
+    while outcome.code == UNSURE or _is_at_kink(packed, outcome):
+        spent = int(outcome.state[at + COUNT])
+        stands = outcome.code == UNSURE
+        sample = first and spent == 0
+        verdict, look = judge(packed, outcome.state, sample) if stands else judge_kink(packed, outcome.state)
+        left: Outcome | None = None
+        if look is not None and verdict.ways:
+            onward[ITERATIONS] = settings[ITERATIONS] - spent - 1
+            if onward[ITERATIONS] < 0.0:
+                return outcome._replace(code=ITERATION_LIMIT, order=SecondOrder.SADDLE)
+            left = _left(look, verdict.ways, lambda state: run(onward, state))
+        if left is None and stands and not outcome.state[at + DUAL] <= settings[STATIONARITY]:
+            # It was taken for a saddle on the way to it.
+            onward[ITERATIONS], onward[SECOND_ORDER] = max(settings[ITERATIONS] - spent - 1, 0.0), REACHED
+            left = run(onward, outcome.state.copy())
+        if left is None:
+            # A saddle for certain is no solution; what rows that depend on each other say of motions may be none.
+            is_solved = stands and verdict.kind is not SecondOrder.SADDLE
+            return outcome._replace(code=SOLVED if is_solved else STALLED, order=verdict.kind)
+        left.state[at + COUNT] += spent + 1
+        outcome = left._replace(history=np.concatenate([outcome.history[: spent + 1], left.history]))
+    return outcome
+
+
+def _is_at_kink(packed: Packed, outcome: Outcome) -> bool:
+    """Whether a solve ended where it began, at a pose that holds, because the objective has no derivatives there."""
+    if outcome.code != STALLED:
+        return False
+    results = outcome.state[packed.results_at :]
+    begins = results[COUNT] == 0.0 and results[VIOLATION] <= HOLDS * packed.scale
+    return bool(begins and np.isfinite(results[OBJECTIVE]) and not np.isfinite(results[DUAL]))
+
+
+def _left(look: Look, ways: list[Way], run: Callable[[Array], Outcome]) -> Outcome | None:
+    """Where the loop ends from lower poses along one of several ways; None where none is found."""
+    left: Outcome | None = None
+    for way in ways[:MOST_WAYS]:
+        lower = lower_neighbor(look, way)
+        if lower is None:
+            continue
+        outcome = run(lower.state)
+        if outcome.code not in (SOLVED, UNSURE):
+            left = left or outcome
+        elif outcome.state[look.packed.results_at + OBJECTIVE] < look.value + KEPT * lower.rise:
+            return outcome
+    return left
