@@ -18,7 +18,7 @@ from numba.extending import intrinsic, overload
 
 from assembly._kernel.decorator import ENTRIES
 
-__all__ = ["address_of", "call_address", "clock_address"]
+__all__ = ["address_of", "call_address", "callback_address", "clock_address"]
 
 _ADDRESSED: dict[int, Callable[..., int]] = {}
 
@@ -43,6 +43,14 @@ def address_of(entry: Any) -> int:
 def call_address(address: int, arguments: tuple[Any, ...]) -> int:
     """Call the kernel at an address that `address_of` gave; the arguments have the types of its signature."""
     return int(_ADDRESSED[int(address)](*arguments))
+
+
+def callback_address(function: Any) -> int:
+    """The address of a function of the interpreter without arguments, made callable by ctypes; the caller keeps it."""
+    address = int(ctypes.cast(function, ctypes.c_void_p).value or 0)
+    if config.DISABLE_JIT:
+        _ADDRESSED[address] = function
+    return address
 
 
 def clock_address() -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from operator import is_
 from os import PathLike
@@ -25,10 +25,11 @@ from assembly.kinematics.pose import Pose, pose_rows
 from assembly.proximity.pairs import inside
 from assembly.proximity.solid_contact import TRACK
 from assembly.solve.attempts import attempt, load
+from assembly.solve.interruption import CTRL_C, Interruption
 from assembly.solve.options import Options
 from assembly.solve.postures import postures_from
 from assembly.solve.settings import ANY_POSE, GATHER, ITERATIONS
-from assembly.solve.solution import Scene, Solution, Status
+from assembly.solve.solution import Scene, Solution
 
 if TYPE_CHECKING:
     from assembly.solve.mobility import Mobility
@@ -37,9 +38,8 @@ if TYPE_CHECKING:
 __all__ = ["Assembly"]
 
 Array = NDArray[np.float64]
-_STATUSES = tuple(Status)
-_SETTINGS = Options().settings()
-_WARM_SETTINGS = Options().settings(warm=True)
+_SETTINGS = CTRL_C.fill(Options().settings())
+_WARM_SETTINGS = CTRL_C.fill(Options().settings(warm=True))
 # How many times as many places as they ask for a solve gives to clearances.
 MOST_CROWDING = 16
 
@@ -206,6 +206,8 @@ class Assembly:
         q0: ArrayLike | Solution | None = None,
         *,
         starts: Mapping[str, ArrayLike] | None = None,
+        time_limit: float | None = None,
+        callback: Callable[[int, float, float], object] | None = None,
         **options: Any,
     ) -> Solution:
         """Find the pose where every constraint holds and the objective has a local minimum.
@@ -220,6 +222,12 @@ class Assembly:
             contacts and multipliers are taken up as well. The bodies' own poses by default.
         starts : mapping of constraint name -> (4,), optional
             Parameters near the pair each contact is to track; a global start finds the others.
+        time_limit : float, optional
+            Seconds after which the solve ends with `Status.TIME_LIMIT`, at the last pose that held if there was one.
+        callback : callable, optional
+            Called with the iteration, the objective and the feasibility (in the scene's unit) every 50 ms, or after a
+            step that takes longer; where it returns True the solve ends with `Status.STOPPED`. What it raises is
+            raised here. Ctrl-C is answered as often, with or without a callback; the scene stays usable.
         **options
             See `Options`.
 
@@ -231,16 +239,19 @@ class Assembly:
         warm = isinstance(q0, Solution)
         if options:
             chosen = Options.of(options)
-            settings, verbose = chosen.settings(warm), chosen.verbose
+            settings, verbose = CTRL_C.fill(chosen.settings(warm)), chosen.verbose
         else:
             settings, verbose = (_WARM_SETTINGS if warm else _SETTINGS), 0
         if not self._objectives:
             settings = settings.copy()
             settings[ANY_POSE] = 1.0
             settings[GATHER] = 0.0 if warm else 1.0
-        solution = self._solved(settings, q0, starts)
+        interruption = CTRL_C if time_limit is None and callback is None else Interruption(time_limit, callback)
+        settings = interruption.settings(settings)
+        solution = self._solved(settings, q0, starts, interruption)
         if (
             not solution.success
+            and not interruption.is_over()
             and solution._packed.guards
             and not isinstance(q0, Solution)
             and settings[ITERATIONS] > 0.0
@@ -250,9 +261,9 @@ class Assembly:
             spent = solution.seconds
             begin = perf_counter()
             q = self.q if q0 is None else pose_rows("q0", q0, len(self._bodies))
-            poses = separated(self, q, options)
+            poses = separated(self, q, {**options, **interruption.rest()})
             # All ways are measured from where the user's bodies were, and the least one is the answer.
-            ways = [solution, *(self._solved(settings, apart, starts, q) for apart in poses)]
+            ways = [solution, *(self._solved(settings, apart, starts, interruption, q) for apart in poses)]
             solution = min((way for way in ways if way.success), key=lambda way: way.objective, default=ways[-1])
             solution.seconds = spent + perf_counter() - begin
         if verbose:
@@ -264,6 +275,7 @@ class Assembly:
         settings: Array,
         q0: ArrayLike | Solution | None,
         starts: Mapping[str, ArrayLike] | None,
+        interruption: Interruption,
         reference: Array | None = None,
     ) -> Solution:
         """A solve from q0, with as many places for contacts of clearances as it turns out to need.
@@ -277,18 +289,21 @@ class Assembly:
             load(packed, start)
             begin = perf_counter()
             if reference is None:
-                code, state, history, order = attempt(packed, settings, start)
+                code, state, history, order = attempt(packed, settings, start, interruption)
             else:
                 with postures_from(packed, reference):
-                    code, state, history, order = attempt(packed, settings, start)
+                    code, state, history, order = attempt(packed, settings, start, interruption)
             spent += perf_counter() - begin
-            if not packed.is_crowded(state) or self._crowding >= MOST_CROWDING or isinstance(q0, Solution):
+            fits = not packed.is_crowded(state) or self._crowding >= MOST_CROWDING or isinstance(q0, Solution)
+            if fits or interruption.is_over():
                 assert self._scene is not None
-                return Solution(self._scene, packed, state, _STATUSES[code], spent, history, order)
+                return Solution(self._scene, packed, state, interruption.status(code), spent, history, order)
             self._crowding *= 2
             self._packed = None
 
-    def solve_all(self, *, starts: int = 16, seed: int = 0, **options: Any) -> list[Solution]:
+    def solve_all(
+        self, *, starts: int = 16, seed: int = 0, time_limit: float | None = None, **options: Any
+    ) -> list[Solution]:
         """The distinct solutions found from several starts: the bodies' poses, then random ones.
 
         Parameters
@@ -298,6 +313,8 @@ class Assembly:
             size along each axis, and turned any way.
         seed : int
             Of the random starts: the same seed, the same starts.
+        time_limit : float, optional
+            Seconds after which no start is begun any more, and the last one ends.
         **options
             See `Options`.
 
@@ -310,7 +327,7 @@ class Assembly:
         """
         from assembly.studies.multistart import solve_all
 
-        return solve_all(self, starts, seed, options)
+        return solve_all(self, starts, seed, Interruption(time_limit), options)
 
     def _start(self, packed: Packed, q0: ArrayLike | Solution | None, starts: Mapping[str, ArrayLike] | None) -> Array:
         """State of the loop: configuration, contact parameters (NaN: to be found), multipliers, room for results."""

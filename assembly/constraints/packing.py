@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._address import clock_address
 from assembly.constraints import addresses, layout
 from assembly.constraints.blocks import FACTORIZE_AT, SOLVE_AT
 from assembly.constraints.clearance import Clearance
@@ -285,6 +286,7 @@ class Packed:
     def _take_addresses(self) -> None:
         """Where the kernels are that only contacts, trims, clearances, expressions or many bodies ask for."""
         table = self.table
+        table[layout.CLOCK_AT] = clock_address()
         if table[layout.BLOCK_RECORD]:
             record = table[table[layout.BLOCK_RECORD] :]
             record[[FACTORIZE_AT, SOLVE_AT]] = addresses.blocks()

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from assembly.constraints.layout import DEEPEST_AT
 from assembly.constraints.packing import Packed
 from assembly.solve.augmented_lagrangian import solve_program
+from assembly.solve.interruption import Interruption
 from assembly.solve.leave import Outcome, settle
 from assembly.solve.options import Options
 from assembly.solve.postures import following_none
@@ -40,30 +41,38 @@ def load(packed: Packed, start: Callable[[], Array]) -> None:
         _loaded.add(packed.tips)
 
 
-def attempt(packed: Packed, settings: Array, start: Callable[[], Array]) -> Outcome:
-    """The outcome of a solve from the states that `start` makes."""
+def attempt(packed: Packed, settings: Array, start: Callable[[], Array], interruption: Interruption) -> Outcome:
+    """The outcome of a solve from the states that `start` makes; no other attempt is made once it is interrupted."""
     # The loop writes contacts of clearances into its table: every solve has its own, also in another thread.
     table = packed.table.copy() if packed.guards else packed.table
-    outcome = _run(packed, table, settings, start())
+
+    def run(table: NDArray[np.int64], settings: Array, state: Array) -> Outcome:
+        return _run(packed, table, settings, state, interruption)
+
+    outcome = run(table, settings, start())
     if outcome.code == SOLVED:
         return outcome
     if outcome.code == CONTACT_LOST and packed.seek_penetration():
         # Perhaps solids cross at the start.
         table[DEEPEST_AT] = packed.table[DEEPEST_AT]
-        outcome = _run(packed, table, settings, start())
-    if not _holds(outcome) and packed.trims:
+        outcome = run(table, settings, start())
+    if packed.trims and not _holds(outcome) and not interruption.is_over():
         # With the coordinates of contacts as unknowns trims have exact second derivatives, except at poles.
         settings = settings.copy()
         settings[FREE_TRIMS] = 1.0
-        other = _run(packed, table, settings, start())
+        other = run(table, settings, start())
         outcome = other if _holds(other) else outcome
-    if not _holds(outcome) and settings[GATHER] == 0.0 and outcome.state[packed.results_at + SCATTER] == 1.0:
+    is_scattered = settings[GATHER] == 0.0 and outcome.state[packed.results_at + SCATTER] == 1.0
+    if is_scattered and not _holds(outcome) and not interruption.is_over():
         # What the start itself did not lead to may be reached from gathered bodies.
         settings = settings.copy()
         settings[GATHER] = 1.0
-        other = _run(packed, table, settings, start())
+        other = run(table, settings, start())
         outcome = other if _holds(other) else outcome
-    return settle(packed, settings, outcome, lambda onward, state: _go_on(packed, onward, state))
+    if interruption.is_over():
+        return outcome
+    # Postures are measured from where they were.
+    return settle(packed, settings, outcome, lambda onward, state: run(following_none(packed), onward, state))
 
 
 def _holds(outcome: Outcome) -> bool:
@@ -71,11 +80,9 @@ def _holds(outcome: Outcome) -> bool:
     return outcome.code in (SOLVED, UNSURE)
 
 
-def _run(packed: Packed, table: NDArray[np.int64], settings: Array, state: Array) -> Outcome:
+def _run(
+    packed: Packed, table: NDArray[np.int64], settings: Array, state: Array, interruption: Interruption
+) -> Outcome:
     history = np.empty((min(int(settings[ITERATIONS]), MOST_HISTORY) + 1, HISTORY))
+    interruption.watch(state[packed.results_at :])
     return Outcome(solve_program(table, packed.pool, settings, state, history, packed.tips), state, history)
-
-
-def _go_on(packed: Packed, settings: Array, state: Array) -> Outcome:
-    """The loop from a state that a solve has led to, with postures measured from where they were."""
-    return _run(packed, following_none(packed), settings, state)

@@ -51,6 +51,7 @@ from assembly.solve.ending import finish, return_to
 from assembly.solve.guards import allowed_share, look_again, numbers_of, place_guards
 from assembly.solve.inertia import note_factor
 from assembly.solve.multipliers import choose_multipliers, forget_objective, least_multipliers, weigh_rows
+from assembly.solve.pauses import SHORT, pause
 from assembly.solve.report import is_clear, keep, log
 from assembly.solve.restoration import LEAST_SHARE, SHARE, SOFTNESS, begin_way, step_back
 from assembly.solve.retreat import BEGINNINGS, LEFT, LONGER, SHORTER, begin_again, has_sunk
@@ -154,7 +155,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
     limit = int(settings[ITERATIONS]) - done
     longest_tick = EXTRA_TIME * int(settings[ITERATIONS]) - done
     mu = settings[PENALTY]
-    floor, slow_steps = settings[PENALTY_FLOOR], 0
+    floor, slow_steps, asked = settings[PENALTY_FLOOR], 0, 0
     way[SOFTNESS] = 1e-2
     begin_way(way)
     # The first step of a tick needs about what that of the last one did; half of it is tried first.
@@ -271,6 +272,8 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             shape, rows, here, shortened, vectors, touches, good, active, gradient, lines[0], gram, y, better_y
         )
         log(history, iteration, (value, violation, dual, mu, shift, alpha, radius))
+        asked, stops = pause(table, pool, settings, results, asked, iteration, value, violation)
+        status = OUT_OF_TIME if stops and status == RUNNING else status
         if status != RUNNING:
             break
         if late:
@@ -303,7 +306,8 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             break
         # What holds, of a tick or where nothing else is asked for; with clearances, what does not cross.
         clear = watched and not tick and not sunk and is_clear(table, residual)
-        if clear or (violation <= feasible and (tick or (any_pose and not watched))):
+        lasts = not watched and (any_pose or first or iteration >= SHORT)
+        if clear or (violation <= feasible and (tick or lasts)):
             holds = True
             leash *= LONGER if iteration != back_at else 1.0
             keep(here, y, rows, held)

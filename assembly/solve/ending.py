@@ -25,6 +25,7 @@ from assembly.solve.settings import (
     IMPROPER,
     INFEASIBLE,
     ITERATION_LIMIT,
+    OUT_OF_TIME,
     RECALL,
     SCATTER,
     SECOND_ORDER,
@@ -87,7 +88,8 @@ def finish(program, settings, state, tips, here, trial, by_row, at_end, held, nu
         # A tick that went well ends at a pose that was just evaluated.
         bound = 1.25 * feasible
         good, violation = judge(table, pool, state, loose, room, shape, rows, here, trial, bound, tick)
-        if is_wish and holds and not good and not watched:
+        is_cut_short = status == OUT_OF_TIME and not tick
+        if (is_wish or is_cut_short) and holds and not good and not watched:
             return_to(table, pool, held, numbers, loose, rows, here, y, better_y, tick)
             results[HELD] = 1.0
             write_pose(table, pool, here[0], state)
@@ -96,7 +98,7 @@ def finish(program, settings, state, tips, here, trial, by_row, at_end, held, nu
             status = SOLVED
             value = goal(table, pool, shape, rows, loose, room, tips, trial, 1, gradient, lagrangian)
             dual = multipliers_at(shape, rows, trial, active, gradient, lines[0], gram, y)
-        elif gathered:
+        elif gathered or is_cut_short:
             value = goal(table, pool, shape, rows, loose, room, tips, trial, 0, gradient, lagrangian)
         if status == SOLVED and not good:
             status = STALLED

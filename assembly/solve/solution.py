@@ -45,6 +45,8 @@ class Status(Enum):
     STALLED = "no further progress; look at the worst violation, start elsewhere or loosen the tolerance"
     ITERATION_LIMIT = "out of iterations; raise max_iterations or start nearer"
     CONTACT_LOST = "a contact has no extremal pair at the start; move the bodies or name the faces"
+    TIME_LIMIT = "the time limit ended it; the pose is the last that held, if one did: raise time_limit or start nearer"
+    STOPPED = "the callback ended it; the pose is the last that held, if one did"
 
 
 class Scene:

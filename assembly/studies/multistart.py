@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.errors import integer
+from assembly.solve.interruption import Interruption
 from assembly.solve.postures import postures_from
 from assembly.solve.solution import Solution
 
@@ -22,7 +23,9 @@ Array = NDArray[np.float64]
 SAME = 1e-6
 
 
-def solve_all(scene: Assembly, starts: int, seed: int, options: Mapping[str, Any]) -> list[Solution]:
+def solve_all(
+    scene: Assembly, starts: int, seed: int, interruption: Interruption, options: Mapping[str, Any]
+) -> list[Solution]:
     """See `Assembly.solve_all`."""
     count = integer("starts", starts, 1, 10**6)
     rng = np.random.default_rng(integer("seed", seed, 0, 2**63 - 1))
@@ -36,9 +39,11 @@ def solve_all(scene: Assembly, starts: int, seed: int, options: Mapping[str, Any
                 q[moving, :3] += packed.scale * rng.uniform(-1.0, 1.0, (len(moving), 3))
                 turns = rng.normal(size=(len(moving), 4))
                 q[moving, 3:] = turns / np.linalg.norm(turns, axis=1, keepdims=True)
-            solution = scene.solve(q, **options)
+            solution = scene.solve(q, **interruption.rest(), **options)
             if solution.success and not any(_is_same(solution.q, other.q, packed.scale) for other in found):
                 found.append(solution)
+            if interruption.is_over():
+                break
     # Of equal objectives, which are so up to rounding only where a scene is symmetric, the first found comes first.
     return sorted(found, key=lambda solution: solution.objective)
 

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly._address import clock_address
 from assembly._copies import InOneProcess
 from assembly._read_only import read_only
 from assembly.assembly import Assembly
@@ -164,7 +163,6 @@ class Tracker(InOneProcess):
         self._budget = budget
         if budget is not None:
             self._settings[BUDGET] = 1e9 * positive("budget", budget)
-            self._packed.table[CLOCK_AT] = clock_address()
             if self._packed.table[CLOCK_AT] == 0:
                 raise InputError("budget is given, but this interpreter has no clock for compiled code; expected None")
         self._history = np.zeros((1, HISTORY))
@@ -179,7 +177,7 @@ class Tracker(InOneProcess):
             # A tick has no last look: rows follow extrema, from edges onto faces as well, which corners do not.
             watch = packed.table[WATCH]
             packed.table[watch + CORNERS] = 0
-            packed.table[watch + CLOCK] = packed.table[CLOCK_AT]
+            packed.table[watch + CLOCK] = 0 if budget is None else packed.table[CLOCK_AT]
             self._state[packed.contacts_at : packed.angles_at].reshape(-1, TRACK)[:, STAYS] = 0.0
         self._settings[RECALL] = self._size
         self._pose = self._state[: self._size]

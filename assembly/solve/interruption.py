@@ -1,0 +1,139 @@
+"""What ends a solve before it is done: a time limit, a callback of the user's, Ctrl-C.
+
+The compiled loop runs without the interpreter. Every 50 ms at most (`pauses.py`) it calls an address in its settings:
+there the interpreter runs again, so that handlers of signals do, and an answer other than 0 ends the loop.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import threading
+from collections.abc import Callable, Iterator
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly._address import callback_address
+from assembly.errors import InputError, number
+from assembly.solve.settings import ASK_AT, COUNT, OBJECTIVE, OUT_OF_TIME, VIOLATION
+from assembly.solve.solution import Status
+
+__all__ = ["CTRL_C", "Interruption"]
+
+Array = NDArray[np.float64]
+Callback = Callable[[int, float, float], object]
+STATUSES = tuple(Status)
+# A time limit that has passed.
+SOONEST = 1e-9
+
+
+class Interruption:
+    """Whom a solve asks whether it is to go on.
+
+    Parameters
+    ----------
+    time_limit : float, optional
+        Seconds from now.
+    callback : callable, optional
+        Called with the iteration, the objective and the feasibility [the scene's unit]; True ends the solve.
+
+    Attributes
+    ----------
+    reason : str or None
+        ``"time limit"`` or ``"callback"`` where that ended a solve.
+    """
+
+    def __init__(self, time_limit: float | None = None, callback: Callback | None = None) -> None:
+        self._deadline = np.inf
+        if time_limit is not None:
+            limit = number("time_limit", time_limit)
+            if not limit > 0.0:
+                raise InputError(f"time_limit is {limit:g}; expected a number of seconds above 0")
+            self._deadline = perf_counter() + limit
+        if callback is not None and not callable(callback):
+            raise TypeError(f"callback is {callback!r}; expected a function of iteration, objective and feasibility")
+        self._callback = callback
+        self._results: Array | None = None
+        self._error: BaseException | None = None
+        self.reason: str | None = None
+        answers = self._answers()
+        next(answers)
+        # Calling the generator's own method runs no instruction outside the `try` in it, where a signal's handler could
+        # raise an exception that nobody catches.
+        self._function = ctypes.CFUNCTYPE(ctypes.c_int64)(answers.__next__)
+        self._address = callback_address(self._function)
+
+    def settings(self, settings: Array) -> Array:
+        """Settings of a loop that asks here."""
+        settings = settings.copy()
+        settings[ASK_AT] = self._address
+        return settings
+
+    def watch(self, results: Array) -> None:
+        """Where the loop that runs next writes how far it is."""
+        self._results = results
+
+    def is_over(self) -> bool:
+        """Whether no other attempt is to be made; the exception of a callback, or a signal's, is raised here."""
+        if self._error is not None:
+            error, self._error = self._error, None
+            raise error
+        if self.reason is None and perf_counter() > self._deadline:
+            self.reason = "time limit"
+        return self.reason is not None
+
+    def rest(self) -> dict[str, Any]:
+        """Options of another solve that ends where this one would."""
+        rest: dict[str, Any] = {}
+        if np.isfinite(self._deadline):
+            rest["time_limit"] = max(self._deadline - perf_counter(), SOONEST)
+        if self._callback is not None:
+            rest["callback"] = self._callback
+        return rest
+
+    def status(self, code: int) -> Status:
+        """The status of a solve by the loop's code."""
+        if code != OUT_OF_TIME:
+            return STATUSES[code]
+        return Status.STOPPED if self.reason == "callback" else Status.TIME_LIMIT
+
+    def _answers(self) -> Iterator[int]:
+        answer = 0
+        while True:
+            try:
+                yield answer
+                answer = self._ask()
+            except GeneratorExit:
+                return
+            except BaseException as error:
+                self._error, answer = error, 1
+
+    def _ask(self) -> int:
+        if perf_counter() > self._deadline:
+            self.reason = "time limit"
+        elif self._callback is not None and self._results is not None:
+            progress = self._results
+            if self._callback(int(progress[COUNT]), float(progress[OBJECTIVE]), float(progress[VIOLATION])):
+                self.reason = "callback"
+        return int(self.reason is not None)
+
+
+class _CtrlC(Interruption):
+    """That of solves without a limit or a callback: in the main thread alone, where handlers of signals run."""
+
+    def settings(self, settings: Array) -> Array:
+        if threading.get_ident() == threading.main_thread().ident:
+            return settings
+        settings = settings.copy()
+        settings[ASK_AT] = 0.0
+        return settings
+
+    def fill(self, settings: Array) -> Array:
+        """Settings that many solves share, with the address to ask at."""
+        settings[ASK_AT] = self._address
+        return settings
+
+
+CTRL_C = _CtrlC()
