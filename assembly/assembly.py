@@ -274,7 +274,13 @@ class Assembly:
             spent += perf_counter() - begin
             if not packed.is_crowded(state) or self._crowding >= MOST_CROWDING or isinstance(q0, Solution):
                 assert self._scene is not None
-                return Solution(self._scene, packed, state, _STATUSES[code], spent, history)
+                status = _STATUSES[code]
+                if status is not Status.SOLVED and self._objectives:
+                    from assembly.solve.unbounded import Asked, status_of
+
+                    asked = Asked(self.bodies, self.constraints, self._objectives)
+                    status = status_of(status, asked, packed, settings, start, state)
+                return Solution(self._scene, packed, state, status, spent, history)
             self._crowding *= 2
             self._packed = None
 

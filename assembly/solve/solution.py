@@ -44,6 +44,7 @@ class Status(Enum):
     STALLED = "no further progress; look at the worst violation, start elsewhere or loosen the tolerance"
     ITERATION_LIMIT = "out of iterations; raise max_iterations or start nearer"
     CONTACT_LOST = "a contact has no extremal pair at the start; move the bodies or name the faces"
+    UNBOUNDED = "the objective is unbounded, it falls on and on along poses that hold; bound it by a limit or a term"
 
 
 class Scene:
@@ -322,7 +323,8 @@ class Solution(ReadOnlyArrays):
         # Of a contact that was lost there are lengths alone.
         parts = {k: v / scale for k, v in self.violations.items()} if self._is_lost else self._largest(scale)
         held_off = sorted((name for name, part in parts.items() if not part <= 1e-9), key=lambda name: -parts[name])
-        if held_off and not self.success:
+        # Of what ran away rounding of its coordinates alone is violated.
+        if held_off and not self.success and self.status is not Status.UNBOUNDED:
             named = ", ".join(f"{name!r} ({self.violations[name]:.3g})" for name in held_off)
             text += f"; violated: {named}"
         if self.status is Status.INFEASIBLE:
