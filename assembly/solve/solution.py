@@ -34,6 +34,8 @@ __all__ = ["Iteration", "Scene", "Solution", "Status"]
 Array = NDArray[np.float64]
 # Moving bodies whose freedoms are printed: counting takes a second for some 300, and grows with the cube.
 MOST_COUNTED = 200
+# Bodies with shapes all pairs of which are looked at when a solution is printed; their number grows with the square.
+MOST_LOOKED = 40
 
 
 class Status(Enum):
@@ -122,7 +124,10 @@ class Solution(ReadOnlyArrays):
     contacts : dict of name -> ContactPair
         Of a clearance every contact that is near, "clearance: a-b", "clearance: a-b 2" and so on.
     crossings : tuple of (name, name)
-        Bodies that cross where no constraint of the scene keeps them apart.
+        Bodies that cross elsewhere than at their contacts, but pairs that a clearance excludes and those that a joint
+        ties directly.
+    crossings_of_joined : tuple of (name, name)
+        Of the pairs that a joint ties directly those that cross.
     iterations : int
     seconds : float
         Time in the compiled loop.
@@ -300,12 +305,19 @@ class Solution(ReadOnlyArrays):
     def crossings(self) -> tuple[tuple[str, str], ...]:
         """Names of bodies that cross at `q` elsewhere than at their contacts, by a look at all pairs when it is read.
 
-        Of a scene with a `Clearance` nothing is looked at: it keeps its bodies apart, and leaves out what may overlap.
-        Bodies of a joint are not looked at either, which are one in the other as a rule. Once read, it is printed, too.
+        Pairs that a joint ties directly, one in the other as a rule, are in `crossings_of_joined`; those which a
+        clearance excludes may overlap. A body in the material of another one crosses it, too.
         """
-        from assembly.solve.crossings import crossings
+        from assembly.solve.crossings import crossing_pairs, free_pairs
 
-        return crossings(self)
+        return crossing_pairs(self, free_pairs(self._scene.bodies, self._scene.constraints))
+
+    @cached_property
+    def crossings_of_joined(self) -> tuple[tuple[str, str], ...]:
+        """The same of bodies that a joint ties directly: a pin in its bore, or links that are drawn too thick."""
+        from assembly.solve.crossings import crossing_pairs, joined_pairs
+
+        return crossing_pairs(self, joined_pairs(self._scene.bodies, self._scene.constraints))
 
     def pose(self, body: Body | str) -> Pose:
         """Pose of a body, given itself or its name."""
@@ -343,6 +355,18 @@ class Solution(ReadOnlyArrays):
     def __repr__(self) -> str:
         return f"Solution({self.status.name}, feasibility={self.feasibility:.1e}, iterations={self.iterations})"
 
+    def _crossing_lines(self) -> list[str]:
+        """What `print` says of bodies that cross."""
+        shaped = sum(bool(body.faces) for body in self._scene.bodies)
+        if shaped > MOST_LOOKED and not {"crossings", "crossings_of_joined"} <= self.__dict__.keys():
+            return [f"  {shaped} bodies were not looked at for crossings; read `crossings` and `crossings_of_joined`"]
+        try:
+            apart, joined = self.crossings, self.crossings_of_joined
+        except InputError as error:
+            return [f"  crossings are not known: {error}"]
+        lines = [f"  {a} and {b} cross; asm.Clearance() keeps them apart" for a, b in apart]
+        return lines + [f"  {a} and {b} cross, which a joint ties" for a, b in joined]
+
     def __str__(self) -> str:
         lines = [
             f"{self.status.name}: {self.message}",
@@ -357,9 +381,7 @@ class Solution(ReadOnlyArrays):
                 pass
             else:
                 lines[1] += f"   {freedoms} degree{'' if freedoms == 1 else 's'} of freedom"
-        # A look takes a second where kernels and trees are not there yet; what is known is said.
-        for a, b in self.__dict__.get("crossings", ()):
-            lines.append(f"  {a} and {b} cross elsewhere; asm.Clearance() keeps them apart")
+        lines += self._crossing_lines()
         worst = sorted(self.violations.items(), key=lambda item: -item[1])[:5]
         lines += [f"  {name:<24} violation {value:.1e}" for name, value in worst]
         for body, row in zip(self._scene.bodies, self.q, strict=True):
