@@ -1,4 +1,4 @@
-"""Poses of rigid bodies whose NURBS surfaces touch, found to 1e-12 with an honest status.
+"""Poses of rigid bodies whose NURBS surfaces touch: constraints hold to 1e-12, with an honest status.
 
 Every name is imported when it is first used, so that a script waits only for what it needs.
 """

@@ -1,8 +1,9 @@
 """Arrays in a block of memory that somebody else holds.
 
 An array of its own costs a kernel some hundred nanoseconds: to allocate it, to count references to it wherever it goes,
-to free it. A tick of some microseconds works in thirty. Those that are carved from one block cost nothing; the block
-has to be an argument of the kernel that carves, so that it outlives them.
+to free it. A tick of some microseconds works in thirty. Those that are carved from one block cost nothing, and do not
+keep it: the block has to be a parameter of the kernel that carves, and of inlined ones that carve for it, so that it
+outlives them. A block that is made there is freed before they are used; `tests/test_house.py` lets none through.
 """
 
 from __future__ import annotations

@@ -29,7 +29,7 @@ from assembly.solve.interruption import CTRL_C, Interruption
 from assembly.solve.options import Options
 from assembly.solve.postures import postures_from
 from assembly.solve.settings import ANY_POSE, GATHER, ITERATIONS
-from assembly.solve.solution import Scene, Solution
+from assembly.solve.solution import Scene, Solution, Status
 
 if TYPE_CHECKING:
     from assembly.solve.mobility import Mobility
@@ -297,7 +297,13 @@ class Assembly:
             fits = not packed.is_crowded(state) or self._crowding >= MOST_CROWDING or isinstance(q0, Solution)
             if fits or interruption.is_over():
                 assert self._scene is not None
-                return Solution(self._scene, packed, state, interruption.status(code), spent, history, order)
+                status = interruption.status(code)
+                if status is not Status.SOLVED and self._objectives:
+                    from assembly.solve.unbounded import Asked, status_of
+
+                    asked = Asked(self.bodies, self.constraints, self._objectives)
+                    status = status_of(status, asked, packed, settings, start, state, interruption)
+                return Solution(self._scene, packed, state, status, spent, history, order)
             self._crowding *= 2
             self._packed = None
 

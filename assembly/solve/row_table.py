@@ -184,11 +184,19 @@ def gradient_at(table, pool, state, free, gradient, tips):
 
     `tips` is None where no term is a dexterity. Dexterities are left out where a contact has no pair.
     """
-    lost, count, point, loose, room = point_at(table, pool, state, free)
+    found = point_at(table, pool, state, free)
+    integers, doubles = size_of_shape(table, table[ROWS] + 4 * found[1], 6 * table[MOVING] + 4 * found[1])
+    # The blocks outlive what is carved from them: they are arguments of the kernel that carves.
+    return slopes_at(table, pool, free, found, tips, gradient, np.empty(integers, np.int64), np.empty(doubles))
+
+
+@kernel(inner=True, allocates=True)
+def slopes_at(table, pool, free, found, tips, gradient, integers, doubles):
+    """The same at a point that `point_at` found, with what it works in."""
+    lost, count, point, loose, room = found
     rows = table[ROWS] + 4 * count
     n = 6 * table[MOVING] + 4 * count
-    integers, doubles = size_of_shape(table, rows, n)
-    shape = shape_of(table, rows, n, table[:0], np.empty(integers, np.int64), np.empty(doubles))
+    shape = shape_of(table, rows, n, table[:0], integers, doubles)
     arrange(table, free, shape, rows, n)
     slopes = np.empty(n)
     curves = np.empty((n, n))

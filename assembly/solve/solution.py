@@ -35,6 +35,8 @@ __all__ = ["Iteration", "Scene", "Solution", "Status"]
 Array = NDArray[np.float64]
 # Moving bodies whose freedoms are printed: counting takes a second for some 300, and grows with the cube.
 MOST_COUNTED = 200
+# Bodies with shapes all pairs of which are looked at when a solution is printed; their number grows with the square.
+MOST_LOOKED = 40
 
 
 class Status(Enum):
@@ -47,6 +49,7 @@ class Status(Enum):
     CONTACT_LOST = "a contact has no extremal pair at the start; move the bodies or name the faces"
     TIME_LIMIT = "the time limit ended it; the pose is the last that held, if one did: raise time_limit or start nearer"
     STOPPED = "the callback ended it; the pose is the last that held, if one did"
+    UNBOUNDED = "the objective is unbounded, it falls on and on along poses that hold; bound it by a limit or a term"
 
 
 class Scene:
@@ -126,10 +129,15 @@ class Solution(ReadOnlyArrays):
         Of an INFEASIBLE solve: constraints that cannot hold together; `conflicting_sets` has the minimal sets.
     mobility : Mobility
         Degrees of freedom at `q`, free motions, redundant constraints.
+    pose_error : float
+        About how far `q` is from where all rows hold exactly, in sizes of the scene and radians.
     contacts : dict of name -> ContactPair
         Of a clearance every contact that is near, "clearance: a-b", "clearance: a-b 2" and so on.
     crossings : tuple of (name, name)
-        Bodies that cross where no constraint of the scene keeps them apart.
+        Bodies that cross elsewhere than at their contacts, but pairs that a clearance excludes and those that a joint
+        ties directly.
+    crossings_of_joined : tuple of (name, name)
+        Of the pairs that a joint ties directly those that cross.
     iterations : int
     seconds : float
         Time in the compiled loop.
@@ -329,12 +337,31 @@ class Solution(ReadOnlyArrays):
     def crossings(self) -> tuple[tuple[str, str], ...]:
         """Names of bodies that cross at `q` elsewhere than at their contacts, by a look at all pairs when it is read.
 
-        Of a scene with a `Clearance` nothing is looked at: it keeps its bodies apart, and leaves out what may overlap.
-        Bodies of a joint are not looked at either, which are one in the other as a rule. Once read, it is printed, too.
+        Pairs that a joint ties directly, one in the other as a rule, are in `crossings_of_joined`; those which a
+        clearance excludes may overlap. A body in the material of another one crosses it, too.
         """
-        from assembly.solve.crossings import crossings
+        from assembly.solve.crossings import crossing_pairs, free_pairs
 
-        return crossings(self)
+        return crossing_pairs(self, free_pairs(self._scene.bodies, self._scene.constraints))
+
+    @cached_property
+    def crossings_of_joined(self) -> tuple[tuple[str, str], ...]:
+        """The same of bodies that a joint ties directly: a pin in its bore, or links that are drawn too thick."""
+        from assembly.solve.crossings import crossing_pairs, joined_pairs
+
+        return crossing_pairs(self, joined_pairs(self._scene.bodies, self._scene.constraints))
+
+    @cached_property
+    def pose_error(self) -> float:
+        """About how far `q` is from where all rows hold exactly, by their residuals: in sizes of the scene and radians.
+
+        Residual over the smallest singular value of the active rows, and at a dead center, where that is zero, the
+        root of twice the residual over the rows' curvature: 1e-13 there is 4e-7. Free motions do not count, nor does
+        how far an objective is from its best; infinite where rows do not hold to 1e-6.
+        """
+        from assembly.solve.pose_error import pose_error
+
+        return pose_error(self._scene, self._packed, self._state)
 
     def pose(self, body: Body | str) -> Pose:
         """Pose of a body, given itself or its name."""
@@ -352,7 +379,8 @@ class Solution(ReadOnlyArrays):
         # Of a contact that was lost there are lengths alone.
         parts = {k: v / scale for k, v in self.violations.items()} if self._is_lost else self._largest(scale)
         held_off = sorted((name for name, part in parts.items() if not part <= 1e-9), key=lambda name: -parts[name])
-        if held_off and not self.success:
+        # Of what ran away rounding of its coordinates alone is violated.
+        if held_off and not self.success and self.status is not Status.UNBOUNDED:
             named = ", ".join(f"{name!r} ({self.violations[name]:.3g})" for name in held_off)
             text += f"; violated: {named}"
         if self.status is Status.INFEASIBLE:
@@ -371,6 +399,18 @@ class Solution(ReadOnlyArrays):
     def __repr__(self) -> str:
         return f"Solution({self.status.name}, feasibility={self.feasibility:.1e}, iterations={self.iterations})"
 
+    def _crossing_lines(self) -> list[str]:
+        """What `print` says of bodies that cross."""
+        shaped = sum(bool(body.faces) for body in self._scene.bodies)
+        if shaped > MOST_LOOKED and not {"crossings", "crossings_of_joined"} <= self.__dict__.keys():
+            return [f"  {shaped} bodies were not looked at for crossings; read `crossings` and `crossings_of_joined`"]
+        try:
+            apart, joined = self.crossings, self.crossings_of_joined
+        except InputError as error:
+            return [f"  crossings are not known: {error}"]
+        lines = [f"  {a} and {b} cross; asm.Clearance() keeps them apart" for a, b in apart]
+        return lines + [f"  {a} and {b} cross, which a joint ties" for a, b in joined]
+
     def __str__(self) -> str:
         lines = [
             f"{self.status.name}: {self.message}",
@@ -385,9 +425,7 @@ class Solution(ReadOnlyArrays):
                 pass
             else:
                 lines[1] += f"   {freedoms} degree{'' if freedoms == 1 else 's'} of freedom"
-        # A look takes a second where kernels and trees are not there yet; what is known is said.
-        for a, b in self.__dict__.get("crossings", ()):
-            lines.append(f"  {a} and {b} cross elsewhere; asm.Clearance() keeps them apart")
+        lines += self._crossing_lines()
         worst = sorted(self.violations.items(), key=lambda item: -item[1])[:5]
         lines += [f"  {name:<24} violation {value:.1e}" for name, value in worst]
         for body, row in zip(self._scene.bodies, self.q, strict=True):
