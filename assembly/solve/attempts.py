@@ -45,13 +45,13 @@ def attempt(packed: Packed, settings: Array, start: Callable[[], Array], interru
     """The outcome of a solve from the states that `start` makes; no other attempt is made once it is interrupted."""
     # The loop writes contacts of clearances into its table: every solve has its own, also in another thread.
     table = packed.table.copy() if packed.guards else packed.table
+    outcome = _run(packed, table, settings, start(), interruption)
+    if outcome.code == SOLVED:
+        return outcome
 
     def run(table: NDArray[np.int64], settings: Array, state: Array) -> Outcome:
         return _run(packed, table, settings, state, interruption)
 
-    outcome = run(table, settings, start())
-    if outcome.code == SOLVED:
-        return outcome
     if outcome.code == CONTACT_LOST and packed.seek_penetration():
         # Perhaps solids cross at the start.
         table[DEEPEST_AT] = packed.table[DEEPEST_AT]
@@ -84,5 +84,5 @@ def _run(
     packed: Packed, table: NDArray[np.int64], settings: Array, state: Array, interruption: Interruption
 ) -> Outcome:
     history = np.empty((min(int(settings[ITERATIONS]), MOST_HISTORY) + 1, HISTORY))
-    interruption.watch(state[packed.results_at :])
+    interruption.watched = (state, packed.results_at)
     return Outcome(solve_program(table, packed.pool, settings, state, history, packed.tips), state, history)

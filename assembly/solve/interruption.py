@@ -43,6 +43,8 @@ class Interruption:
     ----------
     reason : str or None
         ``"time limit"`` or ``"callback"`` where that ended a solve.
+    watched : tuple of array and int, optional
+        The state of the loop that runs, and where in it results begin: the loop writes there how far it is.
     """
 
     def __init__(self, time_limit: float | None = None, callback: Callback | None = None) -> None:
@@ -55,7 +57,7 @@ class Interruption:
         if callback is not None and not callable(callback):
             raise TypeError(f"callback is {callback!r}; expected a function of iteration, objective and feasibility")
         self._callback = callback
-        self._results: Array | None = None
+        self.watched: tuple[Array, int] | None = None
         self._error: BaseException | None = None
         self.reason: str | None = None
         answers = self._answers()
@@ -70,10 +72,6 @@ class Interruption:
         settings = settings.copy()
         settings[ASK_AT] = self._address
         return settings
-
-    def watch(self, results: Array) -> None:
-        """Where the loop that runs next writes how far it is."""
-        self._results = results
 
     def is_over(self) -> bool:
         """Whether no other attempt is to be made; the exception of a callback, or a signal's, is raised here."""
@@ -113,8 +111,9 @@ class Interruption:
     def _ask(self) -> int:
         if perf_counter() > self._deadline:
             self.reason = "time limit"
-        elif self._callback is not None and self._results is not None:
-            progress = self._results
+        elif self._callback is not None and self.watched is not None:
+            state, results_at = self.watched
+            progress = state[results_at:]
             if self._callback(int(progress[COUNT]), float(progress[OBJECTIVE]), float(progress[VIOLATION])):
                 self.reason = "callback"
         return int(self.reason is not None)
