@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from assembly._address import call_address
 from assembly._kernel import kernel
-from assembly.constraints.blocks import is_blocked
-from assembly.constraints.layout import CLOCK_AT, SCALE
+from assembly.constraints.layout import BLOCK_RECORD, CLOCK_AT, SCALE
 from assembly.solve.settings import ASK_AT, COUNT, OBJECTIVE, VIOLATION
 
 # Nanoseconds between two questions.
@@ -17,7 +16,7 @@ SHORT = 4
 @kernel(inline=True)
 def pause(table, pool, settings, results, asked, iteration, value, violation):
     """The time of the last question, or of the first look at the clock [ns]; and whether the solve is to end."""
-    if settings[ASK_AT] == 0.0 or (iteration < SHORT and (iteration > 0 or not is_blocked(table))):
+    if settings[ASK_AT] == 0.0 or (iteration < SHORT and (iteration > 0 or table[BLOCK_RECORD] == 0)):
         return asked, False
     now = call_address(table[CLOCK_AT], ()) if table[CLOCK_AT] != 0 else asked + SLICE
     if asked == 0 or now - asked < SLICE:
