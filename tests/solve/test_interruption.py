@@ -124,12 +124,10 @@ def test_ctrl_c_ends_solves_of_many_starts(scene, whole):
     timer.join()
 
 
-def test_solves_of_many_starts_have_one_time_limit(scene, whole):
-    begin = time.perf_counter()
-    found = scene.solve_all(starts=10**6, time_limit=1.5 * whole.seconds, **LIMIT)
-    assert len(found) >= 1 and all(solution.success for solution in found)
-    # Not timing: a million starts take days.
-    assert time.perf_counter() - begin < 1000.0
+def test_solves_of_many_starts_have_one_time_limit():
+    # A million starts take minutes; the first few take milliseconds.
+    found = long_arm(2).solve_all(starts=10**6, time_limit=0.5)
+    assert found and all(solution.success for solution in found)
 
 
 def test_other_threads_have_no_signals_and_their_own_callbacks(scene, whole):
