@@ -10,8 +10,8 @@ such pairs, far enough from one another to belong to different extrema, Newton r
 opposed outward normals (solids face each other) come first, then the smallest |gap|.
 
 Newton's method goes to any extremum, the far side of a ball as well. A pair farther apart than the samples it came from
-is not theirs: then the distance is first made smaller by direct search, which knows no curvature and passes poles and
-edges, and Newton runs from there.
+is not theirs, nor is, of coarse cells, one from which direct search, which knows no curvature and passes poles and
+edges, leads nearer: then Newton runs from where that ends.
 """
 
 from __future__ import annotations
@@ -41,6 +41,8 @@ NEAREST = 16
 ALIGNED = 8
 # Direct search: at most so many rounds, from steps of 1/32 of the domain down to 1e-5 of that.
 LEVELS = 200
+# Cells are coarse where their spheres are larger than this part of the smaller surface's extent.
+COARSE = 0.25
 # Surfaces nearer than this part of the samples' distance cross there.
 CROSSING = 1e-3
 # w as a part of the square of the smaller extent.
@@ -218,14 +220,22 @@ def global_start(table, pool, f, g, rotation, shift, size):
             best = (3.0, math.inf, np.int64(NOT_CONVERGED), start)
         status, x, _count, frame, _h = solve_pair(table, pool, f, g, rotation, shift, start, size, math.inf, 0.0, False)
         limit = score[i]
-        if not is_near(status, frame, limit):
-            start, reached = approach(table, pool, f, g, rotation, shift, start)
-            if reached <= CROSSING * min(score[i], extent):
+        near = is_near(status, frame, limit)
+        coarse = pool[o + 8] + pool[p + 8] > COARSE * extent
+        if near and coarse and status != LEFT_PATCH and frame[10] > 0.0:
+            # Samples are far apart: an extremum that is no minimum is nearer than they are, and others nearer yet.
+            start, limit = approach(table, pool, f, g, rotation, shift, x)
+            limit += 1e-12 * size
+            near = frame[10] <= limit
+        elif not near:
+            start, limit = approach(table, pool, f, g, rotation, shift, start)
+            limit += 1e-12 * size
+        if not near:
+            if limit <= CROSSING * min(score[i], extent):
                 # Every distance vanishes where the surfaces cross: nearness says nothing there.
                 crossing = True
                 break
             # The minimum is no farther than the points found.
-            limit = reached + 1e-12 * size
             upper = min(upper, limit)
             status, x, _count, frame, _h = solve_pair(
                 table, pool, f, g, rotation, shift, start, size, math.inf, 0.0, False

@@ -8,8 +8,10 @@ may be a neighboring minimum, a little farther.
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from scipy.spatial import cKDTree
 
+import assembly as asm
 from assembly.geometry import shapes
 from assembly.proximity import PairStatus, extremal_pair
 from tests.laws.scenes import random_quaternion
@@ -113,3 +115,22 @@ def test_never_a_wrong_minimum(cases):
     assert not unsolved, f"{len(unsolved)} of {pairs}: {unsolved}"
     assert all(kind == "clip" and gap < 1.05 * smallest for kind, _, gap, smallest in wrong), wrong
     assert len(wrong) <= 0.01 * pairs, f"{len(wrong)} of {pairs}: {wrong}"
+
+
+@pytest.mark.parametrize("plane_first", [False, True])
+def test_of_a_ring_above_a_large_plane_the_lowest_point_is_found(plane_first):
+    # Samples of the plane are farther apart than the ring is large: its inner side was taken for the nearest one in one
+    # of seven starts, and a contact that began there drew the ring into the plane.
+    rng = np.random.default_rng(0)
+    plane, ring = asm.shapes.plane(40.0, 40.0), asm.shapes.torus(1.0, 0.2)
+    ground = np.array([0, 0, 0, 1.0, 0, 0, 0])
+    for _ in range(100):
+        turn = rng.normal(size=4)
+        turn /= np.linalg.norm(turn)
+        axis = asm.Pose((0, 0, 0), turn).apply((0.0, 0.0, 1.0))
+        drop = np.hypot(*axis[:2]) + 0.2
+        height = drop + rng.uniform(0.0, 0.2)
+        q = np.array([*rng.uniform(-1.0, 1.0, 2), height, *turn])
+        sides = (plane, ground, ring, q) if plane_first else (ring, q, plane, ground)
+        pair = asm.proximity.extremal_pair(*sides)
+        assert abs(pair.gap - (height - drop)) < 1e-9
