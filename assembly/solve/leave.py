@@ -106,8 +106,10 @@ def settle(packed: Packed, settings: Array, outcome: Outcome, run: Run) -> Outco
             left = run(onward, outcome.state.copy())
         if left is None:
             # A saddle for certain is no solution; what rows that depend on each other say of motions may be none.
-            is_solved = stands and verdict.kind is not SecondOrder.SADDLE
-            return outcome._replace(code=SOLVED if is_solved else STALLED, order=verdict.kind)
+            if not stands:
+                return outcome
+            code = STALLED if verdict.kind is SecondOrder.SADDLE else SOLVED
+            return outcome._replace(code=code, order=verdict.kind)
         left.state[at + COUNT] += spent + 1
         outcome = left._replace(history=np.concatenate([outcome.history[: spent + 1], left.history]))
     return outcome
