@@ -42,7 +42,7 @@ KEPT = 0.5
 # Rows that hold at a kink.
 HOLDS = 1e-11
 # Ways that are tried from one saddle.
-MOST_WAYS = 6
+MOST_WAYS = 4
 
 
 class Outcome(NamedTuple):
@@ -86,8 +86,7 @@ def settle(packed: Packed, settings: Array, outcome: Outcome, run: Run) -> Outco
     """
     first = settings[PENALTY] > settings[PENALTY_FLOOR]
     onward = settings.copy()
-    # What follows begins on its rows: a soft penalty would let it fall back to where it was.
-    onward[GATHER], onward[PENALTY] = 0.0, settings[PENALTY_FLOOR]
+    onward[GATHER] = 0.0
     at = packed.results_at
     while outcome.code == UNSURE or _is_at_kink(packed, outcome):
         spent = int(outcome.state[at + COUNT])
@@ -99,7 +98,7 @@ def settle(packed: Packed, settings: Array, outcome: Outcome, run: Run) -> Outco
             onward[ITERATIONS] = settings[ITERATIONS] - spent - 1
             if onward[ITERATIONS] < 0.0:
                 return outcome._replace(code=ITERATION_LIMIT, order=SecondOrder.SADDLE)
-            left = _left(look, verdict.ways, lambda state: run(onward, state))
+            left = _left(look, verdict.ways, onward, run)
         if left is None and stands and not outcome.state[at + DUAL] <= settings[STATIONARITY]:
             # It was taken for a saddle on the way to it.
             onward[ITERATIONS], onward[SECOND_ORDER] = max(settings[ITERATIONS] - spent - 1, 0.0), REACHED
@@ -124,16 +123,21 @@ def _is_at_kink(packed: Packed, outcome: Outcome) -> bool:
     return bool(begins and np.isfinite(results[OBJECTIVE]) and not np.isfinite(results[DUAL]))
 
 
-def _left(look: Look, ways: list[Way], run: Callable[[Array], Outcome]) -> Outcome | None:
-    """Where the loop ends from lower poses along one of several ways; None where none is found."""
+def _left(look: Look, ways: list[Way], settings: Array, run: Run) -> Outcome | None:
+    """Where the loop ends from lower poses along one of several ways; None where none is found.
+
+    A soft penalty takes fewer steps, and a hard one does not fall back to where it was.
+    """
     left: Outcome | None = None
+    settings = settings.copy()
+    penalties = sorted({settings[PENALTY], settings[PENALTY_FLOOR]}, reverse=True)
     for way in ways[:MOST_WAYS]:
         lower = lower_neighbor(look, way)
-        if lower is None:
-            continue
-        outcome = run(lower.state)
-        if outcome.code not in (SOLVED, UNSURE):
-            left = left or outcome
-        elif outcome.state[look.packed.results_at + OBJECTIVE] < look.value + KEPT * lower.rise:
-            return outcome
+        for settings[PENALTY] in penalties if lower is not None else ():
+            assert lower is not None
+            outcome = run(settings, lower.state.copy())
+            if outcome.code not in (SOLVED, UNSURE):
+                left = left or outcome
+            elif outcome.state[look.packed.results_at + OBJECTIVE] < look.value + KEPT * lower.rise:
+                return outcome
     return left

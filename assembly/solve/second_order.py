@@ -25,8 +25,9 @@ from assembly.solve.rank import orthonormal
 __all__ = ["SecondOrder", "Verdict", "Way", "judge", "judge_kink"]
 
 Array = NDArray[np.float64]
-# Curvature over the largest that counts as none; where Hessians are differences.
-FLAT, DIFFERENCED = 1e-8, 1e-4
+# Curvature over the largest that counts as none; where Hessians are differences. Negative curvature of more than CLEAR
+# is there for certain: beside a pose that is singular it may be a trace of higher orders.
+FLAT, DIFFERENCED, CLEAR = 1e-8, 1e-4, 1e-5
 # How far is sampled along motions of no curvature, lengths over the size and radians; mixtures of them besides.
 SAMPLES, MIXTURES = (1e-2, 3e-2, 1e-1), 4
 # Of so many one-sided rows without a force all faces of their cone are looked at. A way breaks none by more.
@@ -104,7 +105,8 @@ def judge_look(look: Look, sample: bool) -> Verdict:
     ways = list(_downward(form, basis, cone, flat)) if values[0] < -flat else []
     if ways:
         # Where rows depend on each other a way may exist to first order only, and then leads nowhere.
-        return Verdict(SecondOrder.UNDECIDED if depends else SecondOrder.SADDLE, ways)
+        is_certain = not depends and ways[0].curvature < -CLEAR * max(1.0, float(np.abs(look.hessian).max()))
+        return Verdict(SecondOrder.SADDLE if is_certain else SecondOrder.UNDECIDED, ways)
     if values[0] < -flat and len(cone) > FACES:
         return Verdict(SecondOrder.UNDECIDED)
     zeros = vectors[:, np.abs(values) <= flat]
