@@ -8,10 +8,9 @@ import pytest
 
 import assembly as asm
 from assembly.solve import leave
-from assembly.solve.second_order import SecondOrder
 from tests.solve.lower_poses import Joint, lowest_neighbor, random_scene
 
-MINIMUM, NOT_ISOLATED, UNDECIDED = SecondOrder.MINIMUM, SecondOrder.NOT_ISOLATED, SecondOrder.UNDECIDED
+MINIMUM, NOT_ISOLATED, UNDECIDED = asm.SecondOrder.MINIMUM, asm.SecondOrder.NOT_ISOLATED, asm.SecondOrder.UNDECIDED
 
 
 def chain(count, axes=((0, 0, 1),), limits=None):
@@ -246,7 +245,7 @@ def test_a_saddle_on_a_warm_path_is_left():
 def test_steps_of_saddles_count():
     scene, _ = drawn(2, (-3.0, 0.0, 0.0))
     solution = scene.solve(max_iterations=0)
-    assert solution.status is asm.Status.ITERATION_LIMIT and solution.second_order is SecondOrder.SADDLE
+    assert solution.status is asm.Status.ITERATION_LIMIT and solution.second_order is asm.SecondOrder.SADDLE
     assert solution.iterations == 0 and len(solution.history) == 1
     for limit in (1, 3, 5):
         solution = scene.solve(max_iterations=limit)
@@ -262,7 +261,7 @@ def test_the_same_saddle_is_left_the_same_way():
 
 def test_what_is_not_asked_is_not_said():
     scene, _ = chain(2)
-    assert scene.solve().second_order is SecondOrder.NO_OBJECTIVE
+    assert scene.solve().second_order is asm.SecondOrder.NO_OBJECTIVE
     scene, goal = drawn(1, (3.0, 1.0, 0.0))
     solution = scene.solve()
     # The target that it was solved for is gone when it is asked.
