@@ -32,17 +32,17 @@ from assembly.solve.settings import (
 __all__ = ["Outcome", "settle"]
 
 Array = NDArray[np.float64]
-# The first step along a way, of a scene with clearances, and by what it grows while poses become lower; the longest.
-FIRST, SHY, GROWTH, LONGEST = 0.02, 1e-3, 3.0, 1.0
+# The first step along a way in a scene with clearances; by what steps grow while poses become lower; the longest.
+SHY, GROWTH, LONGEST = 1e-3, 3.0, 1.0
 # A step that leads to no lower pose is shortened by this, down to here; lower is what gives this part of what the
 # curvature promises.
-SHORTENED, SHORTEST, PROMISE = 0.25, 1e-4, 0.1
+SHORTENED, SHORTEST, PROMISE = 0.25, 1e-4, 0.01
 # What of the way down to a pose is not given back by the loop that goes on from there.
 KEPT = 0.5
 # Rows that hold at a kink.
 HOLDS = 1e-11
 # Ways that are tried from one saddle.
-MOST_WAYS = 4
+MOST_WAYS = 6
 
 
 class Outcome(NamedTuple):
@@ -60,7 +60,7 @@ Run = Callable[[Array, Array], Outcome]
 def lower_neighbor(look: Look, way: Way) -> Neighbor | None:
     """A pose that holds and is lower, as far along a way as they become lower; None where there is none."""
     shy = look.packed.guards > 0
-    share = SHY if shy else FIRST
+    share = min(SHY, way.share) if shy else way.share
     best: Neighbor | None = None
     while SHORTEST <= share <= LONGEST:
         there = look.neighbor(way.direction, share)
