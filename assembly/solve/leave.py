@@ -14,6 +14,7 @@ from assembly.solve.second_order import SecondOrder, Way, judge, judge_kink
 from assembly.solve.settings import (
     COUNT,
     DUAL,
+    FEASIBILITY,
     GATHER,
     ITERATION_LIMIT,
     ITERATIONS,
@@ -39,8 +40,8 @@ SHY, GROWTH, LONGEST = 1e-3, 3.0, 1.0
 SHORTENED, SHORTEST, PROMISE = 0.25, 1e-4, 0.01
 # What of the way down to a pose is not given back by the loop that goes on from there.
 KEPT = 0.5
-# Rows that hold at a kink.
-HOLDS = 1e-11
+# Rows that hold at a kink; and at an end, to what is asked for or what rounding of far coordinates may leave.
+HOLDS, MARGIN, FAR_OUT = 1e-11, 1.25, 1e-11
 # Ways that are tried from one saddle.
 MOST_WAYS = 6
 
@@ -99,7 +100,7 @@ def settle(packed: Packed, settings: Array, outcome: Outcome, run: Run) -> Outco
             if onward[ITERATIONS] < 0.0:
                 return outcome._replace(code=ITERATION_LIMIT, order=SecondOrder.SADDLE)
             left = _left(look, verdict.ways, onward, run)
-        if left is None and stands and not outcome.state[at + DUAL] <= settings[STATIONARITY]:
+        if left is None and stands and onward[SECOND_ORDER] != REACHED and not _is_at_end(packed, settings, outcome):
             # It was taken for a saddle on the way to it.
             onward[ITERATIONS], onward[SECOND_ORDER] = max(settings[ITERATIONS] - spent - 1, 0.0), REACHED
             left = run(onward, outcome.state.copy())
@@ -112,6 +113,13 @@ def settle(packed: Packed, settings: Array, outcome: Outcome, run: Run) -> Outco
         left.state[at + COUNT] += spent + 1
         outcome = left._replace(history=np.concatenate([outcome.history[: spent + 1], left.history]))
     return outcome
+
+
+def _is_at_end(packed: Packed, settings: Array, outcome: Outcome) -> bool:
+    """Whether rows hold and the Lagrangian is stationary, and not only nearly so."""
+    results = outcome.state[packed.results_at :]
+    holds = results[VIOLATION] <= max(MARGIN * settings[FEASIBILITY], FAR_OUT) * packed.scale
+    return bool(holds and results[DUAL] <= settings[STATIONARITY])
 
 
 def _is_at_kink(packed: Packed, outcome: Outcome) -> bool:
