@@ -56,6 +56,7 @@ if TYPE_CHECKING:
     from assembly.solve import reference as reference
     from assembly.solve import statics as statics
     from assembly.solve.mobility import Mobility as Mobility
+    from assembly.solve.second_order import SecondOrder as SecondOrder
     from assembly.solve.solution import Solution as Solution
     from assembly.solve.solution import Status as Status
     from assembly.solve.statics import Wrench as Wrench
@@ -108,6 +109,7 @@ else:
             "RackPinion": "assembly.constraints.couplings",
             "Revolute": "assembly.constraints.joints",
             "Screw": "assembly.constraints.joints",
+            "SecondOrder": "assembly.solve.second_order",
             "Solution": "assembly.solve.solution",
             "Spherical": "assembly.constraints.joints",
             "Status": "assembly.solve.solution",

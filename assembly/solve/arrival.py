@@ -17,8 +17,8 @@ from assembly.solve.settings import (
     TICK,
 )
 
-# A saddle is left from where the dual residual is no more: the last step toward one is of no use.
-NEAR_SADDLE = 1e-4
+# A saddle is left from where the dual residual and the violation are no more.
+NEAR_SADDLE, OFF_SADDLE = 1e-3, 1e-6
 # What a step must gain of violations that rounding of far coordinates may explain.
 GAIN = 0.5
 
@@ -41,18 +41,24 @@ def rounding_at(table, pool, settings, here):
 
 
 @kernel(inner=True)
+def leaves_saddle(table, settings, results, violation, dual):
+    """Whether a solve is near a saddle that is to be left: steps toward one gain little, and are of no use."""
+    if settings[SECOND_ORDER] != TESTED or settings[TICK] == 1.0 or table[IMPLICIT] == 1:
+        return False
+    return results[CURVED] == DOWNWARD and violation <= OFF_SADDLE and dual <= NEAR_SADDLE
+
+
+@kernel(inner=True)
 def has_arrived(program, settings, results, here, violation, last_violation, feasible, dual):
     """Whether rows hold and the Lagrangian is stationary, or all but so at a saddle that is to be left.
 
     Of a start that was far out rows held to its rounding. They are to hold to that of where bodies are now, unless
     steps gain nothing more.
     """
-    if not violation <= feasible:
-        return False
     table, pool = program[0], program[1]
-    leaves = settings[SECOND_ORDER] == TESTED and settings[TICK] == 0.0 and table[IMPLICIT] == 0
-    leaves = leaves and results[CURVED] == DOWNWARD
-    if not dual <= (max(NEAR_SADDLE, settings[STATIONARITY]) if leaves else settings[STATIONARITY]):
+    if leaves_saddle(table, settings, results, violation, dual):
+        return True
+    if not (violation <= feasible and dual <= settings[STATIONARITY]):
         return False
     gains = violation > settings[FEASIBILITY] and not violation > GAIN * last_violation
     return not gains or violation <= rounding_at(table, pool, settings, here)

@@ -25,6 +25,7 @@ from assembly._kernel import kernel
 from assembly.constraints.contact_rows import TOUCHING
 from assembly.constraints.layout import (
     CONTACTS,
+    IMPLICIT,
     MOVING,
     RESULTS,
     ROWS,
@@ -264,8 +265,8 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         # Rows of vectors depend on one another: their multipliers drift where nothing keeps them short.
         vectors = table[VECTOR_TRIMS] == 1
         shortened = iteration > 0 and (alpha < 1.0 or vectors)
-        # Which rows push is not known at a first start, nor of contacts. A tenth of the last residual is good.
-        first = iteration == 0 and mu > floor and violation <= feasible
+        # Which rows push is not known at a first start, nor of contacts, and a least move has none where all holds.
+        first = iteration == 0 and violation <= feasible and (mu > floor or table[IMPLICIT] == 1)
         touches = first or (watched and not tick and violation <= TOUCHING)
         good = max(0.0 if first else 0.1 * last_dual, settings[STATIONARITY] if touches else 0.0)
         dual = choose_multipliers(

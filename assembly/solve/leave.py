@@ -14,6 +14,7 @@ from assembly.solve.second_order import SecondOrder, Way, judge, judge_kink
 from assembly.solve.settings import (
     COUNT,
     DUAL,
+    FEASIBILITY,
     GATHER,
     ITERATION_LIMIT,
     ITERATIONS,
@@ -32,15 +33,15 @@ from assembly.solve.settings import (
 __all__ = ["Outcome", "settle"]
 
 Array = NDArray[np.float64]
-# The first step along a way, of a scene with clearances, and by what it grows while poses become lower; the longest.
-FIRST, SHY, GROWTH, LONGEST = 0.02, 1e-3, 3.0, 1.0
+# The first step along a way in a scene with clearances; by what steps grow while poses become lower; the longest.
+SHY, GROWTH, LONGEST = 1e-3, 3.0, 1.0
 # A step that leads to no lower pose is shortened by this, down to here; lower is what gives this part of what the
 # curvature promises.
-SHORTENED, SHORTEST, PROMISE = 0.25, 1e-4, 0.1
+SHORTENED, SHORTEST, PROMISE = 0.25, 1e-4, 0.01
 # What of the way down to a pose is not given back by the loop that goes on from there.
 KEPT = 0.5
-# Rows that hold at a kink.
-HOLDS = 1e-11
+# Rows that hold at a kink; and at an end, to what is asked for or what rounding of far coordinates may leave.
+HOLDS, MARGIN, FAR_OUT = 1e-11, 1.25, 1e-11
 # Ways that are tried from one saddle.
 MOST_WAYS = 6
 
@@ -60,7 +61,7 @@ Run = Callable[[Array, Array], Outcome]
 def lower_neighbor(look: Look, way: Way) -> Neighbor | None:
     """A pose that holds and is lower, as far along a way as they become lower; None where there is none."""
     shy = look.packed.guards > 0
-    share = SHY if shy else FIRST
+    share = min(SHY, way.share) if shy else way.share
     best: Neighbor | None = None
     while SHORTEST <= share <= LONGEST:
         there = look.neighbor(way.direction, share)
@@ -86,8 +87,7 @@ def settle(packed: Packed, settings: Array, outcome: Outcome, run: Run) -> Outco
     """
     first = settings[PENALTY] > settings[PENALTY_FLOOR]
     onward = settings.copy()
-    # What follows begins on its rows: a soft penalty would let it fall back to where it was.
-    onward[GATHER], onward[PENALTY] = 0.0, settings[PENALTY_FLOOR]
+    onward[GATHER] = 0.0
     at = packed.results_at
     while outcome.code == UNSURE or _is_at_kink(packed, outcome):
         spent = int(outcome.state[at + COUNT])
@@ -99,18 +99,27 @@ def settle(packed: Packed, settings: Array, outcome: Outcome, run: Run) -> Outco
             onward[ITERATIONS] = settings[ITERATIONS] - spent - 1
             if onward[ITERATIONS] < 0.0:
                 return outcome._replace(code=ITERATION_LIMIT, order=SecondOrder.SADDLE)
-            left = _left(look, verdict.ways, lambda state: run(onward, state))
-        if left is None and stands and not outcome.state[at + DUAL] <= settings[STATIONARITY]:
+            left = _left(look, verdict.ways, onward, run)
+        if left is None and stands and onward[SECOND_ORDER] != REACHED and not _is_at_end(packed, settings, outcome):
             # It was taken for a saddle on the way to it.
             onward[ITERATIONS], onward[SECOND_ORDER] = max(settings[ITERATIONS] - spent - 1, 0.0), REACHED
             left = run(onward, outcome.state.copy())
         if left is None:
             # A saddle for certain is no solution; what rows that depend on each other say of motions may be none.
-            is_solved = stands and verdict.kind is not SecondOrder.SADDLE
-            return outcome._replace(code=SOLVED if is_solved else STALLED, order=verdict.kind)
+            if not stands:
+                return outcome
+            code = STALLED if verdict.kind is SecondOrder.SADDLE else SOLVED
+            return outcome._replace(code=code, order=verdict.kind)
         left.state[at + COUNT] += spent + 1
         outcome = left._replace(history=np.concatenate([outcome.history[: spent + 1], left.history]))
     return outcome
+
+
+def _is_at_end(packed: Packed, settings: Array, outcome: Outcome) -> bool:
+    """Whether rows hold and the Lagrangian is stationary, and not only nearly so."""
+    results = outcome.state[packed.results_at :]
+    holds = results[VIOLATION] <= max(MARGIN * settings[FEASIBILITY], FAR_OUT) * packed.scale
+    return bool(holds and results[DUAL] <= settings[STATIONARITY])
 
 
 def _is_at_kink(packed: Packed, outcome: Outcome) -> bool:
@@ -122,16 +131,21 @@ def _is_at_kink(packed: Packed, outcome: Outcome) -> bool:
     return bool(begins and np.isfinite(results[OBJECTIVE]) and not np.isfinite(results[DUAL]))
 
 
-def _left(look: Look, ways: list[Way], run: Callable[[Array], Outcome]) -> Outcome | None:
-    """Where the loop ends from lower poses along one of several ways; None where none is found."""
+def _left(look: Look, ways: list[Way], settings: Array, run: Run) -> Outcome | None:
+    """Where the loop ends from lower poses along one of several ways; None where none is found.
+
+    A soft penalty takes fewer steps, and a hard one does not fall back to where it was.
+    """
     left: Outcome | None = None
+    settings = settings.copy()
+    penalties = sorted({settings[PENALTY], settings[PENALTY_FLOOR]}, reverse=True)
     for way in ways[:MOST_WAYS]:
         lower = lower_neighbor(look, way)
-        if lower is None:
-            continue
-        outcome = run(lower.state)
-        if outcome.code not in (SOLVED, UNSURE):
-            left = left or outcome
-        elif outcome.state[look.packed.results_at + OBJECTIVE] < look.value + KEPT * lower.rise:
-            return outcome
+        for settings[PENALTY] in penalties if lower is not None else ():
+            assert lower is not None
+            outcome = run(settings, lower.state.copy())
+            if outcome.code not in (SOLVED, UNSURE):
+                left = left or outcome
+            elif outcome.state[look.packed.results_at + OBJECTIVE] < look.value + KEPT * lower.rise:
+                return outcome
     return left

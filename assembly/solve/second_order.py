@@ -25,10 +25,14 @@ from assembly.solve.rank import orthonormal
 __all__ = ["SecondOrder", "Verdict", "Way", "judge", "judge_kink"]
 
 Array = NDArray[np.float64]
-# Curvature over the largest that counts as none; where Hessians are differences.
-FLAT, DIFFERENCED = 1e-8, 1e-4
+# Curvature over the largest that counts as none; where Hessians are differences. Negative curvature of more than CLEAR
+# is there for certain: beside a pose that is singular it may be a trace of higher orders.
+FLAT, DIFFERENCED, CLEAR = 1e-8, 1e-4, 1e-5
 # How far is sampled along motions of no curvature, lengths over the size and radians; mixtures of them besides.
 SAMPLES, MIXTURES = (1e-2, 3e-2, 1e-1), 4
+# By how much more than in proportion to the way it falls, from sample to sample: what rows that all but depend on each
+# other leave of it is in proportion.
+FASTER = 4.0
 # Of so many one-sided rows without a force all faces of their cone are looked at. A way breaks none by more.
 FACES, WITHIN = 8, 1e-9
 # Ways of negative curvature that are followed; what it is capped at, because kinks look steeper than anything.
@@ -59,10 +63,11 @@ class SecondOrder(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Way:
-    """A direction of length one in the unknowns, and the curvature along it; zero where lower poses were sampled."""
+    """A direction of length one in the unknowns, the curvature along it, and how far to go first."""
 
     direction: Array
-    curvature: float = 0.0
+    curvature: float
+    share: float = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,9 +107,12 @@ def judge_look(look: Look, sample: bool) -> Verdict:
     cone = look.jacobian[look.touching & ~pushing]
     cone = cone[np.linalg.norm(cone @ basis, axis=1) > DEPENDENT]
     ways = list(_downward(form, basis, cone, flat)) if values[0] < -flat else []
+    if ways and depends:
+        # A way may exist to first order only, and lead nowhere; motions that exist are found by trying.
+        ways = ways[:WAYS] + _sampled(look, _canonical(basis), cone, MIXTURES * basis.shape[1], FASTER).ways
     if ways:
-        # Where rows depend on each other a way may exist to first order only, and then leads nowhere.
-        return Verdict(SecondOrder.UNDECIDED if depends else SecondOrder.SADDLE, ways)
+        is_certain = not depends and ways[0].curvature < -CLEAR * max(1.0, float(np.abs(look.hessian).max()))
+        return Verdict(SecondOrder.SADDLE if is_certain else SecondOrder.UNDECIDED, ways)
     if values[0] < -flat and len(cone) > FACES:
         return Verdict(SecondOrder.UNDECIDED)
     zeros = vectors[:, np.abs(values) <= flat]
@@ -112,7 +120,7 @@ def judge_look(look: Look, sample: bool) -> Verdict:
         return Verdict(SecondOrder.MINIMUM)
     if not sample:
         return Verdict(SecondOrder.NOT_ISOLATED)
-    return _sampled(look, _canonical(basis @ zeros), cone)
+    return _sampled(look, _canonical(basis @ zeros), cone, MIXTURES, FASTER)
 
 
 def judge_kink(packed: Packed, state: Array) -> tuple[Verdict, Look | None]:
@@ -121,7 +129,8 @@ def judge_kink(packed: Packed, state: Array) -> tuple[Verdict, Look | None]:
     if look is None:
         return Verdict(SecondOrder.UNDECIDED), None
     basis = null_space(look.jacobian[~look.one_sided], len(look.gradient))
-    return _sampled(look, _canonical(basis), look.jacobian[look.one_sided & look.touching]), look
+    cone = look.jacobian[look.one_sided & look.touching]
+    return _sampled(look, _canonical(basis), cone, MIXTURES, 0.0), look
 
 
 def _symmetric(matrix: Array) -> Array:
@@ -238,24 +247,31 @@ def _canonical(directions: Array) -> Array:
     return orthonormal(directions.T).T
 
 
-def _sampled(look: Look, zeros: Array, cone: Array) -> Verdict:
-    """What the objective does along directions (columns) of no curvature, on both sides, and along mixtures of them."""
+def _sampled(look: Look, motions: Array, cone: Array, mixtures: int, growth: float) -> Verdict:
+    """What the objective does along motions (columns), on both sides, and along random mixtures of them.
+
+    It falls along one where it does so by more than `growth` times as much at one sample as at the one before.
+    """
     rng = np.random.default_rng(0)
-    count = zeros.shape[1]
-    mixed = rng.normal(size=(count, MIXTURES if count > 1 else 0))
-    lines = np.hstack([zeros, zeros @ (mixed / np.linalg.norm(mixed, axis=0))])
+    count = motions.shape[1]
+    mixed = rng.normal(size=(count, mixtures if count > 1 else 0))
+    lines = np.hstack([motions, motions @ (mixed / np.linalg.norm(mixed, axis=0))])
     ways: list[Way] = []
     level = True
-    for line in np.hstack([lines, -lines]).T:
+    for line in np.round(np.hstack([lines, -lines]).T, DIGITS):
         if (cone @ line < -WITHIN).any():
             continue
+        falls = [0.0]
         for share in SAMPLES:
             there = look.neighbor(line, share)
-            if there is not None and there.rise < 0.0:
-                ways.append(Way(np.round(line, DIGITS)))
-            if there is None or there.rise != 0.0:
+            if there is None or there.rise > 0.0:
                 level = False
                 break
-    if ways:
-        return Verdict(SecondOrder.SADDLE, ways)
-    return Verdict(SecondOrder.NOT_ISOLATED if level else SecondOrder.UNDECIDED)
+            falls.append(-there.rise)
+        if len(falls) > 2 and falls[-1] > growth * falls[-2]:
+            share = SAMPLES[len(falls) - 2]
+            ways.append(Way(line, -2.0 * falls[-1] / share**2, share))
+        level = level and not any(falls)
+    # A fall is followed before it is believed: rows that depend on each other are off by more than rounding of others.
+    kind = SecondOrder.NOT_ISOLATED if level else SecondOrder.UNDECIDED
+    return Verdict(kind, sorted(ways, key=lambda way: way.curvature))

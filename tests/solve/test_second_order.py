@@ -8,10 +8,9 @@ import pytest
 
 import assembly as asm
 from assembly.solve import leave
-from assembly.solve.second_order import SecondOrder
 from tests.solve.lower_poses import Joint, lowest_neighbor, random_scene
 
-MINIMUM, NOT_ISOLATED, UNDECIDED = SecondOrder.MINIMUM, SecondOrder.NOT_ISOLATED, SecondOrder.UNDECIDED
+MINIMUM, NOT_ISOLATED, UNDECIDED = asm.SecondOrder.MINIMUM, asm.SecondOrder.NOT_ISOLATED, asm.SecondOrder.UNDECIDED
 
 
 def chain(count, axes=((0, 0, 1),), limits=None):
@@ -89,9 +88,8 @@ def test_no_end_has_a_lower_pose_beside_it(seed, cases):
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 4, 6, 12])
-@pytest.mark.parametrize("axes", [((0, 0, 1),), ((0, 0, 1), (0, 1, 0))])
-def test_an_arm_that_points_away_from_its_target_turns_around(count, axes):
-    scene, _ = drawn(count, (-count - 2.0, 0.0, 0.0), axes=axes)
+def test_an_arm_that_points_away_from_its_target_turns_around(count):
+    scene, _ = drawn(count, (-count - 2.0, 0.0, 0.0))
     solution = scene.solve()
     assert solution.success and solution.objective == pytest.approx(4.0, abs=1e-9)
     assert solution.history.shape == (solution.iterations + 1, 7)
@@ -124,9 +122,10 @@ def test_a_saddle_that_a_solve_comes_to_is_left():
     assert solution.success and solution.objective < 1e-18
 
 
-@pytest.mark.parametrize(("target", "best"), [((5.0, 0, 0), 9.0), ((0.5, 0, 0), 0.0), ((-3.0, 0, 0), 1.0)])
+@pytest.mark.parametrize(("target", "best"), [((5.0, 0, 0), 9.0), ((0.5, 0, 0), 0.25), ((-3.0, 0, 0), 9.0)])
 def test_a_closed_loop_that_is_stretched_moves_the_way_that_exists(target, best):
-    # A rhomb folded onto a line: its motions to first order are more than there are, and rows depend on each other.
+    # A rhomb folded onto a line: its motions to first order are more than there are, and rows depend on each other. The
+    # end goes around the fourth joint.
     ground, a, b, c = asm.Body("ground", fixed=True), asm.Body("a"), asm.Body("b", position=(1, 0, 0)), asm.Body("c")
     scene = asm.Assembly([ground, a, b, c])
     scene.constrain(
@@ -246,7 +245,7 @@ def test_a_saddle_on_a_warm_path_is_left():
 def test_steps_of_saddles_count():
     scene, _ = drawn(2, (-3.0, 0.0, 0.0))
     solution = scene.solve(max_iterations=0)
-    assert solution.status is asm.Status.ITERATION_LIMIT and solution.second_order is SecondOrder.SADDLE
+    assert solution.status is asm.Status.ITERATION_LIMIT and solution.second_order is asm.SecondOrder.SADDLE
     assert solution.iterations == 0 and len(solution.history) == 1
     for limit in (1, 3, 5):
         solution = scene.solve(max_iterations=limit)
@@ -262,11 +261,12 @@ def test_the_same_saddle_is_left_the_same_way():
 
 def test_what_is_not_asked_is_not_said():
     scene, _ = chain(2)
-    assert scene.solve().second_order is SecondOrder.NO_OBJECTIVE
-    scene, goal = drawn(1, (3.0, 0.0, 0.0))
+    assert scene.solve().second_order is asm.SecondOrder.NO_OBJECTIVE
+    scene, goal = drawn(1, (3.0, 1.0, 0.0))
     solution = scene.solve()
     # The target that it was solved for is gone when it is asked.
     goal.target = (0.0, 3.0, 0.0)
+    assert scene.solve(solution).second_order is MINIMUM
     assert solution.success and solution.second_order is UNDECIDED
     scene, _ = drawn(1, (3.0, 0.0, 0.0))
     scene.constrain(asm.Distance(scene.bodies[0], scene.bodies[1].frame(at=(1, 0, 0)), 5.0, "far"))
