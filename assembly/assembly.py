@@ -228,16 +228,35 @@ class Assembly:
         Solution
             Check `success`; the status and the message say what happened otherwise.
         """
-        warm = isinstance(q0, Solution)
-        if options:
-            chosen = Options.of(options)
-            settings, verbose = chosen.settings(warm), chosen.verbose
-        else:
-            settings, verbose = (_WARM_SETTINGS if warm else _SETTINGS), 0
+        solution = self._from_start(q0, starts, options)
+        if not solution.success:
+            from assembly.studies.restarts import may_hold_elsewhere, restarted
+
+            if may_hold_elsewhere(solution):
+                given = q0 if isinstance(q0, Solution) else self._given(q0)
+                solution = restarted(self, solution, self._settings(options, warm=False), given)
+        if options and Options.of(options).verbose:
+            print(solution.iteration_table())
+        return solution
+
+    def _settings(self, options: dict[str, Any], warm: bool) -> Array:
+        """What the loop is told."""
+        settings = Options.of(options).settings(warm) if options else (_WARM_SETTINGS if warm else _SETTINGS)
         if not self._objectives:
             settings = settings.copy()
             settings[ANY_POSE] = 1.0
             settings[GATHER] = 0.0 if warm else 1.0
+        return settings
+
+    def _given(self, q0: ArrayLike | None) -> Array:
+        """Poses (n, 7) of a start."""
+        return self.q if q0 is None else pose_rows("q0", q0, len(self._bodies))
+
+    def _from_start(
+        self, q0: ArrayLike | Solution | None, starts: Mapping[str, ArrayLike] | None, options: dict[str, Any]
+    ) -> Solution:
+        """A solve from this start and no other one."""
+        settings = self._settings(options, isinstance(q0, Solution))
         solution = self._solved(settings, q0, starts)
         if (
             not solution.success
@@ -249,14 +268,12 @@ class Assembly:
 
             spent = solution.seconds
             begin = perf_counter()
-            q = self.q if q0 is None else pose_rows("q0", q0, len(self._bodies))
+            q = self._given(q0)
             poses = separated(self, q, options)
             # All ways are measured from where the user's bodies were, and the least one is the answer.
             ways = [solution, *(self._solved(settings, apart, starts, q) for apart in poses)]
             solution = min((way for way in ways if way.success), key=lambda way: way.objective, default=ways[-1])
             solution.seconds = spent + perf_counter() - begin
-        if verbose:
-            print(solution.iteration_table())
         return solution
 
     def _solved(
@@ -265,22 +282,24 @@ class Assembly:
         q0: ArrayLike | Solution | None,
         starts: Mapping[str, ArrayLike] | None,
         reference: Array | None = None,
+        turns: Array | None = None,
     ) -> Solution:
         """A solve from q0, with as many places for contacts of clearances as it turns out to need.
 
-        Postures are measured from q0, or from a reference (n, 7).
+        Postures are measured from q0, or from a reference (n, 7). `turns` are the values that angles are near where
+        these start on a turn of their own.
         """
         spent = 0.0
         while True:
             packed = self.packed()
-            start = partial(self._start, packed, q0, starts)
+            start = partial(self._start, packed, q0, starts, turns)
             load(packed, start)
             begin = perf_counter()
             if reference is None:
-                code, state, history, order = attempt(packed, settings, start)
+                code, state, history, order = attempt(packed, settings, start, turns)
             else:
                 with postures_from(packed, reference):
-                    code, state, history, order = attempt(packed, settings, start)
+                    code, state, history, order = attempt(packed, settings, start, turns)
             spent += perf_counter() - begin
             if not packed.is_crowded(state) or self._crowding >= MOST_CROWDING or isinstance(q0, Solution):
                 assert self._scene is not None
@@ -312,7 +331,13 @@ class Assembly:
 
         return solve_all(self, starts, seed, options)
 
-    def _start(self, packed: Packed, q0: ArrayLike | Solution | None, starts: Mapping[str, ArrayLike] | None) -> Array:
+    def _start(
+        self,
+        packed: Packed,
+        q0: ArrayLike | Solution | None,
+        starts: Mapping[str, ArrayLike] | None,
+        turns: Array | None = None,
+    ) -> Array:
         """State of the loop: configuration, contact parameters (NaN: to be found), multipliers, room for results."""
         if isinstance(q0, Solution):
             state = self._state_of("q0", packed, q0).copy()
@@ -323,6 +348,8 @@ class Assembly:
             q[:] = self.q if q0 is None else pose_rows("q0", q0, len(self._bodies))
             check_reach("a coordinate of the start", float(np.abs(q[:, :3]).max()), packed.scale)
             state[packed.contacts_at : packed.angles_at] = np.nan
+            if turns is not None:
+                state[packed.angles_at : packed.multipliers_at : TRACK] = turns
         if starts is not None:
             self._place_starts(packed, state, starts)
         packed.refresh()

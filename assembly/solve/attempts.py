@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assembly.constraints.layout import DEEPEST_AT
 from assembly.constraints.packing import Packed
+from assembly.solve.assembled import run_gathered
 from assembly.solve.augmented_lagrangian import solve_program
 from assembly.solve.leave import Outcome, settle
 from assembly.solve.options import Options
@@ -40,28 +42,37 @@ def load(packed: Packed, start: Callable[[], Array]) -> None:
         _loaded.add(packed.tips)
 
 
-def attempt(packed: Packed, settings: Array, start: Callable[[], Array]) -> Outcome:
-    """The outcome of a solve from the states that `start` makes."""
+def attempt(packed: Packed, settings: Array, start: Callable[[], Array], turns: Array | None = None) -> Outcome:
+    """The outcome of a solve from the states that `start` makes.
+
+    `turns` are the values that angles are near, where they start on a turn of their own; zeros by default.
+    """
     # The loop writes contacts of clearances into its table: every solve has its own, also in another thread.
     table = packed.table.copy() if packed.guards else packed.table
-    outcome = _run(packed, table, settings, start())
+
+    def begin(settings: Array) -> Outcome:
+        if packed.chooses_turns and settings[GATHER] > 0.0:
+            return run_gathered(packed, table, settings, start(), turns, partial(_run, packed))
+        return _run(packed, table, settings, start())
+
+    outcome = begin(settings)
     if outcome.code == SOLVED:
         return outcome
     if outcome.code == CONTACT_LOST and packed.seek_penetration():
         # Perhaps solids cross at the start.
         table[DEEPEST_AT] = packed.table[DEEPEST_AT]
-        outcome = _run(packed, table, settings, start())
+        outcome = begin(settings)
     if not _holds(outcome) and packed.trims:
         # With the coordinates of contacts as unknowns trims have exact second derivatives, except at poles.
         settings = settings.copy()
         settings[FREE_TRIMS] = 1.0
-        other = _run(packed, table, settings, start())
+        other = begin(settings)
         outcome = other if _holds(other) else outcome
     if not _holds(outcome) and settings[GATHER] == 0.0 and outcome.state[packed.results_at + SCATTER] == 1.0:
         # What the start itself did not lead to may be reached from gathered bodies.
         settings = settings.copy()
         settings[GATHER] = 1.0
-        other = _run(packed, table, settings, start())
+        other = begin(settings)
         outcome = other if _holds(other) else outcome
     return settle(packed, settings, outcome, lambda onward, state: _go_on(packed, onward, state))
 

@@ -103,6 +103,8 @@ class Solution(ReadOnlyArrays):
         hold near the start: the least move is a preference.
     objective : float
         In the user's units.
+    restarted : bool
+        Whether the constraints did not hold near the start, and the solution was found from another one.
     feasibility : float
         Largest violation of a constraint, in the user's units, evaluated at `q`. Of a contact that has no extremal pair
         there it is the distance of the points in `contacts`. Infinite only where an `Expression` or a derivative of it
@@ -153,6 +155,7 @@ class Solution(ReadOnlyArrays):
         self.status = status
         self.seconds = seconds
         self._order = order
+        self.restarted = False
         # Flat contacts alone need it again, for the center of their pressure.
         self._wishes = packed.pool[scene.wished(packed)] if scene.contacts else None
 
@@ -346,6 +349,8 @@ class Solution(ReadOnlyArrays):
         culprit = int(self._result(CULPRIT))
         if self.status is Status.CONTACT_LOST and culprit >= 0:
             return f"{self._packed.pair_name(culprit)!r}: {text}"
+        if self.restarted:
+            text += "; found from another start: near the one given constraints did not hold"
         scale = self._scene.scale
         # Of a contact that was lost there are lengths alone.
         parts = {k: v / scale for k, v in self.violations.items()} if self._is_lost else self._largest(scale)

@@ -75,7 +75,7 @@ def separated(scene: Assembly, q: Array, options: Mapping[str, Any]) -> list[Arr
                 _part(crossing, q, rows)
         helper = type(scene)(scene.bodies)
         helper.constrain(*others, *contacts)
-        solution = helper.solve(q, **options)
+        solution = helper._from_start(q, None, dict(options))
         if solution.success:
             poses = [solution.q]
             q = solution.q.copy()

@@ -1,0 +1,37 @@
+"""Other poses to start from: about a pose, and scattered ones; the same in every run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.kinematics.body import Body
+from assembly.kinematics.pose import retract
+
+__all__ = ["about", "moving_rows", "scattered"]
+
+Array = NDArray[np.float64]
+
+
+def moving_rows(bodies: Sequence[Body]) -> list[int]:
+    """The rows of poses (n, 7) that may change."""
+    return [k for k, body in enumerate(bodies) if not body.fixed]
+
+
+def about(rng: np.random.Generator, q: Array, moving: Sequence[int], size: float, reach: float) -> Array:
+    """Poses (n, 7) near others: moved by about `reach`, in parts of the scene's size and radians."""
+    moved = q.copy()
+    sizes = np.repeat([size, 1.0], 3)
+    moved[moving] = retract(q[moving], reach / np.sqrt(3.0) * sizes * rng.normal(size=(len(moving), 6)))
+    return moved
+
+
+def scattered(rng: np.random.Generator, q: Array, moving: Sequence[int], size: float) -> Array:
+    """Poses (n, 7) shifted by up to the scene's size along each axis, and turned any way."""
+    moved = q.copy()
+    moved[moving, :3] += size * rng.uniform(-1.0, 1.0, (len(moving), 3))
+    turns = rng.normal(size=(len(moving), 4))
+    moved[moving, 3:] = turns / np.linalg.norm(turns, axis=1, keepdims=True)
+    return moved
