@@ -26,9 +26,10 @@ from assembly.solve.settings import (
     UNSURE,
 )
 
-__all__ = ["attempt", "load"]
+__all__ = ["attempt", "begin", "load"]
 
 Array = NDArray[np.float64]
+Table = NDArray[np.int64]
 # Rows of history that are kept.
 MOST_HISTORY = 1000
 _LOADING = Options(max_iterations=0).settings()
@@ -50,31 +51,33 @@ def attempt(packed: Packed, settings: Array, start: Callable[[], Array], turns: 
     # The loop writes contacts of clearances into its table: every solve has its own, also in another thread.
     table = packed.table.copy() if packed.guards else packed.table
 
-    def begin(settings: Array) -> Outcome:
-        if packed.chooses_turns and settings[GATHER] > 0.0:
-            return run_gathered(packed, table, settings, start(), turns, partial(_run, packed))
-        return _run(packed, table, settings, start())
-
-    outcome = begin(settings)
+    outcome = begin(packed, table, settings, start(), turns)
     if outcome.code == SOLVED:
         return outcome
     if outcome.code == CONTACT_LOST and packed.seek_penetration():
         # Perhaps solids cross at the start.
         table[DEEPEST_AT] = packed.table[DEEPEST_AT]
-        outcome = begin(settings)
+        outcome = begin(packed, table, settings, start(), turns)
     if not _holds(outcome) and packed.trims:
         # With the coordinates of contacts as unknowns trims have exact second derivatives, except at poles.
         settings = settings.copy()
         settings[FREE_TRIMS] = 1.0
-        other = begin(settings)
+        other = begin(packed, table, settings, start(), turns)
         outcome = other if _holds(other) else outcome
     if not _holds(outcome) and settings[GATHER] == 0.0 and outcome.state[packed.results_at + SCATTER] == 1.0:
         # What the start itself did not lead to may be reached from gathered bodies.
         settings = settings.copy()
         settings[GATHER] = 1.0
-        other = begin(settings)
+        other = begin(packed, table, settings, start(), turns)
         outcome = other if _holds(other) else outcome
     return settle(packed, settings, outcome, lambda onward, state: _go_on(packed, onward, state))
+
+
+def begin(packed: Packed, table: Table, settings: Array, state: Array, turns: Array | None) -> Outcome:
+    """The outcome of the loop from a state, with turns chosen anew where bodies are gathered; see `attempt`."""
+    if packed.chooses_turns and settings[GATHER] > 0.0:
+        return run_gathered(packed, table, settings, state, turns, partial(_run, packed))
+    return _run(packed, table, settings, state)
 
 
 def _holds(outcome: Outcome) -> bool:
@@ -82,7 +85,7 @@ def _holds(outcome: Outcome) -> bool:
     return outcome.code in (SOLVED, UNSURE)
 
 
-def _run(packed: Packed, table: NDArray[np.int64], settings: Array, state: Array) -> Outcome:
+def _run(packed: Packed, table: Table, settings: Array, state: Array) -> Outcome:
     history = np.empty((min(int(settings[ITERATIONS]), MOST_HISTORY) + 1, HISTORY))
     return Outcome(solve_program(table, packed.pool, settings, state, history, packed.tips), state, history)
 

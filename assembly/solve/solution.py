@@ -360,7 +360,7 @@ class Solution(ReadOnlyArrays):
             text += f"; violated: {named}"
         if self.status is Status.INFEASIBLE:
             named = " and ".join(", ".join(map(repr, names)) for names in self.conflicting_sets)
-            text += f"; conflicting: {named or 'none, all hold from another start'}"
+            text += f"; conflicting: {named or 'none was shown to be'}"
         if self._result(IMPROPER) > 0.0:
             text += "; at a contact the surfaces cross beside the point (indefinite relative curvature)"
         return text

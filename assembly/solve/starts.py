@@ -1,8 +1,9 @@
-"""Other poses to start from: about a pose, and scattered ones; the same in every run."""
+"""Other starts than one that failed: about the pose where it ended, and scattered ones; the same in every run."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,9 +11,37 @@ from numpy.typing import NDArray
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import retract
 
-__all__ = ["about", "moving_rows", "scattered"]
+__all__ = ["Start", "about", "far_starts", "moving_rows", "near_starts", "scattered"]
 
 Array = NDArray[np.float64]
+# How far about a pose others start, in sizes of the scene and radians: it may be a saddle by symmetry.
+ABOUT = (0.0, 0.03, 0.3)
+
+
+class Start(NamedTuple):
+    """Poses (n, 7) of a start, and whether its bodies are gathered first."""
+
+    q: Array
+    gathers: bool
+
+
+def near_starts(bodies: Sequence[Body], q: Array, size: float) -> list[Start]:
+    """Poses (n, 7) themselves, which a solve has other turns from, and poses about them."""
+    rng = np.random.default_rng(0)
+    moving = moving_rows(bodies)
+    return [Start(about(rng, q, moving, size, reach), gathers=False) for reach in ABOUT]
+
+
+def far_starts(bodies: Sequence[Body], q: Array, size: float, count: int) -> Iterator[list[Start]]:
+    """Scattered starts without end, so many at a time: each is tried with its bodies gathered first, and as it is.
+
+    What the one way does not lead to the other one often does.
+    """
+    rng = np.random.default_rng(0)
+    moving = moving_rows(bodies)
+    while True:
+        poses = [scattered(rng, q, moving, size) for _ in range(count)]
+        yield [Start(pose, gathers) for pose in poses for gathers in (True, False)]
 
 
 def moving_rows(bodies: Sequence[Body]) -> list[int]:

@@ -8,8 +8,8 @@ solutions found the one with the least objective is returned. A solve that did n
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, NamedTuple
+from itertools import islice
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from assembly.proximity.solid_contact import TRACK
 from assembly.solve.rank import HELD
 from assembly.solve.settings import GATHER, ITERATIONS, VIOLATION
 from assembly.solve.solution import Solution, Status
-from assembly.solve.starts import about, moving_rows, scattered
+from assembly.solve.starts import far_starts, near_starts
 
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
@@ -26,17 +26,10 @@ if TYPE_CHECKING:
 __all__ = ["may_hold_elsewhere", "restarted"]
 
 Array = NDArray[np.float64]
-# How far about the end of a solve others start, in sizes of the scene and radians, and how many start scattered.
-ABOUT, SCATTERED = (0.0, 0.03, 0.3), 16
-# Steps of each.
+# Scattered starts of a round, and rounds.
+SCATTERED, ROUNDS = 4, 2
+# Steps of each start.
 STEPS = 100.0
-
-
-class _Start(NamedTuple):
-    """Poses (n, 7) of another start, and whether its bodies are gathered first."""
-
-    q: Array
-    gathers: bool
 
 
 def may_hold_elsewhere(solution: Solution) -> bool:
@@ -64,28 +57,19 @@ def restarted(scene: Assembly, failed: Solution, settings: Array, given: Array |
         reference, turns = given, None
     settings = settings.copy()
     settings[ITERATIONS] = min(settings[ITERATIONS], STEPS)
-    seconds = failed.seconds
-    for ways in _starts(failed):
-        found: list[Solution] = []
-        for start in ways:
+    bodies, size = failed._scene.bodies, failed._scene.scale
+    rounds = islice(far_starts(bodies, failed.q, size, SCATTERED), ROUNDS)
+    best, seconds = failed, failed.seconds
+    for starts in (near_starts(bodies, failed.q, size), *rounds):
+        ends: list[Solution] = []
+        for start in starts:
             settings[GATHER] = 1.0 if start.gathers else 0.0
-            solution = scene._solved(settings, start.q, None, reference, turns)
-            seconds += solution.seconds
-            if solution.success:
-                found.append(solution)
+            ends.append(scene._solved(settings, start.q, None, reference, turns))
+        seconds += sum(end.seconds for end in ends)
+        found = [end for end in ends if end.success]
         if found:
-            best = min(found, key=lambda way: way.objective)
+            best = min(found, key=lambda end: end.objective)
             best.restarted = True
-            failed = best
             break
-    failed.seconds = seconds
-    return failed
-
-
-def _starts(failed: Solution) -> Iterator[list[_Start]]:
-    """Starts near the end of a solve, then scattered ones."""
-    rng = np.random.default_rng(0)
-    moving = moving_rows(failed._scene.bodies)
-    size = failed._scene.scale
-    yield [_Start(about(rng, failed.q, moving, size, reach), gathers=False) for reach in ABOUT]
-    yield [_Start(scattered(rng, failed.q, moving, size), gathers=True) for _ in range(SCATTERED)]
+    best.seconds = seconds
+    return best
