@@ -16,7 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.constraints.packing import Packed
+from assembly.constraints.trim_contact import TrimContact
 from assembly.solve.jacobian import NoPairError, rows_of
+from assembly.solve.rank import HELD
 from assembly.solve.solution import Scene, Status
 from assembly.solve.starts import Start, far_starts, near_starts
 from assembly.solve.subset import Problem, Snapshot
@@ -38,16 +40,22 @@ def conflicting_sets(snapshot: Snapshot) -> list[tuple[int, ...]]:
     bodies, size = snapshot.scene.bodies, snapshot.scene.scale
     far = far_starts(bodies, snapshot.q, size, SCATTERED)
     starts = near_starts(bodies, snapshot.q, size) + next(far)
+    more = [start for _ in range(1, TIMES) for start in next(far)]
     left = list(range(len(snapshot.scene.constraints)))
     found: list[tuple[int, ...]] = []
     while left:
-        violations = _attempt(snapshot, left, starts)
+        violations = _attempt(snapshot, left, starts if found else starts + more)
         if violations is None:
             break
-        if not found and any(_attempt(snapshot, left, next(far)) is None for _ in range(1, TIMES)):
+        least = max(IDLE * violations.max(), HELD)
+        loaded = {k for k, value in zip(left, violations, strict=True) if value > least}
+        # Trims mean nothing without their contacts.
+        items = snapshot.scene.constraints
+        contacts = {item.contact.name for item in (items[k] for k in loaded) if isinstance(item, TrimContact)}
+        core = [k for k in left if k in loaded or items[k].name in contacts]
+        # What is violated and can hold was only stuck, at a pole of an angle say, and shows nothing of the others.
+        if len(core) < len(left) and _attempt(snapshot, core, starts) is None:
             break
-        loaded = [k for k, value in zip(left, violations, strict=True) if value > IDLE * violations.max()]
-        core = loaded if len(loaded) == len(left) or _attempt(snapshot, loaded, starts) is not None else left
         for k in list(core):
             without = [other for other in core if other != k]
             if without and _attempt(snapshot, without, starts) is not None:
