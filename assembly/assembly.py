@@ -236,18 +236,43 @@ class Assembly:
         Solution
             Check `success`; the status and the message say what happened otherwise.
         """
-        warm = isinstance(q0, Solution)
+        interruption = CTRL_C if time_limit is None and callback is None else Interruption(time_limit, callback)
+        solution = self._from_start(q0, starts, options, interruption)
+        if not solution.success:
+            from assembly.studies.restarts import may_hold_elsewhere, restarted
+
+            if may_hold_elsewhere(solution) and not interruption.is_over():
+                given = q0 if isinstance(q0, Solution) else self._given(q0)
+                settings = self._settings(options, interruption, warm=False)
+                solution = restarted(self, solution, settings, given, interruption)
+        if options and Options.of(options).verbose:
+            print(solution.iteration_table())
+        return solution
+
+    def _settings(self, options: dict[str, Any], interruption: Interruption, warm: bool) -> Array:
+        """What the loop is told."""
+        settings = _WARM_SETTINGS if warm else _SETTINGS
         if options:
-            chosen = Options.of(options)
-            settings, verbose = CTRL_C.fill(chosen.settings(warm)), chosen.verbose
-        else:
-            settings, verbose = (_WARM_SETTINGS if warm else _SETTINGS), 0
+            settings = CTRL_C.fill(Options.of(options).settings(warm))
         if not self._objectives:
             settings = settings.copy()
             settings[ANY_POSE] = 1.0
             settings[GATHER] = 0.0 if warm else 1.0
-        interruption = CTRL_C if time_limit is None and callback is None else Interruption(time_limit, callback)
-        settings = interruption.settings(settings)
+        return interruption.settings(settings)
+
+    def _given(self, q0: ArrayLike | None) -> Array:
+        """Poses (n, 7) of a start."""
+        return self.q if q0 is None else pose_rows("q0", q0, len(self._bodies))
+
+    def _from_start(
+        self,
+        q0: ArrayLike | Solution | None,
+        starts: Mapping[str, ArrayLike] | None,
+        options: dict[str, Any],
+        interruption: Interruption,
+    ) -> Solution:
+        """A solve from this start and no other one."""
+        settings = self._settings(options, interruption, isinstance(q0, Solution))
         solution = self._solved(settings, q0, starts, interruption)
         if (
             not solution.success
@@ -260,14 +285,12 @@ class Assembly:
 
             spent = solution.seconds
             begin = perf_counter()
-            q = self.q if q0 is None else pose_rows("q0", q0, len(self._bodies))
-            poses = separated(self, q, {**options, **interruption.rest()})
+            q = self._given(q0)
+            poses = separated(self, q, options, interruption)
             # All ways are measured from where the user's bodies were, and the least one is the answer.
             ways = [solution, *(self._solved(settings, apart, starts, interruption, q) for apart in poses)]
             solution = min((way for way in ways if way.success), key=lambda way: way.objective, default=ways[-1])
             solution.seconds = spent + perf_counter() - begin
-        if verbose:
-            print(solution.iteration_table())
         return solution
 
     def _solved(
@@ -277,22 +300,24 @@ class Assembly:
         starts: Mapping[str, ArrayLike] | None,
         interruption: Interruption,
         reference: Array | None = None,
+        turns: Array | None = None,
     ) -> Solution:
         """A solve from q0, with as many places for contacts of clearances as it turns out to need.
 
-        Postures are measured from q0, or from a reference (n, 7).
+        Postures are measured from q0, or from a reference (n, 7). `turns` are the values that angles are near where
+        these start on a turn of their own.
         """
         spent = 0.0
         while True:
             packed = self.packed()
-            start = partial(self._start, packed, q0, starts)
+            start = partial(self._start, packed, q0, starts, turns)
             load(packed, start)
             begin = perf_counter()
             if reference is None:
-                code, state, history, order = attempt(packed, settings, start, interruption)
+                code, state, history, order = attempt(packed, settings, start, interruption, turns)
             else:
                 with postures_from(packed, reference):
-                    code, state, history, order = attempt(packed, settings, start, interruption)
+                    code, state, history, order = attempt(packed, settings, start, interruption, turns)
             spent += perf_counter() - begin
             fits = not packed.is_crowded(state) or self._crowding >= MOST_CROWDING or isinstance(q0, Solution)
             if fits or interruption.is_over():
@@ -335,7 +360,13 @@ class Assembly:
 
         return solve_all(self, starts, seed, Interruption(time_limit), options)
 
-    def _start(self, packed: Packed, q0: ArrayLike | Solution | None, starts: Mapping[str, ArrayLike] | None) -> Array:
+    def _start(
+        self,
+        packed: Packed,
+        q0: ArrayLike | Solution | None,
+        starts: Mapping[str, ArrayLike] | None,
+        turns: Array | None = None,
+    ) -> Array:
         """State of the loop: configuration, contact parameters (NaN: to be found), multipliers, room for results."""
         if isinstance(q0, Solution):
             state = self._state_of("q0", packed, q0).copy()
@@ -346,6 +377,8 @@ class Assembly:
             q[:] = self.q if q0 is None else pose_rows("q0", q0, len(self._bodies))
             check_reach("a coordinate of the start", float(np.abs(q[:, :3]).max()), packed.scale)
             state[packed.contacts_at : packed.angles_at] = np.nan
+            if turns is not None:
+                state[packed.angles_at : packed.multipliers_at : TRACK] = turns
         if starts is not None:
             self._place_starts(packed, state, starts)
         packed.refresh()

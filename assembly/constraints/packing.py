@@ -80,6 +80,8 @@ class Packed:
         Whether a driven value or a limit asks for the row.
     trims : int
         Rows of trims.
+    chooses_turns : bool
+        Whether the turns of angles are told by where bodies stand once they are put together.
     pairs : (m,) int
         The contact whose pair a row is of, or -1.
     one_sided, lengths : (m,) bool
@@ -173,6 +175,7 @@ class Packed:
         self._places, self._frames = writer.places, writer.frames
         self._targets, self._turns = terms.targets, terms.turns
         self._turned = Turns(self._angles, [(equation, at) for equation, at, _ in self._values])
+        self.chooses_turns = self._turned.chosen and not self.guards
 
     def _pool_header(self) -> Array:
         pool = np.zeros(layout.POOL_HEADER)
@@ -320,6 +323,11 @@ class Packed:
             return False
         self.table[layout.DEEPEST_AT] = addresses.deepest()
         return True
+
+    @property
+    def is_implicit(self) -> bool:
+        """Whether nobody asked for the objective, which is the least move then."""
+        return bool(self.table[layout.IMPLICIT] == 1)
 
     def start_angles(self, q: Array, state: Array, warm: bool) -> None:
         """Write the turns that angles start on into a state."""

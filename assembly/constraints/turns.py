@@ -2,13 +2,17 @@
 
 A driven angle starts on the turn of its value, one that is coupled to a driven freedom on the turn that the coupling
 asks for. Other coupled angles keep, in a warm start, the turn they have; otherwise they too are on the turn of their
-coupling, where the other side is known, within its limits. What is left is looked for within its own.
+coupling, where the other side is known. What is left takes, with all that couplings move with it, the turn whose
+angles are least beyond their limits, and of several the one next to where the angle was, zero at first. An angle that
+is beyond a stop by a little is at that stop, and not a turn farther within the limits: a stop that is touched is passed
+by rounding half of the time.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from math import inf, pi
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +23,33 @@ __all__ = ["Turns"]
 
 Array = NDArray[np.float64]
 Evaluate = Callable[[Coordinate, float], float]
+# An angle beyond a stop by no more than this is at the stop.
+AT_STOP = 1e-2
+# Turns as near as each other by this, half a turn either way, are told apart by how near a stop is.
+SAME = 1e-9
+# Turns of an angle that are tried where couplings tell those of others from it, either way.
+MOST_TURNS = 8
+
+
+class _Choice(NamedTuple):
+    """A turn of an angle and what follows from it: the least one of several is taken."""
+
+    beyond: float  # how far angles are beyond their limits, none of them by a little
+    away: float  # from where the angle was
+    from_stop: float
+
+    @staticmethod
+    def sum(choices: Sequence[_Choice]) -> _Choice:
+        """That of several angles."""
+        return _Choice(*(sum(figures) for figures in zip(*choices, strict=True)))
+
+    @staticmethod
+    def best(choices: Sequence[_Choice]) -> int:
+        """The place of the best one."""
+        beyond = min(choice.beyond for choice in choices)
+        left = [k for k, choice in enumerate(choices) if choice.beyond <= beyond + SAME]
+        away = min(choices[k].away for k in left)
+        return min((k for k in left if choices[k].away <= away + SAME), key=lambda k: choices[k].from_stop)
 
 
 class Turns:
@@ -32,6 +63,7 @@ class Turns:
     """
 
     def __init__(self, angles: Sequence[Coordinate], equations: Sequence[tuple[Equation, int]]) -> None:
+        self._angles = list(angles)
         self._places = {angle: k for k, angle in enumerate(angles)}
         self._drives: list[int | None] = [None] * len(angles)
         self._limits: dict[Coordinate, list[Equation]] = {}
@@ -66,39 +98,74 @@ class Turns:
         """Whether an angle is on a turn that another one tells."""
         return bool(self._couplings)
 
+    @property
+    def chosen(self) -> bool:
+        """Whether the turn of an angle is told by its limits, or a coupling, and where bodies stand."""
+        return bool(self._couplings) or any(angle in self._limits for angle in self._angles)
+
     def follow_drives(self, pool: Array, near: Array) -> None:
         """Driven angles near their values; all there is to do in a warm start without couplings."""
         for k, drive in self._driven:
             near[k] = pool[drive]
 
     def start(self, pool: Array, near: Array, warm: bool, evaluate: Evaluate) -> None:
-        """Write where each angle is looked for into `near`, which has the values found last of a warm start.
+        """Write where each angle is looked for into `near`, which has the values found last, zeros at first.
 
         `evaluate` gives the value of a coordinate at the start, an angle nearest to a number.
         """
-        known, angles = [True] * len(near), list(self._places)
+        known = [True] * len(near)
         for k, drive in enumerate(self._drives):
             if drive is not None:
                 near[k] = pool[drive]
             elif not warm or self._led[k]:
-                known[k] = not self._coupled[k]
-                near[k] = self._within_limits(angles[k]) if not warm else near[k]
+                known[k] = False
+        self._follow_all(near, known, evaluate)
         while not all(known):
-            if not any(self._follow(equation, near, known, evaluate) for equation in self._couplings):
-                # Nothing tells: it is where its limits are.
-                known[known.index(False)] = True
+            unknown = [k for k, told in enumerate(known) if not told]
+            # Of angles that are coupled one with limits tells more.
+            root = next((k for k in unknown if self._angles[k] in self._limits), unknown[0])
+            self._choose(root, near, known, evaluate)
 
     def _range(self, coordinate: Coordinate) -> tuple[float, float]:
         limits = self._limits.get(coordinate, [])
         lower = max((e.current() for e in limits if e.terms[0][0] > 0.0), default=-inf)
         return lower, min((-e.current() for e in limits if e.terms[0][0] < 0.0), default=inf)
 
-    def _within_limits(self, angle: Coordinate) -> float:
+    def _choose(self, root: int, near: Array, known: list[bool], evaluate: Evaluate) -> None:
+        """Find the turn of an angle, and of all that couplings move with it, by their limits."""
+        angle = self._angles[root]
+        known[root] = True
+        if angle not in self._limits:
+            # No angle that is coupled to it and not known has limits either.
+            self._follow_all(near, known, evaluate)
+            return
+        value = evaluate(angle, float(near[root]))
         lower, upper = self._range(angle)
-        if upper - lower < 2.0 * pi:
-            return 0.5 * (lower + upper)
-        # Angles are found within pi of this: all of them are within the limits.
-        return min(max(0.0, lower + pi), upper - pi)
+        first = round((min(max(value, lower), upper) - value) / (2.0 * pi))
+        reach = MOST_TURNS if self._coupled[root] else 1
+        ways: list[tuple[Array, list[bool]]] = []
+        choices: list[_Choice] = []
+        for turn in range(first - reach, first + reach + 1):
+            way, told = near.copy(), known.copy()
+            way[root] = value + 2.0 * pi * turn
+            self._follow_all(way, told, evaluate)
+            moved = [root, *(k for k, now in enumerate(told) if now and not known[k])]
+            ways.append((way, told))
+            choices.append(_Choice.sum([self._choice(k, float(way[k]), float(near[k]), evaluate) for k in moved]))
+        near[:], known[:] = ways[_Choice.best(choices)]
+
+    def _choice(self, k: int, near: float, before: float, evaluate: Evaluate) -> _Choice:
+        """What an angle near a value is, which was at another one before."""
+        value = evaluate(self._angles[k], near)
+        lower, upper = self._range(self._angles[k])
+        beyond = max(lower - value, value - upper, 0.0)
+        from_stop = min(abs(lower - value), abs(upper - value))
+        return _Choice(beyond if beyond > AT_STOP else 0.0, abs(value - before), from_stop)
+
+    def _follow_all(self, near: Array, known: list[bool], evaluate: Evaluate) -> None:
+        """Find the turns of all angles that couplings tell from what is known."""
+        while not all(known) and any(self._follow(equation, near, known, evaluate) for equation in self._couplings):
+            pass
 
     def _follow(self, equation: Equation, near: Array, known: list[bool], evaluate: Evaluate) -> bool:
         """Find the turn of one side of a coupling from the other; whether there was one to find."""

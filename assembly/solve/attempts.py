@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assembly.constraints.layout import DEEPEST_AT
 from assembly.constraints.packing import Packed
+from assembly.solve.assembled import run_gathered
 from assembly.solve.augmented_lagrangian import solve_program
 from assembly.solve.interruption import Interruption
 from assembly.solve.leave import Outcome, settle
@@ -25,9 +27,10 @@ from assembly.solve.settings import (
     UNSURE,
 )
 
-__all__ = ["attempt", "load"]
+__all__ = ["attempt", "begin", "load"]
 
 Array = NDArray[np.float64]
+Table = NDArray[np.int64]
 # Rows of history that are kept.
 MOST_HISTORY = 1000
 _LOADING = Options(max_iterations=0).settings()
@@ -41,38 +44,57 @@ def load(packed: Packed, start: Callable[[], Array]) -> None:
         _loaded.add(packed.tips)
 
 
-def attempt(packed: Packed, settings: Array, start: Callable[[], Array], interruption: Interruption) -> Outcome:
-    """The outcome of a solve from the states that `start` makes; no other attempt is made once it is interrupted."""
+def attempt(
+    packed: Packed,
+    settings: Array,
+    start: Callable[[], Array],
+    interruption: Interruption,
+    turns: Array | None = None,
+) -> Outcome:
+    """The outcome of a solve from the states that `start` makes; no other attempt is made once it is interrupted.
+
+    `turns` are the values that angles are near, where they start on a turn of their own; zeros by default.
+    """
     # The loop writes contacts of clearances into its table: every solve has its own, also in another thread.
     table = packed.table.copy() if packed.guards else packed.table
-    outcome = _run(packed, table, settings, start(), interruption)
+    outcome = begin(packed, interruption, table, settings, start(), turns)
     if outcome.code == SOLVED:
         return outcome
 
-    def run(table: NDArray[np.int64], settings: Array, state: Array) -> Outcome:
-        return _run(packed, table, settings, state, interruption)
+    def again(settings: Array) -> Outcome:
+        return begin(packed, interruption, table, settings, start(), turns)
 
     if outcome.code == CONTACT_LOST and packed.seek_penetration():
         # Perhaps solids cross at the start.
         table[DEEPEST_AT] = packed.table[DEEPEST_AT]
-        outcome = run(table, settings, start())
+        outcome = again(settings)
     if packed.trims and not _holds(outcome) and not interruption.is_over():
         # With the coordinates of contacts as unknowns trims have exact second derivatives, except at poles.
         settings = settings.copy()
         settings[FREE_TRIMS] = 1.0
-        other = run(table, settings, start())
+        other = again(settings)
         outcome = other if _holds(other) else outcome
     is_scattered = settings[GATHER] == 0.0 and outcome.state[packed.results_at + SCATTER] == 1.0
     if is_scattered and not _holds(outcome) and not interruption.is_over():
         # What the start itself did not lead to may be reached from gathered bodies.
         settings = settings.copy()
         settings[GATHER] = 1.0
-        other = run(table, settings, start())
+        other = again(settings)
         outcome = other if _holds(other) else outcome
     if interruption.is_over():
         return outcome
     # Postures are measured from where they were.
-    return settle(packed, settings, outcome, lambda onward, state: run(following_none(packed), onward, state))
+    follows = following_none(packed)
+    return settle(packed, settings, outcome, lambda onward, state: _run(packed, interruption, follows, onward, state))
+
+
+def begin(
+    packed: Packed, interruption: Interruption, table: Table, settings: Array, state: Array, turns: Array | None
+) -> Outcome:
+    """The outcome of the loop from a state, with turns chosen anew where bodies are gathered; see `attempt`."""
+    if packed.chooses_turns and settings[GATHER] > 0.0:
+        return run_gathered(packed, table, settings, state, turns, partial(_run, packed, interruption))
+    return _run(packed, interruption, table, settings, state)
 
 
 def _holds(outcome: Outcome) -> bool:
@@ -80,9 +102,7 @@ def _holds(outcome: Outcome) -> bool:
     return outcome.code in (SOLVED, UNSURE)
 
 
-def _run(
-    packed: Packed, table: NDArray[np.int64], settings: Array, state: Array, interruption: Interruption
-) -> Outcome:
+def _run(packed: Packed, interruption: Interruption, table: Table, settings: Array, state: Array) -> Outcome:
     history = np.empty((min(int(settings[ITERATIONS]), MOST_HISTORY) + 1, HISTORY))
     interruption.watched = (state, packed.results_at)
     return Outcome(solve_program(table, packed.pool, settings, state, history, packed.tips), state, history)

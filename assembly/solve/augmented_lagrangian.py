@@ -201,7 +201,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
     looked_at = -1
     begun = 0
     # Whether other contacts are near than rows are placed for.
-    changed = watched and settings[GATHER] == 1.0 and results[SCATTER] == 1.0
+    changed = watched and settings[GATHER] > 0.0 and results[SCATTER] == 1.0
     # Whether it is known which parts of allowances are used here.
     measured = True
     while True:

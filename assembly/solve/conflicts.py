@@ -4,20 +4,23 @@ Where the sum of squared violations is stationary, J^T c = 0: violations carry o
 zero carry nothing. What is violated there is a contradictory set already. Its members are left out one by one: what
 stays contradictory without one does not need it (a deletion filter: Chinneck & Dravnieks, Locating minimal infeasible
 constraint sets in linear programs, 1991). Whether a set can hold is asked of the solver, from the pose, from poses
-about it and from scattered ones; so a set is contradictory, and minimal, as far as the solver sees.
+about it and from scattered ones; so a set is contradictory, and minimal, as far as the solver sees. Where a solve came
+near to holding all without an end, that was not seen.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assembly.constraints.packing import Packed
-from assembly.kinematics.pose import retract
+from assembly.constraints.trim_contact import TrimContact
 from assembly.solve.jacobian import NoPairError, rows_of
-from assembly.solve.solution import Scene
+from assembly.solve.rank import HELD
+from assembly.solve.solution import Scene, Status
+from assembly.solve.starts import Start, far_starts, near_starts
 from assembly.solve.subset import Problem, Snapshot
 
 __all__ = ["conflicting_sets", "conflicts_at"]
@@ -25,22 +28,34 @@ __all__ = ["conflicting_sets", "conflicts_at"]
 Array = NDArray[np.float64]
 # A violation below this part of the largest carries nothing.
 IDLE = 1e-6
-# How far about the pose starts are, in sizes of the scene and radians, since it may be a saddle by symmetry; and how
-# many scattered ones there are, since it may be stuck.
-ABOUT, SCATTERED = (0.0, 0.03, 0.3), 8
+# Scattered starts besides those about the pose, which may be stuck, and how many times as many where all constraints
+# are asked for: none is named where these hold from somewhere.
+SCATTERED, TIMES = 4, 4
+# What came to less than this part of a least violation, and to no end, may come to nothing.
+ENDED = 0.01
 
 
 def conflicting_sets(snapshot: Snapshot) -> list[tuple[int, ...]]:
     """Disjoint minimal sets of constraints that cannot hold together, by their places; [] where all can."""
-    starts = list(_starts(snapshot))
+    bodies, size = snapshot.scene.bodies, snapshot.scene.scale
+    far = far_starts(bodies, snapshot.q, size, SCATTERED)
+    starts = near_starts(bodies, snapshot.q, size) + next(far)
+    more = [start for _ in range(1, TIMES) for start in next(far)]
     left = list(range(len(snapshot.scene.constraints)))
     found: list[tuple[int, ...]] = []
     while left:
-        violations = _attempt(snapshot, left, starts)
+        violations = _attempt(snapshot, left, starts if found else starts + more)
         if violations is None:
             break
-        loaded = [k for k, value in zip(left, violations, strict=True) if value > IDLE * violations.max()]
-        core = loaded if _attempt(snapshot, loaded, starts) is not None else left
+        least = max(IDLE * violations.max(), HELD)
+        loaded = {k for k, value in zip(left, violations, strict=True) if value > least}
+        # Trims mean nothing without their contacts.
+        items = snapshot.scene.constraints
+        contacts = {item.contact.name for item in (items[k] for k in loaded) if isinstance(item, TrimContact)}
+        core = [k for k in left if k in loaded or items[k].name in contacts]
+        # What is violated and can hold was only stuck, at a pole of an angle say, and shows nothing of the others.
+        if len(core) < len(left) and _attempt(snapshot, core, starts) is None:
+            break
         for k in list(core):
             without = [other for other in core if other != k]
             if without and _attempt(snapshot, without, starts) is not None:
@@ -61,38 +76,29 @@ def conflicts_at(scene: Scene, packed: Packed, state: Array) -> list[tuple[str, 
     return [tuple(scene.constraints[k].name for k in places) for places in sorted(found)]
 
 
-def _attempt(snapshot: Snapshot, which: Sequence[int], starts: Sequence[Array]) -> Array | None:
-    """Least violations of some constraints, from the start where they were least; None if they can hold."""
+def _attempt(snapshot: Snapshot, which: Sequence[int], starts: Sequence[Start]) -> Array | None:
+    """Least violations of some constraints, from the start where they were least; None if they may hold.
+
+    They may where a solve that found no end came nearer to it than all that ended at a least violation.
+    """
     problem = snapshot.problem(which)
     best: Array | None = None
-    for q in starts:
-        solution = problem.solve(q)
+    ended = unended = np.inf
+    for start in starts:
+        solution = problem.solve(start.q, gathers=start.gathers)
         if problem.holds(solution):
             return None
         violations = _of_places(problem, problem.violations(solution), snapshot, which)
+        if solution.status is Status.INFEASIBLE:
+            ended = min(ended, violations.max())
+        else:
+            unended = min(unended, violations.max())
         if best is None or violations.max() < best.max():
             best = violations
-    return best
+    return None if unended < ENDED * ended else best
 
 
 def _of_places(problem: Problem, violations: Array, snapshot: Snapshot, which: Sequence[int]) -> Array:
     """Violations of the constraints asked for; of those without rows 0."""
     named = dict(zip((item.name for item in problem.constraints), violations, strict=True))
     return np.array([named.get(snapshot.scene.constraints[k].name, 0.0) for k in which])
-
-
-def _starts(snapshot: Snapshot) -> Iterator[Array]:
-    """Poses to try, the pose itself first; the same in every run."""
-    rng = np.random.default_rng(0)
-    moving = [k for k, body in enumerate(snapshot.scene.bodies) if not body.fixed]
-    sizes = np.repeat([snapshot.scene.scale, 1.0], 3)
-    for reach in ABOUT:
-        q = snapshot.q.copy()
-        q[moving] = retract(q[moving], reach / np.sqrt(3.0) * sizes * rng.normal(size=(len(moving), 6)))
-        yield q
-    for _ in range(SCATTERED):
-        q = snapshot.q.copy()
-        q[moving, :3] += snapshot.scene.scale * rng.uniform(-1.0, 1.0, (len(moving), 3))
-        turns = rng.normal(size=(len(moving), 4))
-        q[moving, 3:] = turns / np.linalg.norm(turns, axis=1, keepdims=True)
-        yield q

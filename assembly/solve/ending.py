@@ -80,7 +80,7 @@ def finish(program, settings, state, tips, here, trial, by_row, at_end, held, nu
     if holds and ((tick and not violation <= feasible and results[CARRIED] == 0.0) or crosses):
         return_to(table, pool, held, numbers, loose, rows, here, y, better_y, tick)
         results[HELD] = 1.0
-    gathered = table[IMPLICIT] == 1 and settings[GATHER] == 1.0 and results[SCATTER] == 1.0
+    gathered = table[IMPLICIT] == 1 and settings[GATHER] > 0.0 and results[SCATTER] == 1.0
     if gathered:
         # The way from where bodies were gathered was as short as could be; it is measured from where they were given.
         scaled_poses(table, pool, state, trial[0])

@@ -10,7 +10,6 @@ import ctypes
 import threading
 from collections.abc import Callable, Iterator
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +24,6 @@ __all__ = ["CTRL_C", "Interruption"]
 Array = NDArray[np.float64]
 Callback = Callable[[int, float, float], object]
 STATUSES = tuple(Status)
-# A time limit that has passed.
-SOONEST = 1e-9
 
 
 class Interruption:
@@ -81,15 +78,6 @@ class Interruption:
         if self.reason is None and perf_counter() > self._deadline:
             self.reason = "time limit"
         return self.reason is not None
-
-    def rest(self) -> dict[str, Any]:
-        """Options of another solve that ends where this one would."""
-        rest: dict[str, Any] = {}
-        if np.isfinite(self._deadline):
-            rest["time_limit"] = max(self._deadline - perf_counter(), SOONEST)
-        if self._callback is not None:
-            rest["callback"] = self._callback
-        return rest
 
     def status(self, code: int) -> Status:
         """The status of a solve by the loop's code."""

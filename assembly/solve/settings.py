@@ -6,6 +6,8 @@ from __future__ import annotations
 SOLVED, INFEASIBLE, STALLED, ITERATION_LIMIT, CONTACT_LOST, OUT_OF_TIME, RUNNING = 0, 1, 2, 3, 4, 5, 6
 # SOLVED by first derivatives, but no factorization told that no curvature is negative (`inertia.py`).
 UNSURE = 100
+# Scattered bodies were gathered, and turns are to be chosen where they are now.
+GATHERED = 101
 # Settings, in scaled lengths.
 FEASIBILITY, STATIONARITY, ITERATIONS, PENALTY, PENALTY_FLOOR, RADIUS, GATHER, FREE_TRIMS = 0, 1, 2, 3, 4, 5, 6, 7
 # Whether all that moved is looked at once more before a pose counts as solved. Of a tick: whether it is one, which ends
@@ -18,6 +20,8 @@ LAST_LOOK, TICK, BUDGET, SECOND_ORDER, RECALL, ANY_POSE, CARRIES = 8, 9, 10, 11,
 ASK_AT, SETTINGS = 15, 16
 # Whether the end is tested for a minimum (TESTED: and saddles are left before they are reached to the last digit).
 TESTED, REACHED = 1.0, 2.0
+# Whether scattered bodies are gathered (ASSEMBLES: and the loop ends there).
+GATHERS, ASSEMBLES = 1.0, 2.0
 # Results at the end of the state.
 STATUS, COUNT, OBJECTIVE, VIOLATION, DUAL, CULPRIT, IMPROPER, SCATTER = 0, 1, 2, 3, 4, 5, 6, 7
 # Of a tick: whether it ended at a pose that held before; whether its end is a minimum (0: not tested, 1; -1: no), and

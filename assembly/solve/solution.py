@@ -108,6 +108,8 @@ class Solution(ReadOnlyArrays):
         hold near the start: the least move is a preference.
     objective : float
         In the user's units.
+    restarted : bool
+        Whether the constraints did not hold near the start, and the solution was found from another one.
     feasibility : float
         Largest violation of a constraint, in the user's units, evaluated at `q`. Of a contact that has no extremal pair
         there it is the distance of the points in `contacts`. Infinite only where an `Expression` or a derivative of it
@@ -163,6 +165,7 @@ class Solution(ReadOnlyArrays):
         self.status = status
         self.seconds = seconds
         self._order = order
+        self.restarted = False
         # Flat contacts alone need it again, for the center of their pressure.
         self._wishes = packed.pool[scene.wished(packed)] if scene.contacts else None
 
@@ -375,6 +378,8 @@ class Solution(ReadOnlyArrays):
         culprit = int(self._result(CULPRIT))
         if self.status is Status.CONTACT_LOST and culprit >= 0:
             return f"{self._packed.pair_name(culprit)!r}: {text}"
+        if self.restarted:
+            text += "; found from another start: near the one given constraints did not hold"
         scale = self._scene.scale
         # Of a contact that was lost there are lengths alone.
         parts = {k: v / scale for k, v in self.violations.items()} if self._is_lost else self._largest(scale)
@@ -385,7 +390,7 @@ class Solution(ReadOnlyArrays):
             text += f"; violated: {named}"
         if self.status is Status.INFEASIBLE:
             named = " and ".join(", ".join(map(repr, names)) for names in self.conflicting_sets)
-            text += f"; conflicting: {named or 'none, all hold from another start'}"
+            text += f"; conflicting: {named or 'none was shown to be'}"
         if self._result(IMPROPER) > 0.0:
             text += "; at a contact the surfaces cross beside the point (indefinite relative curvature)"
         return text

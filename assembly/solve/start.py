@@ -30,11 +30,13 @@ from assembly.solve.recall import recall
 from assembly.solve.room import results_of, unknowns
 from assembly.solve.rows import arrange
 from assembly.solve.settings import (
+    ASSEMBLES,
     CONTACT_LOST,
     CULPRIT,
     CURVED,
     FREE_TRIMS,
     GATHER,
+    GATHERED,
     HELD,
     RECALL,
     RUNNING,
@@ -127,7 +129,8 @@ def put_together(program, here, by_row):
 def set_out(program, settings, state, here, by_row, n):
     """Find contacts, evaluate rows, gather what is scattered where the settings ask for it.
 
-    Returns CONTACT_LOST or RUNNING, the contact that is lost or -1, and whether that one is at a fold, to be freed.
+    Returns CONTACT_LOST, GATHERED or RUNNING, the contact that is lost or -1, and whether that one is at a fold, to be
+    freed.
     """
     table, _pool, shape, _loose, _room = program
     results = results_of(table, state)
@@ -141,10 +144,11 @@ def set_out(program, settings, state, here, by_row, n):
     folded = lost >= 0 and evaluated and tick and is_of_surfaces(table, lost)
     status = CONTACT_LOST if lost >= 0 and not folded else RUNNING
     results[SCATTER] = 1.0 if status == RUNNING and scattered(table, here[3], shape[1]) else 0.0
-    if settings[GATHER] == 1.0 and results[SCATTER] == 1.0:
+    if settings[GATHER] > 0.0 and results[SCATTER] == 1.0:
         lost = put_together(program, here, by_row)
         folded = False
-        status = CONTACT_LOST if lost >= 0 else RUNNING
+        status = GATHERED if settings[GATHER] == ASSEMBLES else RUNNING
+        status = CONTACT_LOST if lost >= 0 else status
     if status == CONTACT_LOST:
         results[CULPRIT] = float(lost)
     return status, np.int64(lost if folded else -1), folded

@@ -19,11 +19,12 @@ from assembly.constraints.expression import Expression
 from assembly.constraints.packing import Packed, pack
 from assembly.constraints.trim_contact import TrimContact
 from assembly.proximity.solid_contact import TRACK
-from assembly.solve.augmented_lagrangian import solve_program
+from assembly.solve.attempts import begin
+from assembly.solve.interruption import CTRL_C
 from assembly.solve.jacobian import Rows
 from assembly.solve.options import Options
 from assembly.solve.rank import HELD
-from assembly.solve.settings import HISTORY
+from assembly.solve.settings import ANY_POSE, GATHER
 from assembly.solve.solution import Scene, Solution, Status
 
 __all__ = ["Problem", "Snapshot"]
@@ -93,14 +94,21 @@ class Problem:
                 tracked[k] = self._near[contact.name]
             for k, angle in enumerate(packed._angles):
                 tracked[packed.pair_rows + k] = self._near[id(angle)]
+            packed.start_angles(q, state, warm=False)
         return state
 
-    def solve(self, q: Array, after: Solution | None = None) -> Solution:
-        """The nearest poses that hold the constraints, from poses (n, 7); tracked values go on from a solution's."""
+    def solve(self, q: Array, after: Solution | None = None, gathers: bool = False) -> Solution:
+        """The nearest poses that hold the constraints, from poses (n, 7); tracked values go on from a solution's.
+
+        Or any poses that hold them, from where scattered bodies were gathered.
+        """
         packed = self.packed
-        state = self.start(q, after)
-        history = np.empty((1, HISTORY))
-        code = solve_program(packed.table, packed.pool, Options().settings(), state, history, packed.tips)
+        settings = CTRL_C.settings(CTRL_C.fill(Options().settings()))
+        if gathers:
+            settings[GATHER] = settings[ANY_POSE] = 1.0
+        turns = np.array([self._near[id(angle)][0] for angle in packed._angles])
+        code, state, history, _order = begin(packed, CTRL_C, packed.table, settings, self.start(q, after), turns)
+        CTRL_C.is_over()  # raises what ended it
         return Solution(self._scene, packed, state, _STATUSES[code], 0.0, history)
 
     def violations(self, solution: Solution) -> Array:

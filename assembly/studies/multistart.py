@@ -12,6 +12,7 @@ from assembly.errors import integer
 from assembly.solve.interruption import Interruption
 from assembly.solve.postures import postures_from
 from assembly.solve.solution import Solution
+from assembly.solve.starts import moving_rows, scattered
 
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
@@ -30,16 +31,12 @@ def solve_all(
     count = integer("starts", starts, 1, 10**6)
     rng = np.random.default_rng(integer("seed", seed, 0, 2**63 - 1))
     packed = scene.packed()
-    moving = [k for k, body in enumerate(scene.bodies) if not body.fixed]
+    moving = moving_rows(scene.bodies)
     found: list[Solution] = []
     with postures_from(packed, scene.q):
         for start in range(count):
-            q = scene.q.copy()
-            if start > 0:
-                q[moving, :3] += packed.scale * rng.uniform(-1.0, 1.0, (len(moving), 3))
-                turns = rng.normal(size=(len(moving), 4))
-                q[moving, 3:] = turns / np.linalg.norm(turns, axis=1, keepdims=True)
-            solution = scene.solve(q, **interruption.rest(), **options)
+            q = scene.q if start == 0 else scattered(rng, scene.q, moving, packed.scale)
+            solution = scene._from_start(q, None, dict(options), interruption)
             if solution.success and not any(_is_same(solution.q, other.q, packed.scale) for other in found):
                 found.append(solution)
             if interruption.is_over():

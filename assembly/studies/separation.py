@@ -21,6 +21,7 @@ from assembly.kinematics.body import Body
 from assembly.kinematics.pose import rotate
 from assembly.proximity.features import FeaturePair, FeatureStatus, closest_features
 from assembly.proximity.solid import solid_of
+from assembly.solve.interruption import Interruption
 
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
@@ -46,7 +47,7 @@ class _Crossing:
     nested: bool
 
 
-def separated(scene: Assembly, q: Array, options: Mapping[str, Any]) -> list[Array]:
+def separated(scene: Assembly, q: Array, options: Mapping[str, Any], interruption: Interruption) -> list[Array]:
     """Where bodies that clearances keep apart touch and do not cross, near q, and a little farther apart; (n, 7) each.
 
     All other constraints hold there, if that could be had. None where no bodies cross at q, and where the way apart is
@@ -60,7 +61,7 @@ def separated(scene: Assembly, q: Array, options: Mapping[str, Any]) -> list[Arr
     poses: list[Array] = []
     for _ in range(ROUNDS):
         found = [crossing for a, b in guarded if (crossing := _crossing(a, b, q, rows)) is not None]
-        if not found:
+        if not found or interruption.is_over():
             return poses
         before, q = q, q.copy()
         for crossing in found:
@@ -75,7 +76,7 @@ def separated(scene: Assembly, q: Array, options: Mapping[str, Any]) -> list[Arr
                 _part(crossing, q, rows)
         helper = type(scene)(scene.bodies)
         helper.constrain(*others, *contacts)
-        solution = helper.solve(q, **options)
+        solution = helper._from_start(q, None, dict(options), interruption)
         if solution.success:
             poses = [solution.q]
             q = solution.q.copy()

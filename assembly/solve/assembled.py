@@ -1,0 +1,54 @@
+"""Turns chosen where scattered bodies were put together, and the loop from there.
+
+Poses do not tell how often a body has turned, and turns are chosen for the poses a loop begins at (`Turns`). Those of
+scattered bodies say nothing: a body that gathering turns by half a turn would be on a turn that its limits, or other
+angles around a loop, contradict, and no step of a loop changes that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.constraints.packing import Packed
+from assembly.proximity.solid_contact import TRACK
+from assembly.solve.leave import Outcome
+from assembly.solve.postures import following_none, postures_from
+from assembly.solve.settings import ASSEMBLES, GATHER, GATHERED, ITERATIONS, OBJECTIVE
+
+__all__ = ["run_gathered"]
+
+Array = NDArray[np.float64]
+Table = NDArray[np.int64]
+Run = Callable[[Table, Array, Array], Outcome]
+
+
+def run_gathered(packed: Packed, table: Table, settings: Array, state: Array, turns: Array | None, run: Run) -> Outcome:
+    """The outcome of the loop from a state, by way of gathered bodies if they are scattered.
+
+    `turns` are the values that angles are near, zeros by default; `run` is the loop on a table, with settings, from a
+    state.
+    """
+    given = state[: packed.contacts_at].reshape(-1, 7).copy()
+    assembles = settings.copy()
+    assembles[GATHER] = ASSEMBLES
+    outcome = run(table, assembles, state)
+    if outcome.code != GATHERED:
+        return outcome
+    state = outcome.state
+    state[packed.angles_at : packed.multipliers_at : TRACK] = 0.0 if turns is None else turns
+    packed.start_angles(state[: packed.contacts_at].reshape(-1, 7), state, warm=False)
+    onward = settings.copy()
+    onward[GATHER] = 0.0
+    if not packed.is_implicit:
+        return run(following_none(packed), onward, state)
+    # The way from where bodies are now is to be as short as can be; how long it was is measured from where they were.
+    outcome = run(table, onward, state)
+    onward[ITERATIONS] = 0.0
+    with postures_from(packed, given):
+        outcome.state[packed.results_at + OBJECTIVE] = run(packed.table, onward, outcome.state.copy()).state[
+            packed.results_at + OBJECTIVE
+        ]
+    return outcome

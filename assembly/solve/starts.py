@@ -1,0 +1,66 @@
+"""Other starts than one that failed: about the pose where it ended, and scattered ones; the same in every run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.kinematics.body import Body
+from assembly.kinematics.pose import retract
+
+__all__ = ["Start", "about", "far_starts", "moving_rows", "near_starts", "scattered"]
+
+Array = NDArray[np.float64]
+# How far about a pose others start, in sizes of the scene and radians: it may be a saddle by symmetry.
+ABOUT = (0.0, 0.03, 0.3)
+
+
+class Start(NamedTuple):
+    """Poses (n, 7) of a start, and whether its bodies are gathered first."""
+
+    q: Array
+    gathers: bool
+
+
+def near_starts(bodies: Sequence[Body], q: Array, size: float) -> list[Start]:
+    """Poses (n, 7) themselves, which a solve has other turns from, and poses about them."""
+    rng = np.random.default_rng(0)
+    moving = moving_rows(bodies)
+    return [Start(about(rng, q, moving, size, reach), gathers=False) for reach in ABOUT]
+
+
+def far_starts(bodies: Sequence[Body], q: Array, size: float, count: int) -> Iterator[list[Start]]:
+    """Scattered starts without end, so many at a time: each is tried with its bodies gathered first, and as it is.
+
+    What the one way does not lead to the other one often does.
+    """
+    rng = np.random.default_rng(0)
+    moving = moving_rows(bodies)
+    while True:
+        poses = [scattered(rng, q, moving, size) for _ in range(count)]
+        yield [Start(pose, gathers) for pose in poses for gathers in (True, False)]
+
+
+def moving_rows(bodies: Sequence[Body]) -> list[int]:
+    """The rows of poses (n, 7) that may change."""
+    return [k for k, body in enumerate(bodies) if not body.fixed]
+
+
+def about(rng: np.random.Generator, q: Array, moving: Sequence[int], size: float, reach: float) -> Array:
+    """Poses (n, 7) near others: moved by about `reach`, in parts of the scene's size and radians."""
+    moved = q.copy()
+    sizes = np.repeat([size, 1.0], 3)
+    moved[moving] = retract(q[moving], reach / np.sqrt(3.0) * sizes * rng.normal(size=(len(moving), 6)))
+    return moved
+
+
+def scattered(rng: np.random.Generator, q: Array, moving: Sequence[int], size: float) -> Array:
+    """Poses (n, 7) shifted by up to the scene's size along each axis, and turned any way."""
+    moved = q.copy()
+    moved[moving, :3] += size * rng.uniform(-1.0, 1.0, (len(moving), 3))
+    turns = rng.normal(size=(len(moving), 4))
+    moved[moving, 3:] = turns / np.linalg.norm(turns, axis=1, keepdims=True)
+    return moved

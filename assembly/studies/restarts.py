@@ -1,0 +1,83 @@
+"""A solve that failed, tried again from other starts: that all holds from another start is an answer.
+
+The pose that a solve ends at may be one where a sum of violations is least and not zero, a branch on which limits
+cannot hold, or have turns that contradict each other around a loop. Other starts are the end itself, with turns chosen
+there, poses about it, and scattered ones. All of them are measured from where the user's bodies were, and of the
+solutions found the one with the least objective is returned. A solve that did not fail pays nothing.
+"""
+
+from __future__ import annotations
+
+from itertools import islice
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.proximity.solid_contact import TRACK
+from assembly.solve.interruption import Interruption
+from assembly.solve.rank import HELD
+from assembly.solve.settings import GATHER, ITERATIONS, VIOLATION
+from assembly.solve.solution import Solution, Status
+from assembly.solve.starts import far_starts, near_starts
+
+if TYPE_CHECKING:
+    from assembly.assembly import Assembly
+
+__all__ = ["may_hold_elsewhere", "restarted"]
+
+Array = NDArray[np.float64]
+# Scattered starts of a round, and rounds.
+SCATTERED, ROUNDS = 4, 2
+# Steps of each start.
+STEPS = 100.0
+
+
+def may_hold_elsewhere(solution: Solution) -> bool:
+    """Whether a solve ended where constraints do not hold, and not for want of steps or of a contact's pair."""
+    ended = solution.status in (Status.INFEASIBLE, Status.STALLED)
+    return ended and not solution._result(VIOLATION) <= HELD * solution._packed.scale
+
+
+def restarted(
+    scene: Assembly, failed: Solution, settings: Array, given: Array | Solution, interruption: Interruption
+) -> Solution:
+    """The solution with the least objective that is found from other starts, or the one that failed.
+
+    Parameters
+    ----------
+    scene : Assembly
+    failed : Solution
+    settings : array
+        Of a first solve.
+    given : (n, 7) or Solution
+        Where the solve that failed started.
+    interruption : Interruption
+        Whom solves ask whether they are to go on.
+    """
+    if isinstance(given, Solution):
+        packed = given._packed
+        reference, turns = given.q, given._state[packed.angles_at : packed.multipliers_at : TRACK]
+    else:
+        reference, turns = given, None
+    settings = settings.copy()
+    settings[ITERATIONS] = min(settings[ITERATIONS], STEPS)
+    bodies, size = failed._scene.bodies, failed._scene.scale
+    rounds = islice(far_starts(bodies, failed.q, size, SCATTERED), ROUNDS)
+    best, seconds = failed, failed.seconds
+    for starts in (near_starts(bodies, failed.q, size), *rounds):
+        ends: list[Solution] = []
+        for start in starts:
+            settings[GATHER] = 1.0 if start.gathers else 0.0
+            ends.append(scene._solved(settings, start.q, None, interruption, reference, turns))
+            if interruption.is_over():
+                break
+        seconds += sum(end.seconds for end in ends)
+        found = [end for end in ends if end.success]
+        if found:
+            best = min(found, key=lambda end: end.objective)
+            best.restarted = True
+        if found or interruption.is_over():
+            break
+    best.seconds = seconds
+    return best
