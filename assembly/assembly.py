@@ -271,20 +271,23 @@ class Assembly:
         Postures are measured from q0, or from a reference (n, 7).
         """
         spent = 0.0
+        apart = q0._apart if isinstance(q0, Solution) else None
         while True:
             packed = self.packed()
             start = partial(self._start, packed, q0, starts)
             load(packed, start)
             begin = perf_counter()
             if reference is None:
-                code, state, history, order = attempt(packed, settings, start)
+                outcome = attempt(packed, settings, start, apart)
             else:
                 with postures_from(packed, reference):
-                    code, state, history, order = attempt(packed, settings, start)
+                    outcome = attempt(packed, settings, start, apart)
             spent += perf_counter() - begin
-            if not packed.is_crowded(state) or self._crowding >= MOST_CROWDING or isinstance(q0, Solution):
+            if not packed.is_crowded(outcome.state) or self._crowding >= MOST_CROWDING or isinstance(q0, Solution):
                 assert self._scene is not None
-                return Solution(self._scene, packed, state, _STATUSES[code], spent, history, order)
+                status = _STATUSES[outcome.code] if outcome.apart is None else Status.FITTED
+                told = (outcome.history, outcome.order, outcome.apart)
+                return Solution(self._scene, packed, outcome.state, status, spent, *told)
             self._crowding *= 2
             self._packed = None
 

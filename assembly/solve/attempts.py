@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from assembly.constraints.layout import DEEPEST_AT
 from assembly.constraints.packing import Packed
 from assembly.solve.augmented_lagrangian import solve_program
+from assembly.solve.fit import fitted, fitted_again
 from assembly.solve.leave import Outcome, settle
 from assembly.solve.options import Options
 from assembly.solve.postures import following_none
@@ -40,8 +42,12 @@ def load(packed: Packed, start: Callable[[], Array]) -> None:
         _loaded.add(packed.tips)
 
 
-def attempt(packed: Packed, settings: Array, start: Callable[[], Array]) -> Outcome:
-    """The outcome of a solve from the states that `start` makes."""
+def attempt(packed: Packed, settings: Array, start: Callable[[], Array], apart: Array | None = None) -> Outcome:
+    """The outcome of a solve from the states that `start` makes, where rows disagree by so much, if that is known."""
+    if apart is not None:
+        again = fitted_again(packed, settings, start(), apart, _begin, _go_on)
+        if again is not None:
+            return again
     # The loop writes contacts of clearances into its table: every solve has its own, also in another thread.
     table = packed.table.copy() if packed.guards else packed.table
     outcome = _run(packed, table, settings, start())
@@ -51,19 +57,20 @@ def attempt(packed: Packed, settings: Array, start: Callable[[], Array]) -> Outc
         # Perhaps solids cross at the start.
         table[DEEPEST_AT] = packed.table[DEEPEST_AT]
         outcome = _run(packed, table, settings, start())
+    outcome = fitted(packed, settings, outcome, _go_on)
     if not _holds(outcome) and packed.trims:
         # With the coordinates of contacts as unknowns trims have exact second derivatives, except at poles.
         settings = settings.copy()
         settings[FREE_TRIMS] = 1.0
-        other = _run(packed, table, settings, start())
+        other = fitted(packed, settings, _run(packed, table, settings, start()), _go_on)
         outcome = other if _holds(other) else outcome
     if not _holds(outcome) and settings[GATHER] == 0.0 and outcome.state[packed.results_at + SCATTER] == 1.0:
         # What the start itself did not lead to may be reached from gathered bodies.
         settings = settings.copy()
         settings[GATHER] = 1.0
-        other = _run(packed, table, settings, start())
+        other = fitted(packed, settings, _run(packed, table, settings, start()), _go_on)
         outcome = other if _holds(other) else outcome
-    return settle(packed, settings, outcome, lambda onward, state: _go_on(packed, onward, state))
+    return settle(packed, settings, outcome, partial(_go_on_once, packed))
 
 
 def _holds(outcome: Outcome) -> bool:
@@ -76,6 +83,17 @@ def _run(packed: Packed, table: NDArray[np.int64], settings: Array, state: Array
     return Outcome(solve_program(table, packed.pool, settings, state, history, packed.tips), state, history)
 
 
+def _begin(packed: Packed, settings: Array, state: Array) -> Outcome:
+    """The loop from the start of a solve, its end settled."""
+    outcome = _run(packed, packed.table.copy(), settings, state)
+    return settle(packed, settings, outcome, partial(_go_on_once, packed))
+
+
 def _go_on(packed: Packed, settings: Array, state: Array) -> Outcome:
+    """The loop from a state that a solve has led to, its end settled."""
+    return settle(packed, settings, _go_on_once(packed, settings, state), partial(_go_on_once, packed))
+
+
+def _go_on_once(packed: Packed, settings: Array, state: Array) -> Outcome:
     """The loop from a state that a solve has led to, with postures measured from where they were."""
     return _run(packed, following_none(packed), settings, state)

@@ -87,6 +87,7 @@ from assembly.solve.settings import (
     TICK,
     VIOLATION,
 )
+from assembly.solve.standstill import is_stuck, next_floor, stands_still
 from assembly.solve.start import read_state, rearrange, set_out
 from assembly.solve.step import CLOSE, aim, cut_step, leave_saddle, propose, short_share
 from assembly.solve.tangency import off_rows
@@ -94,9 +95,6 @@ from assembly.solve.tangency import off_rows
 # Every so many steps the largest violation must have halved, or the loop sees whether the rows can hold; so many times.
 PATIENCE = 25
 RESTORATIONS = 3
-# Where so many whole steps in a row do not halve the violation, the floor of the penalty gives way, down to here:
-# rounding, times its inverse, must stay small against the objective's curvature.
-SLOW, HARDEST = 3, 1e-10
 # Where a solve with clearances ends at a pose that does not hold, so many more steps lead back onto the rows.
 SETTLING = 30
 # Where nothing is asked for but that constraints hold: so many iterations may follow one at which bodies touch.
@@ -154,7 +152,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
     limit = int(settings[ITERATIONS]) - done
     longest_tick = EXTRA_TIME * int(settings[ITERATIONS]) - done
     mu = settings[PENALTY]
-    floor, slow_steps = settings[PENALTY_FLOOR], 0
+    floor = settings[PENALTY_FLOOR]
     way[SOFTNESS] = 1e-2
     begin_way(way)
     # The first step of a tick needs about what that of the last one did; half of it is tried first.
@@ -243,7 +241,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             gradient, lines, lagrangian, _factor = system
             kept = False
             # What was hard for other rows need not be for these.
-            floor, slow_steps, mu = settings[PENALTY_FLOOR], 0, max(mu, settings[PENALTY_FLOOR])
+            floor, mu = settings[PENALTY_FLOOR], max(mu, settings[PENALTY_FLOOR])
             begin_way(way)
             if folded:
                 # Perhaps another one is lost.
@@ -364,6 +362,9 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             restoring = False
             mu = 1e-4
             check_at, check_violation = iteration + PATIENCE, violation
+        gains_nothing = violation > feasible and mu <= floor and not (restoring or watched or tick)
+        if gains_nothing and stands_still(way, alpha, violation, last_violation, dual, settings[STATIONARITY]):
+            check_at, check_violation = iteration, violation
         if not restoring and iteration >= check_at:
             # The rows gain nothing: see whether they can hold at all. One that has just closed has had no time to.
             least = TOUCHING if check_violation <= feasible else feasible
@@ -423,7 +424,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
                     here, trial = trial, here
                     iteration += 1
                     continue
-                if violation > TOUCHING or watched or not any_pose:
+                if violation > TOUCHING or watched or not any_pose or is_stuck(way):
                     status = INFEASIBLE if violation > TOUCHING else STALLED
                     break
             if ends or slows:
@@ -473,11 +474,8 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         if alpha == 1.0:
             kept = cut == 1.0 and used == shift and mu == floor and not restoring
             if cut == 1.0 and used == shift:
-                # Rows whose slopes all but vanish, at a dead center say: only a harder penalty holds them.
                 slow = mu == floor and violation_of(here[3], one_sided, rows) > max(0.5 * violation, feasible)
-                slow_steps = slow_steps + 1 if slow else 0
-                if slow_steps >= SLOW and not tick:
-                    floor = max(0.1 * floor, HARDEST)
+                floor = next_floor(way, floor, slow and not tick)
                 mu = max(0.1 * mu, floor)
             radius = min(2.0 * radius, 1e6)
         else:

@@ -46,12 +46,16 @@ MOST_WAYS = 6
 
 
 class Outcome(NamedTuple):
-    """How the loop ended, the state and the history it left; of what was looked at, what the end is."""
+    """How the loop ended, the state and the history it left; of what was looked at, what the end is.
+
+    Of rows that repeat each other, by how much they are off (`fit.py`).
+    """
 
     code: int
     state: Array
     history: Array
     order: SecondOrder | None = None
+    apart: Array | None = None
 
 
 Run = Callable[[Array, Array], Outcome]

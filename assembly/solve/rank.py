@@ -13,13 +13,15 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["HELD", "SMALLEST", "Balanced", "orthonormal", "tolerance_at"]
+__all__ = ["HELD", "NEIGHBORHOOD", "SMALLEST", "Balanced", "centered", "orthonormal", "tolerance_at"]
 
 Array = NDArray[np.float64]
 # Of a pose that is exact to rounding.
 SMALLEST = 1e-7
 # A violation that counts as none, lengths over the scene's size; where there is more, the pose is taken as it is.
 HELD = 1e-9
+# How far bodies can be expected to move, lengths over the size and radians, to mend what rows are off.
+NEIGHBORHOOD = 0.02
 # Within this factor of the tolerance the largest gap between singular values decides.
 NEAR = 10.0
 
@@ -57,11 +59,7 @@ class Balanced:
     @classmethod
     def of(cls, jacobian: Array, residual: float, tolerance: float | None = None) -> Balanced:
         """Balance rows in twists at the bodies' origins that hold to a residual; a tolerance decides if it is given."""
-        blocks = jacobian.reshape(len(jacobian), jacobian.shape[1] // 6, 6)
-        centers = np.array([_center(blocks[:, b]) for b in range(blocks.shape[1])]).reshape(-1, 3)
-        shifted = blocks.copy()
-        shifted[:, :, 3:] -= np.cross(centers[None], blocks[:, :, :3])
-        rows: Array = shifted.reshape(jacobian.shape)
+        rows, centers = centered(jacobian)
         lengths = np.linalg.norm(rows, axis=1, keepdims=True)
         expected = tolerance_at(residual)
         counts = lengths > expected
@@ -109,6 +107,15 @@ class Balanced:
         """Orthonormal combinations of rows that vanish, (m - rank, m)."""
         left = np.linalg.svd(self.rows)[0]
         return left[:, self.rank :].T
+
+
+def centered(jacobian: Array) -> tuple[Array, Array]:
+    """Rows in twists at the bodies' origins (m, 6 k) in twists at each body's own center; the centers, (k, 3)."""
+    blocks = jacobian.reshape(len(jacobian), jacobian.shape[1] // 6, 6)
+    centers = np.array([_center(blocks[:, b]) for b in range(blocks.shape[1])]).reshape(-1, 3)
+    shifted = blocks.copy()
+    shifted[:, :, 3:] -= np.cross(centers[None], blocks[:, :, :3])
+    return shifted.reshape(jacobian.shape), centers
 
 
 def _center(blocks: Array) -> Array:

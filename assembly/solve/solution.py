@@ -35,6 +35,8 @@ __all__ = ["Iteration", "Scene", "Solution", "Status"]
 Array = NDArray[np.float64]
 # Moving bodies whose freedoms are printed: counting takes a second for some 300, and grows with the cube.
 MOST_COUNTED = 200
+# A constraint that is off by less than this part of the worst is not one of those that disagree.
+IDLE = 1e-3
 
 
 class Status(Enum):
@@ -45,6 +47,7 @@ class Status(Enum):
     STALLED = "no further progress; look at the worst violation, start elsewhere or loosen the tolerance"
     ITERATION_LIMIT = "out of iterations; raise max_iterations or start nearer"
     CONTACT_LOST = "a contact has no extremal pair at the start; move the bodies or name the faces"
+    FITTED = "constraints that repeat each other disagree by a little and hold as well as they can; all others hold"
 
 
 class Scene:
@@ -145,6 +148,7 @@ class Solution(ReadOnlyArrays):
         seconds: float,
         history: Array,
         order: SecondOrder | None = None,
+        apart: Array | None = None,
     ) -> None:
         self._scene = scene
         self._packed = packed
@@ -153,6 +157,7 @@ class Solution(ReadOnlyArrays):
         self.status = status
         self.seconds = seconds
         self._order = order
+        self._apart = apart
         # Flat contacts alone need it again, for the center of their pressure.
         self._wishes = packed.pool[scene.wished(packed)] if scene.contacts else None
 
@@ -214,8 +219,8 @@ class Solution(ReadOnlyArrays):
 
     @property
     def success(self) -> bool:
-        """Whether the status is SOLVED."""
-        return self.status is Status.SOLVED
+        """Whether the status is SOLVED or FITTED."""
+        return self.status is Status.SOLVED or self.status is Status.FITTED
 
     @property
     def second_order(self) -> SecondOrder | None:
@@ -244,11 +249,29 @@ class Solution(ReadOnlyArrays):
         """The largest violation of every constraint's rows, lengths in a unit."""
         packed = self._packed
         each = np.where(packed.one_sided, np.maximum(-self._residuals, 0.0), np.abs(self._residuals))
-        each = np.where(packed.lengths, each / unit, each)
+        return self._by_constraint(np.where(packed.lengths, each / unit, each))
+
+    def _by_constraint(self, each: Array) -> dict[str, float]:
+        """The largest of what every constraint's rows have."""
         return {
             constraint.name: float(each[rows].max(initial=0.0))
-            for constraint, rows in zip(self._scene.constraints, packed.spans, strict=True)
+            for constraint, rows in zip(self._scene.constraints, self._packed.spans, strict=True)
         }
+
+    @cached_property
+    def disagreeing(self) -> dict[str, float]:
+        """Of a FITTED solve: what repeats each other, and how far each is off, the worst first.
+
+        Lengths in the user's unit, angles in radians.
+        """
+        if self._apart is None:
+            return {}
+        packed = self._packed
+        off = np.abs(self._apart)
+        parts = self._by_constraint(off)
+        amounts = self._by_constraint(np.where(packed.lengths, off * packed.scale, off))
+        least = IDLE * max(parts.values())
+        return {name: amounts[name] for name in sorted(parts, key=lambda name: -parts[name]) if parts[name] > least}
 
     @cached_property
     def multipliers(self) -> dict[str, Array]:
@@ -353,6 +376,8 @@ class Solution(ReadOnlyArrays):
         if held_off and not self.success:
             named = ", ".join(f"{name!r} ({self.violations[name]:.3g})" for name in held_off)
             text += f"; violated: {named}"
+        if self.status is Status.FITTED:
+            text += "; disagreeing: " + ", ".join(f"{name!r} ({off:.3g})" for name, off in self.disagreeing.items())
         if self.status is Status.INFEASIBLE:
             named = " and ".join(", ".join(map(repr, names)) for names in self.conflicting_sets)
             text += f"; conflicting: {named or 'none, all hold from another start'}"
