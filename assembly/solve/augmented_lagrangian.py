@@ -50,7 +50,7 @@ from assembly.solve.contacts import free_folds, is_of_surfaces
 from assembly.solve.ending import finish, return_to
 from assembly.solve.guards import allowed_share, look_again, numbers_of, place_guards
 from assembly.solve.inertia import note_factor
-from assembly.solve.multipliers import choose_multipliers, forget_objective, least_multipliers, weigh_rows
+from assembly.solve.multipliers import choose_multipliers, forget_objective, least_multipliers, strongest, weigh_rows
 from assembly.solve.report import is_clear, keep, log
 from assembly.solve.restoration import LEAST_SHARE, SHARE, SOFTNESS, begin_way, step_back
 from assembly.solve.retreat import BEGINNINGS, LEFT, LONGER, SHORTER, begin_again, has_sunk
@@ -87,7 +87,7 @@ from assembly.solve.settings import (
     TICK,
     VIOLATION,
 )
-from assembly.solve.standstill import is_stuck, next_floor, stands_still
+from assembly.solve.standstill import is_stuck, next_floor, out_of_reach, stands_still
 from assembly.solve.start import read_state, rearrange, set_out
 from assembly.solve.step import CLOSE, aim, cut_step, leave_saddle, propose, short_share
 from assembly.solve.tangency import off_rows
@@ -363,7 +363,8 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             mu = 1e-4
             check_at, check_violation = iteration + PATIENCE, violation
         gains_nothing = violation > feasible and mu <= floor and not (restoring or watched or tick)
-        if gains_nothing and stands_still(way, alpha, violation, last_violation, dual, settings[STATIONARITY]):
+        force = strongest(y, rows) if gains_nothing else 0.0
+        if gains_nothing and stands_still(way, settings, feasible, alpha, violation, last_violation, dual, force, mu):
             check_at, check_violation = iteration, violation
         if not restoring and iteration >= check_at:
             # The rows gain nothing: see whether they can hold at all. One that has just closed has had no time to.
@@ -410,7 +411,8 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
                 cut, may_go = allowed_share(table, pool, memory, here, trial, lines[1], most_of_it)
         slope, steepest = cut_step(shape, here, rows, y, mu, cut, foreseen, lines)
         if restoring:
-            ends = steepest <= 1e-9 * violation or longest < 1e-12
+            least = out_of_reach(feasible, violation) if is_stuck(way) else 1e-9 * violation
+            ends = steepest <= least or longest < 1e-12
             slows = iteration >= check_at and violation > 0.99 * check_violation
             if (ends or slows) and watched and iteration < limit:
                 # A contact may have come to where a given one stands, of which no clearance asks anything.

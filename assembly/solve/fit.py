@@ -21,7 +21,7 @@ from assembly.constraints.packing import Packed
 from assembly.errors import InputError
 from assembly.solve.jacobian import moving_columns, rows_of
 from assembly.solve.leave import Outcome
-from assembly.solve.rank import NEIGHBORHOOD, centered
+from assembly.solve.rank import centered
 from assembly.solve.settings import (
     COUNT,
     FEASIBILITY,
@@ -29,6 +29,7 @@ from assembly.solve.settings import (
     GATHER,
     INFEASIBLE,
     ITERATIONS,
+    NEIGHBORHOOD,
     PENALTY,
     PENALTY_FLOOR,
     SOLVED,
@@ -40,7 +41,7 @@ __all__ = ["fitted", "fitted_again"]
 
 Array = NDArray[np.float64]
 Run = Callable[[Packed, Array, Array], Outcome]
-# So often values are moved, until what rows disagree by changes by no more than this part of it: it depends on the pose.
+# So often values are moved, until what rows disagree by, which depends on the pose, changes by no more than this part.
 ROUNDS, SAME = 5, 1e-6
 # A one-sided row that holds by less touches.
 TOUCHING = 1e-9

@@ -13,15 +13,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["HELD", "NEIGHBORHOOD", "SMALLEST", "Balanced", "centered", "orthonormal", "tolerance_at"]
+__all__ = ["HELD", "SMALLEST", "Balanced", "centered", "orthonormal", "tolerance_at"]
 
 Array = NDArray[np.float64]
 # Of a pose that is exact to rounding.
 SMALLEST = 1e-7
 # A violation that counts as none, lengths over the scene's size; where there is more, the pose is taken as it is.
 HELD = 1e-9
-# How far bodies can be expected to move, lengths over the size and radians, to mend what rows are off.
-NEIGHBORHOOD = 0.02
 # Within this factor of the tolerance the largest gap between singular values decides.
 NEAR = 10.0
 
