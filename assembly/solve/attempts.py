@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from assembly.constraints.layout import DEEPEST_AT
 from assembly.constraints.packing import Packed
 from assembly.solve.augmented_lagrangian import solve_program
-from assembly.solve.fit import fitted, fitted_again
+from assembly.solve.fit import Loop, fitted, fitted_again
 from assembly.solve.leave import Outcome, settle
 from assembly.solve.options import Options
 from assembly.solve.postures import following_none
@@ -45,7 +45,7 @@ def load(packed: Packed, start: Callable[[], Array]) -> None:
 def attempt(packed: Packed, settings: Array, start: Callable[[], Array], apart: Array | None = None) -> Outcome:
     """The outcome of a solve from the states that `start` makes, where rows disagree by so much, if that is known."""
     if apart is not None:
-        again = fitted_again(packed, settings, start(), apart, _begin, _go_on)
+        again = fitted_again(packed, settings, start(), apart, LOOP)
         if again is not None:
             return again
     # The loop writes contacts of clearances into its table: every solve has its own, also in another thread.
@@ -57,18 +57,18 @@ def attempt(packed: Packed, settings: Array, start: Callable[[], Array], apart: 
         # Perhaps solids cross at the start.
         table[DEEPEST_AT] = packed.table[DEEPEST_AT]
         outcome = _run(packed, table, settings, start())
-    outcome = fitted(packed, settings, outcome, _go_on)
+    outcome = fitted(packed, settings, outcome, LOOP)
     if not _holds(outcome) and packed.trims:
         # With the coordinates of contacts as unknowns trims have exact second derivatives, except at poles.
         settings = settings.copy()
         settings[FREE_TRIMS] = 1.0
-        other = fitted(packed, settings, _run(packed, table, settings, start()), _go_on)
+        other = fitted(packed, settings, _run(packed, table, settings, start()), LOOP)
         outcome = other if _holds(other) else outcome
     if not _holds(outcome) and settings[GATHER] == 0.0 and outcome.state[packed.results_at + SCATTER] == 1.0:
         # What the start itself did not lead to may be reached from gathered bodies.
         settings = settings.copy()
         settings[GATHER] = 1.0
-        other = fitted(packed, settings, _run(packed, table, settings, start()), _go_on)
+        other = fitted(packed, settings, _run(packed, table, settings, start()), LOOP)
         outcome = other if _holds(other) else outcome
     return settle(packed, settings, outcome, partial(_go_on_once, packed))
 
@@ -97,3 +97,6 @@ def _go_on(packed: Packed, settings: Array, state: Array) -> Outcome:
 def _go_on_once(packed: Packed, settings: Array, state: Array) -> Outcome:
     """The loop from a state that a solve has led to, with postures measured from where they were."""
     return _run(packed, following_none(packed), settings, state)
+
+
+LOOP = Loop(_begin, _go_on)

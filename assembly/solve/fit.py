@@ -3,20 +3,21 @@
 Where |c|^2 is stationary, J^T c = 0, rows are off by a combination of them that no motion changes. Their values moved
 by it agree, and the loop goes on with these; what they were moved by is the disagreement.
 
-With J = U S V^T, no motion nearby changes a combination u if the step that would, (u . c) / s, is longer than a
-neighborhood: rows tilted against each other by e have s of about e and disagree by about e, while next to a dead center
-c is of the order of s^2. Contacts, limits and expressions have no value to move: what they take part in is balanced by
+With J = U S V^T, no motion nearby changes a combination u where |c| / s is longer than a neighborhood: rows tilted
+against each other by e have s of about e and disagree by about e, while next to a dead center c is of the order of s^2.
+Contacts, limits and expressions have no value to move: what they take part in is balanced by
 the others. See docs/derivations.md.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.constraints.layout import SLOTS
+from assembly.constraints.layout import IMPLICIT, SLOTS
 from assembly.constraints.packing import Packed
 from assembly.errors import InputError
 from assembly.solve.jacobian import moving_columns, rows_of
@@ -30,17 +31,31 @@ from assembly.solve.settings import (
     INFEASIBLE,
     ITERATIONS,
     NEIGHBORHOOD,
+    OBJECTIVE,
     PENALTY,
     PENALTY_FLOOR,
+    SCATTER,
     SOLVED,
     STALLED,
     VIOLATION,
 )
 
-__all__ = ["fitted", "fitted_again"]
+__all__ = ["Loop", "fitted", "fitted_again"]
 
 Array = NDArray[np.float64]
 Run = Callable[[Packed, Array, Array], Outcome]
+
+
+class Loop(NamedTuple):
+    """The loop with settings from a state: one that a solve begins with, and one it has led to.
+
+    From the first one postures without a reference are measured.
+    """
+
+    begin: Run
+    go_on: Run
+
+
 # So often values are moved, until what rows disagree by, which depends on the pose, changes by no more than this part.
 ROUNDS, SAME = 5, 1e-6
 # A one-sided row that holds by less touches.
@@ -49,41 +64,38 @@ TOUCHING = 1e-9
 BALANCED = 1e-3
 
 
-def fitted(packed: Packed, settings: Array, outcome: Outcome, run: Run) -> Outcome:
-    """An outcome; where rows are off by no more than they may disagree by, that of a solve in which they agree.
-
-    `run` is the loop with settings from a state.
-    """
+def fitted(packed: Packed, settings: Array, outcome: Outcome, loop: Loop) -> Outcome:
+    """An outcome; where rows are off by no more than they may disagree by, that of a solve in which they agree."""
     off = outcome.state[packed.results_at + VIOLATION]
     if outcome.code not in (INFEASIBLE, STALLED) or not 0.0 < off <= settings[FIT] * packed.scale:
         return outcome
     apart = _disagreement(packed, outcome.state)
     if apart is None or not settings[FEASIBILITY] < np.abs(apart).max() <= settings[FIT]:
         return outcome
-    return _fitted_from(packed.twin(), settings, outcome, run) or outcome
+    return _fitted_from(packed.twin(), settings, outcome, loop) or outcome
 
 
-def fitted_again(packed: Packed, settings: Array, state: Array, apart: Array, begin: Run, run: Run) -> Outcome | None:
-    """The outcome of a solve whose start is one where rows disagreed by so much; None where they cannot be fitted.
-
-    `begin` is the loop from the start of a solve.
-    """
+def fitted_again(packed: Packed, settings: Array, state: Array, apart: Array, loop: Loop) -> Outcome | None:
+    """The outcome of a solve whose start is one where rows disagreed by so much; None where they cannot be fitted."""
     if not settings[FIT] > 0.0:
         return None
     twin = packed.twin()
     twin.move_values(apart)
     loose = settings.copy()
     loose[FEASIBILITY] = max(settings[FEASIBILITY], settings[FIT])
-    outcome = begin(twin, loose, state)
+    outcome = loop.begin(twin, loose, state)
     twin.move_values(-apart)
-    return _fitted_from(twin, settings, outcome, run) if outcome.code == SOLVED else None
+    return _fitted_from(twin, settings, outcome, loop) if outcome.code == SOLVED else None
 
 
-def _fitted_from(twin: Packed, settings: Array, outcome: Outcome, run: Run) -> Outcome | None:
+def _fitted_from(twin: Packed, settings: Array, outcome: Outcome, loop: Loop) -> Outcome | None:
     """The outcome of solves with values that agree, from where another one ended; the pool of `twin` is written to."""
     onward = settings.copy()
     onward[GATHER], onward[PENALTY] = 0.0, settings[PENALTY_FLOOR]
     at = twin.results_at
+    # Of bodies that were gathered the least move was that from there; it is not looked for anew from the start.
+    gathered = twin.table[IMPLICIT] == 1 and settings[GATHER] == 1.0 and outcome.state[at + SCATTER] == 1.0
+    run, pool = loop.begin if gathered else loop.go_on, twin.pool.copy()
     moved: Array | None = None
     for _ in range(ROUNDS):
         apart = _disagreement(twin, outcome.state)
@@ -96,6 +108,10 @@ def _fitted_from(twin: Packed, settings: Array, outcome: Outcome, run: Run) -> O
             # They agree.
             apart = np.zeros_like(apart)
         if moved is not None and np.abs(apart - moved).max() <= max(settings[FEASIBILITY], SAME * worst):
+            if gathered:
+                twin.pool[:] = pool
+                onward[ITERATIONS] = 0.0
+                outcome.state[at + OBJECTIVE] = loop.go_on(twin, onward, outcome.state.copy()).state[at + OBJECTIVE]
             return _told(twin, outcome, moved)
         spent = int(outcome.state[at + COUNT])
         onward[ITERATIONS] = settings[ITERATIONS] - spent
@@ -152,8 +168,8 @@ def _disagreement(packed: Packed, state: Array) -> Array | None:
 def _unmoved(jacobian: Array, residual: Array, movable: NDArray[np.bool_]) -> Array | None:
     """The combination w of rows, J^T w = 0, with w = c on what of the movable rows no motion nearby changes, (m,)."""
     left, sizes, _ = np.linalg.svd(jacobian, full_matrices=True)
-    parts = left.T @ residual
-    kept = left[:, np.abs(parts) > NEIGHBORHOOD * np.pad(sizes, (0, len(parts) - len(sizes)))]
+    worst = float(np.abs(residual).max(initial=0.0))
+    kept = left[:, np.count_nonzero(sizes > worst / NEIGHBORHOOD) :]
     wanted = kept.T @ residual
     square = kept[movable].T @ kept[movable]
     shares = np.linalg.lstsq(square, wanted, rcond=1e-9)[0]

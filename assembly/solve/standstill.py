@@ -20,8 +20,8 @@ SLOW, HARDEST = 3.0, 1e-10
 def out_of_reach(feasible, violation):
     """The largest |J^T c| where what rows are off is what no motion nearby changes.
 
-    Rows that repeat each other, tilted by s, have |J^T c| = s |c|, and agree a step |c| / s away. Of what is off by much
-    J^T c = 0 tells, but for rounding of the rows.
+    Rows that repeat each other, tilted by s, have |J^T c| = s |c|, and agree a step |c| / s away. Of those that are off
+    by much J^T c = 0 tells, but for rounding.
     """
     tilt = min(violation / NEIGHBORHOOD, MOST_TILTED) if violation <= LITTLE else 0.0
     return tilt * violation + ROUNDED * feasible
