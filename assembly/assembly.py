@@ -271,7 +271,7 @@ class Assembly:
         Postures are measured from q0, or from a reference (n, 7).
         """
         spent = 0.0
-        apart = q0._apart if isinstance(q0, Solution) else None
+        apart = q0._fit.apart if isinstance(q0, Solution) and q0._fit is not None else None
         while True:
             packed = self.packed()
             start = partial(self._start, packed, q0, starts)
@@ -285,9 +285,9 @@ class Assembly:
             spent += perf_counter() - begin
             if not packed.is_crowded(outcome.state) or self._crowding >= MOST_CROWDING or isinstance(q0, Solution):
                 assert self._scene is not None
-                status = _STATUSES[outcome.code] if outcome.apart is None else Status.FITTED
-                told = (outcome.history, outcome.order, outcome.apart)
-                return Solution(self._scene, packed, outcome.state, status, spent, *told)
+                code, state, history, order, fit = outcome
+                status = Status.FITTED if fit is not None and fit.apart is not None else _STATUSES[code]
+                return Solution(self._scene, packed, state, status, spent, history, order, fit)
             self._crowding *= 2
             self._packed = None
 
@@ -404,10 +404,11 @@ class Assembly:
         solved = isinstance(q, Solution)
         # A solution keeps the values it was solved with.
         if isinstance(q, Solution):
-            state = self._state_of("q", packed, q)
+            state, fit = self._state_of("q", packed, q), q._allowed
         else:
             state = self._start(packed, None if q is None else pose_rows("q", q, len(self._bodies)), None)
-        return Mobility.at(self._scene, packed, state, solved=solved, drives=bool(drives), tolerance=tolerance)
+            fit = Options.fit
+        return Mobility.at(self._scene, packed, state, solved=solved, drives=bool(drives), tolerance=tolerance, fit=fit)
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the scene as JSON; `asm.load` reads it back."""

@@ -12,11 +12,12 @@ from assembly.constraints.layout import DEEPEST_AT
 from assembly.constraints.packing import Packed
 from assembly.solve.augmented_lagrangian import solve_program
 from assembly.solve.fit import Loop, fitted, fitted_again
-from assembly.solve.leave import Outcome, settle
+from assembly.solve.leave import Fit, Outcome, settle
 from assembly.solve.options import Options
 from assembly.solve.postures import following_none
 from assembly.solve.settings import (
     CONTACT_LOST,
+    FIT,
     FREE_TRIMS,
     GATHER,
     HISTORY,
@@ -70,7 +71,8 @@ def attempt(packed: Packed, settings: Array, start: Callable[[], Array], apart: 
         settings[GATHER] = 1.0
         other = fitted(packed, settings, _run(packed, table, settings, start()), LOOP)
         outcome = other if _holds(other) else outcome
-    return settle(packed, settings, outcome, partial(_go_on_once, packed))
+    outcome = settle(packed, settings, outcome, partial(_go_on_once, packed))
+    return outcome._replace(fit=outcome.fit or Fit(float(settings[FIT])))
 
 
 def _holds(outcome: Outcome) -> bool:

@@ -411,8 +411,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
                 cut, may_go = allowed_share(table, pool, memory, here, trial, lines[1], most_of_it)
         slope, steepest = cut_step(shape, here, rows, y, mu, cut, foreseen, lines)
         if restoring:
-            least = out_of_reach(feasible, violation) if is_stuck(way) else 1e-9 * violation
-            ends = steepest <= least or longest < 1e-12
+            ends = steepest <= max(1e-9 * violation, out_of_reach(feasible, violation)) or longest < 1e-12
             slows = iteration >= check_at and violation > 0.99 * check_violation
             if (ends or slows) and watched and iteration < limit:
                 # A contact may have come to where a given one stands, of which no clearance asks anything.

@@ -21,7 +21,7 @@ from assembly.constraints.layout import IMPLICIT, SLOTS
 from assembly.constraints.packing import Packed
 from assembly.errors import InputError
 from assembly.solve.jacobian import moving_columns, rows_of
-from assembly.solve.leave import Outcome
+from assembly.solve.leave import Fit, Outcome
 from assembly.solve.rank import centered
 from assembly.solve.settings import (
     COUNT,
@@ -112,7 +112,7 @@ def _fitted_from(twin: Packed, settings: Array, outcome: Outcome, loop: Loop) ->
                 twin.pool[:] = pool
                 onward[ITERATIONS] = 0.0
                 outcome.state[at + OBJECTIVE] = loop.go_on(twin, onward, outcome.state.copy()).state[at + OBJECTIVE]
-            return _told(twin, outcome, moved)
+            return _told(twin, outcome, moved, float(settings[FIT]))
         spent = int(outcome.state[at + COUNT])
         onward[ITERATIONS] = settings[ITERATIONS] - spent
         if onward[ITERATIONS] < 0.0:
@@ -128,14 +128,14 @@ def _fitted_from(twin: Packed, settings: Array, outcome: Outcome, loop: Loop) ->
     return None
 
 
-def _told(packed: Packed, outcome: Outcome, moved: Array) -> Outcome:
+def _told(packed: Packed, outcome: Outcome, moved: Array, allowed: float) -> Outcome:
     """The outcome of a solve whose values were moved, with what rows are off by their own values."""
     if not moved.any():
         return outcome
     state = outcome.state
     state[packed.residuals_at : packed.results_at] += moved * np.where(packed.lengths, packed.scale, 1.0)
     state[packed.results_at + VIOLATION] = np.abs(moved).max() * packed.scale
-    return outcome._replace(apart=moved)
+    return outcome._replace(fit=Fit(allowed, moved))
 
 
 def _disagreement(packed: Packed, state: Array) -> Array | None:

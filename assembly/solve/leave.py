@@ -29,7 +29,7 @@ from assembly.solve.settings import (
     VIOLATION,
 )
 
-__all__ = ["Outcome", "settle"]
+__all__ = ["Fit", "Outcome", "settle"]
 
 Array = NDArray[np.float64]
 # The first step along a way, of a scene with clearances, and by what it grows while poses become lower; the longest.
@@ -45,17 +45,21 @@ HOLDS = 1e-11
 MOST_WAYS = 6
 
 
-class Outcome(NamedTuple):
-    """How the loop ended, the state and the history it left; of what was looked at, what the end is.
+class Fit(NamedTuple):
+    """What rows that repeat each other may disagree by, over the size, and what they do, (m,), if anything (`fit.py`)."""
 
-    Of rows that repeat each other, by how much they are off (`fit.py`).
-    """
+    allowed: float
+    apart: Array | None = None
+
+
+class Outcome(NamedTuple):
+    """How the loop ended, the state and the history it left; of what was looked at, what the end is."""
 
     code: int
     state: Array
     history: Array
     order: SecondOrder | None = None
-    apart: Array | None = None
+    fit: Fit | None = None
 
 
 Run = Callable[[Array, Array], Outcome]

@@ -22,10 +22,12 @@ from assembly.kinematics.pose import Pose
 from assembly.proximity.pairs import ContactPair
 from assembly.proximity.solid_contact import TRACK
 from assembly.solve.measure import measure, standing
+from assembly.solve.options import Options
 from assembly.solve.settings import COUNT, CULPRIT, DUAL, IMPROPER, OBJECTIVE, VIOLATION
 
 if TYPE_CHECKING:
     from assembly.kinematics.body import BodyFace
+    from assembly.solve.leave import Fit
     from assembly.solve.mobility import Mobility
     from assembly.solve.second_order import SecondOrder
     from assembly.solve.statics import Wrench
@@ -148,7 +150,7 @@ class Solution(ReadOnlyArrays):
         seconds: float,
         history: Array,
         order: SecondOrder | None = None,
-        apart: Array | None = None,
+        fit: Fit | None = None,
     ) -> None:
         self._scene = scene
         self._packed = packed
@@ -157,7 +159,7 @@ class Solution(ReadOnlyArrays):
         self.status = status
         self.seconds = seconds
         self._order = order
-        self._apart = apart
+        self._fit = fit
         # Flat contacts alone need it again, for the center of their pressure.
         self._wishes = packed.pool[scene.wished(packed)] if scene.contacts else None
 
@@ -258,16 +260,21 @@ class Solution(ReadOnlyArrays):
             for constraint, rows in zip(self._scene.constraints, self._packed.spans, strict=True)
         }
 
+    @property
+    def _allowed(self) -> float:
+        """What rows that repeat each other may disagree by, over the size."""
+        return Options.fit if self._fit is None else self._fit.allowed
+
     @cached_property
     def disagreeing(self) -> dict[str, float]:
         """Of a FITTED solve: what repeats each other, and how far each is off, the worst first.
 
         Lengths in the user's unit, angles in radians.
         """
-        if self._apart is None:
+        if self._fit is None or self._fit.apart is None:
             return {}
         packed = self._packed
-        off = np.abs(self._apart)
+        off = np.abs(self._fit.apart)
         parts = self._by_constraint(off)
         amounts = self._by_constraint(np.where(packed.lengths, off * packed.scale, off))
         least = IDLE * max(parts.values())
@@ -314,7 +321,7 @@ class Solution(ReadOnlyArrays):
         """Degrees of freedom at `q`, free motions, redundant constraints; `Assembly.mobility` has options."""
         from assembly.solve.mobility import Mobility
 
-        return Mobility.at(self._scene, self._packed, self._state, solved=True)
+        return Mobility.at(self._scene, self._packed, self._state, solved=True, fit=self._allowed)
 
     @cached_property
     def conflicting_sets(self) -> list[tuple[str, ...]]:
@@ -326,7 +333,7 @@ class Solution(ReadOnlyArrays):
             return []
         from assembly.solve.conflicts import conflicts_at
 
-        return conflicts_at(self._scene, self._packed, self._state)
+        return conflicts_at(self._scene, self._packed, self._state, self._allowed)
 
     @property
     def conflicting(self) -> list[str]:
