@@ -308,27 +308,29 @@ class Assembly:
         these start on a turn of their own.
         """
         spent = 0.0
+        apart = q0._fit.apart if isinstance(q0, Solution) and q0._fit is not None else None
         while True:
             packed = self.packed()
             start = partial(self._start, packed, q0, starts, turns)
             load(packed, start)
             begin = perf_counter()
             if reference is None:
-                code, state, history, order = attempt(packed, settings, start, interruption, turns)
+                outcome = attempt(packed, settings, start, interruption, turns, apart)
             else:
                 with postures_from(packed, reference):
-                    code, state, history, order = attempt(packed, settings, start, interruption, turns)
+                    outcome = attempt(packed, settings, start, interruption, turns, apart)
             spent += perf_counter() - begin
-            fits = not packed.is_crowded(state) or self._crowding >= MOST_CROWDING or isinstance(q0, Solution)
+            fits = not packed.is_crowded(outcome.state) or self._crowding >= MOST_CROWDING or isinstance(q0, Solution)
             if fits or interruption.is_over():
                 assert self._scene is not None
-                status = interruption.status(code)
+                code, state, history, order, fit = outcome
+                status = Status.FITTED if fit is not None and fit.apart is not None else interruption.status(code)
                 if status is not Status.SOLVED and self._objectives:
                     from assembly.solve.unbounded import Asked, status_of
 
                     asked = Asked(self.bodies, self.constraints, self._objectives)
                     status = status_of(status, asked, packed, settings, start, state, interruption)
-                return Solution(self._scene, packed, state, status, spent, history, order)
+                return Solution(self._scene, packed, state, status, spent, history, order, fit)
             self._crowding *= 2
             self._packed = None
 
@@ -457,10 +459,11 @@ class Assembly:
         solved = isinstance(q, Solution)
         # A solution keeps the values it was solved with.
         if isinstance(q, Solution):
-            state = self._state_of("q", packed, q)
+            state, fit = self._state_of("q", packed, q), q._allowed
         else:
             state = self._start(packed, None if q is None else pose_rows("q", q, len(self._bodies)), None)
-        return Mobility.at(self._scene, packed, state, solved=solved, drives=bool(drives), tolerance=tolerance)
+            fit = Options.fit
+        return Mobility.at(self._scene, packed, state, solved=solved, drives=bool(drives), tolerance=tolerance, fit=fit)
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the scene as JSON; `asm.load` reads it back."""

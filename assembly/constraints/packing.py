@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from itertools import pairwise
 from typing import Any
 
@@ -349,6 +350,22 @@ class Packed:
             return value if coordinate.is_angle else value * self.scale
 
         self._turned.start(self.pool, near, warm, evaluate)
+
+    def twin(self) -> Packed:
+        """The same with a table and values of its own."""
+        other = copy(self)
+        other.pool = self.pool.copy()
+        return other
+
+    @property
+    def value_rows(self) -> NDArray[np.int64]:
+        """The rows of joints and couplings, which have a value each."""
+        first = int((self.pairs >= 0).sum())
+        return np.arange(first, first + len(self._values))
+
+    def move_values(self, change: Array) -> None:
+        """Add a change (m,) to the values of joints' and couplings' rows, until the next `refresh`."""
+        self.pool[[at for _, at, _ in self._values]] += change[self.value_rows]
 
     def refresh(self) -> None:
         """Write what may have changed since the last solve: values and targets."""

@@ -12,12 +12,14 @@ from assembly.constraints.layout import DEEPEST_AT
 from assembly.constraints.packing import Packed
 from assembly.solve.assembled import run_gathered
 from assembly.solve.augmented_lagrangian import solve_program
+from assembly.solve.fit import Loop, fitted, fitted_again
 from assembly.solve.interruption import Interruption
-from assembly.solve.leave import Outcome, settle
+from assembly.solve.leave import Fit, Outcome, settle
 from assembly.solve.options import Options
 from assembly.solve.postures import following_none
 from assembly.solve.settings import (
     CONTACT_LOST,
+    FIT,
     FREE_TRIMS,
     GATHER,
     HISTORY,
@@ -50,24 +52,32 @@ def attempt(
     start: Callable[[], Array],
     interruption: Interruption,
     turns: Array | None = None,
+    apart: Array | None = None,
 ) -> Outcome:
     """The outcome of a solve from the states that `start` makes; no other attempt is made once it is interrupted.
 
-    `turns` are the values that angles are near, where they start on a turn of their own; zeros by default.
+    `turns` are the values that angles are near, where they start on a turn of their own; zeros by default. `apart` is
+    what rows disagree by, where that is known.
     """
+    if apart is not None:
+        known = fitted_again(packed, settings, start(), apart, _loop(interruption, turns))
+        if known is not None:
+            return known
     # The loop writes contacts of clearances into its table: every solve has its own, also in another thread.
     table = packed.table.copy() if packed.guards else packed.table
     outcome = begin(packed, interruption, table, settings, start(), turns)
     if outcome.code == SOLVED:
         return outcome
+    loop = _loop(interruption, turns)
 
     def again(settings: Array) -> Outcome:
-        return begin(packed, interruption, table, settings, start(), turns)
+        return fitted(packed, settings, begin(packed, interruption, table, settings, start(), turns), loop)
 
     if outcome.code == CONTACT_LOST and packed.seek_penetration():
         # Perhaps solids cross at the start.
         table[DEEPEST_AT] = packed.table[DEEPEST_AT]
-        outcome = again(settings)
+        outcome = begin(packed, interruption, table, settings, start(), turns)
+    outcome = fitted(packed, settings, outcome, loop)
     if packed.trims and not _holds(outcome) and not interruption.is_over():
         # With the coordinates of contacts as unknowns trims have exact second derivatives, except at poles.
         settings = settings.copy()
@@ -81,11 +91,9 @@ def attempt(
         settings[GATHER] = 1.0
         other = again(settings)
         outcome = other if _holds(other) else outcome
-    if interruption.is_over():
-        return outcome
-    # Postures are measured from where they were.
-    follows = following_none(packed)
-    return settle(packed, settings, outcome, lambda onward, state: _run(packed, interruption, follows, onward, state))
+    if not interruption.is_over():
+        outcome = settle(packed, settings, outcome, partial(_go_on_once, interruption, packed))
+    return outcome._replace(fit=outcome.fit or Fit(float(settings[FIT])))
 
 
 def begin(
@@ -97,6 +105,20 @@ def begin(
     return _run(packed, interruption, table, settings, state)
 
 
+def _loop(interruption: Interruption, turns: Array | None) -> Loop:
+    """The loop from the start of a solve and from a state that a solve has led to, its end settled."""
+
+    def first(packed: Packed, settings: Array, state: Array) -> Outcome:
+        outcome = begin(packed, interruption, packed.table.copy(), settings, state, turns)
+        return settle(packed, settings, outcome, partial(_go_on_once, interruption, packed))
+
+    def go_on(packed: Packed, settings: Array, state: Array) -> Outcome:
+        outcome = _go_on_once(interruption, packed, settings, state)
+        return settle(packed, settings, outcome, partial(_go_on_once, interruption, packed))
+
+    return Loop(first, go_on)
+
+
 def _holds(outcome: Outcome) -> bool:
     """Whether rows hold and the objective is stationary, whatever it is of second order."""
     return outcome.code in (SOLVED, UNSURE)
@@ -106,3 +128,8 @@ def _run(packed: Packed, interruption: Interruption, table: Table, settings: Arr
     history = np.empty((min(int(settings[ITERATIONS]), MOST_HISTORY) + 1, HISTORY))
     interruption.watched = (state, packed.results_at)
     return Outcome(solve_program(table, packed.pool, settings, state, history, packed.tips), state, history)
+
+
+def _go_on_once(interruption: Interruption, packed: Packed, settings: Array, state: Array) -> Outcome:
+    """The loop from a state that a solve has led to, with postures measured from where they were."""
+    return _run(packed, interruption, following_none(packed), settings, state)

@@ -51,7 +51,7 @@ from assembly.solve.contacts import free_folds, is_of_surfaces
 from assembly.solve.ending import finish, return_to
 from assembly.solve.guards import allowed_share, look_again, numbers_of, place_guards
 from assembly.solve.inertia import note_factor
-from assembly.solve.multipliers import choose_multipliers, forget_objective, least_multipliers, weigh_rows
+from assembly.solve.multipliers import choose_multipliers, forget_objective, least_multipliers, strongest, weigh_rows
 from assembly.solve.pauses import SHORT, pause
 from assembly.solve.report import is_clear, keep, log
 from assembly.solve.restoration import LEAST_SHARE, SHARE, SOFTNESS, begin_way, step_back
@@ -89,6 +89,7 @@ from assembly.solve.settings import (
     TICK,
     VIOLATION,
 )
+from assembly.solve.standstill import is_stuck, next_floor, out_of_reach, stands_still
 from assembly.solve.start import read_state, rearrange, set_out
 from assembly.solve.step import CLOSE, aim, cut_step, leave_saddle, propose, short_share
 from assembly.solve.tangency import off_rows
@@ -96,9 +97,6 @@ from assembly.solve.tangency import off_rows
 # Every so many steps the largest violation must have halved, or the loop sees whether the rows can hold; so many times.
 PATIENCE = 25
 RESTORATIONS = 3
-# Where so many whole steps in a row do not halve the violation, the floor of the penalty gives way, down to here:
-# rounding, times its inverse, must stay small against the objective's curvature.
-SLOW, HARDEST = 3, 1e-10
 # Where a solve with clearances ends at a pose that does not hold, so many more steps lead back onto the rows.
 SETTLING = 30
 # Where nothing is asked for but that constraints hold: so many iterations may follow one at which bodies touch.
@@ -156,7 +154,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
     limit = int(settings[ITERATIONS]) - done
     longest_tick = EXTRA_TIME * int(settings[ITERATIONS]) - done
     mu = settings[PENALTY]
-    floor, slow_steps, asked = settings[PENALTY_FLOOR], 0, 0
+    floor, asked = settings[PENALTY_FLOOR], 0
     way[SOFTNESS] = 1e-2
     begin_way(way)
     # The first step of a tick needs about what that of the last one did; half of it is tried first.
@@ -245,7 +243,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             gradient, lines, lagrangian, _factor = system
             kept = False
             # What was hard for other rows need not be for these.
-            floor, slow_steps, mu = settings[PENALTY_FLOOR], 0, max(mu, settings[PENALTY_FLOOR])
+            floor, mu = settings[PENALTY_FLOOR], max(mu, settings[PENALTY_FLOOR])
             begin_way(way)
             if folded:
                 # Perhaps another one is lost.
@@ -369,6 +367,10 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             restoring = False
             mu = 1e-4
             check_at, check_violation = iteration + PATIENCE, violation
+        gains_nothing = violation > feasible and mu <= floor and not (restoring or watched or tick)
+        force = strongest(y, rows) if gains_nothing else 0.0
+        if gains_nothing and stands_still(way, settings, feasible, alpha, violation, last_violation, dual, force, mu):
+            check_at, check_violation = iteration, violation
         if not restoring and iteration >= check_at:
             # The rows gain nothing: see whether they can hold at all. One that has just closed has had no time to.
             least = TOUCHING if check_violation <= feasible else feasible
@@ -414,7 +416,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
                 cut, may_go = allowed_share(table, pool, memory, here, trial, lines[1], most_of_it)
         slope, steepest = cut_step(shape, here, rows, y, mu, cut, foreseen, lines)
         if restoring:
-            ends = steepest <= 1e-9 * violation or longest < 1e-12
+            ends = steepest <= max(1e-9 * violation, out_of_reach(feasible, violation)) or longest < 1e-12
             slows = iteration >= check_at and violation > 0.99 * check_violation
             if (ends or slows) and watched and iteration < limit:
                 # A contact may have come to where a given one stands, of which no clearance asks anything.
@@ -428,7 +430,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
                     here, trial = trial, here
                     iteration += 1
                     continue
-                if violation > TOUCHING or watched or not any_pose:
+                if violation > TOUCHING or watched or not any_pose or is_stuck(way):
                     status = INFEASIBLE if violation > TOUCHING else STALLED
                     break
             if ends or slows:
@@ -478,11 +480,8 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         if alpha == 1.0:
             kept = cut == 1.0 and used == shift and mu == floor and not restoring
             if cut == 1.0 and used == shift:
-                # Rows whose slopes all but vanish, at a dead center say: only a harder penalty holds them.
                 slow = mu == floor and violation_of(here[3], one_sided, rows) > max(0.5 * violation, feasible)
-                slow_steps = slow_steps + 1 if slow else 0
-                if slow_steps >= SLOW and not tick:
-                    floor = max(0.1 * floor, HARDEST)
+                floor = next_floor(way, floor, slow and not tick)
                 mu = max(0.1 * mu, floor)
             radius = min(2.0 * radius, 1e6)
         else:

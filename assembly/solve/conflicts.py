@@ -19,6 +19,7 @@ from assembly.constraints.packing import Packed
 from assembly.constraints.trim_contact import TrimContact
 from assembly.solve.jacobian import NoPairError, rows_of
 from assembly.solve.rank import HELD
+from assembly.solve.settings import VIOLATION
 from assembly.solve.solution import Scene, Status
 from assembly.solve.starts import Start, far_starts, near_starts
 from assembly.solve.subset import Problem, Snapshot
@@ -65,14 +66,17 @@ def conflicting_sets(snapshot: Snapshot) -> list[tuple[int, ...]]:
     return found
 
 
-def conflicts_at(scene: Scene, packed: Packed, state: Array) -> list[tuple[str, ...]]:
-    """The same by their names, at the state that a solve left."""
+def conflicts_at(scene: Scene, packed: Packed, state: Array, fit: float) -> list[tuple[str, ...]]:
+    """The same by their names, at the state that a solve left; what disagrees by no more than `fit` is no conflict."""
     try:
         rows = rows_of(packed, state)
     except NoPairError:
         # Then values that were driven since are not told from those of the solve.
         rows = None
-    found = conflicting_sets(Snapshot(scene, packed, state if rows is None else rows.state, rows, solved=True))
+    # Unless all that is violated is so by less: then it is contacts or limits that do not hold.
+    held = fit if state[packed.results_at + VIOLATION] > fit * packed.scale else HELD
+    there = state if rows is None else rows.state
+    found = conflicting_sets(Snapshot(scene, packed, there, rows, solved=True, held=max(held, HELD)))
     return [tuple(scene.constraints[k].name for k in places) for places in sorted(found)]
 
 

@@ -45,10 +45,12 @@ def groups_of(
     rows: Rows,
     counted: NDArray[np.bool_],
     tolerance: float | None = None,
+    fit: float = 0.0,
 ) -> list[Group]:
     """The groups of a scene, in the order of their first bodies, with those rows that are counted.
 
-    A tolerance decides on rank if it is given, else what the rows' residuals make of the pose.
+    A tolerance decides on rank if it is given, else what the rows' residuals make of the pose: up to `fit` they may be
+    what rows that repeat each other disagree by.
     """
     worst = float(np.abs(rows.residual[counted]).max(initial=0.0))
     places = {id(body): k for k, body in enumerate(bodies)}
@@ -72,5 +74,5 @@ def groups_of(
             dtype=np.int64,
         )
         jacobian = rows.jacobian[np.ix_(own, moving_columns(members))]
-        found.append(Group(members, own, Balanced.of(jacobian, worst, tolerance)))
+        found.append(Group(members, own, Balanced.of(jacobian, worst, tolerance, fit)))
     return found

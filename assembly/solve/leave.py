@@ -30,7 +30,7 @@ from assembly.solve.settings import (
     VIOLATION,
 )
 
-__all__ = ["Outcome", "settle"]
+__all__ = ["Fit", "Outcome", "settle"]
 
 Array = NDArray[np.float64]
 # The first step along a way in a scene with clearances; by what steps grow while poses become lower; the longest.
@@ -46,6 +46,13 @@ HOLDS, MARGIN, FAR_OUT = 1e-11, 1.25, 1e-11
 MOST_WAYS = 6
 
 
+class Fit(NamedTuple):
+    """What rows that repeat each other may disagree by, over the size, and what they do, (m,), if anything."""
+
+    allowed: float
+    apart: Array | None = None
+
+
 class Outcome(NamedTuple):
     """How the loop ended, the state and the history it left; of what was looked at, what the end is."""
 
@@ -53,6 +60,7 @@ class Outcome(NamedTuple):
     state: Array
     history: Array
     order: SecondOrder | None = None
+    fit: Fit | None = None
 
 
 Run = Callable[[Array, Array], Outcome]

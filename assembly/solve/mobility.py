@@ -83,6 +83,7 @@ class Mobility(ReadOnlyArrays):
     _groups: tuple[Group, ...] = field(repr=False)
     _rows: Rows = field(repr=False)
     _worst: float = field(repr=False)
+    _held: float = field(repr=False)
     _snapshot: Snapshot = field(repr=False)
     _drives: bool = field(repr=False)
 
@@ -96,12 +97,16 @@ class Mobility(ReadOnlyArrays):
         solved: bool,
         drives: bool = True,
         tolerance: float | None = None,
+        fit: float,
     ) -> Mobility:
-        """The mobility of a packed scene at a state; `solved` as of `Snapshot`, the rest as of `Assembly.mobility`."""
+        """The mobility of a packed scene at a state; `solved` as of `Snapshot`, the rest as of `Assembly.mobility`.
+
+        Rows that repeat each other and disagree by no more than `fit` count once.
+        """
         rows = rows_of(packed, state)
         counted = ~rows.one_sided & (drives | ~rows.drives)
         limit = None if tolerance is None else positive("tolerance", tolerance)
-        groups = tuple(groups_of(scene.bodies, scene.constraints, rows, counted, limit))
+        groups = tuple(groups_of(scene.bodies, scene.constraints, rows, counted, limit, fit))
         rank = sum(group.balanced.rank for group in groups)
         unknowns = 6 * sum(len(group.places) for group in groups)
         motions = np.zeros((unknowns - rank, packed.count, 6))
@@ -110,6 +115,8 @@ class Mobility(ReadOnlyArrays):
             for motion in group.balanced.free:
                 motions[k, list(group.places)] = motion.reshape(-1, 6) * np.repeat([packed.scale, 1.0], 3)
                 k += 1
+        worst = float(np.abs(rows.residual[counted]).max(initial=0.0))
+        held = fit if HELD < worst <= fit else HELD
         values = np.concatenate([group.balanced.singular_values for group in groups])
         return cls(
             dof=unknowns - rank,
@@ -125,8 +132,9 @@ class Mobility(ReadOnlyArrays):
             _scene=scene,
             _groups=groups,
             _rows=rows,
-            _worst=float(np.abs(rows.residual[counted]).max(initial=0.0)),
-            _snapshot=Snapshot(scene, packed, rows.state, rows, solved),
+            _worst=worst,
+            _held=held,
+            _snapshot=Snapshot(scene, packed, rows.state, rows, solved, held),
             _drives=drives,
         )
 
@@ -174,7 +182,7 @@ class Mobility(ReadOnlyArrays):
         motions from which bodies come back do not count: they exist to first order only. Found when this is first
         read. Where the rows do not hold it is `dof`.
         """
-        if self.dof == 0 or not self._worst <= HELD:
+        if self.dof == 0 or not self._worst <= self._held:
             return self.dof
         return finite_dof(self._problem, self._groups, self.q, self.size)
 
@@ -227,13 +235,14 @@ class Mobility(ReadOnlyArrays):
         lines = [
             f"{self.dof} {many} of freedom; Grubler's count is {self.grubler}: {self.rows} rows of rank {self.rank}"
         ]
-        if self._worst <= HELD:
+        if self._worst <= self._held:
             if self.singular:
                 lines.append(f"  singular: {self.finite_dof} at poses nearby")
             lines += [f"  redundant: {_listed(names)}" for names in self.redundant_sets]
-        else:
+        if HELD < self._worst <= self._held:
+            lines.append(f"  redundant constraints disagree by up to {self.feasibility:.3g}")
+        if not self._worst <= self._held:
             lines.append(f"  the pose violates constraints by {self.feasibility:.3g}; counts are those of this pose")
-        if not self._worst <= HELD:
             lines += [f"  conflicting: {_listed(names)}" for names in self.conflicting_sets]
         for k, motion in enumerate(self.free_motions[:MOST_MOTIONS]):
             for body, twist, place in zip(self._scene.bodies, motion, self.q[:, :3], strict=True):

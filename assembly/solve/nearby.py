@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from assembly.kinematics.pose import multiply, retract
 from assembly.solve.groups import Group, groups_of
 from assembly.solve.jacobian import rows_of
-from assembly.solve.rank import HELD
 from assembly.solve.solution import Solution
 from assembly.solve.subset import Problem
 
@@ -55,7 +54,8 @@ def moves(q: Array, other: Array, size: float) -> Array:
 def _at(problem: Problem, solution: Solution) -> list[Group]:
     """The groups at a solution of a problem of two-sided rows."""
     rows = rows_of(problem.packed, solution._state)
-    return groups_of(solution._scene.bodies, problem.constraints, rows, np.ones(len(rows.owners), dtype=bool))
+    counted = np.ones(len(rows.owners), dtype=bool)
+    return groups_of(solution._scene.bodies, problem.constraints, rows, counted, fit=problem.held)
 
 
 def finite_dof(problem: Problem, groups: Sequence[Group], q: Array, size: float) -> int:
@@ -117,7 +117,7 @@ class Walks:
         violation = self._problem.violations(solution).max(initial=0.0)
         if not violation <= ROUGH:
             return
-        holds = violation <= HELD
+        holds = violation <= self._problem.held
         there = {group.places: group.dof for group in _at(self._problem, solution)} if holds else {}
         gone = moves(self._q, solution.q, self._size)
         for g, (group, part) in enumerate(zip(self.groups, parts, strict=True)):

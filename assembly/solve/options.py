@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from assembly.errors import InputError, integer, number
 from assembly.solve.settings import (
     FEASIBILITY,
+    FIT,
     ITERATIONS,
     LAST_LOOK,
     PENALTY,
@@ -43,6 +44,9 @@ class Options:
         Smallest mu while violations shrink; where they do not, it falls further, to 1e-10.
     radius : float
         First bound of a step: lengths relative to the scene's size, and radians.
+    fit : float
+        What constraints of joints, couplings and driven values that repeat each other may disagree by, as those of CAD
+        files do; such a solve ends FITTED. 0: they are to agree to the tolerance.
     verbose : int
         1 prints a table of the iterations after the solve; nothing is printed at 0.
     """
@@ -53,6 +57,7 @@ class Options:
     penalty: float = 1e-2
     penalty_floor: float = 1e-6
     radius: float = 0.2
+    fit: float = 1e-6
     verbose: int = 0
 
     def __post_init__(self) -> None:
@@ -62,6 +67,9 @@ class Options:
             value = number(name, getattr(self, name))
             if not 0.0 < value <= high:
                 raise InputError(f"{name} is {value:g}; expected a number above 0 and at most {high:g}")
+        fit = number("fit", self.fit)
+        if not 0.0 <= fit <= 1e-2:
+            raise InputError(f"fit is {fit:g}; expected a number from 0 to 0.01")
         floor = number("penalty_floor", self.penalty_floor)
         if not 1e-12 <= floor <= self.penalty:
             raise InputError(f"penalty_floor is {floor:g}; expected a number from 1e-12 to penalty {self.penalty:g}")
@@ -84,6 +92,7 @@ class Options:
         out[PENALTY] = self.penalty_floor if warm else self.penalty
         out[PENALTY_FLOOR] = self.penalty_floor
         out[RADIUS] = self.radius
+        out[FIT] = self.fit
         out[LAST_LOOK] = 1.0
         out[SECOND_ORDER] = 1.0
         return out

@@ -13,7 +13,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["HELD", "SMALLEST", "Balanced", "orthonormal", "tolerance_at"]
+from assembly.solve.settings import NEIGHBORHOOD
+
+__all__ = ["HELD", "SMALLEST", "Balanced", "centered", "orthonormal", "tolerance_at"]
 
 Array = NDArray[np.float64]
 # Of a pose that is exact to rounding.
@@ -24,13 +26,16 @@ HELD = 1e-9
 NEAR = 10.0
 
 
-def tolerance_at(residual: float) -> float:
+def tolerance_at(residual: float, fit: float) -> float:
     """The singular value that counts as zero where the rows hold to a residual, lengths over the scene's size.
 
     Where rows have no first-order part along some motion, a residual c leaves the pose uncertain by the square root
-    of c, and singular values with it.
+    of c, and singular values with it. Rows that repeat each other and disagree by so much, up to `fit`, are tilted
+    against each other by about as much (`fit.py`).
     """
-    return max(SMALLEST, 10.0 * float(np.sqrt(residual))) if residual <= HELD else SMALLEST
+    if residual <= HELD:
+        return max(SMALLEST, 10.0 * float(np.sqrt(residual)))
+    return max(SMALLEST, residual / NEIGHBORHOOD) if residual <= fit else SMALLEST
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,15 +60,14 @@ class Balanced:
     near: float
 
     @classmethod
-    def of(cls, jacobian: Array, residual: float, tolerance: float | None = None) -> Balanced:
-        """Balance rows in twists at the bodies' origins that hold to a residual; a tolerance decides if it is given."""
-        blocks = jacobian.reshape(len(jacobian), jacobian.shape[1] // 6, 6)
-        centers = np.array([_center(blocks[:, b]) for b in range(blocks.shape[1])]).reshape(-1, 3)
-        shifted = blocks.copy()
-        shifted[:, :, 3:] -= np.cross(centers[None], blocks[:, :, :3])
-        rows: Array = shifted.reshape(jacobian.shape)
+    def of(cls, jacobian: Array, residual: float, tolerance: float | None = None, fit: float = 0.0) -> Balanced:
+        """Balance rows in twists at the bodies' origins that hold to a residual; a tolerance decides if it is given.
+
+        `fit` as of `tolerance_at`.
+        """
+        rows, centers = centered(jacobian)
         lengths = np.linalg.norm(rows, axis=1, keepdims=True)
-        expected = tolerance_at(residual)
+        expected = tolerance_at(residual, fit)
         counts = lengths > expected
         rows = np.where(counts, rows / np.where(counts, lengths, 1.0), 0.0)
         return cls(rows, centers, expected, NEAR) if tolerance is None else cls(rows, centers, tolerance, 1.0)
@@ -109,6 +113,15 @@ class Balanced:
         """Orthonormal combinations of rows that vanish, (m - rank, m)."""
         left = np.linalg.svd(self.rows)[0]
         return left[:, self.rank :].T
+
+
+def centered(jacobian: Array) -> tuple[Array, Array]:
+    """Rows in twists at the bodies' origins (m, 6 k) in twists at each body's own center; the centers, (k, 3)."""
+    blocks = jacobian.reshape(len(jacobian), jacobian.shape[1] // 6, 6)
+    centers = np.array([_center(blocks[:, b]) for b in range(blocks.shape[1])]).reshape(-1, 3)
+    shifted = blocks.copy()
+    shifted[:, :, 3:] -= np.cross(centers[None], blocks[:, :, :3])
+    return shifted.reshape(jacobian.shape), centers
 
 
 def _center(blocks: Array) -> Array:

@@ -29,15 +29,17 @@ def dependent_sets(balanced: Balanced, owners: NDArray[np.int64]) -> list[tuple[
     if balanced.rank == len(balanced.rows):
         return []
     combinations = balanced.dependencies
+    # Rows that are tilted against each other turn combinations by about as much.
+    absent = max(ABSENT, balanced.tolerance)
     # A row that is in no combination is independent of all others.
-    taking_part = np.linalg.norm(combinations, axis=0) > ABSENT
+    taking_part = np.linalg.norm(combinations, axis=0) > absent
     rows = {int(owner): np.flatnonzero(owners == owner) for owner in np.unique(owners[taking_part])}
 
     def rank(which: Sequence[int]) -> int:
         inside = np.concatenate([*(rows[k] for k in which), np.empty(0, dtype=np.int64)])
         beyond = np.delete(combinations, inside, axis=1)
         sizes = np.linalg.svd(beyond, compute_uv=False) if beyond.size else np.empty(0)
-        return len(inside) - (len(combinations) - int(np.count_nonzero(sizes > ABSENT)))
+        return len(inside) - (len(combinations) - int(np.count_nonzero(sizes > absent)))
 
     found: list[tuple[int, ...]] = []
     earlier: list[int] = []

@@ -18,8 +18,8 @@ from assembly.solve.tangency import off_rows
 # back.
 SHORTENED, ASTRAY, LEAST_SHARE = 0.25, 10.0, 1e-4
 # What is known of the way: the softness of the last step, the share to take of the next one, the least violation so
-# far, whether the last step led off.
-SOFTNESS, SHARE, LOWEST, LED_OFF, WAY = 0, 1, 2, 3, 4
+# far, whether the last step led off. Of the loop: whole steps in a row that changed nothing, and that gained little.
+SOFTNESS, SHARE, LOWEST, LED_OFF, STILLS, SLOW_STEPS, WAY = 0, 1, 2, 3, 4, 5, 6
 
 
 @kernel(inline=True)
@@ -52,6 +52,8 @@ def begin_way(way):
     way[SHARE] = 1.0
     way[LOWEST] = math.inf
     way[LED_OFF] = 0.0
+    way[STILLS] = 0.0
+    way[SLOW_STEPS] = 0.0
 
 
 @kernel(inline=True)

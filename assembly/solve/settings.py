@@ -14,10 +14,11 @@ FEASIBILITY, STATIONARITY, ITERATIONS, PENALTY, PENALTY_FLOOR, RADIUS, GATHER, F
 # at a pose that holds after so many iterations, and at the last one that held where it ends otherwise; how long it may
 # take (0: as long as it takes). Whether the end is tested for a minimum. Of a tick: where in the state the rows are
 # that the last one left (0: nowhere). Whether nothing is asked for but that constraints hold: the least move is a wish.
-# Whether a tick whose time is spent where its pose does not hold leaves that pose for the next one to go on from.
-LAST_LOOK, TICK, BUDGET, SECOND_ORDER, RECALL, ANY_POSE, CARRIES = 8, 9, 10, 11, 12, 13, 14
+# Whether a tick whose time is spent where its pose does not hold leaves that pose for the next one to go on from. What
+# rows that repeat each other may disagree by (`fit.py`).
+LAST_LOOK, TICK, BUDGET, SECOND_ORDER, RECALL, ANY_POSE, CARRIES, FIT = 8, 9, 10, 11, 12, 13, 14, 15
 # The address at which a solve asks whether it is to go on (0: nowhere).
-ASK_AT, SETTINGS = 15, 16
+ASK_AT, SETTINGS = 16, 17
 # Whether the end is tested for a minimum (TESTED: and saddles are left before they are reached to the last digit).
 TESTED, REACHED = 1.0, 2.0
 # Whether scattered bodies are gathered (ASSEMBLES: and the loop ends there).
@@ -32,6 +33,8 @@ HELD, CURVED, FIRST_SHIFT, CARRIED = 8, 9, 10, 11
 HISTORY = 7  # figures an iteration: objective, feasibility, stationarity, mu, regularization, step length, radius
 # Rounding of poses far from the origin, in parts of that.
 ROUNDING = 4e-16
+# How far bodies may be expected to move to mend what rows are off, lengths over the size and radians.
+NEIGHBORHOOD = 0.02
 # More than this is no rounding that a solution may have.
 MOST_ROUNDING = 1e-6
 # A pair this near to a fold (det H over |H|^2) gets its coordinates as unknowns.

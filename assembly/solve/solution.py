@@ -22,10 +22,12 @@ from assembly.kinematics.pose import Pose
 from assembly.proximity.pairs import ContactPair
 from assembly.proximity.solid_contact import TRACK
 from assembly.solve.measure import measure, standing
+from assembly.solve.options import Options
 from assembly.solve.settings import COUNT, CULPRIT, DUAL, IMPROPER, OBJECTIVE, VIOLATION
 
 if TYPE_CHECKING:
     from assembly.kinematics.body import BodyFace
+    from assembly.solve.leave import Fit
     from assembly.solve.mobility import Mobility
     from assembly.solve.second_order import SecondOrder
     from assembly.solve.statics import Wrench
@@ -37,6 +39,8 @@ Array = NDArray[np.float64]
 MOST_COUNTED = 200
 # Bodies with shapes all pairs of which are looked at when a solution is printed; their number grows with the square.
 MOST_LOOKED = 40
+# A constraint that is off by less than this part of the worst is not one of those that disagree.
+IDLE = 1e-3
 
 
 class Status(Enum):
@@ -50,6 +54,7 @@ class Status(Enum):
     TIME_LIMIT = "the time limit ended it; the pose is the last that held, if one did: raise time_limit or start nearer"
     STOPPED = "the callback ended it; the pose is the last that held, if one did"
     UNBOUNDED = "the objective is unbounded, it falls on and on along poses that hold; bound it by a limit or a term"
+    FITTED = "constraints that repeat each other disagree by a little and hold as well as they can; all others hold"
 
 
 class Scene:
@@ -157,6 +162,7 @@ class Solution(ReadOnlyArrays):
         seconds: float,
         history: Array,
         order: SecondOrder | None = None,
+        fit: Fit | None = None,
     ) -> None:
         self._scene = scene
         self._packed = packed
@@ -166,6 +172,7 @@ class Solution(ReadOnlyArrays):
         self.seconds = seconds
         self._order = order
         self.restarted = False
+        self._fit = fit
         # Flat contacts alone need it again, for the center of their pressure.
         self._wishes = packed.pool[scene.wished(packed)] if scene.contacts else None
 
@@ -227,8 +234,8 @@ class Solution(ReadOnlyArrays):
 
     @property
     def success(self) -> bool:
-        """Whether the status is SOLVED."""
-        return self.status is Status.SOLVED
+        """Whether the status is SOLVED or FITTED."""
+        return self.status is Status.SOLVED or self.status is Status.FITTED
 
     @property
     def second_order(self) -> SecondOrder | None:
@@ -257,11 +264,34 @@ class Solution(ReadOnlyArrays):
         """The largest violation of every constraint's rows, lengths in a unit."""
         packed = self._packed
         each = np.where(packed.one_sided, np.maximum(-self._residuals, 0.0), np.abs(self._residuals))
-        each = np.where(packed.lengths, each / unit, each)
+        return self._by_constraint(np.where(packed.lengths, each / unit, each))
+
+    def _by_constraint(self, each: Array) -> dict[str, float]:
+        """The largest of what every constraint's rows have."""
         return {
             constraint.name: float(each[rows].max(initial=0.0))
-            for constraint, rows in zip(self._scene.constraints, packed.spans, strict=True)
+            for constraint, rows in zip(self._scene.constraints, self._packed.spans, strict=True)
         }
+
+    @property
+    def _allowed(self) -> float:
+        """What rows that repeat each other may disagree by, over the size."""
+        return Options.fit if self._fit is None else self._fit.allowed
+
+    @cached_property
+    def disagreeing(self) -> dict[str, float]:
+        """Of a FITTED solve: what repeats each other, and how far each is off, the worst first.
+
+        Lengths in the user's unit, angles in radians.
+        """
+        if self._fit is None or self._fit.apart is None:
+            return {}
+        packed = self._packed
+        off = np.abs(self._fit.apart)
+        parts = self._by_constraint(off)
+        amounts = self._by_constraint(np.where(packed.lengths, off * packed.scale, off))
+        least = IDLE * max(parts.values())
+        return {name: amounts[name] for name in sorted(parts, key=lambda name: -parts[name]) if parts[name] > least}
 
     @cached_property
     def multipliers(self) -> dict[str, Array]:
@@ -304,7 +334,7 @@ class Solution(ReadOnlyArrays):
         """Degrees of freedom at `q`, free motions, redundant constraints; `Assembly.mobility` has options."""
         from assembly.solve.mobility import Mobility
 
-        return Mobility.at(self._scene, self._packed, self._state, solved=True)
+        return Mobility.at(self._scene, self._packed, self._state, solved=True, fit=self._allowed)
 
     @cached_property
     def conflicting_sets(self) -> list[tuple[str, ...]]:
@@ -316,7 +346,7 @@ class Solution(ReadOnlyArrays):
             return []
         from assembly.solve.conflicts import conflicts_at
 
-        return conflicts_at(self._scene, self._packed, self._state)
+        return conflicts_at(self._scene, self._packed, self._state, self._allowed)
 
     @property
     def conflicting(self) -> list[str]:
@@ -388,6 +418,8 @@ class Solution(ReadOnlyArrays):
         if held_off and not self.success and self.status is not Status.UNBOUNDED:
             named = ", ".join(f"{name!r} ({self.violations[name]:.3g})" for name in held_off)
             text += f"; violated: {named}"
+        if self.status is Status.FITTED:
+            text += "; disagreeing: " + ", ".join(f"{name!r} ({off:.3g})" for name, off in self.disagreeing.items())
         if self.status is Status.INFEASIBLE:
             named = " and ".join(", ".join(map(repr, names)) for names in self.conflicting_sets)
             text += f"; conflicting: {named or 'none was shown to be'}"

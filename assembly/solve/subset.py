@@ -64,15 +64,20 @@ class Problem:
         Contacts name their faces.
     near : mapping of id -> array
         Where tracked values are looked for: parameters by name of a contact, angles by identity of a coordinate.
+    held : float
+        Violations up to it count as none, lengths over the scene's size.
     """
 
-    def __init__(self, scene: Scene, constraints: Sequence[Constraint], near: dict[str | int, Array]) -> None:
+    def __init__(
+        self, scene: Scene, constraints: Sequence[Constraint], near: dict[str | int, Array], held: float = HELD
+    ) -> None:
         self.packed = pack(scene.bodies, constraints, ())
         self._size = scene.scale
         self._scene = Scene(
             scene.bodies, tuple(constraints), tuple(self.packed.contacts), tuple(self.packed.sides), self.packed.scale
         )
         self._near = near
+        self.held = held
 
     @property
     def constraints(self) -> tuple[Constraint, ...]:
@@ -107,9 +112,9 @@ class Problem:
         if gathers:
             settings[GATHER] = settings[ANY_POSE] = 1.0
         turns = np.array([self._near[id(angle)][0] for angle in packed._angles])
-        code, state, history, _order = begin(packed, CTRL_C, packed.table, settings, self.start(q, after), turns)
+        outcome = begin(packed, CTRL_C, packed.table, settings, self.start(q, after), turns)
         CTRL_C.is_over()  # raises what ended it
-        return Solution(self._scene, packed, state, _STATUSES[code], 0.0, history)
+        return Solution(self._scene, packed, outcome.state, _STATUSES[outcome.code], 0.0, outcome.history)
 
     def violations(self, solution: Solution) -> Array:
         """Violations of the constraints, in their order: lengths over the size of the whole scene."""
@@ -123,7 +128,7 @@ class Problem:
 
     def holds(self, solution: Solution) -> bool:
         """Whether all constraints hold at a solution."""
-        return solution.status is not Status.CONTACT_LOST and bool((self.violations(solution) <= HELD).all())
+        return solution.status is not Status.CONTACT_LOST and bool((self.violations(solution) <= self.held).all())
 
 
 class Snapshot:
@@ -138,10 +143,15 @@ class Snapshot:
         At the state.
     solved : bool
         Whether the state's residuals are those of its poses; values that were driven since then are told by them.
+    held : float
+        As of `Problem`.
     """
 
-    def __init__(self, scene: Scene, packed: Packed, state: Array, rows: Rows | None, solved: bool) -> None:
+    def __init__(
+        self, scene: Scene, packed: Packed, state: Array, rows: Rows | None, solved: bool, held: float = HELD
+    ) -> None:
         self.scene = scene
+        self._held = held
         self.q = state[: packed.contacts_at].reshape(-1, 7)
         tracked = state[packed.contacts_at : packed.multipliers_at].reshape(-1, TRACK)
         self._near: dict[str | int, Array] = {contact.name: tracked[k] for k, contact in enumerate(packed.contacts)}
@@ -176,7 +186,7 @@ class Snapshot:
         # A trim means nothing without its contact.
         contacts = {part.name for part in parts if isinstance(part, Contact)}
         kept = [part for part in parts if not isinstance(part, TrimContact) or part.contact.name in contacts]
-        return Problem(self.scene, kept, self._near)
+        return Problem(self.scene, kept, self._near, self._held)
 
     def _part(self, place: int, one_sided: bool, drives: bool) -> Constraint | None:
         constraint = self.scene.constraints[place]

@@ -1,0 +1,56 @@
+"""Where whole steps gain nothing of the violation: rows contradict each other, or only a harder penalty holds them."""
+
+from __future__ import annotations
+
+from assembly._kernel import kernel
+from assembly.solve.restoration import SLOW_STEPS, STILLS
+from assembly.solve.settings import NEIGHBORHOOD, STATIONARITY
+
+# So many whole steps in a row that leave this part of the largest violation tell that rows contradict each other; one
+# may be by an old factor.
+STUCK, STILL = 2.0, 0.99
+# Rows that are off by this at most may repeat each other, tilted by so much. Rounding, in parts of what counts as held.
+LITTLE, MOST_TILTED, ROUNDED = 1e-2, 1e-3, 0.01
+# Where so many whole steps in a row do not halve the violation, the floor of the penalty gives way, down to here:
+# rounding, times its inverse, must stay small against the objective's curvature.
+SLOW, HARDEST = 3.0, 1e-10
+
+
+@kernel(inline=True)
+def out_of_reach(feasible, violation):
+    """The largest |J^T c| where what rows are off is what no motion nearby changes.
+
+    Rows that repeat each other, tilted by s, have |J^T c| = s |c|, and agree a step |c| / s away. Of those that are off
+    by much J^T c = 0 tells, but for rounding.
+    """
+    tilt = min(violation / NEIGHBORHOOD, MOST_TILTED) if violation <= LITTLE else 0.0
+    return tilt * violation + ROUNDED * feasible
+
+
+@kernel(inline=True)
+def stands_still(way, settings, feasible, alpha, violation, last_violation, dual, force, mu):
+    """Whether whole steps in a row, at a stationary point, left what rows are off: it is what no motion changes.
+
+    The multipliers y + c / mu of the next step leave the Lagrangian as stationary as y only where J^T c = 0. `force` is
+    the strongest one, which grows by every step.
+    """
+    nearly = settings[STATIONARITY] * max(1.0, force) + out_of_reach(feasible, violation) / mu
+    still = alpha == 1.0 and violation > STILL * last_violation and dual <= nearly
+    way[STILLS] = way[STILLS] + 1.0 if still else 0.0
+    return way[STILLS] == STUCK
+
+
+@kernel(inline=True)
+def is_stuck(way):
+    """Whether the loop was found to stand still, and has not moved since but by restoring rows."""
+    return way[STILLS] == STUCK
+
+
+@kernel(inline=True)
+def next_floor(way, floor, is_slow):
+    """The floor of the penalty after a whole step by it, which gives way where such steps do not halve the violation.
+
+    Rows whose slopes all but vanish, at a dead center say: only a harder penalty holds them.
+    """
+    way[SLOW_STEPS] = way[SLOW_STEPS] + 1.0 if is_slow else 0.0
+    return max(0.1 * floor, HARDEST) if way[SLOW_STEPS] >= SLOW else floor
