@@ -154,6 +154,7 @@ def _left(look: Look, ways: list[Way], settings: Array, run: Run) -> Outcome | N
             outcome = run(settings, lower.state.copy())
             if outcome.code not in (SOLVED, UNSURE):
                 left = left or outcome
-            elif outcome.state[look.packed.results_at + OBJECTIVE] < look.value + KEPT * lower.rise:
+                break
+            if outcome.state[look.packed.results_at + OBJECTIVE] < look.value + KEPT * lower.rise:
                 return outcome
     return left
