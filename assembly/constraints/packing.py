@@ -34,7 +34,7 @@ from assembly.errors import FARTHEST, InputError
 from assembly.geometry.surface import NurbsSurface
 from assembly.kinematics.body import Body, BodyFace
 from assembly.proximity import watch_memory
-from assembly.proximity.events import fresh_memory
+from assembly.proximity.events import fresh_memory, listed_places
 from assembly.proximity.solid_contact import TRACK
 
 __all__ = ["Packed", "lone_surfaces", "pack", "structure_of"]
@@ -251,8 +251,8 @@ class Packed:
                     row[layout.SURFACE_F : layout.SHELL_G + 1] = pair[
                         watch_memory.PAIR_SURFACE_F : watch_memory.PAIR_SHELL_G + 1
                     ]
-                    row[layout.MINIMUM] = pair[watch_memory.PAIR_MINIMUM] + watch_memory.IN_PLACE * given
-                    row[layout.GUARD_NUMBER] = number
+                    least = pair[watch_memory.PAIR_MINIMUM] + watch_memory.IN_PLACE * given
+                    row[layout.MINIMUM], row[layout.GUARD_NUMBER] = least, number
         return table
 
     def may_have_outgrown(self) -> bool:
@@ -278,14 +278,11 @@ class Packed:
 
     def listed(self, state: Array) -> list[tuple[int, int]]:
         """Of every place of a watch in a state: its pair of bodies, or -1, and the number of its contact."""
-        return [(pair, number) for pair, number, _ in self._placed(state)]
+        return [(pair, number) for pair, number, _given in self._placed(state)]
 
     def _placed(self, state: Array) -> list[list[int]]:
-        """Of every place of a watch as well whether its contact is in the place of a given one."""
-        pairs = sum(map(len, self.guarded))
-        at = self.memory_at + watch_memory.MEMORY_HEADER + watch_memory.PAIR_MEMORY * pairs
-        places = state[at : at + watch_memory.PLACE_MEMORY * self.guards].reshape(-1, watch_memory.PLACE_MEMORY)
-        return [[int(value) for value in place] for place in places.tolist()]
+        """The same, and whether it is in the place of a given contact."""
+        return listed_places(state[self.memory_at :], sum(map(len, self.guarded)), self.guards)
 
     def _take_addresses(self) -> None:
         """Where the kernels are that only contacts, trims, clearances, expressions or many bodies ask for."""
@@ -304,8 +301,8 @@ class Packed:
         if self.guards:
             table[[layout.LOOK_AT, layout.STAYED_AT, layout.PARTS_AT, layout.WENT_AT]] = addresses.watch()
             table[table[layout.WATCH] + watch_memory.TRACK_SOLIDS] = table[layout.TRACK_AT]
-            if table[table[layout.WATCH] + watch_memory.MARK_AT]:
-                table[table[layout.WATCH] + watch_memory.MARK_AT] = addresses.places()
+            at = table[layout.WATCH] + watch_memory.MARK_AT
+            table[at] = addresses.places() if table[at] else 0
         if table[table[layout.TAPE_ROOM]] > 0:
             table[layout.RUN_TAPE_AT] = addresses.tapes()
 
