@@ -9,13 +9,14 @@ from assembly.constraints.free_contacts import free_row, free_terms
 from assembly.constraints.tapes import run_scene_tape
 from assembly.constraints.trim_rows import trim_rows, trim_terms
 from assembly.proximity.allowances import measure_parts, went_beyond
+from assembly.proximity.contact_place import mark_places
 from assembly.proximity.free_pair import coordinate_lengths, has_stayed, is_extremal
 from assembly.proximity.nearest_query import find_deepest, find_nearest
 from assembly.proximity.solid_contact import search_solids, track_solids
 from assembly.proximity.start import start_surfaces
 from assembly.proximity.watch import look
 
-__all__ = ["blocks", "contacts", "deepest", "solids", "surfaces", "tapes", "trims", "watch"]
+__all__ = ["blocks", "contacts", "deepest", "places", "solids", "surfaces", "tapes", "trims", "watch"]
 
 
 def blocks() -> tuple[int, int]:
@@ -46,6 +47,11 @@ def solids() -> tuple[int, int, int]:
 def deepest() -> int:
     """Of `find_deepest`."""
     return address_of(find_deepest)
+
+
+def places() -> int:
+    """Of `mark_places`."""
+    return address_of(mark_places)
 
 
 def trims() -> tuple[int, int]:

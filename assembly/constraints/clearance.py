@@ -19,8 +19,11 @@ class Clearance(Constraint):
     each is a row gap >= minimum as long as it is near, and a step is never longer than to where something that is not
     listed could touch. A solve ends SOLVED only after a look at its pose found no contact that is violated.
 
-    Pairs of points that a `Contact` of the same two bodies has are that contact's: its gap of zero is no violation. Of
-    bodies with edges the contact counts for both, so a `minimum` above zero contradicts it there.
+    Pairs of points that a `Contact` of the same two bodies has are that contact's: its gap of zero is no violation. A
+    `minimum` above zero does not ask for the place of the contact: what is reached from its points, between the two
+    bodies, without their gap rising to `minimum`. Nothing crosses there, and elsewhere the bodies keep it. The place of
+    a contact that is still open is the one it will have once it is closed; a one-sided one that is open by `minimum` or
+    more leaves nothing out that is nearer.
 
     Bodies that cross at the start are pushed apart where they are in each other by less than a tenth of the scene's
     size and less than their radii of curvature. Deeper ones stay, and the solve ends STALLED, never SOLVED; a tracker

@@ -36,7 +36,7 @@ from assembly.errors import FARTHEST, InputError
 from assembly.geometry.surface import NurbsSurface
 from assembly.kinematics.body import Body, BodyFace
 from assembly.proximity import watch_memory
-from assembly.proximity.events import fresh_memory
+from assembly.proximity.events import fresh_memory, listed_places
 from assembly.proximity.solid_contact import TRACK
 
 __all__ = ["Packed", "lone_surfaces", "pack", "structure_of"]
@@ -194,8 +194,8 @@ class Packed:
         rows.add_guards(self.clearances, self.places)
         writer.header[layout.WATCH] = -1
         if self.guards:
-            watch = pack_watch(writer, self.clearances, self.guarded, self.places, self.contacts)
-            writer.header[layout.WATCH] = watch
+            given = list(zip(self.contacts, self.sides, self.whole, strict=True))
+            writer.header[layout.WATCH] = pack_watch(writer, self.clearances, self.guarded, self.places, given)
         rows.add_trims(self.contacts)
         rows.add_joints(slots)
         rows.add_expressions()
@@ -249,14 +249,15 @@ class Packed:
                 : watch_memory.PAIR_RECORD * table[record + watch_memory.PAIRS]
             ]
             pairs = pairs.reshape(-1, watch_memory.PAIR_RECORD)
-            for row, (place, number) in zip(rows.reshape(-1, layout.ROW), self.listed(state), strict=True):
+            for row, (place, number, given) in zip(rows.reshape(-1, layout.ROW), self._placed(state), strict=True):
                 if place >= 0:
                     pair = pairs[place]
                     row[[layout.BODY_F, layout.BODY_G]] = pair[[watch_memory.PAIR_F, watch_memory.PAIR_G]]
                     row[layout.SURFACE_F : layout.SHELL_G + 1] = pair[
                         watch_memory.PAIR_SURFACE_F : watch_memory.PAIR_SHELL_G + 1
                     ]
-                    row[layout.MINIMUM], row[layout.GUARD_NUMBER] = pair[watch_memory.PAIR_MINIMUM], number
+                    least = pair[watch_memory.PAIR_MINIMUM] + watch_memory.IN_PLACE * given
+                    row[layout.MINIMUM], row[layout.GUARD_NUMBER] = least, number
         return table
 
     def may_have_outgrown(self) -> bool:
@@ -282,10 +283,11 @@ class Packed:
 
     def listed(self, state: Array) -> list[tuple[int, int]]:
         """Of every place of a watch in a state: its pair of bodies, or -1, and the number of its contact."""
-        pairs = sum(map(len, self.guarded))
-        at = self.memory_at + watch_memory.MEMORY_HEADER + watch_memory.PAIR_MEMORY * pairs
-        places = state[at : at + watch_memory.PLACE_MEMORY * self.guards].reshape(-1, watch_memory.PLACE_MEMORY)
-        return [(int(pair), int(number)) for pair, number in places.tolist()]
+        return [(pair, number) for pair, number, _given in self._placed(state)]
+
+    def _placed(self, state: Array) -> list[list[int]]:
+        """The same, and whether it is in the place of a given contact."""
+        return listed_places(state[self.memory_at :], sum(map(len, self.guarded)), self.guards)
 
     def _take_addresses(self) -> None:
         """Where the kernels are that only contacts, trims, clearances, expressions or many bodies ask for."""
@@ -305,6 +307,8 @@ class Packed:
         if self.guards:
             table[[layout.LOOK_AT, layout.STAYED_AT, layout.PARTS_AT, layout.WENT_AT]] = addresses.watch()
             table[table[layout.WATCH] + watch_memory.TRACK_SOLIDS] = table[layout.TRACK_AT]
+            at = table[layout.WATCH] + watch_memory.MARK_AT
+            table[at] = addresses.places() if table[at] else 0
         if table[table[layout.TAPE_ROOM]] > 0:
             table[layout.RUN_TAPE_AT] = addresses.tapes()
 

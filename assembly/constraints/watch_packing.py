@@ -12,10 +12,11 @@ from assembly.constraints.scene_writer import SceneWriter
 from assembly.errors import InputError
 from assembly.geometry.face import Face
 from assembly.geometry.spine import spine_of
-from assembly.kinematics.body import Body
+from assembly.kinematics.body import Body, BodyFace
 from assembly.proximity import watch_memory
 from assembly.proximity.facet_tree import FacetTree
 from assembly.proximity.patch_list import LIST_INTS
+from assembly.proximity.roots import GIVEN_RECORD
 from assembly.proximity.solid import is_one_smooth
 from assembly.proximity.spine_packing import pack_spine
 from assembly.proximity.tree_packing import pack_tree
@@ -23,6 +24,10 @@ from assembly.proximity.tree_packing import pack_tree
 __all__ = ["LAST_REACH", "guarded_pairs", "is_of_surfaces", "pack_watch", "place_count"]
 
 Pair = tuple[Body, Body]
+Side = Body | BodyFace
+# A contact of the scene, its sides, and whether it is one of their whole surfaces, without edges.
+GivenContact = tuple[Contact, tuple[Side, Side], bool]
+
 # Of a watch, in parts of the scene's size: how far its looks reach at least, and at most.
 FIRST_REACH, LAST_REACH = 0.005, 0.1
 # How far bodies may go between looks where contacts may be born, in parts of the smallest radius of curvature of the
@@ -70,7 +75,7 @@ def pack_watch(
     clearances: Sequence[Clearance],
     guarded: Sequence[Sequence[Pair]],
     places: Sequence[int],
-    contacts: Sequence[Contact],
+    contacts: Sequence[GivenContact],
 ) -> int:
     """Pack the watch of clearances, of which each has pairs and places; where its record begins.
 
@@ -95,16 +100,19 @@ def pack_watch(
     record[watch_memory.LENGTHS] = lengths_at
     record[watch_memory.LISTS], record[watch_memory.LIST_TABLE] = lists, list_table
     record[watch_memory.CORNERS] = any(clearance.corners for clearance in clearances)
+    # Where one is asked for, its address is written when the scene is ready.
+    record[watch_memory.MARK_AT] = pairs.any_in_place
     return writer.add(record)[0]
 
 
 class _PairPacking:
     """The pairs of a watch while they are packed; the trees of all their bodies come first."""
 
-    def __init__(self, writer: SceneWriter, pairs: Sequence[Pair], contacts: Sequence[Contact]) -> None:
+    def __init__(self, writer: SceneWriter, pairs: Sequence[Pair], contacts: Sequence[GivenContact]) -> None:
         self._writer = writer
         self._contacts = contacts
         self._records: list[list[int]] = []
+        self.any_in_place = False
         self._given: list[int] = []
         self._surfaces: dict[tuple[int, bool], int] = {}
         self._spines: dict[Face, int] = {}
@@ -129,17 +137,22 @@ class _PairPacking:
         tree_g, ball_g, far_g, radius_g, offset_g = self._trees[g]
         flank = max(FLANK * min(radius_f, radius_g), LEAST_FLANK)
         far = [far_f / writer.scale, far_g / writer.scale]
-        _, minimum = writer.add(pool=[least / writer.scale, flank, offset_f, offset_g, *far])
-        given: list[int] = []
+        lengths = [least / writer.scale, flank, offset_f, offset_g, *far]
         spines = [-1, -1]
         if is_of_surfaces(pair):
             shape = [writer.surface(self._surfaces, f[0]), writer.surface(self._surfaces, g[0]), -1, -1]
-            given = self._contacts_of(pair)
             spines = self._spines_of(f[0], g[0])
         else:
             shape = [-1, -1, writer.shell(f), writer.shell(g)]
+        # Of bodies with edges a contact and a least gap of zero are both asked for.
+        given = self._contacts_of(pair) if is_of_surfaces(pair) or least > 0.0 else []
+        if given and least > 0.0:
+            self.any_in_place = True
+            lengths += [0.0, *lengths[1:]]
+        _, minimum = writer.add(pool=lengths)
         fields = [*writer.places_of(pair), tree_f, tree_g, *shape, minimum, *places]
-        self._records.append([*fields, len(self._given), len(given) // 2, int(ball_g <= ball_f), *spines])
+        many = len(given) // GIVEN_RECORD
+        self._records.append([*fields, len(self._given), many, int(ball_g <= ball_f), *spines])
         self._given += given
 
     def _spines_of(self, f: Face, g: Face) -> list[int]:
@@ -156,13 +169,18 @@ class _PairPacking:
         return [self._spines[f], self._spines[g]]
 
     def _contacts_of(self, pair: Pair) -> list[int]:
-        """The rows of given contacts between two bodies, each with whether they are the other way round there."""
-        return [
-            field
-            for k, contact in enumerate(self._contacts)
-            if {id(body) for body in contact.bodies} == {id(body) for body in pair}
-            for field in (k, int(contact.body_a is pair[1]))
-        ]
+        """The records of given contacts between two bodies."""
+        writer = self._writer
+        fields: list[int] = []
+        for k, (contact, sides, is_whole) in enumerate(self._contacts):
+            if {id(body) for body in contact.bodies} == {id(body) for body in pair}:
+                faces = [side_faces(side) for side in sides]
+                fields += [k, int(contact.body_a is pair[1]), int(contact.unilateral)]
+                if is_whole:
+                    fields += [*(writer.surface(self._surfaces, own[0]) for own in faces), -1, -1]
+                else:
+                    fields += [-1, -1, *(writer.shell(own) for own in faces)]
+        return fields
 
     def write(self) -> tuple[int, int]:
         """How many pairs there are, and where their records begin."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from assembly.proximity import watch_memory
 
-__all__ = ["Event", "EventKind", "EventReason", "PairState", "events_of", "fresh_memory"]
+__all__ = ["Event", "EventKind", "EventReason", "PairState", "events_of", "fresh_memory", "listed_places"]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
@@ -83,6 +83,13 @@ def fresh_memory(pairs: int, places: int, reach: float) -> Array:
     memory[pairs_at + watch_memory.REACH : places_at : watch_memory.PAIR_MEMORY] = reach
     memory[places_at : events_at : watch_memory.PLACE_MEMORY] = -1.0
     return memory
+
+
+def listed_places(memory: Array, pairs: int, places: int) -> list[list[int]]:
+    """Of every place its pair of bodies, or -1, the number of its contact, and 1 if that is in a given one's place."""
+    at = watch_memory.MEMORY_HEADER + watch_memory.PAIR_MEMORY * pairs
+    rows = memory[at : at + watch_memory.PLACE_MEMORY * places].reshape(-1, watch_memory.PLACE_MEMORY)
+    return [[int(value) for value in row] for row in rows.tolist()]
 
 
 def events_of(memory: Array, names: list[tuple[str, str]], scale: float, since: int = 0) -> tuple[Event, ...]:

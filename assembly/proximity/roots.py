@@ -27,13 +27,18 @@ from assembly.proximity.velocity import ARM_F
 from assembly.proximity.velocity import GAP as RECORD_GAP
 
 # A root: parameters, features, normal in the axes of f, gap, where it is from, its points in the axes of f, how far it
-# is from a fold (det H / |H|^2), how far so beyond the knot lines beside it (NaN: not looked at), and what it holds on
-# to if it is no root, but a corner (`corners.py`).
-CODE_F, CODE_G, ROOT_NORMAL, GAP, ORIGIN, POINT_F, POINT_G, ROOT_FOLD, ROOT_BEYOND, CORNER, ROOT = (
-    4, 5, 6, 9, 10, 11, 14, 17, 18, 19, 20
+# is from a fold (det H / |H|^2), how far so beyond the knot lines beside it (NaN: not looked at), what it holds on to
+# if it is no root, but a corner (`corners.py`), and whether it is in the place of a contact (`contact_place.py`).
+CODE_F, CODE_G, ROOT_NORMAL, GAP, ORIGIN, POINT_F, POINT_G, ROOT_FOLD, ROOT_BEYOND, CORNER, ROOT_PLACE, ROOT = (
+    4, 5, 6, 9, 10, 11, 14, 17, 18, 19, 20, 21
 )  # fmt: skip
 # Where it is from: of no use, new, from LISTED on the place it has, down from GIVEN_CONTACT which given contact it is.
 USELESS, NEW, LISTED, GIVEN_CONTACT = -2.0, -1.0, 0, -3.0
+# A given contact of two bodies: its row, 1 if the bodies are the other way round there, 1 if its gap may be open, and
+# the surfaces of its sides, or else (-1) their shells.
+GIVEN_ROW, SWAPPED, OPENS, GIVEN_SURFACE, GIVEN_SHELL, GIVEN_RECORD = 0, 1, 2, 3, 5, 7
+# Of a root: in no contact's place, in one beside the contact's own pair, that pair.
+ELSEWHERE, BESIDE_CONTACT, OF_CONTACT = 0.0, 1.0, 2.0
 # What became of a start: nothing there, a root that is known, a saddle, a minimum.
 NOTHING, ALIKE, SADDLE, MINIMUM_FOUND = 0, 1, 2, 3
 # Roots of no use are the same within this radius, in parts of the scene's size.
@@ -157,6 +162,7 @@ def write(roots, k, x, code_f, code_g, n, gap, pf, pg, fold):
     roots[k, ROOT_FOLD] = fold
     roots[k, ROOT_BEYOND] = math.nan
     roots[k, CORNER] = 0.0
+    roots[k, ROOT_PLACE] = ELSEWHERE
 
 
 @kernel(inner=True)
@@ -189,11 +195,12 @@ def add_given(table, pool, scene, tracked, listed, many, neglect, roots, work):
     """
     count = 0
     for c in range(many):
-        r = table[listed + 2 * c]
+        given = listed + GIVEN_RECORD * c
+        r = table[given + GIVEN_ROW]
         x = (tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3])
         if math.isnan(x[0]) or count == roots.shape[0]:
             continue
-        if table[listed + 2 * c + 1] == 1:
+        if table[given + SWAPPED] == 1:
             x = (x[2], x[3], x[0], x[1])
         before = count
         count, found = add_root(table, pool, scene, (0, 0), x, (0.0, 0.0, 0.0), 0.0, roots, count, work, 0.0)

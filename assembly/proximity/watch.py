@@ -26,7 +26,18 @@ from assembly.proximity.near_root import PASSED
 from assembly.proximity.overlap import crosses
 from assembly.proximity.patch_list import LIST_INTS
 from assembly.proximity.root_search import search_patches
-from assembly.proximity.roots import CORNER, GAP, LISTED, ORIGIN, ROOT, USELESS, is_alone
+from assembly.proximity.roots import (
+    CORNER,
+    ELSEWHERE,
+    GAP,
+    GIVEN_CONTACT,
+    LISTED,
+    ORIGIN,
+    ROOT,
+    ROOT_PLACE,
+    USELESS,
+    is_alone,
+)
 from assembly.proximity.solid_contact import CONTACT_RECORD, PAIR_GAP, STAYS, TRACK
 from assembly.proximity.spine_curve import both_radii
 from assembly.proximity.spine_minima import MINIMA
@@ -46,6 +57,7 @@ from assembly.proximity.watch_memory import (
     FAR,
     FIRST,
     FIRST_REACH,
+    GIVEN_COUNT,
     HIGH,
     LAST_REACH,
     LENGTHS,
@@ -53,6 +65,7 @@ from assembly.proximity.watch_memory import (
     LISTS,
     LOOKS,
     LOW,
+    MARK_AT,
     NEAR,
     NEGLECT,
     PAIR_F,
@@ -84,6 +97,7 @@ from assembly.proximity.watch_memory import (
     known_roots,
     list_roots,
     memory_places,
+    release_given,
     seat_given,
 )
 
@@ -145,7 +159,8 @@ def crosses_elsewhere(table, pool, watch, memory, p, scene, roots, count, least,
     places = memory_places(table, watch)[1]
     deep = False
     for k in range(count):
-        deep = deep or (roots[k, GAP] < least - CROSSING and roots[k, ORIGIN] != USELESS)
+        asked = least if roots[k, ORIGIN] > GIVEN_CONTACT and roots[k, ROOT_PLACE] == ELSEWHERE else 0.0
+        deep = deep or (roots[k, GAP] < asked - CROSSING and roots[k, ORIGIN] != USELESS)
     for k in range(table[pair + LOW], table[pair + HIGH]):
         if memory[places + PLACE_MEMORY * k] == p:
             deep = deep or tracked[table[watch + FIRST] + k, PAIR_GAP] < -CROSSING
@@ -261,11 +276,14 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, rooms, roots, asks):
             table, pool, watch, scene, memory[at + REACH], least, offsets, rooms[0], rooms[1], roots, count, rooms[4],
             tracked,
         )  # fmt: skip
-    rest, wanting = list_roots(table, pool, watch, memory, p, roots, count, tracked)
+    if table[watch + MARK_AT] != 0 and least > 0.0 and table[pair + GIVEN_COUNT] > 0:
+        call_address(table[watch + MARK_AT], (table, pool, watch, p, q, tracked, roots, count))
+        release_given(table, watch, memory, p, roots, count, tracked)
+    rest, lowest, wanting = list_roots(table, pool, watch, memory, p, roots, count, tracked)
     memory[at + CROSSED] = math.nan
     if wires and asks != NEVER:
         # All that is as near as this is known, and most of it is listed.
-        memory[at + CROSSED] = 1.0 if rest + least < -CROSSING else 0.0
+        memory[at + CROSSED] = 1.0 if lowest < -CROSSING else 0.0
     elif asks == ALWAYS or (asks == WHERE_LOST and any_gone):
         crossed = crosses_elsewhere(
             table, pool, watch, memory, p, scene, roots, count, least, offsets, rooms[0], rooms[1], tracked

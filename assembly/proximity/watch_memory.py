@@ -17,18 +17,24 @@ from assembly.proximity.holding import HELD_F
 from assembly.proximity.overlap import is_outside
 from assembly.proximity.roots import (
     ALIKE,
+    BESIDE_CONTACT,
     CODE_F,
     CODE_G,
     CORNER,
     GAP,
     GIVEN_CONTACT,
+    GIVEN_RECORD,
+    GIVEN_ROW,
     LISTED,
     MINIMUM_FOUND,
     NEW,
+    OF_CONTACT,
     ORIGIN,
     POINT_F,
     ROOT_FOLD,
     ROOT_NORMAL,
+    ROOT_PLACE,
+    SWAPPED,
     USELESS,
     add_given,
     add_root,
@@ -38,20 +44,23 @@ from assembly.proximity.spine_curve import both_radii
 
 # The record of a watch: counts; where pairs begin; the row of `tracked` that is the first place; address of
 # `track_solids`; where its lengths are in the pool; how many lists there are, where they begin; whether corners are
-# listed (`corners.py`); address of what tells the time, 0 where looks have as much as they need.
-PAIRS, PLACES, PAIR_TABLE, FIRST, TRACK_SOLIDS, LENGTHS, LISTS, LIST_TABLE, CORNERS, CLOCK, WATCH_RECORD = (
-    0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10
+# listed (`corners.py`); address of what tells the time, 0 where looks have as much as they need; address of
+# `mark_places` (`contact_place.py`), 0 where no contact's bodies have a least gap above zero.
+PAIRS, PLACES, PAIR_TABLE, FIRST, TRACK_SOLIDS, LENGTHS, LISTS, LIST_TABLE, CORNERS, CLOCK, MARK_AT, WATCH_RECORD = (
+    0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11
 )  # fmt: skip
 # Its lengths: roots nearer to each other than the first, and along the surfaces, are one; the reach of a first look;
 # the largest.
 NEGLECT, FIRST_REACH, LAST_REACH, LENGTH_COUNT = 0, 1, 2, 3
 # A pair: bodies, trees, surfaces or else (-1) shells, where its least gap is in the pool (behind it how far it may
 # go between looks where contacts may be born, how far facets of either are from their surfaces, and how far either
-# reaches from its origin), its places from
-# and to, rows of given contacts between the two (row, 1 if the bodies are the other way round), whether it is f (0) or
-# g (1) that is the smaller one, and the spines of two round wires (-1: others).
+# reaches from its origin; behind these the same with a least gap of zero, for what is in the place of a contact), its
+# places from and to, given contacts between the two (`roots.py`), whether it is f (0) or g (1) that is the smaller one,
+# and the spines of two round wires (-1: others).
 PAIR_F, PAIR_G, TREE_F, TREE_G, PAIR_SURFACE_F, PAIR_SURFACE_G, PAIR_SHELL_F, PAIR_SHELL_G = 0, 1, 2, 3, 4, 5, 6, 7
 PAIR_MINIMUM, LOW, HIGH, GIVEN, GIVEN_COUNT, SMALLER, SPINE_F, SPINE_G, PAIR_RECORD = 8, 9, 10, 11, 12, 13, 14, 15, 16
+# How far behind a pair's least gap that of zero is.
+IN_PLACE = 6
 # Memory. Header: events, looks and contacts so far, the time of the caller, whether a near root ever found no place,
 # calls so far; of a tick with a budget, when a look is to end after the pair that it is at, and how many looks there
 # were before it.
@@ -68,8 +77,8 @@ BALL, BALL_RADIUS, BALL_PLACE, BALL_ALLOWANCE, PART, SURE, CROSSED, WANTING, CUT
     11, 14, 15, 18, 19, 20, 21, 22, 23, 24, 25
 )  # fmt: skip
 FAR, NEAR, TRACKING = 0, 1, 2
-# Of a place: its pair (-1: none), the number of its contact.
-PLACE_PAIR, PLACE_NUMBER, PLACE_MEMORY = 0, 1, 2
+# Of a place: its pair (-1: none), the number of its contact, and 1 where that is in the place of a given contact.
+PLACE_PAIR, PLACE_NUMBER, PLACE_GIVEN, PLACE_MEMORY = 0, 1, 2, 3
 # An event: kind, reason, pair, number of the contact, gap, time. The last so many are kept.
 EVENT, EVENTS = 6, 64
 ADDED, REMOVED, HANDED_OFF, MERGED, REFUSED = 0, 1, 2, 3, 4
@@ -178,7 +187,8 @@ def known_roots(table, pool, watch, memory, p, scene, offsets, tracked, roots, w
     neglect = pool[table[watch + LENGTHS] + NEGLECT]
     # A contact that is to close a gap would contradict a clearance that asks for one, where both stood for one root.
     radius = neglect if pool[table[pair + PAIR_MINIMUM]] == 0.0 else math.inf
-    count = add_given(table, pool, scene, tracked, table[pair + GIVEN], table[pair + GIVEN_COUNT], radius, roots, work)
+    many = table[pair + GIVEN_COUNT] if scene[2][0] >= 0 else 0
+    count = add_given(table, pool, scene, tracked, table[pair + GIVEN], many, radius, roots, work)
     first, last = table[pair + LOW], table[pair + HIGH]
     any_gone = False
     # Roots first, then corners, which give way to them.
@@ -216,11 +226,39 @@ def known_roots(table, pool, watch, memory, p, scene, offsets, tracked, roots, w
     return count, any_gone
 
 
+@kernel(inline=True)
+def gap_beyond(roots, i, least):
+    """By how much root i is farther than its row asks for: in the place of a contact that is nothing."""
+    return roots[i, GAP] - (0.0 if roots[i, ROOT_PLACE] == BESIDE_CONTACT else least)
+
+
+@kernel(inner=True)
+def release_given(table, watch, memory, p, roots, count, tracked):
+    """Take their places from the roots that are a given contact's own pair, or that came into its place or left it.
+
+    The latter ask for another least gap from now on, and are listed anew.
+    """
+    places = memory_places(table, watch)[1]
+    for i in range(count):
+        origin = np.int64(roots[i, ORIGIN])
+        own = roots[i, ROOT_PLACE] == OF_CONTACT
+        if origin >= LISTED:
+            o = places + PLACE_MEMORY * (origin - LISTED)
+            if own or (roots[i, ROOT_PLACE] == BESIDE_CONTACT) != (memory[o + PLACE_GIVEN] == 1.0):
+                kind, reason = (MERGED, SAME_ROOT) if own else (HANDED_OFF, SAME_ROOT)
+                note(table, watch, memory, kind, reason, p, memory[o + PLACE_NUMBER], roots[i, GAP])
+                release(table, watch, memory, origin - LISTED, tracked)
+                roots[i, ORIGIN] = NEW
+        if own and roots[i, ORIGIN] == NEW:
+            roots[i, ORIGIN] = USELESS
+
+
 @kernel(inner=True)
 def list_roots(table, pool, watch, memory, p, roots, count, tracked):
     """Give places to the near roots of pair p and take them from the far ones.
 
-    Returns the least gap that is not listed, and whether a place was wanting.
+    Returns by how much the nearest one that is not listed is farther than it has to be, its gap, and whether a place
+    was wanting.
     """
     wanting = False
     pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
@@ -228,27 +266,30 @@ def list_roots(table, pool, watch, memory, p, roots, count, tracked):
     places, reach = memory_places(table, watch)[1], memory[at + REACH]
     least = pool[table[pair + PAIR_MINIMUM]]
     rest = math.inf
+    lowest = math.inf
     for i in range(count):
         origin = np.int64(roots[i, ORIGIN])
-        if origin >= LISTED and roots[i, GAP] - least > KEEP * reach:
+        if origin >= LISTED and gap_beyond(roots, i, least) > KEEP * reach:
             k = origin - LISTED
             number = memory[places + PLACE_MEMORY * k + PLACE_NUMBER]
             note(table, watch, memory, REMOVED, WENT_AWAY, p, number, roots[i, GAP])
             release(table, watch, memory, k, tracked)
-            rest = min(rest, roots[i, GAP] - least)
+            rest = min(rest, gap_beyond(roots, i, least))
+            lowest = min(lowest, roots[i, GAP])
     # The nearest first, so that it is the far ones for which places may be wanting.
     while True:
         best = -1
         for i in range(count):
-            if roots[i, ORIGIN] == NEW and (best < 0 or roots[i, GAP] < roots[best, GAP]):
+            if roots[i, ORIGIN] == NEW and (best < 0 or gap_beyond(roots, i, least) < gap_beyond(roots, best, least)):
                 best = i
         if best < 0:
             break
-        gap = roots[best, GAP] - least
+        gap = gap_beyond(roots, best, least)
         roots[best, ORIGIN] = USELESS
         k = free_place(table, watch, memory, pair) if gap <= TAKE * reach else -1
         if k < 0:
             rest = min(rest, gap)
+            lowest = min(lowest, roots[best, GAP])
             if gap <= TAKE * reach and not wanting:
                 wanting = True
                 if memory[at + WANTING] == 0.0:
@@ -258,10 +299,11 @@ def list_roots(table, pool, watch, memory, p, roots, count, tracked):
         memory[o + PLACE_PAIR] = float(p)
         memory[BORN] += 1.0
         memory[o + PLACE_NUMBER] = memory[BORN]
+        memory[o + PLACE_GIVEN] = 1.0 if roots[best, ROOT_PLACE] == BESIDE_CONTACT else 0.0
         write_root(roots, best, tracked, table[watch + FIRST] + k)
         note(table, watch, memory, ADDED, CAME_NEAR, p, memory[BORN], roots[best, GAP])
     memory[at + WANTING] = 1.0 if wanting else 0.0
-    return rest, wanting
+    return rest, lowest, wanting
 
 
 @kernel(inner=True)
@@ -299,8 +341,8 @@ def seat_given(table, watch, memory, p, roots, count, tracked):
         if k < 0:
             continue
         c = np.int64(GIVEN_CONTACT - roots[i, ORIGIN])
-        r = table[given + 2 * c]
-        swap = 2 * table[given + 2 * c + 1]
+        r = table[given + GIVEN_RECORD * c + GIVEN_ROW]
+        swap = 2 * table[given + GIVEN_RECORD * c + SWAPPED]
         for l in range(4):
             tracked[r, l] = roots[k, (l + swap) % 4]
         tracked[r, PAIR_GAP] = roots[k, GAP]

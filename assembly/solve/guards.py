@@ -33,6 +33,7 @@ from assembly.proximity.watch import USED
 from assembly.proximity.watch_memory import (
     ALLOWANCE,
     CUT_SHORT,
+    IN_PLACE,
     LAST_REACH,
     LENGTHS,
     NEGLECT,
@@ -46,6 +47,7 @@ from assembly.proximity.watch_memory import (
     PAIR_TABLE,
     PAIRS,
     PART,
+    PLACE_GIVEN,
     PLACE_MEMORY,
     PLACE_NUMBER,
     REACH,
@@ -110,7 +112,8 @@ def place_guards(table, memory, here, y, better_y, free, begins):
         pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
         table[row + BODY_F] = table[pair + PAIR_F]
         table[row + BODY_G] = table[pair + PAIR_G]
-        table[row + MINIMUM] = table[pair + PAIR_MINIMUM]
+        in_place = memory[places + PLACE_MEMORY * k + PLACE_GIVEN] == 1.0
+        table[row + MINIMUM] = table[pair + PAIR_MINIMUM] + (IN_PLACE if in_place else 0)
         for i in range(2):
             table[row + SURFACE_F + i] = table[pair + PAIR_SURFACE_F + i]
             table[row + SHELL_F + i] = table[pair + PAIR_SHELL_F + i]

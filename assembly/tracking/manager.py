@@ -154,7 +154,8 @@ class Manager(OwnState):
         self._memory[:head] = old[1][:head]
         new_pairs[:] = pairs
         new_places[: len(places)] = places
-        new_places[len(places) :] = (-1.0, 0.0)
+        new_places[len(places) :] = 0.0
+        new_places[len(places) :, watch_memory.PLACE_PAIR] = -1.0
         new_events[:] = events
         # Every pair is looked at once more.
         new_pairs[:, watch_memory.TURN] = nan

@@ -16,7 +16,7 @@ SOLIDS = {"track_solids", "search_solids", "find_nearest"}
 CLEARANCES = {"look", "has_stayed", "measure_parts", "went_beyond"}
 BLOCKS, TAPES, TRIMS = {"factorize_blocks", "solve_blocks"}, {"run_scene_tape"}, {"trim_rows", "trim_terms"}
 # All that solves call; shapes ask for others, before.
-SOLVES = LOOP | CONTACTS | SURFACES | SOLIDS | CLEARANCES | BLOCKS | TAPES | TRIMS | {"find_deepest"}
+SOLVES = LOOP | CONTACTS | SURFACES | SOLIDS | CLEARANCES | BLOCKS | TAPES | TRIMS | {"find_deepest", "mark_places"}
 SCENES = {
     "joints": (
         """
@@ -68,6 +68,15 @@ scene = asm.Assembly([box, other])
 scene.constrain(asm.Contact(box, other))
 """,
         LOOP | CONTACTS | SOLIDS,
+    ),
+    "a contact and a least gap": (
+        """
+ball = asm.Body("ball", asm.shapes.sphere(1.0), fixed=True)
+other = asm.Body("other", asm.shapes.sphere(1.0), position=(3, 1, 0))
+scene = asm.Assembly([ball, other])
+scene.constrain(asm.Contact(ball, other), asm.Clearance(minimum=0.1))
+""",
+        LOOP | CONTACTS | SURFACES | CLEARANCES | {"mark_places"},
     ),
     "a clearance": (
         """
