@@ -1,4 +1,4 @@
-"""The second derivatives of a scene at a state, dense, and poses beside it that hold: what ends are judged by.
+"""The second derivatives of a scene at a state, and poses beside it that hold: what ends are judged by.
 
 Unknowns are those of the loop: twists of the moving bodies in the order of the table's slots, lengths over the scene's
 size, then four coordinates of every contact whose pair is at a fold. Rows are those of the program, then four of
@@ -19,15 +19,19 @@ from assembly.constraints.row_terms import add_row_terms
 from assembly.proximity.extremal import BEND
 from assembly.proximity.solid_contact import TRACK
 from assembly.solve.carry import carry
+from assembly.solve.linear import factorize_shifted, solve_step
 from assembly.solve.multipliers import toward_rows
 from assembly.solve.report import write_pose
+from assembly.solve.room import unknowns
 from assembly.solve.row_table import new_point, point_at
-from assembly.solve.rows import add_row, arrange, move, shape_of, size_of_shape
+from assembly.solve.rows import add_row, arrange, move, record_of_blocks, shape_of, size_of_shape
 from assembly.solve.search import goal
 from assembly.solve.tangency import off_rows
 
 # Rows that hold; so many steps lead back onto them, none longer than this.
 HOLDS, EXACT, STEPS, LONGEST = 1e-11, 1e-14, 12, 1.0
+# Of large scenes the least curvature is found by so many inverse iterations, from the shift that a step tries first.
+ITERATIONS, LEAST_SHIFT = 60, 1e-8
 # The weight of rows in these steps, and of the steps' own squares; a step that gains less than this factor is the last.
 MU, SOFTNESS, GAIN = 1e-6, 1e-2, 0.1
 
@@ -96,11 +100,12 @@ def walk_within(table, pool, state, step, share, residual, tips, integers, doubl
     rows, n = table[ROWS] + 4 * count, 6 * table[MOVING] + 4 * count
     if lost >= 0 or n != step.size:
         return math.inf
-    shape = shape_of(table, table[ROWS] + 4 * pairs, 6 * table[MOVING] + 4 * pairs, table[:0], integers, doubles)
+    blocks = record_of_blocks(table)
+    shape = shape_of(table, table[ROWS] + 4 * pairs, 6 * table[MOVING] + 4 * pairs, blocks, integers, doubles)
     arrange(table, free, shape, rows, n)
     trial = new_point(table)
     trial[0][:] = here[0]
-    lagrangian, matrix = np.zeros((n, n)), np.empty((n, n))
+    _gradient, _lines, lagrangian, matrix = unknowns(n, shape[2])
     active, forces, way = np.zeros(rows), np.zeros(rows), step.copy()
     before = math.inf
     for _ in range(STEPS):
@@ -142,3 +147,59 @@ def walk(table, pool, state, step, share, residual, tips):
     pairs = table[CONTACTS]
     integers, doubles = size_of_shape(table, table[ROWS] + 4 * pairs, 6 * table[MOVING] + 4 * pairs)
     return walk_within(table, pool, state, step, share, residual, tips, np.empty(integers, np.int64), np.empty(doubles))
+
+
+@kernel(inner=True, allocates=True)
+def least_within(table, pool, state, forces, active, direction, tips, integers, doubles):
+    """The same as `least_curvature`, with what it works in."""
+    lost, count, point, loose, room = point_at(table, pool, state, np.empty(table[CONTACTS], np.int64))
+    rows, n = table[ROWS], 6 * table[MOVING]
+    if lost >= 0 or count > 0:
+        return math.nan
+    shape = shape_of(table, rows, n, record_of_blocks(table), integers, doubles)
+    arrange(table, loose[0], shape, rows, n)
+    gradient, lines, lagrangian, matrix = unknowns(n, shape[2])
+    goal(table, pool, shape, rows, loose, room, tips, point, 1, gradient, lagrangian)
+    add_row_terms(table, pool, loose, room, shape, point, forces, active, lagrangian)
+    shift = factorize_shifted(lagrangian, n, shape[2], LEAST_SHIFT, matrix)
+    if shift < 0.0:
+        return math.nan
+    for i in range(n):
+        direction[i] = math.sin(1.0 + i)
+    curvature = math.nan
+    before, after = lines[0], lines[1]
+    for _ in range(ITERATIONS):
+        square = 0.0
+        for i in range(n):
+            square += direction[i] * direction[i]
+        for i in range(n):
+            before[i] = direction[i] / math.sqrt(square)
+            after[i] = before[i]
+        # With A + s I the matrix and w = (A + s I)^-1 v: w^T A w = w.v - s w.w.
+        solve_step(matrix, n, shape[2], after)
+        across, square = 0.0, 0.0
+        for i in range(n):
+            across += after[i] * before[i]
+            square += after[i] * after[i]
+            direction[i] = after[i]
+        curvature = across / square - shift
+        for i in range(n):
+            direction[i] /= math.sqrt(square)
+    return curvature
+
+
+@kernel(
+    signatures=(
+        "(i8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], i8)",
+        "(i8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], none)",
+    ),
+)
+def least_curvature(table, pool, state, forces, active, direction, tips):
+    """The least curvature of objective + forces . rows along motions that keep the rows; its direction is written.
+
+    `active` has the weight of every row that is to be kept, zero for others. No number where a contact is at a fold.
+    """
+    integers, doubles = size_of_shape(table, table[ROWS], 6 * table[MOVING])
+    return least_within(
+        table, pool, state, forces, active, direction, tips, np.empty(integers, np.int64), np.empty(doubles)
+    )

@@ -105,17 +105,18 @@ def settle(packed: Packed, settings: Array, outcome: Outcome, run: Run) -> Outco
         left: Outcome | None = None
         if look is not None and verdict.ways:
             onward[ITERATIONS] = settings[ITERATIONS] - spent - 1
-            if onward[ITERATIONS] < 0.0:
-                return outcome._replace(code=ITERATION_LIMIT, order=SecondOrder.SADDLE)
-            left = _left(look, verdict.ways, onward, run)
+            if onward[ITERATIONS] >= 0.0:
+                left = _left(look, verdict.ways, onward, run)
+            elif verdict.kind is SecondOrder.SADDLE:
+                return outcome._replace(code=ITERATION_LIMIT, order=verdict.kind)
         if left is None and stands and onward[SECOND_ORDER] != REACHED and not _is_at_end(packed, settings, outcome):
             # It was taken for a saddle on the way to it.
             onward[ITERATIONS], onward[SECOND_ORDER] = max(settings[ITERATIONS] - spent - 1, 0.0), REACHED
             left = run(onward, outcome.state.copy())
+        if left is None and not stands:
+            return outcome
         if left is None:
             # A saddle for certain is no solution; what rows that depend on each other say of motions may be none.
-            if not stands:
-                return outcome
             code = STALLED if verdict.kind is SecondOrder.SADDLE else SOLVED
             return outcome._replace(code=code, order=verdict.kind)
         left.state[at + COUNT] += spent + 1

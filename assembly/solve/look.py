@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from assembly.constraints import layout
 from assembly.constraints.packing import Packed
-from assembly.solve.curvature import curvature_at, walk
+from assembly.solve.curvature import curvature_at, least_curvature, walk
 
 __all__ = ["Look", "Neighbor", "null_space"]
 
@@ -23,6 +23,8 @@ UNBALANCED = 1e-9
 STATIONARY = 1e-6
 # Singular values of rows of length one that count as none; what least squares take for none.
 DEPENDENT, CUT = 1e-7, 1e-9
+# The weight of rows that are kept, against the objective's curvature.
+STIFFNESS = 1e6
 # How much of an objective may be rounding, and how much of what rows are off, times their forces, is not linear.
 NOISE, NONLINEAR = 2e-12, 0.3
 
@@ -90,6 +92,26 @@ class Look:
             return None
         look = replace(look, gradient=np.zeros_like(look.gradient), hessian=np.zeros_like(look.hessian))
         return look if look._is_finite else None
+
+    @classmethod
+    def coarse(cls, packed: Packed, state: Array) -> Look | None:
+        """A look without derivatives, of a large scene, at the pose next to the state at which all rows hold."""
+        table, n = packed.table_at(state), 6 * int(packed.table[layout.MOVING])
+        state, residual = state.copy(), np.zeros(packed.rows + 4 * packed.pair_rows)
+        value = float(walk(table, packed.pool, state, np.zeros(n), 0.0, residual, packed.tips))
+        if not np.isfinite(value):
+            return None
+        m = packed.rows
+        forces = state[packed.multipliers_at : packed.residuals_at].copy()
+        none = (np.zeros(n), np.zeros((m, 0)), np.zeros((0, 0)))
+        return cls(packed, table, state, forces, value, residual[:m], *none, packed.one_sided)
+
+    def least_curvature(self) -> tuple[float, Array]:
+        """The least curvature along motions that keep the rows which push, and its direction, by inverse iteration."""
+        direction = np.zeros(len(self.gradient))
+        active = np.where(self.pushing, STIFFNESS, 0.0)
+        arguments = (self.state, self.forces, active, direction, self.packed.tips)
+        return float(least_curvature(self.table, self.packed.pool, *arguments)), direction
 
     @classmethod
     def _with(cls, packed: Packed, table: NDArray[np.int64], state: Array, given: Array) -> Look | None:

@@ -42,8 +42,8 @@ ALIKE, DIGITS = 1e-6, 6
 # Steps toward multipliers of which the form is not negative: of one combination of rows halvings of its range; how much
 # of a combination counts.
 HALVINGS, RANGE, CLIMBS, BENDS = 70, 1e6, 40, 1e-6
-# Dense decompositions of more unknowns take longer than a second.
-MOST_UNKNOWNS = 1200
+# Dense decompositions of more unknowns take longer than a solve.
+MOST_UNKNOWNS = 360
 
 
 class SecondOrder(StrEnum):
@@ -81,7 +81,8 @@ class Verdict:
 def judge(packed: Packed, state: Array, sample: bool) -> tuple[Verdict, Look | None]:
     """What the stationary point of a state, or one near it, is; with `sample` motions of no curvature are followed."""
     if 6 * packed.table[MOVING] + 4 * packed.pair_rows > MOST_UNKNOWNS:
-        return Verdict(SecondOrder.UNDECIDED), None
+        look = Look.coarse(packed, state)
+        return (Verdict(SecondOrder.UNDECIDED) if look is None else judge_coarse(look)), look
     look = Look.at(packed, state)
     return (Verdict(SecondOrder.UNDECIDED) if look is None else judge_look(look, sample)), look
 
@@ -121,6 +122,16 @@ def judge_look(look: Look, sample: bool) -> Verdict:
     if not sample:
         return Verdict(SecondOrder.NOT_ISOLATED)
     return _sampled(look, _canonical(basis @ zeros), cone, MIXTURES, FASTER)
+
+
+def judge_coarse(look: Look) -> Verdict:
+    """Of a large scene: whether its least curvature is negative."""
+    curvature, direction = look.least_curvature()
+    if not curvature < -FLAT:
+        return Verdict(SecondOrder.UNDECIDED)
+    ways = [Way(np.round(d, DIGITS), curvature) for d in (direction, -direction)]
+    is_certain = curvature < -CLEAR and not (look.touching & ~look.pushing).any()
+    return Verdict(SecondOrder.SADDLE if is_certain else SecondOrder.UNDECIDED, ways)
 
 
 def judge_kink(packed: Packed, state: Array) -> tuple[Verdict, Look | None]:

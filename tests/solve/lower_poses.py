@@ -306,11 +306,19 @@ def chain(rng, exact):
     return finish(rng, exact, bodies, rows, constraints, (count, at, target, sign))
 
 
+def floor(level, is_solid):
+    """A floor at a level: a sheet, which has two sides, or the top of a plate, which a clearance keeps bodies off."""
+    if is_solid:
+        return asm.Body("floor", asm.shapes.box(40.0, 40.0, 4.0), fixed=True, position=(0.0, 0.0, level - 2.0))
+    return asm.Body("floor", asm.shapes.plane(40.0, 40.0), fixed=True, position=(0.0, 0.0, level))
+
+
 def add_touch(rng, exact, bodies, rows, constraints, here, radius):
     """Something that the last body, a ball at `here`, touches at an exact start, or is near."""
+    pick = rng.random()
     if rng.random() < 0.5:
         level = -radius if exact else -radius - rng.uniform(0.1, 0.6)
-        bodies.append(asm.Body("floor", asm.shapes.plane(60.0, 60.0), fixed=True, position=(0.0, 0.0, level)))
+        bodies.append(floor(level, 0.4 <= pick < 0.75))
         row = Touch(len(bodies) - 2, np.full(3, radius), level=level)
     else:
         size = rng.choice([0.3, 0.8])
@@ -319,7 +327,6 @@ def add_touch(rng, exact, bodies, rows, constraints, here, radius):
         place = here + apart * away / np.linalg.norm(away)
         bodies.append(asm.Body("rock", asm.shapes.sphere(size), fixed=True, position=place))
         row = Touch(len(bodies) - 2, np.full(3, radius), other=len(bodies) - 1, radius=size)
-    pick = rng.random()
     if pick < 0.4:
         constraints.append(asm.Contact(bodies[-1], bodies[-2], "touch", unilateral=True))
     elif pick < 0.75:
@@ -340,10 +347,10 @@ def standing(rng, exact):
         ]
     height = np.sqrt(((radii * matrix(np.array(e))[2]) ** 2).sum())
     egg = asm.Body("egg", asm.shapes.ellipsoid(*radii), position=(0.0, 0.0, height), quaternion=e)
-    bodies = [asm.Body("floor", asm.shapes.plane(60.0, 60.0), fixed=True), egg]
     one_sided = rng.random() < 0.6
-    touch = asm.Contact(bodies[0], egg, "touch", unilateral=True) if one_sided else asm.Contact(bodies[0], egg, "touch")
-    constraints = [asm.Clearance() if one_sided and rng.random() < 0.5 else touch]
+    is_clearance = one_sided and rng.random() < 0.5
+    bodies = [floor(0.0, is_clearance), egg]
+    constraints = [asm.Clearance() if is_clearance else asm.Contact(bodies[0], egg, "touch", unilateral=one_sided)]
     rows = [Touch(1, radii, one_sided=one_sided)]
     point = np.zeros(3) if exact or rng.random() < 0.5 else 0.5 * rng.normal(size=3)
     target = np.array([0.0, 0.0, rng.choice([-2.0, -0.5, 0.0])]) if exact else 1.5 * rng.normal(size=3)

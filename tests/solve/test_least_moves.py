@@ -87,7 +87,8 @@ def test_what_holds_is_not_moved_by_a_bit(kind, few, cases):
         tried += 1
         start = scene.q
         # A last look of a clearance that lists another contact counts as an iteration.
-        for again, most in ((scene.solve(), 0), (scene.solve(first), int(kind is of_solids))):
+        looks = any(isinstance(item, asm.Clearance) for item in scene.constraints)
+        for again, most in ((scene.solve(), 0), (scene.solve(first), int(looks))):
             assert again.success and again.iterations <= most
             np.testing.assert_array_equal(again.q, start)
     assert tried > few // 2

@@ -8,6 +8,7 @@ import pytest
 
 import assembly as asm
 from assembly.solve import leave
+from assembly.solve.look import Look
 from tests.solve.lower_poses import Joint, lowest_neighbor, random_scene
 
 MINIMUM, NOT_ISOLATED, UNDECIDED = asm.SecondOrder.MINIMUM, asm.SecondOrder.NOT_ISOLATED, asm.SecondOrder.UNDECIDED
@@ -282,3 +283,16 @@ def test_a_posture_that_follows_the_start_does_not_follow_a_saddle():
     lever = 0.5 * scene.packed().scale
     assert solution.success
     assert solution.objective == pytest.approx(((tip - [-3, 0, 0]) ** 2).sum() + 0.01 * lever**2 * turn, abs=1e-9)
+
+
+def test_large_scenes_leave_saddles_by_a_sparse_factor(monkeypatch):
+    # Each of 70 cranks points away from its target; dense decompositions would be of 420 unknowns.
+    monkeypatch.setattr(Look, "at", None)
+    ground = asm.Body("ground", fixed=True)
+    cranks = [asm.Body(f"crank {k}", position=(0.0, 0.0, k)) for k in range(70)]
+    scene = asm.Assembly([ground, *cranks])
+    for k, crank in enumerate(cranks):
+        scene.constrain(asm.Revolute(ground.frame(at=(0.0, 0.0, k)), crank, f"hinge {k}"))
+        scene.minimize(asm.PointDistance(crank.point(1.0, 0.0, 0.0), (-3.0, 0.0, k)))
+    solution = scene.solve()
+    assert solution.success and solution.objective == pytest.approx(4.0 * 70, abs=1e-7)
