@@ -10,7 +10,8 @@ by rounding half of the time.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from math import inf, pi
 from typing import NamedTuple
 
@@ -22,7 +23,6 @@ from assembly.constraints.constraint import Coordinate, Equation
 __all__ = ["Turns"]
 
 Array = NDArray[np.float64]
-Evaluate = Callable[[Coordinate, float], float]
 # An angle beyond a stop by no more than this is at the stop.
 AT_STOP = 1e-2
 # Turns as near as each other by this, half a turn either way, are told apart by how near a stop is.
@@ -50,6 +50,18 @@ class _Choice(NamedTuple):
         left = [k for k, choice in enumerate(choices) if choice.beyond <= beyond + SAME]
         away = min(choices[k].away for k in left)
         return min((k for k in left if choices[k].away <= away + SAME), key=lambda k: choices[k].from_stop)
+
+
+@dataclass(frozen=True)
+class _Values:
+    """Values of coordinates at a start."""
+
+    known: Mapping[Coordinate, float]
+
+    def of(self, coordinate: Coordinate, near: float) -> float:
+        """The value of a coordinate, of an angle on the turn nearest to a number."""
+        value = self.known[coordinate]
+        return value + 2.0 * pi * round((near - value) / (2.0 * pi)) if coordinate.is_angle else value
 
 
 class Turns:
@@ -99,6 +111,13 @@ class Turns:
         return bool(self._couplings)
 
     @property
+    def told(self) -> list[Coordinate]:
+        """Coordinates whose values at a start tell turns."""
+        limited = [angle for angle in self._angles if angle in self._limits]
+        coupled = [coordinate for equation in self._couplings for _, coordinate in equation.terms]
+        return list(dict.fromkeys([*limited, *coupled]))
+
+    @property
     def chosen(self) -> bool:
         """Whether the turn of an angle is told by its limits, or a coupling, and where bodies stand."""
         return bool(self._couplings) or any(angle in self._limits for angle in self._angles)
@@ -108,11 +127,12 @@ class Turns:
         for k, drive in self._driven:
             near[k] = pool[drive]
 
-    def start(self, pool: Array, near: Array, warm: bool, evaluate: Evaluate) -> None:
+    def start(self, pool: Array, near: Array, warm: bool, values: Array) -> None:
         """Write where each angle is looked for into `near`, which has the values found last, zeros at first.
 
-        `evaluate` gives the value of a coordinate at the start, an angle nearest to a number.
+        `values` are those of the coordinates `told` at the start, of angles on any turn.
         """
+        evaluate = _Values(dict(zip(self.told, values.tolist(), strict=True)))
         known = [True] * len(near)
         for k, drive in enumerate(self._drives):
             if drive is not None:
@@ -131,7 +151,7 @@ class Turns:
         lower = max((e.current() for e in limits if e.terms[0][0] > 0.0), default=-inf)
         return lower, min((-e.current() for e in limits if e.terms[0][0] < 0.0), default=inf)
 
-    def _choose(self, root: int, near: Array, known: list[bool], evaluate: Evaluate) -> None:
+    def _choose(self, root: int, near: Array, known: list[bool], evaluate: _Values) -> None:
         """Find the turn of an angle, and of all that couplings move with it, by their limits."""
         angle = self._angles[root]
         known[root] = True
@@ -139,7 +159,7 @@ class Turns:
             # No angle that is coupled to it and not known has limits either.
             self._follow_all(near, known, evaluate)
             return
-        value = evaluate(angle, float(near[root]))
+        value = evaluate.of(angle, float(near[root]))
         lower, upper = self._range(angle)
         first = round((min(max(value, lower), upper) - value) / (2.0 * pi))
         reach = MOST_TURNS if self._coupled[root] else 1
@@ -154,20 +174,20 @@ class Turns:
             choices.append(_Choice.sum([self._choice(k, float(way[k]), float(near[k]), evaluate) for k in moved]))
         near[:], known[:] = ways[_Choice.best(choices)]
 
-    def _choice(self, k: int, near: float, before: float, evaluate: Evaluate) -> _Choice:
+    def _choice(self, k: int, near: float, before: float, evaluate: _Values) -> _Choice:
         """What an angle near a value is, which was at another one before."""
-        value = evaluate(self._angles[k], near)
+        value = evaluate.of(self._angles[k], near)
         lower, upper = self._range(self._angles[k])
         beyond = max(lower - value, value - upper, 0.0)
         from_stop = min(abs(lower - value), abs(upper - value))
         return _Choice(beyond if beyond > AT_STOP else 0.0, abs(value - before), from_stop)
 
-    def _follow_all(self, near: Array, known: list[bool], evaluate: Evaluate) -> None:
+    def _follow_all(self, near: Array, known: list[bool], evaluate: _Values) -> None:
         """Find the turns of all angles that couplings tell from what is known."""
         while not all(known) and any(self._follow(equation, near, known, evaluate) for equation in self._couplings):
             pass
 
-    def _follow(self, equation: Equation, near: Array, known: list[bool], evaluate: Evaluate) -> bool:
+    def _follow(self, equation: Equation, near: Array, known: list[bool], evaluate: _Values) -> bool:
         """Find the turn of one side of a coupling from the other; whether there was one to find."""
         for (factor, this), (other_factor, other) in (equation.terms, equation.terms[::-1]):
             k = self._places.get(this)
@@ -177,7 +197,7 @@ class Turns:
                 if target is not None:
                     value = target.current()
                 else:
-                    value = evaluate(other, 0.0 if j is None else float(near[j]))
+                    value = evaluate.of(other, 0.0 if j is None else float(near[j]))
                     lower, upper = self._range(other)
                     value = min(max(value, lower), upper)
                 near[k] = (equation.current() - other_factor * value) / factor
