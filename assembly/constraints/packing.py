@@ -339,10 +339,11 @@ class Packed:
         if warm and not self._turned.coupled:
             self._turned.follow_drives(self.pool, near)
             return
-        scaled = q.copy()
-        scaled[:, :3] = (q[:, :3] - self.reference) / self.scale
         values = np.empty(len(self._standing))
-        coordinates_at(self.table, self.pool, scaled, self._standing, np.empty((1, JOINT_FRAMES)), values)
+        if values.size:
+            scaled = q.copy()
+            scaled[:, :3] = (q[:, :3] - self.reference) / self.scale
+            coordinates_at(self.table, self.pool, scaled, self._standing, np.empty((1, JOINT_FRAMES)), values)
         self._turned.start(self.pool, near, warm, values * self._standing_units)
 
     def refresh(self) -> None:

@@ -104,18 +104,15 @@ class Turns:
                 if sides & led:
                     led |= sides
         self._led = [angle in led for angle in angles]
+        # Coordinates whose values at a start tell turns.
+        limited = [angle for angle in angles if angle in self._limits]
+        sides = [coordinate for equation in self._couplings for _, coordinate in equation.terms]
+        self.told = list(dict.fromkeys([*limited, *sides]))
 
     @property
     def coupled(self) -> bool:
         """Whether an angle is on a turn that another one tells."""
         return bool(self._couplings)
-
-    @property
-    def told(self) -> list[Coordinate]:
-        """Coordinates whose values at a start tell turns."""
-        limited = [angle for angle in self._angles if angle in self._limits]
-        coupled = [coordinate for equation in self._couplings for _, coordinate in equation.terms]
-        return list(dict.fromkeys([*limited, *coupled]))
 
     @property
     def chosen(self) -> bool:
@@ -147,9 +144,13 @@ class Turns:
             self._choose(root, near, known, evaluate)
 
     def _range(self, coordinate: Coordinate) -> tuple[float, float]:
-        limits = self._limits.get(coordinate, [])
-        lower = max((e.current() for e in limits if e.terms[0][0] > 0.0), default=-inf)
-        return lower, min((-e.current() for e in limits if e.terms[0][0] < 0.0), default=inf)
+        lower, upper = -inf, inf
+        for limit in self._limits.get(coordinate, ()):
+            if limit.terms[0][0] > 0.0:
+                lower = max(lower, limit.current())
+            else:
+                upper = min(upper, -limit.current())
+        return lower, upper
 
     def _choose(self, root: int, near: Array, known: list[bool], evaluate: _Values) -> None:
         """Find the turn of an angle, and of all that couplings move with it, by their limits."""
@@ -161,6 +162,11 @@ class Turns:
             return
         value = evaluate.of(angle, float(near[root]))
         lower, upper = self._range(angle)
+        within = lower - AT_STOP <= value <= upper + AT_STOP
+        if within and not self._coupled[root] and abs(value - near[root]) < pi - SAME:
+            # No other turn is as near.
+            near[root] = value
+            return
         first = round((min(max(value, lower), upper) - value) / (2.0 * pi))
         reach = MOST_TURNS if self._coupled[root] else 1
         ways: list[tuple[Array, list[bool]]] = []
