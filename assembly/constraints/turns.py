@@ -106,8 +106,8 @@ class Turns:
         self._led = [angle in led for angle in angles]
         # Coordinates whose values at a start tell turns.
         limited = [angle for angle in angles if angle in self._limits]
-        sides = [coordinate for equation in self._couplings for _, coordinate in equation.terms]
-        self.told = list(dict.fromkeys([*limited, *sides]))
+        told = [coordinate for equation in self._couplings for _, coordinate in equation.terms]
+        self.told = list(dict.fromkeys([*limited, *told]))
 
     @property
     def coupled(self) -> bool:

@@ -57,14 +57,14 @@ def restarted(scene: Assembly, failed: Solution, settings: Array, given: Array |
         reference, turns = given, None
     settings = settings.copy()
     settings[ITERATIONS] = min(settings[ITERATIONS], STEPS)
+    # From each start as it is, and with its bodies gathered where that fails: the one often does where the other one
+    # does not.
+    settings[GATHER] = 0.0
     bodies, size = failed._scene.bodies, failed._scene.scale
     rounds = islice(far_starts(bodies, failed.q, size, SCATTERED), ROUNDS)
     best, seconds = failed, failed.seconds
     for starts in (near_starts(bodies, failed.q, size), *rounds):
-        ends: list[Solution] = []
-        for start in starts:
-            settings[GATHER] = 1.0 if start.gathers else 0.0
-            ends.append(scene._solved(settings, start.q, None, reference, turns))
+        ends = [scene._solved(settings, start, None, reference, turns) for start in starts]
         seconds += sum(end.seconds for end in ends)
         found = [end for end in ends if end.success]
         if found:

@@ -167,6 +167,28 @@ def test_a_contradiction_is_one_from_everywhere():
     assert solution.conflicting == ["ab", "ac", "bc"]
 
 
+def test_what_is_stuck_at_a_pole_is_called_no_contradiction():
+    # All of it holds where it was made; an azimuth that is driven draws the loop to where it has no value.
+    case = linkage(1273)
+    solution = case.scene.solve()
+    assert case.scene.solve(case.held).success and solution.status is asm.Status.INFEASIBLE
+    assert solution.conflicting == [] and "conflicting: none was shown to be" in solution.message
+
+
+def test_linkages_that_are_drawn_somewhere_are_closed():
+    closed = restarted = 0
+    for seed in range(100):
+        case = linkage(seed)
+        rng = np.random.default_rng(seed)
+        point = case.scene.bodies[1].point(*rng.uniform(-1.0, 1.0, 3))
+        case.scene.minimize(asm.PointDistance(point, rng.uniform(-2.0, 2.0, 3)))
+        solution = case.scene.solve()
+        closed += solution.success
+        restarted += solution.restarted
+    # 396 of 400; 378 from the start alone.
+    assert closed >= 98 and restarted > 0
+
+
 def test_a_solve_out_of_steps_is_not_tried_elsewhere():
     solution = crank_slider((0.0, None)).solve(max_iterations=3)
     assert solution.status is asm.Status.ITERATION_LIMIT and not solution.restarted
