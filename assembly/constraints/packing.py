@@ -339,12 +339,17 @@ class Packed:
         if warm and not self._turned.coupled:
             self._turned.follow_drives(self.pool, near)
             return
-        values = np.empty(len(self._standing))
-        if values.size:
-            scaled = q.copy()
-            scaled[:, :3] = (q[:, :3] - self.reference) / self.scale
-            coordinates_at(self.table, self.pool, scaled, self._standing, np.empty((1, JOINT_FRAMES)), values)
-        self._turned.start(self.pool, near, warm, values * self._standing_units)
+
+        def measure() -> Array:
+            values = np.empty(len(self._standing))
+            if values.size:
+                scaled = q.copy()
+                scaled[:, :3] = (q[:, :3] - self.reference) / self.scale
+                coordinates_at(self.table, self.pool, scaled, self._standing, np.empty((1, JOINT_FRAMES)), values)
+            values *= self._standing_units
+            return values
+
+        self._turned.start(self.pool, near, warm, measure)
 
     def refresh(self) -> None:
         """Write what may have changed since the last solve: values and targets."""
