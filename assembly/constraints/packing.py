@@ -14,8 +14,9 @@ from assembly._address import clock_address
 from assembly.constraints import addresses, layout
 from assembly.constraints.blocks import FACTORIZE_AT, SOLVE_AT
 from assembly.constraints.clearance import Clearance
-from assembly.constraints.constraint import Constraint, Coordinate, structure_changes
+from assembly.constraints.constraint import Constraint, structure_changes
 from assembly.constraints.contact import Contact, side_faces
+from assembly.constraints.coordinates_at import coordinates_at
 from assembly.constraints.couplings import Coupling
 from assembly.constraints.elimination import FEW, block_record
 from assembly.constraints.expression import Expression
@@ -23,8 +24,6 @@ from assembly.constraints.joint import Joint
 from assembly.constraints.numbering import number_bodies
 from assembly.constraints.objectives import Objective, Posture
 from assembly.constraints.primitives import RECORD as JOINT_FRAMES
-from assembly.constraints.primitives import coordinate as coordinate_value
-from assembly.constraints.primitives import place_frames
 from assembly.constraints.row_packing import RowPacking
 from assembly.constraints.scene_size import check_reach, has_no_extent, scene_size
 from assembly.constraints.scene_writer import SceneWriter
@@ -177,6 +176,11 @@ class Packed:
         self._targets, self._turns = terms.targets, terms.turns
         self._turned = Turns(self._angles, [(equation, at) for equation, at, _ in self._values])
         self.chooses_turns = self._turned.chosen and not self.guards
+        told = self._turned.told
+        self._standing = np.array(
+            [(self._frames[item.frames], item.kind, item.component) for item in told], dtype=np.int64
+        ).reshape(-1, 3)
+        self._standing_units = np.array([1.0 if item.is_angle else self.scale for item in told])
 
     def _pool_header(self) -> Array:
         pool = np.zeros(layout.POOL_HEADER)
@@ -342,18 +346,17 @@ class Packed:
         if warm and not self._turned.coupled:
             self._turned.follow_drives(self.pool, near)
             return
-        scaled = q.copy()
-        scaled[:, :3] = (q[:, :3] - self.reference) / self.scale
-        records = np.empty((1, JOINT_FRAMES))
 
-        def evaluate(coordinate: Coordinate, near: float) -> float:
-            number = self._frames[coordinate.frames]
-            i, j, at = self.table[self.table[layout.JOINT_TABLE] + layout.JOINT_RECORD * number :][:3]
-            place_frames(self.pool, at, scaled, i, j, records, 0)
-            value = float(coordinate_value(coordinate.kind, coordinate.component, records, 0, near)[0])
-            return value if coordinate.is_angle else value * self.scale
+        def measure() -> Array:
+            values = np.empty(len(self._standing))
+            if values.size:
+                scaled = q.copy()
+                scaled[:, :3] = (q[:, :3] - self.reference) / self.scale
+                coordinates_at(self.table, self.pool, scaled, self._standing, np.empty((1, JOINT_FRAMES)), values)
+            values *= self._standing_units
+            return values
 
-        self._turned.start(self.pool, near, warm, evaluate)
+        self._turned.start(self.pool, near, warm, measure)
 
     def twin(self) -> Packed:
         """The same with a table and values of its own."""

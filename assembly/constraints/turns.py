@@ -10,7 +10,8 @@ by rounding half of the time.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from math import inf, pi
 from typing import NamedTuple
 
@@ -22,7 +23,6 @@ from assembly.constraints.constraint import Coordinate, Equation
 __all__ = ["Turns"]
 
 Array = NDArray[np.float64]
-Evaluate = Callable[[Coordinate, float], float]
 # An angle beyond a stop by no more than this is at the stop.
 AT_STOP = 1e-2
 # Turns as near as each other by this, half a turn either way, are told apart by how near a stop is.
@@ -31,25 +31,34 @@ SAME = 1e-9
 MOST_TURNS = 8
 
 
-class _Choice(NamedTuple):
-    """A turn of an angle and what follows from it: the least one of several is taken."""
+class _Turn(NamedTuple):
+    """A turn of an angle, and what follows from it."""
 
+    near: Array
+    known: list[bool]
     beyond: float  # how far angles are beyond their limits, none of them by a little
-    away: float  # from where the angle was
+    away: float  # how far the angle is from where it was
     from_stop: float
 
-    @staticmethod
-    def sum(choices: Sequence[_Choice]) -> _Choice:
-        """That of several angles."""
-        return _Choice(*(sum(figures) for figures in zip(*choices, strict=True)))
+    def is_better(self, other: _Turn) -> bool:
+        """Whether less is beyond limits, or as much and the angle nearer to where it was, or to a stop."""
+        if abs(self.beyond - other.beyond) > SAME:
+            return self.beyond < other.beyond
+        if abs(self.away - other.away) > SAME:
+            return self.away < other.away
+        return self.from_stop < other.from_stop
 
-    @staticmethod
-    def best(choices: Sequence[_Choice]) -> int:
-        """The place of the best one."""
-        beyond = min(choice.beyond for choice in choices)
-        left = [k for k, choice in enumerate(choices) if choice.beyond <= beyond + SAME]
-        away = min(choices[k].away for k in left)
-        return min((k for k in left if choices[k].away <= away + SAME), key=lambda k: choices[k].from_stop)
+
+@dataclass(frozen=True)
+class _Values:
+    """Values of coordinates at a start."""
+
+    known: Mapping[Coordinate, float]
+
+    def of(self, coordinate: Coordinate, near: float) -> float:
+        """The value of a coordinate, of an angle on the turn nearest to a number."""
+        value = self.known[coordinate]
+        return value + 2.0 * pi * round((near - value) / (2.0 * pi)) if coordinate.is_angle else value
 
 
 class Turns:
@@ -92,6 +101,10 @@ class Turns:
                 if sides & led:
                     led |= sides
         self._led = [angle in led for angle in angles]
+        # Coordinates whose values at a start tell turns.
+        limited = [angle for angle in angles if angle in self._limits]
+        told = [coordinate for equation in self._couplings for _, coordinate in equation.terms]
+        self.told = list(dict.fromkeys([*limited, *told]))
 
     @property
     def coupled(self) -> bool:
@@ -108,10 +121,10 @@ class Turns:
         for k, drive in self._driven:
             near[k] = pool[drive]
 
-    def start(self, pool: Array, near: Array, warm: bool, evaluate: Evaluate) -> None:
+    def start(self, pool: Array, near: Array, warm: bool, measure: Callable[[], Array]) -> None:
         """Write where each angle is looked for into `near`, which has the values found last, zeros at first.
 
-        `evaluate` gives the value of a coordinate at the start, an angle nearest to a number.
+        `measure` gives the values of the coordinates `told` at the start, of angles on any turn.
         """
         known = [True] * len(near)
         for k, drive in enumerate(self._drives):
@@ -119,6 +132,9 @@ class Turns:
                 near[k] = pool[drive]
             elif not warm or self._led[k]:
                 known[k] = False
+        if all(known):
+            return
+        evaluate = _Values(dict(zip(self.told, measure().tolist(), strict=True)))
         self._follow_all(near, known, evaluate)
         while not all(known):
             unknown = [k for k, told in enumerate(known) if not told]
@@ -127,11 +143,15 @@ class Turns:
             self._choose(root, near, known, evaluate)
 
     def _range(self, coordinate: Coordinate) -> tuple[float, float]:
-        limits = self._limits.get(coordinate, [])
-        lower = max((e.current() for e in limits if e.terms[0][0] > 0.0), default=-inf)
-        return lower, min((-e.current() for e in limits if e.terms[0][0] < 0.0), default=inf)
+        lower, upper = -inf, inf
+        for limit in self._limits.get(coordinate, ()):
+            if limit.terms[0][0] > 0.0:
+                lower = max(lower, limit.current())
+            else:
+                upper = min(upper, -limit.current())
+        return lower, upper
 
-    def _choose(self, root: int, near: Array, known: list[bool], evaluate: Evaluate) -> None:
+    def _choose(self, root: int, near: Array, known: list[bool], evaluate: _Values) -> None:
         """Find the turn of an angle, and of all that couplings move with it, by their limits."""
         angle = self._angles[root]
         known[root] = True
@@ -139,35 +159,47 @@ class Turns:
             # No angle that is coupled to it and not known has limits either.
             self._follow_all(near, known, evaluate)
             return
-        value = evaluate(angle, float(near[root]))
+        value = evaluate.of(angle, float(near[root]))
         lower, upper = self._range(angle)
+        within = lower - AT_STOP <= value <= upper + AT_STOP
+        if within and not self._coupled[root] and abs(value - near[root]) < pi - SAME:
+            # No other turn is as near.
+            near[root] = value
+            return
+        before = float(near[root])
         first = round((min(max(value, lower), upper) - value) / (2.0 * pi))
         reach = MOST_TURNS if self._coupled[root] else 1
-        ways: list[tuple[Array, list[bool]]] = []
-        choices: list[_Choice] = []
-        for turn in range(first - reach, first + reach + 1):
-            way, told = near.copy(), known.copy()
-            way[root] = value + 2.0 * pi * turn
-            self._follow_all(way, told, evaluate)
-            moved = [root, *(k for k, now in enumerate(told) if now and not known[k])]
-            ways.append((way, told))
-            choices.append(_Choice.sum([self._choice(k, float(way[k]), float(near[k]), evaluate) for k in moved]))
-        near[:], known[:] = ways[_Choice.best(choices)]
+        turned = (value + 2.0 * pi * turn for turn in range(first - reach, first + reach + 1))
+        best: _Turn | None = None
+        for away, there in sorted((abs(there - before), there) for there in turned):
+            if best is not None and best.beyond == 0.0 and away > best.away + SAME:
+                break
+            turn = self._turn(root, there, away, (near, known), evaluate)
+            if best is None or turn.is_better(best):
+                best = turn
+        assert best is not None
+        near[:], known[:] = best.near, best.known
 
-    def _choice(self, k: int, near: float, before: float, evaluate: Evaluate) -> _Choice:
-        """What an angle near a value is, which was at another one before."""
-        value = evaluate(self._angles[k], near)
-        lower, upper = self._range(self._angles[k])
-        beyond = max(lower - value, value - upper, 0.0)
-        from_stop = min(abs(lower - value), abs(upper - value))
-        return _Choice(beyond if beyond > AT_STOP else 0.0, abs(value - before), from_stop)
+    def _turn(self, root: int, there: float, away: float, before: tuple[Array, list[bool]], evaluate: _Values) -> _Turn:
+        """What follows from an angle's value, where others were told before."""
+        near, known = before[0].copy(), before[1].copy()
+        near[root] = there
+        self._follow_all(near, known, evaluate)
+        beyond, from_stop = 0.0, inf
+        for k in [root, *(k for k, now in enumerate(known) if now and not before[1][k])]:
+            value = evaluate.of(self._angles[k], float(near[k]))
+            lower, upper = self._range(self._angles[k])
+            off = max(lower - value, value - upper)
+            beyond += off if off > AT_STOP else 0.0
+            from_stop = min(from_stop, abs(lower - value), abs(upper - value))
+        return _Turn(near, known, beyond, away, from_stop)
 
-    def _follow_all(self, near: Array, known: list[bool], evaluate: Evaluate) -> None:
+    def _follow_all(self, near: Array, known: list[bool], evaluate: _Values) -> None:
         """Find the turns of all angles that couplings tell from what is known."""
         while not all(known) and any(self._follow(equation, near, known, evaluate) for equation in self._couplings):
             pass
 
-    def _follow(self, equation: Equation, near: Array, known: list[bool], evaluate: Evaluate) -> bool:
+    def _follow(self, equation: Equation, near: Array, known: list[bool], evaluate: _Values) -> bool:
         """Find the turn of one side of a coupling from the other; whether there was one to find."""
         for (factor, this), (other_factor, other) in (equation.terms, equation.terms[::-1]):
             k = self._places.get(this)
@@ -177,7 +209,7 @@ class Turns:
                 if target is not None:
                     value = target.current()
                 else:
-                    value = evaluate(other, 0.0 if j is None else float(near[j]))
+                    value = evaluate.of(other, 0.0 if j is None else float(near[j]))
                     lower, upper = self._range(other)
                     value = min(max(value, lower), upper)
                 near[k] = (equation.current() - other_factor * value) / factor

@@ -11,6 +11,7 @@ near to holding all without an end, that was not seen.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,7 @@ from assembly.solve.jacobian import NoPairError, rows_of
 from assembly.solve.rank import HELD
 from assembly.solve.settings import VIOLATION
 from assembly.solve.solution import Scene, Status
-from assembly.solve.starts import Start, far_starts, near_starts
+from assembly.solve.starts import far_starts, near_starts
 from assembly.solve.subset import Problem, Snapshot
 
 __all__ = ["conflicting_sets", "conflicts_at"]
@@ -36,12 +37,20 @@ SCATTERED, TIMES = 4, 4
 ENDED = 0.01
 
 
+class _Start(NamedTuple):
+    """Poses (n, 7) of a start, and whether its bodies are gathered first: the one often leads where the other fails."""
+
+    q: Array
+    gathers: bool
+
+
 def conflicting_sets(snapshot: Snapshot) -> list[tuple[int, ...]]:
     """Disjoint minimal sets of constraints that cannot hold together, by their places; [] where all can."""
     bodies, size = snapshot.scene.bodies, snapshot.scene.scale
     far = far_starts(bodies, snapshot.q, size, SCATTERED)
-    starts = near_starts(bodies, snapshot.q, size) + next(far)
-    more = [start for _ in range(1, TIMES) for start in next(far)]
+    starts = [_Start(q, gathers=False) for q in near_starts(bodies, snapshot.q, size)]
+    starts += [_Start(q, gathers) for q in next(far) for gathers in (True, False)]
+    more = [_Start(q, gathers) for _ in range(1, TIMES) for q in next(far) for gathers in (True, False)]
     left = list(range(len(snapshot.scene.constraints)))
     found: list[tuple[int, ...]] = []
     while left:
@@ -80,7 +89,7 @@ def conflicts_at(scene: Scene, packed: Packed, state: Array, fit: float) -> list
     return [tuple(scene.constraints[k].name for k in places) for places in sorted(found)]
 
 
-def _attempt(snapshot: Snapshot, which: Sequence[int], starts: Sequence[Start]) -> Array | None:
+def _attempt(snapshot: Snapshot, which: Sequence[int], starts: Sequence[_Start]) -> Array | None:
     """Least violations of some constraints, from the start where they were least; None if they may hold.
 
     They may where a solve that found no end came nearer to it than all that ended at a least violation.

@@ -2,9 +2,9 @@
 
 Bodies are taken in an order (`numbering.py`) in which each has joints with bodies that stand already. Each is moved by
 Levenberg and Marquardt's method until the rows it shares with those are as small as they get: exactly zero where the
-joints make a tree. Where several joints do not hold together from where the body was, perhaps because an angle would
-have to go around the other way, it is put where one of them holds, and then where all are as small as they get. Rows
-that close a loop are left to the loop of the solve.
+joints make a tree. Rows that close a loop are left to the loop of the solve. Where a driven angle stays far from its
+value, because it would have to go around the other way, the body is put where one of its joints holds, and then where
+all are as small as they get.
 """
 
 from __future__ import annotations
@@ -114,6 +114,17 @@ def body_row(bases, jacobian, r, s, out):
 
 
 @kernel(inner=True)
+def is_half_around(table, residual, first, count):
+    """Whether an angle of rows listed in the table is far from where it is driven to."""
+    for l in range(first, first + count):
+        row = table[ROW_TABLE] + ROW * table[l]
+        driven = table[row + ONE_SIDED] == 0 and table[row + SECOND] < 0 and table[row + ANGLE] >= 0
+        if driven and abs(residual[table[l]]) > SCATTERED:
+            return True
+    return False
+
+
+@kernel(inner=True)
 def normal_equations(table, bases, first, count, joint, s, point, room):
     """J^T J and J^T c of rows that do not hold, in the twist that stands at s."""
     _q, _tracked, _records, residual, jacobian = point
@@ -186,7 +197,7 @@ def put_pose(q, body, pose):
 @kernel(inner=True, allocates=True)
 def gather(table, pool, bases, slots, point):
     """Move the bodies of the point one by one."""
-    q, tracked, _records, _residual, _jacobian = point
+    q, tracked, _records, residual, _jacobian = point
     room = (np.empty((6, 6)), np.empty((6, 6)), np.full(6, 5), np.empty(6), np.empty(6), np.empty(6))
     o = table[GATHER_TABLE] + 1
     for _entry in range(table[table[GATHER_TABLE]]):
@@ -197,6 +208,8 @@ def gather(table, pool, bases, slots, point):
         s = 6 * table[slots + body]
         start = pose_of(q, body)
         cost = fit_body(table, pool, bases, body, first, count, -1, s, point, room)
+        if cost <= ENOUGH or not is_half_around(table, residual, first, count):
+            continue
         best = pose_of(q, body)
         tried = -1
         for l in range(first, first + count):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,37 +10,26 @@ from numpy.typing import NDArray
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import retract
 
-__all__ = ["Start", "about", "far_starts", "moving_rows", "near_starts", "scattered"]
+__all__ = ["about", "far_starts", "moving_rows", "near_starts", "scattered"]
 
 Array = NDArray[np.float64]
 # How far about a pose others start, in sizes of the scene and radians: it may be a saddle by symmetry.
 ABOUT = (0.0, 0.03, 0.3)
 
 
-class Start(NamedTuple):
-    """Poses (n, 7) of a start, and whether its bodies are gathered first."""
-
-    q: Array
-    gathers: bool
-
-
-def near_starts(bodies: Sequence[Body], q: Array, size: float) -> list[Start]:
+def near_starts(bodies: Sequence[Body], q: Array, size: float) -> list[Array]:
     """Poses (n, 7) themselves, which a solve has other turns from, and poses about them."""
     rng = np.random.default_rng(0)
     moving = moving_rows(bodies)
-    return [Start(about(rng, q, moving, size, reach), gathers=False) for reach in ABOUT]
+    return [about(rng, q, moving, size, reach) for reach in ABOUT]
 
 
-def far_starts(bodies: Sequence[Body], q: Array, size: float, count: int) -> Iterator[list[Start]]:
-    """Scattered starts without end, so many at a time: each is tried with its bodies gathered first, and as it is.
-
-    What the one way does not lead to the other one often does.
-    """
+def far_starts(bodies: Sequence[Body], q: Array, size: float, count: int) -> Iterator[list[Array]]:
+    """Scattered poses (n, 7) without end, so many at a time."""
     rng = np.random.default_rng(0)
     moving = moving_rows(bodies)
     while True:
-        poses = [scattered(rng, q, moving, size) for _ in range(count)]
-        yield [Start(pose, gathers) for pose in poses for gathers in (True, False)]
+        yield [scattered(rng, q, moving, size) for _ in range(count)]
 
 
 def moving_rows(bodies: Sequence[Body]) -> list[int]:

@@ -62,14 +62,16 @@ def restarted(
         reference, turns = given, None
     settings = settings.copy()
     settings[ITERATIONS] = min(settings[ITERATIONS], STEPS)
+    # From each start as it is, and with its bodies gathered where that fails: the one often does where the other one
+    # does not.
+    settings[GATHER] = 0.0
     bodies, size = failed._scene.bodies, failed._scene.scale
     rounds = islice(far_starts(bodies, failed.q, size, SCATTERED), ROUNDS)
     best, seconds = failed, failed.seconds
     for starts in (near_starts(bodies, failed.q, size), *rounds):
         ends: list[Solution] = []
         for start in starts:
-            settings[GATHER] = 1.0 if start.gathers else 0.0
-            ends.append(scene._solved(settings, start.q, None, interruption, reference, turns))
+            ends.append(scene._solved(settings, start, None, interruption, reference, turns))
             if interruption.is_over():
                 break
         seconds += sum(end.seconds for end in ends)

@@ -10,13 +10,15 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 LOOP = {"solve_program"}
+TURNS = {"coordinates_at"}
 CONTACTS = {"contact_rows"}
 SURFACES = {"start_surfaces", "coordinate_lengths", "free_row", "free_terms", "is_extremal"}
 SOLIDS = {"track_solids", "search_solids", "find_nearest"}
 CLEARANCES = {"look", "has_stayed", "measure_parts", "went_beyond"}
 BLOCKS, TAPES, TRIMS = {"factorize_blocks", "solve_blocks"}, {"run_scene_tape"}, {"trim_rows", "trim_terms"}
 # All that solves call; shapes ask for others, before.
-SOLVES = LOOP | CONTACTS | SURFACES | SOLIDS | CLEARANCES | BLOCKS | TAPES | TRIMS | {"find_deepest", "mark_places"}
+CALLED = BLOCKS | TAPES | TRIMS | {"find_deepest", "mark_places"}
+SOLVES = LOOP | TURNS | CONTACTS | SURFACES | SOLIDS | CLEARANCES | CALLED
 SCENES = {
     "joints": (
         """
@@ -30,6 +32,14 @@ scene.constrain(
 )
 """,
         LOOP,
+    ),
+    "a limit": (
+        """
+door = asm.Body("door")
+scene = asm.Assembly([ground, door])
+scene.constrain(asm.Revolute(ground, door, limits=(0.0, 1.0)))
+""",
+        LOOP | TURNS,
     ),
     "many bodies": (
         """
