@@ -64,7 +64,7 @@ class Problem:
     near : mapping of id -> array
         Where tracked values are looked for: parameters by name of a contact, angles by identity of a coordinate.
     held : float
-        Violations up to it count as none of what joints, couplings and driven values ask, lengths over the scene's size.
+        Violations up to it count as none of what joints, couplings and driven values ask, over the scene's size.
     """
 
     def __init__(
@@ -116,8 +116,9 @@ class Problem:
     def holds(self, solution: Solution) -> bool:
         """Whether all constraints hold at a solution: contacts, limits and expressions to rounding."""
         packed = self.packed
-        allowed = np.full(packed.rows, HELD)
-        allowed[packed.value_rows] = np.where(packed.one_sided[packed.value_rows], HELD, self.held)
+        allowed = np.full(packed.rows, min(self.held, HELD))
+        values = packed.value_rows
+        allowed[values[~packed.one_sided[values]]] = self.held
         return solution.status is not Status.CONTACT_LOST and bool((self._off(solution) <= allowed).all())
 
     def _off(self, solution: Solution) -> Array:
