@@ -196,3 +196,45 @@ def least_squares_step(scene, size, q):
     here = rows(scene, size, places, turns)
     jacobian = np.array([(at(k, i, STEP) - at(k, i, -STEP)) / (2.0 * STEP) for k in moving for i in range(6)]).T
     return here, np.linalg.lstsq(jacobian, -here, rcond=DEPENDENT)[0]
+
+
+def contradiction(rng):
+    """A scene two of whose constraints ask for different things, by 3e-5 of its size or more; bodies stand anywhere."""
+    off = 10.0 ** rng.uniform(-4.5, 0.0)
+    ground = asm.Body("ground", fixed=True)
+    count = int(rng.integers(2, 5))
+    bodies = [asm.Body(f"body {k}", asm.shapes.box(2, 2, 2), rng.uniform(-2, 2, 3)) for k in range(count)]
+    chain = [ground, *bodies]
+    f, g = (body.frame(at=rng.uniform(-2, 2, 3), z=rng.normal(size=3)) for body in chain[:2])
+    value = float(rng.uniform(-1.0, 1.0))
+    kind = int(rng.integers(6))
+    if kind == 0:
+        way = rng.normal(size=3)
+        at = f.origin + 4.0 * off * way / np.linalg.norm(way)
+        rows = [asm.Fixed(f, g, "one"), asm.Fixed(ground.frame(at=at, z=f.axes[:, 2], x=f.axes[:, 0]), g, "other")]
+    elif kind == 1:
+        lengths = rng.uniform(0.5, 2.0, count)
+        ends = zip(chain[:-1], chain[1:], lengths, strict=True)
+        rows = [asm.Distance(a.point(0, 0, 0), b.point(0, 0, 0), float(length)) for a, b, length in ends]
+        far = float(lengths.sum() * (1.0 + off))
+        rows.append(asm.Distance(ground.point(0, 0, 0), bodies[-1].point(0, 0, 0), far, "too far"))
+    elif kind == 2:
+        angles = rng.uniform(-1.0, 1.0, count)
+        ends = zip(chain[:-1], chain[1:], angles, strict=True)
+        rows = [asm.Revolute(a, b, angle=float(angle)) for a, b, angle in ends]
+        rows.append(asm.Revolute(bodies[-1], ground, "last", angle=float(off - angles.sum())))
+    elif kind == 3:
+        ratio = float(rng.choice([-1.0, 1.0]) * rng.uniform(0.5, 2.0))
+        first = asm.Revolute(ground, bodies[0], "first", angle=value)
+        second = asm.Revolute(ground, bodies[1], "second", angle=ratio * value + off)
+        rows = [first, second, asm.Gear(first, second, ratio)]
+    elif kind == 4:
+        rows = [asm.Prismatic(f, g, slide=value), asm.Cylindrical(f, g, slide=value + 3.0 * off)]
+    else:
+        rows = [asm.Spherical(f, g), asm.Revolute(f, g), asm.Angle(f, g, min(3.0 * off, 2.5))]
+    scene = asm.Assembly([ground, *(body for body in bodies if any(body in row.bodies for row in rows))])
+    scene.constrain(*rows)
+    for body in scene.bodies[1:]:
+        turn = rng.normal(size=4)
+        body.pose = asm.Pose(body.pose.position, turn / np.linalg.norm(turn))
+    return scene

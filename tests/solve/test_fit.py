@@ -7,7 +7,15 @@ import pytest
 
 import assembly as asm
 from assembly.errors import InputError
-from tests.solve.redundant import MECHANISMS, bennett, fixed_twice, four_bar, least_squares_step, parallelogram
+from tests.solve.redundant import (
+    MECHANISMS,
+    bennett,
+    contradiction,
+    fixed_twice,
+    four_bar,
+    least_squares_step,
+    parallelogram,
+)
 
 # What is wrong in one frame, for errors in parts of the mechanism's size.
 KINDS = {
@@ -169,7 +177,7 @@ def test_contacts_hold_where_joints_are_fitted(off):
     assert set(solution.disagreeing) == {"held", "held again"}
 
 
-@pytest.mark.parametrize("off", [1e-10, 1e-8, 1e-6, 1e-3])
+@pytest.mark.parametrize("off", [1e-9, 1e-8, 1e-6, 1e-3])
 def test_contacts_that_contradict_are_not_fitted(off):
     # A ball between a floor and a ceiling that are too far apart to touch both.
     ball = asm.Body("ball", asm.shapes.sphere(1.0), (0.1, 0.2, 1.1))
@@ -179,3 +187,47 @@ def test_contacts_that_contradict_are_not_fitted(off):
     scene.constrain(asm.Contact(floor, ball, "below"), asm.Contact(ceiling, ball, "above"))
     solution = scene.solve()
     assert solution.status is asm.Status.INFEASIBLE and solution.conflicting_sets == [("below", "above")], solution
+
+
+def test_contradictions_are_infeasible_and_named(cases):
+    steps = []
+    for seed in range(cases(60, 1000)):
+        scene = contradiction(np.random.default_rng(seed))
+        solution = scene.solve()
+        assert solution.status is asm.Status.INFEASIBLE and solution.conflicting, (seed, solution)
+        steps.append(solution.iterations)
+    assert np.median(steps) <= 10
+
+
+def test_distant_bodies_do_not_matter():
+    # The disagreement is of the rows, whatever the bodies' origins are.
+    scenes = []
+    for far in (0.0, 1000.0):
+        ground, plate = asm.Body("ground", fixed=True), asm.Body("plate", position=(-far, 0.1, 0))
+        scene = asm.Assembly([ground, plate])
+        scene.constrain(
+            asm.Revolute(ground, plate.frame(at=(far, 0, 0)), "low"),
+            asm.Revolute(ground.frame(at=(0, 0, 2 + 1e-6)), plate.frame(at=(far, 0, 2)), "high"),
+        )
+        scenes.append(scene.solve())
+    near, far = scenes
+    assert near.status is far.status is asm.Status.FITTED and near.mobility.dof == far.mobility.dof == 1
+    assert far.disagreeing == pytest.approx(near.disagreeing, rel=1e-3)
+
+
+def test_what_is_tracked_is_fitted():
+    # Two hinges that are off by a little, their door led by its handle.
+    ground, door = asm.Body("ground", fixed=True), asm.Body("door")
+    scene = asm.Assembly([ground, door])
+    scene.constrain(
+        asm.Revolute(ground, door, "low"),
+        asm.Revolute(ground.frame(at=(1e-7, 0, 2)), door.frame(at=(0, 0, 2)), "high"),
+    )
+    tracker = scene.tracker(door.point(1, 0, 1))
+    for turn in np.linspace(0.0, 3.0, 60):
+        step = tracker.step((np.cos(turn), np.sin(turn), 1.0))
+        assert step.feasibility <= 1e-7 and step.status in (asm.TrackStatus.FOLLOWED, asm.TrackStatus.APPROACHING)
+    step = tracker.step((np.cos(turn), np.sin(turn), 1.0))
+    assert step.status is asm.TrackStatus.FOLLOWED
+    x, y, _ = step.solution.pose(door).apply((1, 0, 1))
+    assert np.arctan2(y, x) == pytest.approx(3.0, abs=1e-6)
