@@ -173,7 +173,7 @@ class Tracker(InOneProcess):
         self._history = np.zeros((1, HISTORY))
         packed = self._packed
         names = [(a.name, b.name) for pairs in packed.guarded for a, b in pairs]
-        self._followed = Followed(self._scene, packed, names, self._hand, self._place)
+        self._followed = Followed(self._scene, packed, names, self._hand, self._place, first.status)
         # Behind the state of a solve are the rows of the last tick; steps have no copy of those.
         self._size = first._state.size
         recalled = recall_size(packed.count, packed.pair_rows)

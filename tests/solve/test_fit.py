@@ -228,6 +228,6 @@ def test_what_is_tracked_is_fitted():
         step = tracker.step((np.cos(turn), np.sin(turn), 1.0))
         assert step.feasibility <= 1e-7 and step.status in (asm.TrackStatus.FOLLOWED, asm.TrackStatus.APPROACHING)
     step = tracker.step((np.cos(turn), np.sin(turn), 1.0))
-    assert step.status is asm.TrackStatus.FOLLOWED
+    assert step.status is asm.TrackStatus.FOLLOWED and step.solution.status is asm.Status.FITTED
     x, y, _ = step.solution.pose(door).apply((1, 0, 1))
     assert np.arctan2(y, x) == pytest.approx(3.0, abs=1e-6)
