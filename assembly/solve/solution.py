@@ -270,7 +270,7 @@ class Solution(ReadOnlyArrays):
 
     @cached_property
     def disagreeing(self) -> dict[str, float]:
-        """Constraints that repeat each other and disagree, and how far each is off (lengths, radians), the worst first."""
+        """Constraints that repeat each other and disagree, and how far each is off: lengths, radians; worst first."""
         if self._fit is None or self._fit.apart is None:
             return {}
         packed = self._packed
