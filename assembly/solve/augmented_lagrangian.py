@@ -89,7 +89,7 @@ from assembly.solve.settings import (
     TICK,
     VIOLATION,
 )
-from assembly.solve.standstill import is_stuck, next_floor, out_of_reach, stands_still
+from assembly.solve.standstill import contradicts, is_stuck, next_floor, out_of_reach, stands_still
 from assembly.solve.start import read_state, rearrange, set_out
 from assembly.solve.step import CLOSE, aim, cut_step, leave_saddle, propose, short_share
 from assembly.solve.tangency import off_rows
@@ -431,7 +431,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
                     iteration += 1
                     continue
                 if violation > TOUCHING or watched or not any_pose or is_stuck(way):
-                    status = INFEASIBLE if violation > TOUCHING else STALLED
+                    status = INFEASIBLE if contradicts(way, feasible, violation) else STALLED
                     break
             if ends or slows:
                 if settles and not watched:

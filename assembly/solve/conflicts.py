@@ -35,6 +35,8 @@ IDLE = 1e-6
 SCATTERED, TIMES = 4, 4
 # What came to less than this part of a least violation, and to no end, may come to nothing.
 ENDED = 0.01
+# A set holds that violates a small part of what the whole one does, or what the loop takes for none.
+PART, LEAST = 0.1, 4e-13
 
 
 class _Start(NamedTuple):
@@ -82,10 +84,11 @@ def conflicts_at(scene: Scene, packed: Packed, state: Array, fit: float) -> list
     except NoPairError:
         # Then values that were driven since are not told from those of the solve.
         rows = None
-    # Unless all that is violated is so by less: then it is contacts or limits that do not hold.
-    held = fit if state[packed.results_at + VIOLATION] > fit * packed.scale else HELD
+    # Where all that is violated is so by less, contacts or limits do not hold, or nothing is to disagree.
+    off = float(state[packed.results_at + VIOLATION]) / packed.scale
+    held = max(fit, HELD) if off > max(fit, HELD) else max(min(HELD, PART * off), LEAST)
     there = state if rows is None else rows.state
-    found = conflicting_sets(Snapshot(scene, packed, there, rows, solved=True, held=max(held, HELD)))
+    found = conflicting_sets(Snapshot(scene, packed, there, rows, solved=True, held=held))
     return [tuple(scene.constraints[k].name for k in places) for places in sorted(found)]
 
 

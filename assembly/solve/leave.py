@@ -47,7 +47,7 @@ MOST_WAYS = 6
 
 
 class Fit(NamedTuple):
-    """What rows that repeat each other may disagree by, over the size, and what they do, (m,), if anything."""
+    """What rows that repeat each other may disagree by, over the size, and what they do, (m,), if at all (`fit.py`)."""
 
     allowed: float
     apart: Array | None = None

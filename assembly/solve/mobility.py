@@ -61,7 +61,8 @@ class Mobility(ReadOnlyArrays):
         Of the rows, falling, one for every unknown; lengths divided by `size`, every row of length one.
     tolerance : float
         Singular values below it count as zero: 1e-7, or 10 sqrt(feasibility / size) if that is more, because a residual
-        leaves a singular pose uncertain by its square root. Where some are within a factor 10 of it, the widest gap
+        leaves a singular pose uncertain by its square root; where redundant rows disagree by 1e-9 to `fit` of the size,
+        50 times as much as they do. Where some are within a factor 10 of it, the widest gap
         between them decides.
     size : float
         The scene's size, which lengths are divided by.

@@ -117,7 +117,7 @@ class Walks:
         violation = self._problem.violations(solution).max(initial=0.0)
         if not violation <= ROUGH:
             return
-        holds = violation <= self._problem.held
+        holds = self._problem.holds(solution)
         there = {group.places: group.dof for group in _at(self._problem, solution)} if holds else {}
         gone = moves(self._q, solution.q, self._size)
         for g, (group, part) in enumerate(zip(self.groups, parts, strict=True)):

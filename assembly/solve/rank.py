@@ -118,19 +118,21 @@ class Balanced:
 def centered(jacobian: Array) -> tuple[Array, Array]:
     """Rows in twists at the bodies' origins (m, 6 k) in twists at each body's own center; the centers, (k, 3)."""
     blocks = jacobian.reshape(len(jacobian), jacobian.shape[1] // 6, 6)
-    centers = np.array([_center(blocks[:, b]) for b in range(blocks.shape[1])]).reshape(-1, 3)
+    centers = _centers(blocks)
     shifted = blocks.copy()
     shifted[:, :, 3:] -= np.cross(centers[None], blocks[:, :, :3])
     return shifted.reshape(jacobian.shape), centers
 
 
-def _center(blocks: Array) -> Array:
-    """The point about which the moments h - c x n of forces and moments (m, 6) are least, from the origin."""
-    n, h = blocks[:, :3], blocks[:, 3:]
+def _centers(blocks: Array) -> Array:
+    """The points (k, 3) about which the moments h - c x n of rows (m, k, 6) are least, from the origins."""
+    n, h = blocks[:, :, :3], blocks[:, :, 3:]
     # sum (n.n I - n n^T) c = sum n x h
-    normal = np.sum(n * n) * np.eye(3) - n.T @ n
-    center: Array = np.linalg.pinv(normal, rcond=1e-9, hermitian=True) @ np.cross(n, h).sum(axis=0)
-    return center
+    square = np.einsum("mki,mkj->kij", n, n)
+    normal = np.trace(square, axis1=1, axis2=2)[:, None, None] * np.eye(3) - square
+    moments = np.cross(n, h).sum(axis=0)
+    centers: Array = (np.linalg.pinv(normal, rcond=1e-9, hermitian=True) @ moments[:, :, None])[:, :, 0]
+    return centers
 
 
 def orthonormal(motions: Array) -> Array:

@@ -109,8 +109,9 @@ class Solution(ReadOnlyArrays):
     status : Status
     success : bool
         True only where the constraints, evaluated afresh at `q`, hold to the tolerance, and the objective, if there is
-        one, is stationary and no pose beside `q` was found to be lower. Without an objective it says that constraints
-        hold near the start: the least move is a preference.
+        one, is stationary and no pose beside `q` was found to be lower: SOLVED. FITTED, too, where constraints that
+        repeat each other disagree by no more than `fit`. Without an objective it says that constraints hold near the
+        start: the least move is a preference.
     objective : float
         In the user's units.
     restarted : bool
@@ -132,6 +133,8 @@ class Solution(ReadOnlyArrays):
         What each constraint exerts on its bodies: multipliers as forces and torques.
     values : dict of "joint.freedom" -> float
         Every freedom of every joint, in the user's units and radians; driven and limited angles go on past whole turns.
+    disagreeing : dict of name -> float
+        Of a FITTED solve: the constraints that repeat each other, and by how much each is off, the worst first.
     conflicting : list of name
         Of an INFEASIBLE solve: constraints that cannot hold together; `conflicting_sets` has the minimal sets.
     mobility : Mobility
@@ -280,10 +283,7 @@ class Solution(ReadOnlyArrays):
 
     @cached_property
     def disagreeing(self) -> dict[str, float]:
-        """Of a FITTED solve: what repeats each other, and how far each is off, the worst first.
-
-        Lengths in the user's unit, angles in radians.
-        """
+        """Constraints that repeat each other and disagree, and how far each is off: lengths, radians; worst first."""
         if self._fit is None or self._fit.apart is None:
             return {}
         packed = self._packed

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from assembly._kernel import kernel
+from assembly.constraints.contact_rows import TOUCHING
 from assembly.solve.restoration import SLOW_STEPS, STILLS
 from assembly.solve.settings import NEIGHBORHOOD, STATIONARITY
 
@@ -11,6 +12,8 @@ from assembly.solve.settings import NEIGHBORHOOD, STATIONARITY
 STUCK, STILL = 2.0, 0.99
 # Rows that are off by this at most may repeat each other, tilted by so much. Rounding, in parts of what counts as held.
 LITTLE, MOST_TILTED, ROUNDED = 1e-2, 1e-3, 0.01
+# What is off by so many times what counts as held is not so by rounding.
+MUCH = 10.0
 # Where so many whole steps in a row do not halve the violation, the floor of the penalty gives way, down to here:
 # rounding, times its inverse, must stay small against the objective's curvature.
 SLOW, HARDEST = 3.0, 1e-10
@@ -44,6 +47,12 @@ def stands_still(way, settings, feasible, alpha, violation, last_violation, dual
 def is_stuck(way):
     """Whether the loop was found to stand still, and has not moved since but by restoring rows."""
     return way[STILLS] == STUCK
+
+
+@kernel(inline=True)
+def contradicts(way, feasible, violation):
+    """Whether what restored rows are off tells of a contradiction; less does where the loop stood still."""
+    return violation > (MUCH * feasible if is_stuck(way) else TOUCHING)
 
 
 @kernel(inline=True)

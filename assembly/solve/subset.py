@@ -65,7 +65,7 @@ class Problem:
     near : mapping of id -> array
         Where tracked values are looked for: parameters by name of a contact, angles by identity of a coordinate.
     held : float
-        Violations up to it count as none, lengths over the scene's size.
+        Violations up to it count as none of what joints, couplings and driven values ask, over the scene's size.
     """
 
     def __init__(
@@ -118,17 +118,25 @@ class Problem:
 
     def violations(self, solution: Solution) -> Array:
         """Violations of the constraints, in their order: lengths over the size of the whole scene."""
+        each = self._off(solution)
+        return np.array([each[rows].max(initial=0.0) for rows in self.packed.spans])
+
+    def holds(self, solution: Solution) -> bool:
+        """Whether all constraints hold at a solution: contacts, limits and expressions to rounding."""
+        packed = self.packed
+        allowed = np.full(packed.rows, min(self.held, HELD))
+        values = packed.value_rows
+        allowed[values[~packed.one_sided[values]]] = self.held
+        return solution.status is not Status.CONTACT_LOST and bool((self._off(solution) <= allowed).all())
+
+    def _off(self, solution: Solution) -> Array:
+        """Violations of the rows, lengths over the size of the whole scene; infinite where there is no value."""
         packed = self.packed
         values = solution._residuals
         each = np.where(packed.one_sided, np.maximum(-values, 0.0), np.abs(values))
         each = np.where(packed.lengths, each / self._size, each)
         # What never had a pair does not hold.
-        each = np.where(np.isfinite(each), each, np.inf)
-        return np.array([each[rows].max(initial=0.0) for rows in packed.spans])
-
-    def holds(self, solution: Solution) -> bool:
-        """Whether all constraints hold at a solution."""
-        return solution.status is not Status.CONTACT_LOST and bool((self.violations(solution) <= self.held).all())
+        return np.where(np.isfinite(each), each, np.inf)
 
 
 class Snapshot:

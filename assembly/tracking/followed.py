@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from assembly.constraints.objectives import FrameDistance, PointDistance
 from assembly.constraints.packing import Packed
 from assembly.kinematics.pose import Pose, rotation_matrix
-from assembly.solve.solution import Scene
+from assembly.solve.solution import Scene, Status
 
 __all__ = ["Followed"]
 
@@ -31,6 +31,8 @@ class Followed:
         The spring; its weight is half the stiffness.
     place : int
         Of the body that is held, among those of the scene.
+    begun : Status
+        SOLVED, or FITTED where rows of the scene repeat each other and disagree: those hold as well as they can.
     """
 
     scene: Scene
@@ -38,6 +40,7 @@ class Followed:
     names: list[tuple[str, str]]
     hand: PointDistance | FrameDistance
     place: int
+    begun: Status
 
     def wrench(self, q: Array, target: Array) -> Array:
         """Force and torque of the spring on the hand, (6,), bodies at q (n, 7), the hand at a target."""

@@ -129,7 +129,7 @@ class Step(ReadOnlyArrays):
     def solution(self) -> Solution:
         """The pose as a solution."""
         followed = self._followed
-        status = Status.SOLVED if self.status is TrackStatus.FOLLOWED else Status.ITERATION_LIMIT
+        status = followed.begun if self.status is TrackStatus.FOLLOWED else Status.ITERATION_LIMIT
         # A solution writes what it tracks; the tracker goes back to the state of its last step.
         state = self._state.copy()
         return Solution(followed.scene, followed.packed, state, status, self.seconds, np.empty((0, HISTORY)))

@@ -87,7 +87,7 @@ class Tracker(InOneProcess):
         Steps of a tick after which it ends, if the constraints hold; it takes up to four times as many until they do.
     tolerance : float
         Largest violation that counts as held, in parts of the scene's size; far from the origin, what rounding of
-        coordinates alone violates.
+        coordinates alone violates. Where the start is FITTED it is 1e-6 at least.
     second_order : bool
         Whether every tick is tested for a minimum.
 
@@ -148,6 +148,9 @@ class Tracker(InOneProcess):
         self._inner = inner
         # A solve packs anew where contacts found no place: what it ends with is what ticks go on with.
         first = inner.solve(poses)
+        if first.disagreeing:
+            # What rows disagree by depends on the pose.
+            limit = max(limit, Options.fit)
         if not first.success:
             raise InputError(f"q0 is a start that leads to no pose to begin at; expected one: {first.message}")
         self._packed: Packed = inner.packed()
@@ -168,7 +171,7 @@ class Tracker(InOneProcess):
         self._history = np.zeros((1, HISTORY))
         packed = self._packed
         names = [(a.name, b.name) for pairs in packed.guarded for a, b in pairs]
-        self._followed = Followed(self._scene, packed, names, self._hand, self._place)
+        self._followed = Followed(self._scene, packed, names, self._hand, self._place, first.status)
         # Behind the state of a solve are the rows of the last tick; steps have no copy of those.
         self._size = first._state.size
         recalled = recall_size(packed.count, packed.pair_rows)
