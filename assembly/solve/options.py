@@ -19,6 +19,7 @@ from assembly.solve.settings import (
     SECOND_ORDER,
     SETTINGS,
     STATIONARITY,
+    TOUCHING,
 )
 
 __all__ = ["Options"]
@@ -43,6 +44,9 @@ class Options:
         Smallest mu while violations shrink; where they do not, it falls further, to 1e-10.
     radius : float
         First bound of a step: lengths relative to the scene's size, and radians.
+    touching : float
+        What bodies that a clearance keeps apart may be in each other where the solve begins: so much is called
+        touching, they need not be parted, and no contact of these goes deeper. For parts of files 1e-6 is right, say.
     verbose : int
         1 prints a table of the iterations after the solve; nothing is printed at 0.
     """
@@ -53,6 +57,7 @@ class Options:
     penalty: float = 1e-2
     penalty_floor: float = 1e-6
     radius: float = 0.2
+    touching: float = 1e-9
     verbose: int = 0
 
     def __post_init__(self) -> None:
@@ -62,6 +67,9 @@ class Options:
             value = number(name, getattr(self, name))
             if not 0.0 < value <= high:
                 raise InputError(f"{name} is {value:g}; expected a number above 0 and at most {high:g}")
+        touching = number("touching", self.touching)
+        if not 0.0 <= touching <= 1e-3:
+            raise InputError(f"touching is {touching:g}; expected a number from 0 to 0.001")
         floor = number("penalty_floor", self.penalty_floor)
         if not 1e-12 <= floor <= self.penalty:
             raise InputError(f"penalty_floor is {floor:g}; expected a number from 1e-12 to penalty {self.penalty:g}")
@@ -85,5 +93,6 @@ class Options:
         out[PENALTY_FLOOR] = self.penalty_floor
         out[RADIUS] = self.radius
         out[LAST_LOOK] = 1.0
+        out[TOUCHING] = self.touching
         out[SECOND_ORDER] = 1.0
         return out

@@ -12,8 +12,9 @@ FEASIBILITY, STATIONARITY, ITERATIONS, PENALTY, PENALTY_FLOOR, RADIUS, GATHER, F
 # at a pose that holds after so many iterations, and at the last one that held where it ends otherwise; how long it may
 # take (0: as long as it takes). Whether the end is tested for a minimum. Of a tick: where in the state the rows are
 # that the last one left (0: nowhere). Whether nothing is asked for but that constraints hold: the least move is a wish.
-# Whether a tick whose time is spent where its pose does not hold leaves that pose for the next one to go on from.
-LAST_LOOK, TICK, BUDGET, SECOND_ORDER, RECALL, ANY_POSE, CARRIES, SETTINGS = 8, 9, 10, 11, 12, 13, 14, 15
+# Whether a tick whose time is spent where its pose does not hold leaves that pose for the next one to go on from. What
+# bodies may be in each other where a solve begins, and stay.
+LAST_LOOK, TICK, BUDGET, SECOND_ORDER, RECALL, ANY_POSE, CARRIES, TOUCHING, SETTINGS = 8, 9, 10, 11, 12, 13, 14, 15, 16
 # Whether the end is tested for a minimum (TESTED: and saddles are left before they are reached to the last digit).
 TESTED, REACHED = 1.0, 2.0
 # Results at the end of the state.

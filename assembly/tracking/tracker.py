@@ -42,6 +42,7 @@ from assembly.solve.settings import (
     SOLVED,
     STATIONARITY,
     TICK,
+    TOUCHING,
     VIOLATION,
 )
 from assembly.solve.solution import Scene, Solution
@@ -159,6 +160,8 @@ class Tracker(InOneProcess):
         self._settings[STATIONARITY] = 1e-9
         self._settings[ITERATIONS] = integer("iterations", iterations, 1, 1000)
         self._settings[TICK] = 1.0
+        # A tick begins where the last one ended: what bodies may be in each other there was told at the start.
+        self._settings[TOUCHING] = 0.0
         self._settings[LAST_LOOK] = 0.0
         self._settings[SECOND_ORDER] = float(second_order)
         self._budget = budget
