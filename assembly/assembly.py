@@ -27,7 +27,7 @@ from assembly.proximity.solid_contact import TRACK
 from assembly.solve.attempts import attempt, load
 from assembly.solve.options import Options
 from assembly.solve.postures import postures_from
-from assembly.solve.settings import ANY_POSE, GATHER, ITERATIONS
+from assembly.solve.settings import ANY_POSE, GATHER, ITERATIONS, TOUCHING
 from assembly.solve.solution import Scene, Solution, Status
 
 if TYPE_CHECKING:
@@ -284,7 +284,9 @@ class Assembly:
             spent += perf_counter() - begin
             if not packed.is_crowded(state) or self._crowding >= MOST_CROWDING or isinstance(q0, Solution):
                 assert self._scene is not None
-                return Solution(self._scene, packed, state, _STATUSES[code], spent, history, order)
+                solution = Solution(self._scene, packed, state, _STATUSES[code], spent, history, order)
+                solution._touching = float(settings[TOUCHING])
+                return solution
             self._crowding *= 2
             self._packed = None
 

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 __all__ = ["crossings"]
 
-# What counts as crossing, and how deep looks see, in parts of the scene's size. A deep look of wires that cross often
-# finds so much that it lacks room for the rest, so that there are several.
+# What counts as crossing where no more is called touching, and how deep looks see, in parts of the scene's size. A deep
+# look of wires that cross often finds so much that it lacks room for the rest, so that there are several.
 CROSSING, DEPTHS = 1e-8, (0.005, 0.015, 0.05)
 
 
@@ -51,6 +51,7 @@ def crossings(solution: Solution) -> tuple[tuple[str, str], ...]:
         return ()
     q = solution.q.copy()
     q[:, :3] = (q[:, :3] - packed.reference) / packed.scale
+    deep = max(CROSSING, solution._touching)
     found = set()
     for depth in DEPTHS:
         state = packed.new_state()
@@ -65,7 +66,5 @@ def crossings(solution: Solution) -> tuple[tuple[str, str], ...]:
         )
         found |= set(np.flatnonzero(each[:, watch_memory.CROSSED] == 1.0).tolist())
         gaps = tracked[len(contacts) :, PAIR_GAP]
-        found |= {
-            pair for gap, (pair, _) in zip(gaps, packed.listed(state), strict=True) if pair >= 0 and gap < -CROSSING
-        }
+        found |= {pair for gap, (pair, _) in zip(gaps, packed.listed(state), strict=True) if pair >= 0 and gap < -deep}
     return tuple((a.name, b.name) for k, (a, b) in enumerate(packed.guarded[0]) if k in found)

@@ -22,6 +22,7 @@ from assembly.kinematics.pose import Pose
 from assembly.proximity.pairs import ContactPair
 from assembly.proximity.solid_contact import TRACK
 from assembly.solve.measure import measure, standing
+from assembly.solve.options import Options
 from assembly.solve.settings import COUNT, CULPRIT, DUAL, IMPROPER, OBJECTIVE, VIOLATION
 
 if TYPE_CHECKING:
@@ -153,6 +154,8 @@ class Solution(ReadOnlyArrays):
         self.status = status
         self.seconds = seconds
         self._order = order
+        # What bodies may be in each other and still touch, in parts of the scene's size.
+        self._touching = Options.touching
         # Flat contacts alone need it again, for the center of their pressure.
         self._wishes = packed.pool[scene.wished(packed)] if scene.contacts else None
 

@@ -92,6 +92,8 @@ class Tracker(InOneProcess):
         coordinates alone violates.
     second_order : bool
         Whether every tick is tested for a minimum.
+    touching : float
+        What bodies of a clearance may be in each other where it begins and still touch, in parts of the scene's size.
 
     Raises
     ------
@@ -112,6 +114,7 @@ class Tracker(InOneProcess):
         iterations: int = 2,
         tolerance: float = 1e-12,
         second_order: bool = False,
+        touching: float = 1e-9,
     ) -> None:
         weight = 0.5 * positive("stiffness", stiffness)
         if not isinstance(follow, (Point, Frame, Body)):
@@ -122,7 +125,7 @@ class Tracker(InOneProcess):
         if not isinstance(second_order, (bool, np.bool_)):
             raise InputError(f"second_order is {second_order!r}; expected True or False")
         self._scene_given = scene
-        begin = scene.solve(q0) if scene.constraints else None
+        begin = scene.solve(q0, touching=touching) if scene.constraints else None
         if begin is not None and not begin.success:
             raise InputError(f"q0 is a start that leads to no pose to begin at; expected one: {begin.message}")
         if begin is not None:
@@ -149,7 +152,7 @@ class Tracker(InOneProcess):
         inner.minimize(self._hand)
         self._inner = inner
         # A solve packs anew where contacts found no place: what it ends with is what ticks go on with.
-        first = inner.solve(poses)
+        first = inner.solve(poses, touching=touching)
         if not first.success:
             raise InputError(f"q0 is a start that leads to no pose to begin at; expected one: {first.message}")
         self._packed: Packed = inner.packed()

@@ -115,3 +115,38 @@ def test_touching_is_a_number_of_the_size():
     for touching in (-1e-9, 0.1, np.nan):
         with pytest.raises(InputError, match="touching is"):
             scene.solve(touching=touching)
+
+
+@pytest.mark.parametrize(("over", "touching", "crosses"), [(0.0, 1e-9, False), (1e-7, 1e-6, False), (1e-7, 1e-9, True)])
+def test_crossings_are_more_than_touching(over, touching, crosses):
+    """Of a scene without a clearance: bodies that a contact holds, and one that is flush with another one."""
+    bodies = flush(1.0, over, (0, 0, 0))["parts of faces"]
+    ball = asm.Body("ball", asm.shapes.sphere(2.0), position=(-3, -3, 7))
+    scene = asm.Assembly([*bodies, ball])
+    scene.constrain(asm.Contact(bodies[0], ball))
+    solution = scene.solve(touching=touching)
+    assert solution.success and solution.crossings == ((("body 0", "body 1"),) if crosses else ())
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_head_that_lies_on_a_plate_is_no_crossing(order):
+    plate, bolt = bolt_and_plate(9.0)
+    ball = asm.Body("ball", asm.shapes.sphere(2.0), position=(30, 0, 7))
+    scene = asm.Assembly([plate, bolt, ball][::order])
+    scene.constrain(asm.Contact(plate, ball))
+    solution = scene.solve()
+    assert solution.success and solution.crossings == ()
+
+
+def test_a_tracker_begins_where_bodies_touch():
+    bodies = flush(1.0, 1e-7, (0, 0, 0))["parts of faces"]
+    scene = asm.Assembly(bodies)
+    scene.constrain(asm.Clearance())
+    before = np.array(scene.q)
+    tracker = scene.tracker(follow=bodies[1].point(0, 0, 0), touching=1e-6)
+    step = tracker.step(before[1, :3])
+    assert step.status is asm.TrackStatus.FOLLOWED and np.allclose(step.q, before, rtol=0.0, atol=1e-12)
+    # Drawn down it goes no deeper.
+    for _ in range(20):
+        step = tracker.step(before[1, :3] - np.array([0.0, 0.0, 0.5]))
+    assert step.q[1, 2] > before[1, 2] - 1e-10
