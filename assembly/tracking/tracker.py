@@ -20,7 +20,16 @@ from assembly.errors import FARTHEST, InputError, integer, number, positive
 from assembly.kinematics.body import Body, Frame, Point
 from assembly.kinematics.pose import Pose, axes_quaternion
 from assembly.proximity.solid_contact import STAYS, TRACK
-from assembly.proximity.watch_memory import CLOCK, CORNERS, EVENT_COUNT
+from assembly.proximity.watch_memory import (
+    CLOCK,
+    CORNERS,
+    EVENT_COUNT,
+    MARK_AT,
+    MEMORY_HEADER,
+    PAIR_MEMORY,
+    PAIRS,
+    TURN,
+)
 from assembly.solve.augmented_lagrangian import solve_program
 from assembly.solve.options import Options
 from assembly.solve.recall import recall_size
@@ -62,6 +71,20 @@ SHORTEST_RADIUS = 1e-7
 # What the loop says of a tick whose pose holds.
 _STATUSES = {SOLVED: TrackStatus.FOLLOWED, OUT_OF_TIME: TrackStatus.LATE}
 _CODES = {status: k for k, status in enumerate(TrackStatus)}
+
+
+def _follow_extrema(packed: Packed, state: Array) -> None:
+    """Let rows of clearances follow extrema, from edges onto faces as well, which corners do not.
+
+    Ticks have no last look. Which rows are in the place of a contact, or are its own pair, the first look of a tick tells.
+    """
+    watch = packed.table[WATCH]
+    packed.table[watch + CORNERS] = 0
+    packed.table[watch + CLOCK] = packed.table[CLOCK_AT]
+    state[packed.contacts_at : packed.angles_at].reshape(-1, TRACK)[:, STAYS] = 0.0
+    if packed.table[watch + MARK_AT]:
+        pairs = state[packed.memory_at + MEMORY_HEADER :][: PAIR_MEMORY * int(packed.table[watch + PAIRS])]
+        pairs.reshape(-1, PAIR_MEMORY)[:, TURN] = np.nan
 
 
 class Tracker(InOneProcess):
@@ -182,11 +205,7 @@ class Tracker(InOneProcess):
         recalled = recall_size(packed.count, packed.pair_rows)
         self._state = np.concatenate([first._state, np.zeros(recalled)])
         if packed.guards:
-            # A tick has no last look: rows follow extrema, from edges onto faces as well, which corners do not.
-            watch = packed.table[WATCH]
-            packed.table[watch + CORNERS] = 0
-            packed.table[watch + CLOCK] = packed.table[CLOCK_AT]
-            self._state[packed.contacts_at : packed.angles_at].reshape(-1, TRACK)[:, STAYS] = 0.0
+            _follow_extrema(packed, self._state)
         self._settings[RECALL] = self._size
         self._pose = self._state[: self._size]
         # Numbers are read from a view in half the time it takes to read them from the array.
