@@ -76,7 +76,7 @@ _CODES = {status: k for k, status in enumerate(TrackStatus)}
 def _follow_extrema(packed: Packed, state: Array) -> None:
     """Let rows of clearances follow extrema, from edges onto faces as well, which corners do not.
 
-    Ticks have no last look. Which rows are in the place of a contact, or are its own pair, the first look of a tick tells.
+    Ticks have no last look. Which rows are in the place of a contact, or are its own pair, their first look tells.
     """
     watch = packed.table[WATCH]
     packed.table[watch + CORNERS] = 0
