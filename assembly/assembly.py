@@ -28,7 +28,7 @@ from assembly.solve.attempts import attempt, load
 from assembly.solve.interruption import CTRL_C, Interruption
 from assembly.solve.options import Options
 from assembly.solve.postures import postures_from
-from assembly.solve.settings import ANY_POSE, GATHER, ITERATIONS
+from assembly.solve.settings import ANY_POSE, GATHER, ITERATIONS, TOUCHING
 from assembly.solve.solution import Scene, Solution, Status
 
 if TYPE_CHECKING:
@@ -330,7 +330,9 @@ class Assembly:
 
                     asked = Asked(self.bodies, self.constraints, self._objectives)
                     status = status_of(status, asked, packed, settings, start, state, interruption)
-                return Solution(self._scene, packed, state, status, spent, history, order, fit)
+                solution = Solution(self._scene, packed, state, status, spent, history, order, fit)
+                solution._touching = float(settings[TOUCHING])
+                return solution
             self._crowding *= 2
             self._packed = None
 

@@ -34,7 +34,7 @@ from assembly.constraints.layout import (
 from assembly.geometry.vec import dot, sub
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.extremal import CLOSE, CONVERGED, LEFT_PATCH, SINGULAR, solve_pair
-from assembly.proximity.solid_contact import CONTACT_RECORD, FOLD, IDLE, PAIR_GAP, PROPER, SLACK, STAYS, TRACK
+from assembly.proximity.solid_contact import ALLOWED, CONTACT_RECORD, FOLD, IDLE, PAIR_GAP, PROPER, SLACK, STAYS, TRACK
 from assembly.proximity.velocity import GAP, RATES, RECORD, gradient_row, store_record
 
 # A clearance's contact of solids that are hardly in each other may be given up where its pair ends: then MAY_GO - k
@@ -121,6 +121,13 @@ def is_guard(table, r):
 
 
 @kernel(inline=True)
+def least_gap(table, pool, r, tracked):
+    """The least gap of row r: of a clearance's, less by what the bodies were in each other where the solve began."""
+    least = pool[table[table[ROW_TABLE] + ROW * r + MINIMUM]]
+    return least - tracked[r, ALLOWED] if is_guard(table, r) else least
+
+
+@kernel(inline=True)
 def is_of_solids(table, r):
     """Whether row r is a contact of solids, or has no contact."""
     return table[table[ROW_TABLE] + ROW * r + SHELL_F] >= 0
@@ -166,13 +173,14 @@ def lost_guard(table, pool, r, start, point, past, goes):
     find.
     """
     row = table[ROW_TABLE] + ROW * r
-    gap = start[r, PAIR_GAP] - pool[table[row + MINIMUM]]
+    least = least_gap(table, pool, r, start)
+    gap = start[r, PAIR_GAP] - least
     if past:
         gap = max(gap, 0.0)
     elif not gap > (-TOUCHING if table[row + SHELL_F] >= 0 else 0.0) and not goes and not math.isnan(start[r, 0]):
         return False
     idle_row(r, gap, point)
-    point[1][r, PAIR_GAP] = gap + pool[table[row + MINIMUM]]
+    point[1][r, PAIR_GAP] = gap + least
     # Nothing moves it: its pair is not known.
     for i in range(RATES, RECORD):
         point[2][r, i] = 0.0
@@ -213,7 +221,7 @@ def solids_row(table, pool, r, start, patience, point):
         status = track_row(table, pool, row, q, tracked, math.inf, records, tracked, r)
         if status != CONVERGED and status != SINGULAR:
             return False
-    residual[r] = records[r, GAP] - pool[table[row + MINIMUM]]
+    residual[r] = records[r, GAP] - least_gap(table, pool, r, tracked)
     tracked[r, PAIR_GAP] = records[r, GAP]
     gradient_row(records, r, jacobian, r)
     return True
@@ -250,10 +258,10 @@ def row_of_pair(table, pool, r, start, patience, point):
             records[r, FOLD] = 1.0
         elif not records[r, GAP] > 0.0:
             return False
-    residual[r] = records[r, GAP] - pool[table[row + MINIMUM]]
+    residual[r] = records[r, GAP] - least_gap(table, pool, r, tracked)
     gradient_row(records, r, jacobian, r)
     tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3] = x
-    tracked[r, PAIR_GAP] = residual[r] + pool[table[row + MINIMUM]]
+    tracked[r, PAIR_GAP] = records[r, GAP]
     return True
 
 
@@ -271,7 +279,7 @@ def contact_row(table, pool, r, start, patience, point):
         return True
     if start[r, IDLE] == 1.0:
         tracked[r, IDLE] = 0.0
-        residual[r] = start[r, PAIR_GAP] - pool[table[row + MINIMUM]]
+        residual[r] = start[r, PAIR_GAP] - least_gap(table, pool, r, start)
         return True
     if not row_of_pair(table, pool, r, start, patience, point):
         return False

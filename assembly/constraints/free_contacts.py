@@ -6,11 +6,10 @@ Both kernels are called by their addresses.
 from __future__ import annotations
 
 from assembly._kernel import kernel
-from assembly.constraints.contact_rows import copy_tracked
+from assembly.constraints.contact_rows import copy_tracked, least_gap
 from assembly.constraints.layout import (
     BODY_F,
     BODY_G,
-    MINIMUM,
     MOVING,
     ROW,
     ROW_TABLE,
@@ -50,7 +49,7 @@ def free_row(table, pool, r, start, free, lengths, vectors, q, tracked, records,
         table[ROWS] + 4 * free[r],
     )
     tracked[r, PAIR_GAP] = residual[r]
-    residual[r] -= pool[table[row + MINIMUM]]
+    residual[r] -= least_gap(table, pool, r, tracked)
     records[r, SLACK] = 0.0
     return 0
 

@@ -6,7 +6,7 @@ A body is its faces with the edges and vertices they share. Everything returned 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import lru_cache
 from typing import Literal
@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly._copies import OwnState
 from assembly._read_only import ReadOnlyArrays
-from assembly.errors import InputError, check_coordinates
+from assembly.errors import InputError, check_coordinates, number
 from assembly.geometry.face import Face
 from assembly.geometry.surface import NurbsSurface
 from assembly.kinematics.body import Body, BodyFace
@@ -36,6 +36,7 @@ from assembly.proximity.nearest_query import (
 )
 from assembly.proximity.shell_packing import pack_shell
 from assembly.proximity.solid import solid_of
+from assembly.proximity.touching import flush_ways
 
 __all__ = ["Feature", "FeaturePair", "FeatureStatus", "FeatureTracker", "closest_features"]
 
@@ -200,7 +201,9 @@ def _pair(
     )
 
 
-def closest_features(a: Shape, b: Shape, q_a: ArrayLike | None = None, q_b: ArrayLike | None = None) -> FeaturePair:
+def closest_features(
+    a: Shape, b: Shape, q_a: ArrayLike | None = None, q_b: ArrayLike | None = None, *, touching: float = 1e-9
+) -> FeaturePair:
     """The closest points of two bodies over all their faces, edges and vertices.
 
     Parameters
@@ -209,18 +212,21 @@ def closest_features(a: Shape, b: Shape, q_a: ArrayLike | None = None, q_b: Arra
         Faces given together share their edges and vertices.
     q_a, q_b : (7,), optional
         Poses; a body's own by default, else the identity.
+    touching : float
+        What the bodies may be in each other and still touch, in parts of the larger one's size. So do those whose flat
+        faces lie on each other, where as small a move off these faces parts them.
 
     Returns
     -------
     FeaturePair
-        Where the bodies are apart, their nearest points. Where they cross, a pair with normals that oppose each other
-        and a negative gap: one that closes as the bodies come apart along the normal of a face that crosses, of these
-        the one that leads out first.
+        Where the bodies are apart or touch, their nearest points. Where they cross, a pair with normals that oppose
+        each other and a negative gap: one that closes as the bodies come apart along the normal of a face that crosses,
+        of these the one that leads out first.
 
     Raises
     ------
     InputError, TypeError
-        Shapes without faces, wrong poses, coordinates of 1e150 and more.
+        Shapes without faces, wrong poses, coordinates of 1e150 and more, `touching` that is not from 0 to 0.001.
 
     Notes
     -----
@@ -231,9 +237,35 @@ def closest_features(a: Shape, b: Shape, q_a: ArrayLike | None = None, q_b: Arra
     """
     faces = _faces("a", a), _faces("b", b)
     q = np.stack([_pose("q_a", a, q_a), _pose("q_b", b, q_b)])
+    if not 0.0 <= number("touching", touching) <= 1e-3:
+        raise InputError(f"touching is {touching:g}; expected a number from 0 to 0.001")
+    pair = _closest(faces, q)
+    if pair.status not in (FeatureStatus.PENETRATING, FeatureStatus.CROSSING):
+        return pair
+    reach = touching * _packed(*faces)[4]
+    if pair.status is FeatureStatus.PENETRATING and pair.gap >= -reach:
+        return replace(pair, status=FeatureStatus.APART)
+    return _parted(faces, q, reach) or pair
+
+
+def _closest(faces: tuple[Faces, Faces], q: Array) -> FeaturePair:
+    """The pair at poses (2, 7)."""
     codes, out = np.zeros(2, dtype=np.int64), np.empty(PAIR)
     status = _search(_packed(*faces), q, codes, out)
     return _pair((features_of(faces[0]), features_of(faces[1])), codes, out, status)
+
+
+def _parted(faces: tuple[Faces, Faces], q: Array, reach: float) -> FeaturePair | None:
+    """The nearest pair of bodies with flush faces that a move by twice the reach off these parts, moved back."""
+    for way in flush_ways(faces[0], q[0], faces[1], q[1], reach):
+        moved = q.copy()
+        moved[1, :3] += 2.0 * reach * way
+        pair = _closest(faces, moved)
+        if pair.status not in (FeatureStatus.PENETRATING, FeatureStatus.CROSSING):
+            points = pair.points - np.array([0.0 * way, 2.0 * reach * way])
+            gap = pair.gap - 2.0 * reach * float(way @ pair.normal)
+            return replace(pair, points=points, gap=gap, lower=0.0)
+    return None
 
 
 class FeatureTracker(OwnState):

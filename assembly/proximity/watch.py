@@ -22,6 +22,7 @@ from assembly.proximity.allowances import LEAST_ALLOWANCE, STILL, allow_ball, la
 from assembly.proximity.bounding_tree import NODE_POOL, RADIUS, least_distance
 from assembly.proximity.corners import add_corners
 from assembly.proximity.facing import facing_pairs, near_enough
+from assembly.proximity.flush import any_deep, drop_flush
 from assembly.proximity.near_root import PASSED
 from assembly.proximity.overlap import crosses
 from assembly.proximity.patch_list import LIST_INTS
@@ -276,6 +277,8 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, rooms, roots, asks):
             table, pool, watch, scene, memory[at + REACH], least, offsets, rooms[0], rooms[1], roots, count, rooms[4],
             tracked,
         )  # fmt: skip
+    if scene[2][0] < 0 and any_deep(roots, count):
+        drop_flush(table, pool, watch, memory, p, scene, roots, count, tracked)
     if table[watch + MARK_AT] != 0 and least > 0.0 and table[pair + GIVEN_COUNT] > 0:
         call_address(table[watch + MARK_AT], (table, pool, watch, p, q, tracked, roots, count))
         release_given(table, watch, memory, p, roots, count, tracked)

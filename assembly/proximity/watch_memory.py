@@ -39,7 +39,7 @@ from assembly.proximity.roots import (
     add_given,
     add_root,
 )
-from assembly.proximity.solid_contact import FEATURE_F, FEATURE_G, IDLE, PAIR_GAP, PAIR_NORMAL, STAYS
+from assembly.proximity.solid_contact import ALLOWED, FEATURE_F, FEATURE_G, IDLE, PAIR_GAP, PAIR_NORMAL, STAYS
 from assembly.proximity.spine_curve import both_radii
 
 # The record of a watch: counts; where pairs begin; the row of `tracked` that is the first place; address of
@@ -63,8 +63,8 @@ PAIR_MINIMUM, LOW, HIGH, GIVEN, GIVEN_COUNT, SMALLER, SPINE_F, SPINE_G, PAIR_REC
 IN_PLACE = 6
 # Memory. Header: events, looks and contacts so far, the time of the caller, whether a near root ever found no place,
 # calls so far; of a tick with a budget, when a look is to end after the pair that it is at, and how many looks there
-# were before it.
-EVENT_COUNT, LOOKS, BORN, TIME, CROWDED, CALLS, DEADLINE, EARLIER, MEMORY_HEADER = 0, 1, 2, 3, 4, 5, 6, 7, 8
+# were before it; by how much less than the least gap a new contact may stay, as where a solve begins.
+EVENT_COUNT, LOOKS, BORN, TIME, CROWDED, CALLS, DEADLINE, EARLIER, OVERLAP, MEMORY_HEADER = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9
 # Of a pair: how the smaller body was turned, seen from the other, at its last look (a quaternion, NaN before there was
 # one), and where the middle of its tree was; how far it may go from there, its reach, its state, calls at its last
 # look; a ball on it, where its middle was, and how far what is in it may go; which part of its allowances is used;
@@ -301,6 +301,7 @@ def list_roots(table, pool, watch, memory, p, roots, count, tracked):
         memory[o + PLACE_NUMBER] = memory[BORN]
         memory[o + PLACE_GIVEN] = 1.0 if roots[best, ROOT_PLACE] == BESIDE_CONTACT else 0.0
         write_root(roots, best, tracked, table[watch + FIRST] + k)
+        tracked[table[watch + FIRST] + k, ALLOWED] = -gap if -memory[OVERLAP] <= gap < 0.0 else 0.0
         note(table, watch, memory, ADDED, CAME_NEAR, p, memory[BORN], roots[best, GAP])
     memory[at + WANTING] = 1.0 if wanting else 0.0
     return rest, lowest, wanting

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 __all__ = ["crossing_pairs", "free_pairs", "joined_pairs"]
 
 Pair = tuple[Body, Body]
-# What counts as crossing, and how deep looks see, in parts of the scene's size. A deep look of wires that cross often
-# finds so much that it lacks room for the rest, so that there are several.
+# What counts as crossing where no more is called touching, and how deep looks see, in parts of the scene's size. A deep
+# look of wires that cross often finds so much that it lacks room for the rest, so that there are several.
 CROSSING, DEPTHS = 1e-8, (0.005, 0.015, 0.05)
 
 
@@ -96,6 +96,7 @@ def _seen(packed: Packed, solution: Solution, contacts: int) -> set[int]:
     q = solution.q.copy()
     q[:, :3] = (q[:, :3] - packed.reference) / packed.scale
     count = watch_memory.PAIR_MEMORY * len(packed.guarded[0])
+    deep = max(CROSSING, solution._touching)
     found = set()
     for depth in DEPTHS:
         state = packed.new_state()
@@ -107,7 +108,5 @@ def _seen(packed: Packed, solution: Solution, contacts: int) -> set[int]:
         watch.look(packed.table, packed.pool, packed.table[layout.WATCH], memory, q, tracked, watch.EVERYTHING)
         found |= set(np.flatnonzero(pairs[:, watch_memory.CROSSED] == 1.0).tolist())
         gaps = tracked[contacts:, PAIR_GAP]
-        found |= {
-            pair for gap, (pair, _) in zip(gaps, packed.listed(state), strict=True) if pair >= 0 and gap < -CROSSING
-        }
+        found |= {pair for gap, (pair, _) in zip(gaps, packed.listed(state), strict=True) if pair >= 0 and gap < -deep}
     return found

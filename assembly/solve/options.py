@@ -20,6 +20,7 @@ from assembly.solve.settings import (
     SECOND_ORDER,
     SETTINGS,
     STATIONARITY,
+    TOUCHING,
 )
 
 __all__ = ["Options"]
@@ -47,6 +48,9 @@ class Options:
     fit : float
         What constraints of joints, couplings and driven values that repeat each other may disagree by, as those of CAD
         files do; such a solve ends FITTED. 0: they are to agree to the tolerance.
+    touching : float
+        What bodies that a clearance keeps apart may be in each other where the solve begins: so much is called
+        touching, they need not be parted, and no contact of these goes deeper. For parts of files 1e-6 is right, say.
     verbose : int
         1 prints a table of the iterations after the solve; nothing is printed at 0.
     """
@@ -58,6 +62,7 @@ class Options:
     penalty_floor: float = 1e-6
     radius: float = 0.2
     fit: float = 1e-6
+    touching: float = 1e-9
     verbose: int = 0
 
     def __post_init__(self) -> None:
@@ -70,6 +75,9 @@ class Options:
         fit = number("fit", self.fit)
         if not 0.0 <= fit <= 1e-2:
             raise InputError(f"fit is {fit:g}; expected a number from 0 to 0.01")
+        touching = number("touching", self.touching)
+        if not 0.0 <= touching <= 1e-3:
+            raise InputError(f"touching is {touching:g}; expected a number from 0 to 0.001")
         floor = number("penalty_floor", self.penalty_floor)
         if not 1e-12 <= floor <= self.penalty:
             raise InputError(f"penalty_floor is {floor:g}; expected a number from 1e-12 to penalty {self.penalty:g}")
@@ -94,5 +102,6 @@ class Options:
         out[RADIUS] = self.radius
         out[FIT] = self.fit
         out[LAST_LOOK] = 1.0
+        out[TOUCHING] = self.touching
         out[SECOND_ORDER] = 1.0
         return out

@@ -15,10 +15,11 @@ FEASIBILITY, STATIONARITY, ITERATIONS, PENALTY, PENALTY_FLOOR, RADIUS, GATHER, F
 # take (0: as long as it takes). Whether the end is tested for a minimum. Of a tick: where in the state the rows are
 # that the last one left (0: nowhere). Whether nothing is asked for but that constraints hold: the least move is a wish.
 # Whether a tick whose time is spent where its pose does not hold leaves that pose for the next one to go on from. What
-# rows that repeat each other may disagree by (`fit.py`).
-LAST_LOOK, TICK, BUDGET, SECOND_ORDER, RECALL, ANY_POSE, CARRIES, FIT = 8, 9, 10, 11, 12, 13, 14, 15
+# rows that repeat each other may disagree by (`fit.py`). What bodies may be in each other where a solve begins, and may
+# stay.
+LAST_LOOK, TICK, BUDGET, SECOND_ORDER, RECALL, ANY_POSE, CARRIES, FIT, TOUCHING = 8, 9, 10, 11, 12, 13, 14, 15, 16
 # The address at which a solve asks whether it is to go on (0: nowhere).
-ASK_AT, SETTINGS = 16, 17
+ASK_AT, SETTINGS = 17, 18
 # Whether the end is tested for a minimum (TESTED: and saddles are left before they are reached to the last digit).
 TESTED, REACHED = 1.0, 2.0
 # Whether scattered bodies are gathered (ASSEMBLES: and the loop ends there).

@@ -176,6 +176,8 @@ class Solution(ReadOnlyArrays):
         self._order = order
         self.restarted = False
         self._fit = fit
+        # What bodies may be in each other and still touch, in parts of the scene's size.
+        self._touching = Options.touching
         # Flat contacts alone need it again, for the center of their pressure.
         self._wishes = packed.pool[scene.wished(packed)] if scene.contacts else None
 

@@ -23,6 +23,7 @@ from assembly.constraints.program import evaluate
 from assembly.constraints.terms import recenter
 from assembly.proximity.solid_contact import FOLD, TRACK
 from assembly.proximity.watch import AS_NEEDED, SPARING
+from assembly.proximity.watch_memory import OVERLAP
 from assembly.solve.contacts import free_folds, is_of_surfaces, start_contacts
 from assembly.solve.gather import gather, scattered
 from assembly.solve.guards import forget_guards, look_around, place_guards
@@ -42,6 +43,7 @@ from assembly.solve.settings import (
     RUNNING,
     SCATTER,
     TICK,
+    TOUCHING,
 )
 
 
@@ -73,9 +75,10 @@ def read_state(table, pool, state, here, trial, y, better_y):
 
 
 @kernel(inline=True)
-def find_contacts(program, state, recalled, here, by_row, n, free_trims, sparing):
+def find_contacts(program, state, recalled, here, by_row, n, free_trims, sparing, touching):
     """Find the contacts of the start and evaluate its rows, unless the last tick left them at `recalled`.
 
+    Bodies of a clearance that are in each other by no more than `touching` there may stay so.
     Returns the contact that has no pair, or -1, and whether that was told by evaluating the rows: which are not
     evaluated yet where a contact has no pair to begin with, or is at a fold.
     """
@@ -88,7 +91,9 @@ def find_contacts(program, state, recalled, here, by_row, n, free_trims, sparing
         place_guards(table, memory, here, y, better_y, free, True)
     lost = start_contacts(table, pool, here[0], here[1], free, lengths)
     if watched and lost < 0:
+        memory[OVERLAP] = touching
         came = look_around(table, pool, memory, here, SPARING if sparing else AS_NEEDED)
+        memory[OVERLAP] = 0.0
         place_guards(table, memory, here, y, better_y, free, False)
     count = free_folds(table, pool, here[2], here[1], active, free, lengths, -1.0, -1, free_trims)
     if lost >= 0 or count > 0:
@@ -139,7 +144,9 @@ def set_out(program, settings, state, here, by_row, n):
     results[CURVED] = 0.0
     free_trims = settings[FREE_TRIMS] == 1.0
     tick = settings[TICK] == 1.0
-    lost, evaluated = find_contacts(program, state, int(settings[RECALL]), here, by_row, n, free_trims, tick)
+    lost, evaluated = find_contacts(
+        program, state, int(settings[RECALL]), here, by_row, n, free_trims, tick, settings[TOUCHING]
+    )
     # A tick begins where the last one ended: there a pair that Newton's method loses is at a fold.
     folded = lost >= 0 and evaluated and tick and is_of_surfaces(table, lost)
     status = CONTACT_LOST if lost >= 0 and not folded else RUNNING

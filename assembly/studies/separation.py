@@ -22,6 +22,7 @@ from assembly.kinematics.pose import rotate
 from assembly.proximity.features import FeaturePair, FeatureStatus, closest_features
 from assembly.proximity.solid import solid_of
 from assembly.solve.interruption import Interruption
+from assembly.solve.options import Options
 
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
@@ -59,8 +60,9 @@ def separated(scene: Assembly, q: Array, options: Mapping[str, Any], interruptio
     often: Counter[tuple[str, str]] = Counter()
     contacts: list[Contact] = []
     poses: list[Array] = []
+    touching = options.get("touching", Options.touching) * scene.packed().scale
     for _ in range(ROUNDS):
-        found = [crossing for a, b in guarded if (crossing := _crossing(a, b, q, rows)) is not None]
+        found = [crossing for a, b in guarded if (crossing := _crossing(a, b, q, rows, touching)) is not None]
         if not found or interruption.is_over():
             return poses
         before, q = q, q.copy()
@@ -73,7 +75,7 @@ def separated(scene: Assembly, q: Array, options: Mapping[str, Any], interruptio
             if crossing.nested:
                 _push_out(crossing, q, rows)
             elif often[names] > TRIES:
-                _part(crossing, q, rows)
+                _part(crossing, q, rows, touching)
         helper = type(scene)(scene.bodies)
         helper.constrain(*others, *contacts)
         solution = helper._from_start(q, None, dict(options), interruption)
@@ -88,17 +90,19 @@ def separated(scene: Assembly, q: Array, options: Mapping[str, Any], interruptio
     return []
 
 
-def _crossing(a: Body, b: Body, q: Array, rows: Mapping[str, int]) -> _Crossing | None:
+def _crossing(a: Body, b: Body, q: Array, rows: Mapping[str, int], touching: float) -> _Crossing | None:
+    """How two bodies cross, if they do, by more than what is called touching."""
     row_a, row_b = q[rows[a.name]], q[rows[b.name]]
     if float(np.linalg.norm(_center(b, row_b) - _center(a, row_a))) > 0.5 * (a.size + b.size):
         return None
-    pair = closest_features(a, b, row_a, row_b)
+    part = min(touching / max(a.size, b.size), 1e-3)
+    pair = closest_features(a, b, row_a, row_b, touching=part)
     if pair.status in (FeatureStatus.PENETRATING, FeatureStatus.CROSSING):
         return _Crossing(a, b, pair, nested=False)
     if _is_closed(a) and pair.gap < WITHIN * a.size:
         return _Crossing(a, b, pair, nested=True)
     if _is_closed(b):
-        pair = closest_features(b, a, row_b, row_a)
+        pair = closest_features(b, a, row_b, row_a, touching=part)
         if pair.gap < WITHIN * b.size:
             return _Crossing(b, a, pair, nested=True)
     return None
@@ -110,14 +114,14 @@ def _push_out(crossing: _Crossing, q: Array, rows: Mapping[str, int]) -> None:
     _move(crossing, (FARTHER * max(a.size, b.size) - pair.gap) * pair.normal, q, rows)
 
 
-def _part(crossing: _Crossing, q: Array, rows: Mapping[str, int]) -> None:
+def _part(crossing: _Crossing, q: Array, rows: Mapping[str, int], touching: float) -> None:
     """Move one body away from the other one until they do not cross."""
     a, b = crossing.a, crossing.b
     away = _center(b, q[rows[b.name]]) - _center(a, q[rows[a.name]])
     far = float(np.linalg.norm(away))
     way = away / far if far > FARTHER * a.size else crossing.pair.normal
     step = 0.02 * max(a.size, b.size)
-    while _crossing(a, b, q, rows) is not None:
+    while _crossing(a, b, q, rows, touching) is not None:
         _move(crossing, step * way, q, rows)
         step *= 2.0
 

@@ -19,7 +19,16 @@ from assembly.errors import FARTHEST, InputError, integer, number, positive
 from assembly.kinematics.body import Body, Frame, Point
 from assembly.kinematics.pose import Pose, axes_quaternion
 from assembly.proximity.solid_contact import STAYS, TRACK
-from assembly.proximity.watch_memory import CLOCK, CORNERS, EVENT_COUNT
+from assembly.proximity.watch_memory import (
+    CLOCK,
+    CORNERS,
+    EVENT_COUNT,
+    MARK_AT,
+    MEMORY_HEADER,
+    PAIR_MEMORY,
+    PAIRS,
+    TURN,
+)
 from assembly.solve.augmented_lagrangian import solve_program
 from assembly.solve.options import Options
 from assembly.solve.recall import recall_size
@@ -41,6 +50,7 @@ from assembly.solve.settings import (
     SOLVED,
     STATIONARITY,
     TICK,
+    TOUCHING,
     VIOLATION,
 )
 from assembly.solve.solution import Scene, Solution
@@ -60,6 +70,20 @@ SHORTEST_RADIUS = 1e-7
 # What the loop says of a tick whose pose holds.
 _STATUSES = {SOLVED: TrackStatus.FOLLOWED, OUT_OF_TIME: TrackStatus.LATE}
 _CODES = {status: k for k, status in enumerate(TrackStatus)}
+
+
+def _follow_extrema(packed: Packed, state: Array, keeps_time: bool) -> None:
+    """Let rows of clearances follow extrema, from edges onto faces as well, which corners do not.
+
+    Ticks have no last look. Which rows are in the place of a contact, or are its own pair, their first look tells.
+    """
+    watch = packed.table[WATCH]
+    packed.table[watch + CORNERS] = 0
+    packed.table[watch + CLOCK] = packed.table[CLOCK_AT] if keeps_time else 0
+    state[packed.contacts_at : packed.angles_at].reshape(-1, TRACK)[:, STAYS] = 0.0
+    if packed.table[watch + MARK_AT]:
+        pairs = state[packed.memory_at + MEMORY_HEADER :][: PAIR_MEMORY * int(packed.table[watch + PAIRS])]
+        pairs.reshape(-1, PAIR_MEMORY)[:, TURN] = np.nan
 
 
 class Tracker(InOneProcess):
@@ -90,6 +114,8 @@ class Tracker(InOneProcess):
         coordinates alone violates. Where the start is FITTED it is 1e-6 at least.
     second_order : bool
         Whether every tick is tested for a minimum.
+    touching : float
+        What bodies of a clearance may be in each other where it begins and still touch, in parts of the scene's size.
 
     Raises
     ------
@@ -110,6 +136,7 @@ class Tracker(InOneProcess):
         iterations: int = 2,
         tolerance: float = 1e-12,
         second_order: bool = False,
+        touching: float = 1e-9,
     ) -> None:
         weight = 0.5 * positive("stiffness", stiffness)
         if not isinstance(follow, (Point, Frame, Body)):
@@ -120,7 +147,7 @@ class Tracker(InOneProcess):
         if not isinstance(second_order, (bool, np.bool_)):
             raise InputError(f"second_order is {second_order!r}; expected True or False")
         self._scene_given = scene
-        begin = scene.solve(q0) if scene.constraints else None
+        begin = scene.solve(q0, touching=touching) if scene.constraints else None
         if begin is not None and not begin.success:
             raise InputError(f"q0 is a start that leads to no pose to begin at; expected one: {begin.message}")
         if begin is not None:
@@ -147,7 +174,7 @@ class Tracker(InOneProcess):
         inner.minimize(self._hand)
         self._inner = inner
         # A solve packs anew where contacts found no place: what it ends with is what ticks go on with.
-        first = inner.solve(poses)
+        first = inner.solve(poses, touching=touching)
         if first.disagreeing:
             # What rows disagree by depends on the pose.
             limit = max(limit, Options.fit)
@@ -161,6 +188,8 @@ class Tracker(InOneProcess):
         self._settings[STATIONARITY] = 1e-9
         self._settings[ITERATIONS] = integer("iterations", iterations, 1, 1000)
         self._settings[TICK] = 1.0
+        # A tick begins where the last one ended: what bodies may be in each other there was told at the start.
+        self._settings[TOUCHING] = 0.0
         self._settings[LAST_LOOK] = 0.0
         self._settings[SECOND_ORDER] = float(second_order)
         self._budget = budget
@@ -177,11 +206,7 @@ class Tracker(InOneProcess):
         recalled = recall_size(packed.count, packed.pair_rows)
         self._state = np.concatenate([first._state, np.zeros(recalled)])
         if packed.guards:
-            # A tick has no last look: rows follow extrema, from edges onto faces as well, which corners do not.
-            watch = packed.table[WATCH]
-            packed.table[watch + CORNERS] = 0
-            packed.table[watch + CLOCK] = 0 if budget is None else packed.table[CLOCK_AT]
-            self._state[packed.contacts_at : packed.angles_at].reshape(-1, TRACK)[:, STAYS] = 0.0
+            _follow_extrema(packed, self._state, budget is not None)
         self._settings[RECALL] = self._size
         self._pose = self._state[: self._size]
         # Numbers are read from a view in half the time it takes to read them from the array.

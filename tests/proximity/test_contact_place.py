@@ -135,3 +135,27 @@ def test_a_ball_that_rolls_far_is_followed(minimum, cases):
     for k in range(cases(30, 300)):
         step = tracker.step((10 * np.sin(k / 40), 10 * np.cos(k / 40) - 10, 3.5))
         assert step.status is asm.TrackStatus.FOLLOWED
+
+
+@pytest.mark.parametrize("minimum", [0.0, 0.5])
+def test_a_box_that_a_hand_turns_over_keeps_touching(minimum, cases):
+    """Its contact goes from vertex to vertex: none of them is asked for a gap, as all are in the contact's place."""
+    floor = asm.Body("floor", asm.shapes.box(60, 60, 4), fixed=True, position=(0, 0, -2))
+    box = turned(asm.Body("box", asm.shapes.box(4, 5, 6)), (0, 0, 6), 0.8, (3, 2, 1))
+    scene = scene_of([floor, box], False, minimum)
+    held = asm.FrameDistance(box, asm.Pose((0, 0, 4)))
+    scene.minimize(held)
+
+    def hand(turn):
+        half = 0.5 * turn
+        return asm.Pose((5 * np.sin(turn), 0, 4), (np.cos(half), 0.6 * np.sin(half), 0.8 * np.sin(half), 0))
+
+    solution = scene.solve()
+    for k in range(cases(20, 60)):
+        held.target = hand(0.1 * k)
+        solution = scene.solve(solution)
+        assert solution.success, k
+    tracker = scene.tracker(follow=box.frame())
+    for k in range(cases(60, 200)):
+        step = tracker.step(hand(0.02 * k))
+        assert step.status in (asm.TrackStatus.FOLLOWED, asm.TrackStatus.APPROACHING), k
