@@ -19,17 +19,25 @@ def pulled(function_of):
     return scene
 
 
-@pytest.mark.parametrize("f", [lambda x: ca.sqrt(x[0]) - 1, lambda x: ca.log(x[0]), lambda x: 1 / x[0] - 2])
-def test_no_value_or_slope_at_the_start_is_a_stall(f):
-    # The square root has a value at zero, and an infinite slope: the loop once never ended.
+@pytest.mark.parametrize("f", [lambda x: ca.sqrt(-1 - x[0] ** 2), lambda x: ca.log(-1 - x[0] ** 2)])
+def test_no_value_or_slope_anywhere_is_a_stall(f):
     scene = pulled(f)
-    elsewhere = scene.solve()
-    assert elsewhere.success and elsewhere.restarted
-    solution = scene._from_start(None, None, {})
+    solution = scene.solve()
     assert solution.status is asm.Status.STALLED
     assert "STALLED" in str(solution)
     with pytest.raises(InputError, match="no finite value or slope"):
         scene.mobility(solution)
+
+
+@pytest.mark.parametrize(
+    ("f", "x"), [(lambda x: ca.sqrt(x[0]) - 1, 1.0), (lambda x: ca.log(x[0]), 1.0), (lambda x: 1 / x[0] - 2, 0.5)]
+)
+def test_where_there_is_no_value_or_slope_other_starts_are_tried(f, x):
+    # The square root has a value at zero, and an infinite slope: the loop once never ended.
+    solution = pulled(f).solve()
+    assert solution.success and solution.restarted
+    assert abs(solution.pose("body").position[0] - x) < 1e-11
+    assert "found from another start" in solution.message
 
 
 def test_a_solution_is_no_door_to_the_next_start():
