@@ -1,8 +1,9 @@
 """CurveProximityQueries.jl: its README and the curves of `test/runtests.jl` and of `examples`.
 
 The README prints a cubic and a polygon of twenty corners to six digits, and the answers of its queries to sixteen: the
-distance is asked for to the tolerance of its own tests, 1e-5, and is to be no larger than what it found. The curves of its tests are random numbers of another language; what is
-left of these tests is what holds of any curve, tried on curves of the same degrees that are written down here.
+distance is asked for to the tolerance of its own tests, 1e-5, and is to be no larger than what it found. The curves of
+its tests are random numbers of another language; what is left of these tests is what holds of any curve, tried on
+curves that are written down here.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Schittkowski, More Test Examples for Nonlinear Programming Codes (1987): problems 201 to 260, two to four variables.
 
-Objectives, constraints, bounds, standard starts and solutions are those of the book. Not here: optima without
-multipliers (218 to 221), powers that are flat to more than the fourth order (213), and problem 216, whose optimum is
-printed as 1 at (2, 4): the constraint has no slope there, and the objective falls to 0.999375.
+Objectives, constraints, bounds, standard starts and solutions are those of the book. Not here: problems 213
+and 214, powers that are flat or have no slope at the optimum; 216, whose optimum is printed as 1 at (2, 4), where the
+constraint has no slope in x[0] and the objective falls on to 0.999375; 221, an optimum without multipliers.
 """
 
 from __future__ import annotations
@@ -36,6 +36,11 @@ def _wood(x):
     )
 
 
+def _crossed_wood(x):
+    """Problem 257: Wood's function with another product."""
+    return _wood(x) + 19.8 * (x[3] - 1) * (x[0] - x[1])
+
+
 def _exponentials(x):
     """Problem 242 (Box): ten residuals."""
     rows = (ca.exp(-x[0] * t) - ca.exp(-x[1] * t) - x[2] * (exp(-t) - exp(-10 * t)) for t in _tenths())
@@ -45,6 +50,12 @@ def _exponentials(x):
 def _biggs(x):
     """Problem 244 (Biggs): ten residuals."""
     rows = (ca.exp(-x[0] * t) - x[2] * ca.exp(-x[1] * t) - exp(-t) + 5 * exp(-10 * t) for t in _tenths())
+    return sum(row**2 for row in rows)
+
+
+def _integers(x):
+    """Problem 245: ten residuals."""
+    rows = (ca.exp(-k * x[0] / 10) - ca.exp(-k * x[1] / 10) - x[2] * (exp(-k / 10) - exp(-k)) for k in range(1, 11))
     return sum(row**2 for row in rows)
 
 
@@ -98,6 +109,19 @@ TWO = (
         low=(0,),
     ),
     Program(
+        "218", (9, 100), lambda x: x[1], 0.0, (0, 0), positive=lambda x: [x[1] - x[0] ** 2], low=(None, 0), close_x=2e-5
+    ),
+    Program(
+        "220",
+        (25000, 25000),
+        lambda x: x[0],
+        1.0,
+        (1, 0),
+        zero=lambda x: [(x[0] - 1) ** 3 - x[1]],
+        low=(1, 0),
+        close_x=1e-4,
+    ),
+    Program(
         "222",
         (1.3, 0.2),
         lambda x: -x[0],
@@ -125,6 +149,20 @@ TWO = (
         positive=lambda x: [x[0] + 3 * x[1], 18 - x[0] - 3 * x[1], x[0] + x[1], 8 - x[0] - x[1]],
         low=(0, 0),
         high=(6, 6),
+    ),
+    Program(
+        "225",
+        (3, 1),
+        lambda x: x[0] ** 2 + x[1] ** 2,
+        2.0,
+        (1, 1),
+        positive=lambda x: [
+            x[0] + x[1] - 1,
+            x[0] ** 2 + x[1] ** 2 - 1,
+            9 * x[0] ** 2 + x[1] ** 2 - 9,
+            x[0] ** 2 - x[1],
+            x[1] ** 2 - x[0],
+        ],
     ),
     Program(
         "226",
@@ -196,6 +234,14 @@ TWO = (
 
 MORE = (
     Program(
+        "219",
+        (10, 10, 10, 10),
+        lambda x: -x[0],
+        -1.0,
+        (1, 1, 0, 0),
+        zero=lambda x: [x[1] - x[0] ** 3 - x[2] ** 2, x[0] ** 2 - x[1] - x[3] ** 2],
+    ),
+    Program(
         "235",
         (-2, 3, 1),
         lambda x: 0.01 * (x[0] - 1) ** 2 + (x[1] - x[0] ** 2) ** 2,
@@ -213,6 +259,7 @@ MORE = (
     Program("241", (1, 2, 0), _five_squares, 0.0, (0, 0, 1)),
     Program("242", (2.5, 10, 10), _exponentials, 0.0, None, low=(0, 0, 0), high=(10, 10, 10)),
     Program("244", (1, 2, 1), _biggs, 0.0, None),
+    Program("245", (0, 10, 20), _integers, 0.0, (1, 10, 1), low=(0, 0, 0), high=(12, 12, 20)),
     Program(
         "246",
         (-1.2, 2, 0),
@@ -268,6 +315,9 @@ MORE = (
         high=(-1,),
     ),
     Program(
+        "253", (0, 2, 0), _corners, 40 * R3, (5, 5, 5), positive=lambda x: [30 - 3 * x[0] - 3 * x[2]], low=(0, 0, 0)
+    ),
+    Program(
         "254",
         (1, 1, 1),
         lambda x: ca.log(x[2]) - x[1],
@@ -284,8 +334,9 @@ MORE = (
         (0, 0, 0, 0),
         close_x=5e-3,  # the fourth powers are flat
     ),
+    Program("257", (-3, -1, -3, -1), _crossed_wood, 0.0, (1, 1, 1, 1), low=(0, None, 0, None)),
+    Program("258", (-3, -1, -3, -1), _wood, 0.0, (1, 1, 1, 1)),
     Program("259", (0, 0, 0, 0), _wood, 0.0, (1, 1, 1, 1), high=(None, None, None, 1)),
-    Program("260", (-3, -1, -3, -1), _wood, 0.0, (1, 1, 1, 1)),
 )
 
 
