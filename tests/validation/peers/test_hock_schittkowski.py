@@ -1,8 +1,8 @@
 """Hock and Schittkowski, Test Examples for Nonlinear Programming Codes (1981): problems of two to four variables.
 
 Objectives, constraints, bounds, standard starts and solutions are those of the book, problems 1 to 35; the others are
-in `test_hock_schittkowski_four`. Of four problems the standard start lies nearer to another local optimum, to which
-other codes go as well; both are asked for.
+in `test_hock_schittkowski_four`. Of four problems the standard start leads to another local optimum than the
+published one; both are asked for.
 """
 
 from __future__ import annotations
