@@ -41,7 +41,7 @@ def rounding_at(table, pool, settings, here):
 
 
 @kernel(inner=True)
-def leaves_saddle(table, settings, results, violation, dual):
+def is_near_saddle(table, settings, results, violation, dual):
     """Whether a solve is near a saddle that is to be left: steps toward one gain little, and are of no use."""
     if settings[SECOND_ORDER] != TESTED or settings[TICK] == 1.0 or table[IMPLICIT] == 1:
         return False
@@ -56,7 +56,7 @@ def has_arrived(program, settings, results, here, violation, last_violation, fea
     steps gain nothing more.
     """
     table, pool = program[0], program[1]
-    if leaves_saddle(table, settings, results, violation, dual):
+    if is_near_saddle(table, settings, results, violation, dual):
         return True
     if not (violation <= feasible and dual <= settings[STATIONARITY]):
         return False

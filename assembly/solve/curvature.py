@@ -92,7 +92,7 @@ def curvature_at(table, pool, state, forces, out, tips):
 
 
 @kernel(inner=True, allocates=True)
-def walk_within(table, pool, state, step, share, residual, tips, integers, doubles):
+def walk_within(table, pool, state, step, share, kept, residual, tips, integers, doubles):
     """The same as `walk`, with what it works in."""
     pairs = table[CONTACTS]
     free = np.empty(pairs, np.int64)
@@ -103,6 +103,9 @@ def walk_within(table, pool, state, step, share, residual, tips, integers, doubl
     blocks = record_of_blocks(table)
     shape = shape_of(table, table[ROWS] + 4 * pairs, 6 * table[MOVING] + 4 * pairs, blocks, integers, doubles)
     arrange(table, free, shape, rows, n)
+    for r in range(table[ROWS]):
+        if kept[r] > 0.0:
+            shape[1][r] = 0
     trial = new_point(table)
     trial[0][:] = here[0]
     _gradient, _lines, lagrangian, matrix = unknowns(n, shape[2])
@@ -135,18 +138,21 @@ def walk_within(table, pool, state, step, share, residual, tips, integers, doubl
 
 @kernel(
     signatures=(
-        "(i8[::1], f8[::1], f8[::1], f8[::1], f8, f8[::1], i8)",
-        "(i8[::1], f8[::1], f8[::1], f8[::1], f8, f8[::1], none)",
+        "(i8[::1], f8[::1], f8[::1], f8[::1], f8, f8[::1], f8[::1], i8)",
+        "(i8[::1], f8[::1], f8[::1], f8[::1], f8, f8[::1], f8[::1], none)",
     ),
 )
-def walk(table, pool, state, step, share, residual, tips):
+def walk(table, pool, state, step, share, kept, residual, tips):
     """Move a state by a share of a step, and by least steps back onto the rows. Returns the objective's value there.
 
-    Infinite, with the state as it was, where no pose near it holds. The residuals left, within rounding, are written.
+    One-sided rows that are `kept` (not zero) stay at their bound. Infinite, with the state as it was, where no pose
+    near it holds. The residuals left, within rounding, are written.
     """
     pairs = table[CONTACTS]
     integers, doubles = size_of_shape(table, table[ROWS] + 4 * pairs, 6 * table[MOVING] + 4 * pairs)
-    return walk_within(table, pool, state, step, share, residual, tips, np.empty(integers, np.int64), np.empty(doubles))
+    return walk_within(
+        table, pool, state, step, share, kept, residual, tips, np.empty(integers, np.int64), np.empty(doubles)
+    )
 
 
 @kernel(inner=True, allocates=True)

@@ -9,7 +9,7 @@ from assembly.constraints.layout import IMPLICIT, ROWS, SCALE, WATCH
 from assembly.constraints.program import evaluate
 from assembly.constraints.terms import recenter
 from assembly.proximity.watch import EVERYTHING, any_crossed
-from assembly.solve.arrival import leaves_saddle
+from assembly.solve.arrival import is_near_saddle
 from assembly.solve.guards import clear_guards, go_back, look_around, place_guards
 from assembly.solve.inertia import test_end
 from assembly.solve.multipliers import multipliers_at
@@ -103,7 +103,7 @@ def finish(program, settings, state, tips, here, trial, by_row, at_end, held, nu
         elif gathered or is_cut_short:
             value = goal(table, pool, shape, rows, loose, room, tips, trial, 0, gradient, lagrangian)
         if status == SOLVED and not good:
-            status = UNSURE if leaves_saddle(table, settings, results, violation, dual) else STALLED
+            status = UNSURE if is_near_saddle(table, settings, results, violation, dual) else STALLED
     results[IMPROPER] = write_rows(table, here, y, loose, tick, pool[SCALE], state)
     if settings[SECOND_ORDER] > 0.0 and results[HELD] + results[CARRIED] == 0.0 and status != CONTACT_LOST:
         status = test_end(program, settings, results, status, tips, here, rows, y, active, forces, system)

@@ -98,7 +98,8 @@ class Look:
         """A look without derivatives, of a large scene, at the pose next to the state at which all rows hold."""
         table, n = packed.table_at(state), 6 * int(packed.table[layout.MOVING])
         state, residual = state.copy(), np.zeros(packed.rows + 4 * packed.pair_rows)
-        value = float(walk(table, packed.pool, state, np.zeros(n), 0.0, residual, packed.tips))
+        kept = np.zeros(packed.rows)
+        value = float(walk(table, packed.pool, state, np.zeros(n), 0.0, kept, residual, packed.tips))
         if not np.isfinite(value):
             return None
         m = packed.rows
@@ -171,9 +172,14 @@ class Look:
         return forces
 
     def neighbor(self, way: Array, share: float) -> Neighbor | None:
-        """Where a share of a step leads, put back onto the rows; None where nothing near there holds."""
+        """Where a share of a step leads, put back onto the rows; None where nothing near there holds.
+
+        Rows that push stay at their bound: opened, they would take from the way what their forces do.
+        """
         state, residual = self.state.copy(), np.zeros(len(self.residual))
-        value = walk(self.table, self.packed.pool, state, np.ascontiguousarray(way), share, residual, self.packed.tips)
+        kept = np.where(self.one_sided & self.pushing, 1.0, 0.0)
+        way = np.ascontiguousarray(way)
+        value = walk(self.table, self.packed.pool, state, way, share, kept, residual, self.packed.tips)
         if not np.isfinite(value):
             return None
         # What rows are off, within rounding, changes the objective by their forces.

@@ -296,3 +296,18 @@ def test_large_scenes_leave_saddles_by_a_sparse_factor(monkeypatch):
         scene.minimize(asm.PointDistance(crank.point(1.0, 0.0, 0.0), (-3.0, 0.0, k)))
     solution = scene.solve()
     assert solution.success and solution.objective == pytest.approx(4.0 * 70, abs=1e-7)
+
+
+def test_a_contact_that_pushes_stays_closed_on_the_way_down():
+    # Tilted by an angle the egg is lower by less than it would be off the floor if it did not follow.
+    floor = asm.Body("floor", asm.shapes.plane(20.0, 20.0), fixed=True)
+    egg = asm.Body("egg", asm.shapes.ellipsoid(1.3, 0.5, 0.8), position=(0, 0, 0.8))
+    scene = asm.Assembly([floor, egg])
+    scene.constrain(asm.Contact(floor, egg, unilateral=True))
+    scene.minimize(asm.FrameDistance(egg.frame(), asm.Pose((0.0, 0.0, -0.5)), length=0.7))
+    solution = scene.solve()
+    angles = np.linspace(0.0, 1.0, 100_001)
+    heights = np.sqrt((0.5 * np.sin(angles)) ** 2 + (0.8 * np.cos(angles)) ** 2)
+    best = ((heights + 0.5) ** 2 + 0.49 * 4.0 * np.sin(0.5 * angles) ** 2).min()
+    # The angles are 1e-5 apart.
+    assert solution.success and solution.objective == pytest.approx(best, abs=1e-9)
