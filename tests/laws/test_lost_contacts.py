@@ -17,7 +17,7 @@ from assembly.constraints.layout import (
     ROW_TABLE,
     SHELL_F,
 )
-from assembly.proximity.solid_contact import CONTACT_RECORD, PAIR_GAP, STAYS, TRACK
+from assembly.proximity.solid_contact import ALLOWED, CONTACT_RECORD, PAIR_GAP, STAYS, TRACK
 from assembly.solve.contacts import start_contacts
 
 LEAST = 0.25
@@ -30,7 +30,7 @@ def guards(gap, solids=True):
     table[[HEADER + MINIMUM, HEADER + ROW + MINIMUM]] = 1
     table[[HEADER + SHELL_F, HEADER + ROW + SHELL_F]] = 0 if solids else -1
     start = np.full((2, TRACK), 0.5)
-    start[:, STAYS] = 0.0
+    start[:, [STAYS, ALLOWED]] = 0.0
     start[:, PAIR_GAP] = LEAST + 1.0, LEAST + gap
     point = None, start.copy(), np.full((2, CONTACT_RECORD), np.nan), np.full(2, np.nan), np.full((2, 16), np.nan)
     return table, np.array([0.0, LEAST]), start, point

@@ -165,7 +165,8 @@ def test_bodies_in_each_other_come_apart_by_the_shortest_way(a, b, place, gap):
         # A ball beside the ring of a torus: the distance from its middle to the circle, less both radii.
         gap = np.hypot(np.hypot(*place[:2]) - 1.0, place[2]) - 0.72 - 0.57
     for first, second, sign in ((a, b, 1.0), (b, a, -1.0)):
-        pair = closest_features(first, second, q_b=[*(sign * np.array(place)), 1.0, 0.0, 0.0, 0.0])
+        # A way of 1e-9 is one, too.
+        pair = closest_features(first, second, q_b=[*(sign * np.array(place)), 1.0, 0.0, 0.0, 0.0], touching=0.0)
         assert pair.gap == pytest.approx(gap, abs=1e-12)
         assert pair.status is (FeatureStatus.PENETRATING if pair.gap < 0.0 else FeatureStatus.APART)
 
