@@ -213,7 +213,8 @@ class Assembly:
         """Find the pose where every constraint holds and the objective has a local minimum.
 
         Without an objective the least move is sought; where that is not found, any pose does at which all holds. What
-        holds as it stands is not moved.
+        holds as it stands is not moved. Where constraints do not hold near the start, others are tried, the same in
+        every run, and the solution with the least objective is returned; its `restarted` says so.
 
         Parameters
         ----------

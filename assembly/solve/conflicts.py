@@ -30,9 +30,9 @@ __all__ = ["conflicting_sets", "conflicts_at"]
 Array = NDArray[np.float64]
 # A violation below this part of the largest carries nothing.
 IDLE = 1e-6
-# Scattered starts besides those about the pose, which may be stuck, and how many times as many where all constraints
-# are asked for: none is named where these hold from somewhere.
-SCATTERED, TIMES = 4, 4
+# Scattered starts besides those about the pose, which may be stuck, and how many rounds of others a set is asked from
+# before it is named.
+SCATTERED, ROUNDS = 4, 8
 # What came to less than this part of a least violation, and to no end, may come to nothing.
 ENDED = 0.01
 # A set holds that violates a small part of what the whole one does, or what the loop takes for none.
@@ -52,11 +52,11 @@ def conflicting_sets(snapshot: Snapshot) -> list[tuple[int, ...]]:
     far = far_starts(bodies, snapshot.q, size, SCATTERED)
     starts = [_Start(q, gathers=False) for q in near_starts(bodies, snapshot.q, size)]
     starts += [_Start(q, gathers) for q in next(far) for gathers in (True, False)]
-    more = [_Start(q, gathers) for _ in range(1, TIMES) for q in next(far) for gathers in (True, False)]
+    more = [_Start(q, gathers) for _ in range(ROUNDS) for q in next(far) for gathers in (True, False)]
     left = list(range(len(snapshot.scene.constraints)))
     found: list[tuple[int, ...]] = []
     while left:
-        violations = _attempt(snapshot, left, starts if found else starts + more)
+        violations = _attempt(snapshot, left, starts)
         if violations is None:
             break
         least = max(IDLE * violations.max(), HELD)
@@ -72,6 +72,9 @@ def conflicting_sets(snapshot: Snapshot) -> list[tuple[int, ...]]:
             without = [other for other in core if other != k]
             if without and _attempt(snapshot, without, starts) is not None:
                 core = without
+        # What can hold together is stuck at some places and not at others: few constraints are asked from many starts.
+        if _attempt(snapshot, core, more) is None:
+            break
         found.append(tuple(core))
         left = [k for k in left if k not in core]
     return found
@@ -95,7 +98,8 @@ def conflicts_at(scene: Scene, packed: Packed, state: Array, fit: float) -> list
 def _attempt(snapshot: Snapshot, which: Sequence[int], starts: Sequence[_Start]) -> Array | None:
     """Least violations of some constraints, from the start where they were least; None if they may hold.
 
-    They may where a solve that found no end came nearer to it than all that ended at a least violation.
+    They may where a solve that found no end came nearer to it than all that ended at a least violation; but where a
+    contact nears a fold of its pair, its violation vanishes there and tells nothing.
     """
     problem = snapshot.problem(which)
     best: Array | None = None
@@ -107,7 +111,7 @@ def _attempt(snapshot: Snapshot, which: Sequence[int], starts: Sequence[_Start])
         violations = _of_places(problem, problem.violations(solution), snapshot, which)
         if solution.status is Status.INFEASIBLE:
             ended = min(ended, violations.max())
-        else:
+        elif not problem.packed.contacts:
             unended = min(unended, violations.max())
         if best is None or violations.max() < best.max():
             best = violations
