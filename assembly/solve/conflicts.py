@@ -27,8 +27,9 @@ __all__ = ["conflicting_sets", "conflicts_at"]
 Array = NDArray[np.float64]
 # A violation below this part of the largest carries nothing.
 IDLE = 1e-6
-# A set holds that violates a small part of what the whole one does, or what the loop takes for none.
-PART, LEAST = 0.1, 4e-13
+# A set holds that violates a part of what the whole one does, or what the loop takes for none; the largest of three
+# coordinates changes with the pose.
+PART, LEAST = 0.5, 4e-13
 # How far about the pose starts are, in sizes of the scene and radians, since it may be a saddle by symmetry; and how
 # many scattered ones there are, since it may be stuck.
 ABOUT, SCATTERED = (0.0, 0.03, 0.3), 8
@@ -63,7 +64,7 @@ def conflicts_at(scene: Scene, packed: Packed, state: Array, fit: float) -> list
         rows = None
     # Where all that is violated is so by less, contacts or limits do not hold, or nothing is to disagree.
     off = float(state[packed.results_at + VIOLATION]) / packed.scale
-    held = max(fit, HELD) if off > max(fit, HELD) else max(min(HELD, PART * off), LEAST)
+    held = max(min(max(fit, HELD) if off > fit else HELD, PART * off), LEAST)
     there = state if rows is None else rows.state
     found = conflicting_sets(Snapshot(scene, packed, there, rows, solved=True, held=held))
     return [tuple(scene.constraints[k].name for k in places) for places in sorted(found)]
