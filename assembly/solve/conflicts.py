@@ -35,8 +35,9 @@ IDLE = 1e-6
 SCATTERED, ROUNDS = 4, 8
 # What came to less than this part of a least violation, and to no end, may come to nothing.
 ENDED = 0.01
-# A set holds that violates a small part of what the whole one does, or what the loop takes for none.
-PART, LEAST = 0.1, 4e-13
+# A set holds that violates a part of what the whole one does, or what the loop takes for none; the largest of three
+# coordinates changes with the pose.
+PART, LEAST = 0.5, 4e-13
 
 
 class _Start(NamedTuple):
@@ -89,7 +90,7 @@ def conflicts_at(scene: Scene, packed: Packed, state: Array, fit: float) -> list
         rows = None
     # Where all that is violated is so by less, contacts or limits do not hold, or nothing is to disagree.
     off = float(state[packed.results_at + VIOLATION]) / packed.scale
-    held = max(fit, HELD) if off > max(fit, HELD) else max(min(HELD, PART * off), LEAST)
+    held = max(min(max(fit, HELD) if off > fit else HELD, PART * off), LEAST)
     there = state if rows is None else rows.state
     found = conflicting_sets(Snapshot(scene, packed, there, rows, solved=True, held=held))
     return [tuple(scene.constraints[k].name for k in places) for places in sorted(found)]

@@ -60,6 +60,8 @@ class Loop(NamedTuple):
 ROUNDS, SAME = 5, 1e-6
 # A one-sided row that holds by less touches.
 TOUCHING = 1e-9
+# A slope of the violation that is rounding; where the step to mend it is longer than this.
+LEVEL, NEGLIGIBLE = 1e-14, 1e-4
 # What combinations of rows may miss of what they are to balance, in parts.
 BALANCED = 1e-3
 
@@ -169,7 +171,11 @@ def _unmoved(jacobian: Array, residual: Array, movable: NDArray[np.bool_]) -> Ar
     """The combination w of rows, J^T w = 0, with w = c on what of the movable rows no motion nearby changes, (m,)."""
     left, sizes, _ = np.linalg.svd(jacobian, full_matrices=True)
     worst = float(np.abs(residual).max(initial=0.0))
-    kept = left[:, np.count_nonzero(sizes > worst / NEIGHBORHOOD) :]
+    sizes = np.pad(sizes, (0, len(left) - len(sizes)))
+    parts = np.abs(left.T @ residual)
+    # Next to a dead center that is out of reach what rows are off is level to rounding, and they cannot do better.
+    level = (sizes * parts <= LEVEL) & (parts > sizes * NEGLIGIBLE)
+    kept = left[:, (sizes <= worst / NEIGHBORHOOD) | level]
     wanted = kept.T @ residual
     square = kept[movable].T @ kept[movable]
     shares = np.linalg.lstsq(square, wanted, rcond=1e-9)[0]

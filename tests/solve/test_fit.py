@@ -231,3 +231,46 @@ def test_what_is_tracked_is_fitted():
     assert step.status is asm.TrackStatus.FOLLOWED and step.solution.status is asm.Status.FITTED
     x, y, _ = step.solution.pose(door).apply((1, 0, 1))
     assert np.arctan2(y, x) == pytest.approx(3.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("off", [1e-10, 1e-7, 1e-5])
+def test_wheels_of_a_closed_train(off):
+    ground, *wheels = (asm.Body(name, fixed=name == "ground") for name in ("ground", "a", "b", "c"))
+    scene = asm.Assembly([ground, *wheels])
+    pins = [asm.Revolute(ground.frame(at=(k, 0, 0)), wheel, f"pin {k}") for k, wheel in enumerate(wheels)]
+    gears = [asm.Gear(pins[k], pins[(k + 1) % 3], ratio, f"gear {k}") for k, ratio in enumerate((-2.0, -0.5, 1.0))]
+    gears[2].offset = off
+    scene.constrain(*pins, *gears)
+    solution = scene.solve()
+    assert solution.iterations <= 20 and solution.mobility.dof == 1
+    if off > 1e-6:
+        assert solution.status is asm.Status.INFEASIBLE and solution.conflicting == ["gear 0", "gear 1", "gear 2"]
+        return
+    # The least squares of (b + 2 a, c + b / 2, a - c - off).
+    shares = np.array([-0.5, 1.0, 1.0]) / 2.25
+    assert solution.status is asm.Status.FITTED
+    assert solution.disagreeing == pytest.approx({f"gear {k}": abs(s) * off for k, s in enumerate(shares)}, rel=1e-3)
+
+
+@pytest.mark.parametrize("off", [1e-10, 1e-7, 1e-5])
+def test_a_linkage_out_of_reach(off):
+    # A crank and a rod that are to be longer than they are: straight they are off least.
+    ground, crank, rod, slider = (
+        asm.Body(name, fixed=name == "ground") for name in ("ground", "crank", "rod", "slider")
+    )
+    scene = asm.Assembly([ground, crank, rod, slider])
+    x = (1, 0, 0)
+    scene.constrain(
+        asm.Revolute(ground, crank, "drive"),
+        asm.Revolute(crank.frame(at=(1, 0, 0)), rod, "pin"),
+        asm.Revolute(rod.frame(at=(2, 0, 0)), slider, "wrist"),
+        asm.Prismatic(ground.frame(z=x), slider.frame(z=x), "guide", slide=3.0 * (1.0 + off)),
+    )
+    solution = scene.solve()
+    status = asm.Status.FITTED if off < 1e-6 else asm.Status.INFEASIBLE
+    assert solution.status is status and solution.iterations <= 20
+    assert abs(solution.values["drive.angle"]) < 1e-6 and abs(solution.values["pin.angle"]) < 1e-6
+    named = solution.disagreeing or solution.conflicting
+    assert set(named) == {"drive", "guide", "pin", "wrist"}
+    if solution.success:
+        assert sum(named.values()) == pytest.approx(3.0 * off, rel=1e-3)
