@@ -178,7 +178,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
     check_at = PATIENCE
     check_violation = math.inf
     iteration = 0
-    alpha = 0.0
+    alpha, cut = 0.0, 1.0
     free_trims = settings[FREE_TRIMS] == 1.0
     any_pose = settings[ANY_POSE] == 1.0
     # Whether what fails is led back onto its rows at the end.
@@ -369,7 +369,8 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             check_at, check_violation = iteration + PATIENCE, violation
         gains_nothing = violation > feasible and mu <= floor and not (restoring or watched or tick)
         force = strongest(y, rows) if gains_nothing else 0.0
-        if gains_nothing and stands_still(way, settings, feasible, alpha, violation, last_violation, dual, force, mu):
+        left = violation / max(last_violation, feasible) if alpha * cut == 1.0 else 0.0
+        if gains_nothing and stands_still(way, settings, feasible, violation, left, dual, force, mu):
             check_at, check_violation = iteration, violation
         if not restoring and iteration >= check_at:
             # The rows gain nothing: see whether they can hold at all. One that has just closed has had no time to.

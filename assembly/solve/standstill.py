@@ -13,7 +13,7 @@ STUCK, STILL = 2.0, 0.99
 # Rows that are off by this at most may repeat each other, tilted by so much. Rounding, in parts of what counts as held.
 LITTLE, MOST_TILTED, ROUNDED = 1e-2, 1e-3, 0.01
 # What is off by so many times what counts as held is not so by rounding.
-MUCH = 10.0
+MUCH = 2.0
 # Where so many whole steps in a row do not halve the violation, the floor of the penalty gives way, down to here:
 # rounding, times its inverse, must stay small against the objective's curvature.
 SLOW, HARDEST = 3.0, 1e-10
@@ -31,14 +31,14 @@ def out_of_reach(feasible, violation):
 
 
 @kernel(inline=True)
-def stands_still(way, settings, feasible, alpha, violation, last_violation, dual, force, mu):
+def stands_still(way, settings, feasible, violation, left, dual, force, mu):
     """Whether whole steps in a row, at a stationary point, left what rows are off: it is what no motion changes.
 
     The multipliers y + c / mu of the next step leave the Lagrangian as stationary as y only where J^T c = 0. `force` is
-    the strongest one, which grows by every step.
+    the strongest one, which grows by every step, `left` the part of the violation that the last whole step left.
     """
     nearly = settings[STATIONARITY] * max(1.0, force) + out_of_reach(feasible, violation) / mu
-    still = alpha == 1.0 and violation > STILL * last_violation and dual <= nearly
+    still = left > STILL and dual <= nearly
     way[STILLS] = way[STILLS] + 1.0 if still else 0.0
     return way[STILLS] == STUCK
 
