@@ -189,6 +189,19 @@ def test_linkages_that_are_drawn_somewhere_are_closed():
     assert closed >= 98 and restarted > 0
 
 
+def test_with_clearances_bodies_stay_on_their_sides():
+    # A box between two walls that are too near each other: outside of them there is room.
+    left, box, right = (
+        asm.Body(name, asm.shapes.box(1, 1, 1), fixed=name != "box") for name in ("left", "box", "right")
+    )
+    left.pose, right.pose = asm.Pose((-0.9, 0, 0), about_z(0.0)), asm.Pose((0.9, 0, 0), about_z(0.0))
+    scene = asm.Assembly([left, box, right])
+    scene.constrain(asm.Clearance(), asm.PointOnLine(box.point(0, 0, 0), left.frame(z=(1, 0, 0))))
+    scene.constrain(asm.Distance(left.point(0, 0, 0), box.point(0, 0, 0), 1.2))
+    solution = scene.solve()
+    assert not solution.success and not solution.restarted
+
+
 def test_a_solve_out_of_steps_is_not_tried_elsewhere():
     solution = crank_slider((0.0, None)).solve(max_iterations=3)
     assert solution.status is asm.Status.ITERATION_LIMIT and not solution.restarted
