@@ -89,7 +89,7 @@ from assembly.solve.settings import (
     TICK,
     VIOLATION,
 )
-from assembly.solve.standstill import contradicts, is_stuck, next_floor, out_of_reach, stands_still
+from assembly.solve.standstill import contradicts, is_stuck, next_floor, stands_still, stays_off
 from assembly.solve.start import read_state, rearrange, set_out
 from assembly.solve.step import CLOSE, aim, cut_step, leave_saddle, propose, short_share
 from assembly.solve.tangency import off_rows
@@ -163,7 +163,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
     violation = math.inf
     dual = math.inf
     value = math.inf
-    last_violation = last_dual = math.inf
+    last_violation = last_dual = restored = math.inf
     kept = False
     restoring = False
     entered = math.inf
@@ -417,7 +417,8 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
                 cut, may_go = allowed_share(table, pool, memory, here, trial, lines[1], most_of_it)
         slope, steepest = cut_step(shape, here, rows, y, mu, cut, foreseen, lines)
         if restoring:
-            ends = steepest <= max(1e-9 * violation, out_of_reach(feasible, violation)) or longest < 1e-12
+            ends = steepest <= 1e-9 * violation or longest < 1e-12
+            ends = ends or stays_off(feasible, steepest, violation, restored)
             slows = iteration >= check_at and violation > 0.99 * check_violation
             if (ends or slows) and watched and iteration < limit:
                 # A contact may have come to where a given one stands, of which no clearance asks anything.
@@ -443,6 +444,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
                 continue
             if iteration >= check_at:
                 check_at, check_violation = iteration + PATIENCE, violation
+        restored = violation if restoring else math.inf
         longest *= cut
         cuts = cuts + 1 if watched and cut < 0.5 and violation <= TOUCHING else 0
         room_left = 2.0 * longest if cuts > 0 else math.inf

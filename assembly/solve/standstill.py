@@ -44,6 +44,15 @@ def stands_still(way, settings, feasible, violation, left, dual, force, mu):
 
 
 @kernel(inline=True)
+def stays_off(feasible, steepest, violation, before):
+    """Whether a step that restores rows left what they were off before it, which no motion changes.
+
+    Near a dead center |J^T c| falls faster than |c|, below rounding in the end, but every step still gains.
+    """
+    return violation > STILL * before and steepest <= out_of_reach(feasible, violation)
+
+
+@kernel(inline=True)
 def is_stuck(way):
     """Whether the loop was found to stand still, and has not moved since but by restoring rows."""
     return way[STILLS] == STUCK
