@@ -20,14 +20,13 @@ SLOW, HARDEST = 3.0, 1e-10
 
 
 @kernel(inline=True)
-def out_of_reach(feasible, violation):
-    """The largest |J^T c| where what rows are off is what no motion nearby changes.
+def out_of_reach(violation):
+    """The largest |J^T c|, but for rounding, where what rows are off is what no motion nearby changes.
 
     Rows that repeat each other, tilted by s, have |J^T c| = s |c|, and agree a step |c| / s away. Of those that are off
-    by much J^T c = 0 tells, but for rounding.
+    by much J^T c = 0 tells.
     """
-    tilt = min(violation / NEIGHBORHOOD, MOST_TILTED) if violation <= LITTLE else 0.0
-    return tilt * violation + ROUNDED * feasible
+    return min(violation / NEIGHBORHOOD, MOST_TILTED) * violation if violation <= LITTLE else 0.0
 
 
 @kernel(inline=True)
@@ -37,7 +36,7 @@ def stands_still(way, settings, feasible, violation, left, dual, force, mu):
     The multipliers y + c / mu of the next step leave the Lagrangian as stationary as y only where J^T c = 0. `force` is
     the strongest one, which grows by every step, `left` the part of the violation that the last whole step left.
     """
-    nearly = settings[STATIONARITY] * max(1.0, force) + out_of_reach(feasible, violation) / mu
+    nearly = settings[STATIONARITY] * max(1.0, force) + (out_of_reach(violation) + ROUNDED * feasible) / mu
     still = left > STILL and dual <= nearly
     way[STILLS] = way[STILLS] + 1.0 if still else 0.0
     return way[STILLS] == STUCK
@@ -45,11 +44,12 @@ def stands_still(way, settings, feasible, violation, left, dual, force, mu):
 
 @kernel(inline=True)
 def stays_off(feasible, steepest, violation, before):
-    """Whether a step that restores rows left what they were off before it, which no motion changes.
+    """Whether what restored rows are off is what no motion nearby changes; `before` is what they were off a step ago.
 
-    Near a dead center |J^T c| falls faster than |c|, below rounding in the end, but every step still gains.
+    Near a dead center |J^T c| falls faster than |c|, below its rounding in the end, but every step still gains.
     """
-    return violation > STILL * before and steepest <= out_of_reach(feasible, violation)
+    gains = violation <= STILL * before
+    return steepest <= out_of_reach(violation) + (0.0 if gains else ROUNDED * feasible)
 
 
 @kernel(inline=True)
