@@ -60,7 +60,7 @@ def conflicting_sets(snapshot: Snapshot) -> list[tuple[int, ...]]:
         violations = _attempt(snapshot, left, starts)
         if violations is None:
             break
-        least = max(IDLE * violations.max(), HELD)
+        least = max(IDLE * violations.max(), LEAST)
         loaded = {k for k, value in zip(left, violations, strict=True) if value > least}
         # Trims mean nothing without their contacts.
         items = snapshot.scene.constraints

@@ -103,7 +103,6 @@ def settle(packed: Packed, settings: Array, outcome: Outcome, run: Run) -> Outco
         sample = first and spent == 0
         verdict, look = judge(packed, outcome.state, sample) if stands else judge_kink(packed, outcome.state)
         left: Outcome | None = None
-        step = 1
         if look is not None and verdict.ways:
             onward[ITERATIONS] = settings[ITERATIONS] - spent - 1
             if onward[ITERATIONS] >= 0.0:
@@ -111,9 +110,10 @@ def settle(packed: Packed, settings: Array, outcome: Outcome, run: Run) -> Outco
             elif verdict.kind is SecondOrder.SADDLE:
                 return outcome._replace(code=ITERATION_LIMIT, order=verdict.kind)
         if left is None and stands and onward[SECOND_ORDER] != REACHED and not _is_at_end(packed, settings, outcome):
-            # It was taken for a saddle on the way to it; the loop goes on from there.
-            step = 0
-            onward[ITERATIONS], onward[SECOND_ORDER] = settings[ITERATIONS] - spent, REACHED
+            # It was taken for a saddle on the way to it.
+            onward[ITERATIONS], onward[SECOND_ORDER] = settings[ITERATIONS] - spent - 1, REACHED
+            if onward[ITERATIONS] < 0.0:
+                return outcome._replace(code=ITERATION_LIMIT, order=verdict.kind)
             left = run(onward, outcome.state.copy())
         if left is None and not stands:
             return outcome
@@ -121,8 +121,8 @@ def settle(packed: Packed, settings: Array, outcome: Outcome, run: Run) -> Outco
             # A saddle for certain is no solution; what rows that depend on each other say of motions may be none.
             code = STALLED if verdict.kind is SecondOrder.SADDLE else SOLVED
             return outcome._replace(code=code, order=verdict.kind)
-        left.state[at + COUNT] += spent + step
-        outcome = left._replace(history=np.concatenate([outcome.history[: spent + step], left.history]))
+        left.state[at + COUNT] += spent + 1
+        outcome = left._replace(history=np.concatenate([outcome.history[: spent + 1], left.history]))
     return outcome
 
 
