@@ -136,18 +136,22 @@ def test_the_least_move_of_several_ways_is_measured_from_the_start():
 
 
 def test_linkages_that_close_are_closed(cases):
-    """Of 2,000 1,988 are; the others have a driven angle of a ball joint, which draws them to its pole."""
+    """Of 2,000 1,988 are; the others have a driven angle of a ball joint, which draws them to its pole.
+
+    Next to a pole one may be off by less than `fit`, and is FITTED.
+    """
     count = cases(200, 2000)
-    closed = 0
+    closed = fitted = 0
     for seed in range(count):
         case = linkage(seed)
         assert case.scene.solve(case.held).success, seed
         solution = case.scene.solve()
-        closed += solution.success
-        assert solution.feasibility <= 1e-9 or not solution.success
+        closed += solution.status is asm.Status.SOLVED
+        fitted += solution.status is asm.Status.FITTED
+        assert solution.feasibility <= 1e-9 or solution.status is not asm.Status.SOLVED
         # They can hold, so that none contradicts another one.
         assert solution.conflicting == [], seed
-    assert closed >= 0.99 * count
+    assert closed >= 0.99 * count and fitted <= 0.005 * count
 
 
 def test_other_starts_are_the_same_in_every_run():
