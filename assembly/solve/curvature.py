@@ -91,6 +91,15 @@ def curvature_at(table, pool, state, forces, out, tips):
     return write_curvature(table, pool, state, forces, out, tips, np.empty(integers, np.int64), np.empty(doubles))
 
 
+@kernel(inline=True)
+def is_at_most(values, limit):
+    """Whether no value is larger, without its sign, or no number."""
+    for value in values:
+        if not abs(value) <= limit:
+            return False
+    return True
+
+
 @kernel(inner=True, allocates=True)
 def walk_within(table, pool, state, step, share, kept, residual, tips, integers, doubles):
     """The same as `walk`, with what it works in."""
@@ -131,7 +140,7 @@ def walk_within(table, pool, state, step, share, kept, residual, tips, integers,
         toward_rows(
             shape, table[ROWS], rows, here[3], here[4], MU, active, SOFTNESS, EXACT, lagrangian, matrix, n, forces, way
         )
-        if not np.max(np.abs(way)) <= LONGEST:
+        if not is_at_most(way, LONGEST):
             break
     return math.inf
 
