@@ -126,7 +126,8 @@ def _holds(outcome: Outcome) -> bool:
 
 def _run(packed: Packed, interruption: Interruption, table: Table, settings: Array, state: Array) -> Outcome:
     history = np.empty((min(int(settings[ITERATIONS]), MOST_HISTORY) + 1, HISTORY))
-    interruption.watched = (state, packed.results_at)
+    if interruption.callback is not None:
+        interruption.watched = (state, packed.results_at)
     return Outcome(solve_program(table, packed.pool, settings, state, history, packed.tips), state, history)
 
 

@@ -40,8 +40,10 @@ class Interruption:
     ----------
     reason : str or None
         ``"time limit"`` or ``"callback"`` where that ended a solve.
+    callback : callable, optional
+        See above.
     watched : tuple of array and int, optional
-        The state of the loop that runs, and where in it results begin: the loop writes there how far it is.
+        For a callback: the state of the loop that runs, and where in it results begin, which say how far it is.
     """
 
     def __init__(self, time_limit: float | None = None, callback: Callback | None = None) -> None:
@@ -53,7 +55,7 @@ class Interruption:
             self._deadline = perf_counter() + limit
         if callback is not None and not callable(callback):
             raise TypeError(f"callback is {callback!r}; expected a function of iteration, objective and feasibility")
-        self._callback = callback
+        self.callback = callback
         self.watched: tuple[Array, int] | None = None
         self._error: BaseException | None = None
         self.reason: str | None = None
@@ -99,10 +101,10 @@ class Interruption:
     def _ask(self) -> int:
         if perf_counter() > self._deadline:
             self.reason = "time limit"
-        elif self._callback is not None and self.watched is not None:
+        elif self.callback is not None and self.watched is not None:
             state, results_at = self.watched
             progress = state[results_at:]
-            if self._callback(int(progress[COUNT]), float(progress[OBJECTIVE]), float(progress[VIOLATION])):
+            if self.callback(int(progress[COUNT]), float(progress[OBJECTIVE]), float(progress[VIOLATION])):
                 self.reason = "callback"
         return int(self.reason is not None)
 

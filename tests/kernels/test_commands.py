@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import llvmlite.binding as llvm
@@ -152,7 +153,10 @@ if __name__ == "__main__":
         folder = tmp_path / str(int(number))
         folder.mkdir()
         variables = {**os.environ, "PYTHONPATH": str(ROOT)}
-        command = subprocess.Popen([sys.executable, str(script), str(folder)], env=variables, stderr=subprocess.DEVNULL)
+        # A process begun in the background ignores Ctrl-C, and so do those that it begins.
+        wakes = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
+        line = [sys.executable, str(script), str(folder)]
+        command = subprocess.Popen(line, env=variables, stderr=subprocess.DEVNULL, preexec_fn=wakes)
         wait_for(lambda folder=folder: len(list(folder.iterdir())) == 2)
         workers = [int(path.name) for path in folder.iterdir()]
         command.send_signal(number)

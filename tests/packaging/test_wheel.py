@@ -30,7 +30,7 @@ def is_built(item: Item, kind: str) -> bool:
 def run(*command: str | Path, folder: Path = ROOT, **variables: str) -> str:
     """What a command printed; its errors where it fails."""
     environment = {**os.environ, **variables}
-    for name in ("PYTHONPATH", "NUMBA_CACHE_DIR"):
+    for name in ("PYTHONPATH", "NUMBA_CACHE_DIR", "PIP_QUIET"):
         environment.pop(name, None)
     environment.update(variables)
     line = list(map(str, command))
