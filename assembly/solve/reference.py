@@ -235,7 +235,11 @@ class ReferenceSolver:
             if not _EXACT < size < np.inf:
                 break
             damped = jacobian @ jacobian.T + max(min(size**2, 1.0), 1e-14) * np.eye(len(g))
-            x = x - jacobian.T @ np.linalg.solve(damped, g)
+            try:
+                x = x - jacobian.T @ np.linalg.solve(damped, g)
+            except np.linalg.LinAlgError:
+                # IPOPT went to where slopes are so large that the damping is lost in them.
+                break
             g, jacobian, size = evaluate(x)
         if len(g) == 0 or not size <= _HELD:
             return x0, self._bounds
