@@ -36,10 +36,10 @@ STEPS = 100.0
 def may_hold_elsewhere(solution: Solution) -> bool:
     """Whether a solve ended where constraints do not hold, and not for want of steps or of a contact's pair.
 
-    With clearances it is not tried elsewhere: scattered bodies would come to be on other sides of each other, linked
-    rings apart.
+    With contacts or clearances it is not tried elsewhere: scattered bodies would come to be on other sides of each
+    other, a ball under the floor that it is to touch, linked rings apart.
     """
-    if solution._packed.guards:
+    if solution._packed.guards or solution._packed.contacts:
         return False
     ended = solution.status in (Status.INFEASIBLE, Status.STALLED)
     return ended and not solution._result(VIOLATION) <= HELD * solution._packed.scale

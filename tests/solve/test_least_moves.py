@@ -79,7 +79,8 @@ def test_what_holds_is_not_moved_by_a_bit(kind, few, cases):
     for k in range(cases(few, 1000)):
         scene = kind(np.random.default_rng([k, few]))
         first = scene.solve()
-        if not first.success:
+        # Where rounding of far coordinates violates more than the tolerance, what it leaves depends on the start.
+        if not first.success or first.feasibility > 2e-13 * scene.packed().scale:
             continue
         for body in scene.bodies:
             if not body.fixed:
@@ -88,8 +89,8 @@ def test_what_holds_is_not_moved_by_a_bit(kind, few, cases):
         start = scene.q
         # A last look of a clearance that lists another contact counts as an iteration.
         looks = any(isinstance(item, asm.Clearance) for item in scene.constraints)
-        for again, most in ((scene.solve(), 0), (scene.solve(first), int(looks))):
-            assert again.success and again.iterations <= most
+        for again in (scene.solve(), scene.solve(first)):
+            assert again.success and again.iterations <= int(looks)
             np.testing.assert_array_equal(again.q, start)
     assert tried > few // 2
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import assembly as asm
+from assembly.solve.starts import scattered
 from tests.solve.linkages import linkage, random_turn
 from tests.solve.test_least_moves import move
 
@@ -204,6 +205,29 @@ def test_with_clearances_bodies_stay_on_their_sides():
     scene.constrain(asm.Distance(left.point(0, 0, 0), box.point(0, 0, 0), 1.2))
     solution = scene.solve()
     assert not solution.success and not solution.restarted
+
+
+def test_with_contacts_bodies_stay_on_their_sides(cases):
+    # A ball on an arm of two links, drawn to somewhere: it ends above the floor, or fails.
+    rng = np.random.default_rng(5)
+    solved = 0
+    for _ in range(cases(60, 1500)):
+        ground, link, ball = asm.Body("ground", fixed=True), asm.Body("link"), asm.Body("ball", asm.shapes.sphere(0.3))
+        level = rng.uniform(-0.8, 0.3)
+        floor = asm.Body("floor", asm.shapes.plane(40, 40), (0, 0, level), fixed=True)
+        axes = rng.normal(size=(4, 3))
+        scene = asm.Assembly([ground, link, ball, floor])
+        scene.constrain(
+            asm.Revolute(ground.frame(z=axes[0]), link.frame(z=axes[1]), "shoulder", limits=(-1.6, 1.1)),
+            asm.Revolute(link.frame(at=rng.uniform(-0.7, 0.7, 3), z=axes[2]), ball.frame(z=axes[3]), "elbow"),
+            asm.Contact(floor, ball, unilateral=True),
+        )
+        scene.minimize(asm.PointDistance(ball.point(0.2, 0, 0), rng.uniform(-1.5, 1.5, 3)))
+        solution = scene.solve(scattered(rng, scene.q, [1, 2], 1.0))
+        if solution.success:
+            solved += 1
+            assert solution.pose(ball).position[2] - 0.3 - level > -1e-10
+    assert solved > 20
 
 
 def test_a_solve_out_of_steps_is_not_tried_elsewhere():
