@@ -14,7 +14,7 @@ class OwnState:
 
     def _shared(self) -> Iterable[object]:
         """What a copy has in common with the original."""
-        raise NotImplementedError
+        raise NotImplementedError  # every class that copies itself so says it
 
     def __copy__(self) -> Self:
         # What stands in the memo is taken for copied already.

@@ -102,7 +102,7 @@ class Body(KnownSettings):
         self._name = text("name", name)
         self._fixed = bool(fixed)
         # Pose takes what is like an array, which its fields do not say: they are tuples once it is made.
-        self._pose = Pose(position, quaternion)  # type: ignore[arg-type]
+        self._pose = Pose(position, quaternion)  # type: ignore[arg-type]  # Pose converts them
         check_coordinates("position", self._pose.position.tolist())
         self._faces = self._named(shape)
         self.color = color
