@@ -190,6 +190,18 @@ def lost_guard(table, pool, r, start, point, past, goes):
     return True
 
 
+@kernel(inline=True)
+def write_gap_row(table, pool, r, point):
+    """Row r, of contact r, from its record: the gap less the least one, and its gradient over the twists."""
+    _q, tracked, records, residual, jacobian = point
+    residual[r] = records[r, GAP] - least_gap(table, pool, r, tracked)
+    gradient_row(records, r, jacobian, r)
+    # A pair that follows the bodies has no unknowns of its own.
+    for i in range(4):
+        jacobian[r, FREE_COLUMN + i] = 0.0
+    tracked[r, PAIR_GAP] = records[r, GAP]
+
+
 @kernel(inner=True)
 def solids_row(table, pool, r, start, patience, point):
     """Row r, of a contact of solids. Returns whether its pair was found.
@@ -198,7 +210,7 @@ def solids_row(table, pool, r, start, patience, point):
     row is one-sided or a step may end anywhere: the loop shortens steps as long as it can. A clearance has a watch for
     that.
     """
-    q, tracked, records, residual, jacobian = point
+    q, tracked, records, _residual, _jacobian = point
     row = table[ROW_TABLE] + ROW * r
     goes = start[r, STAYS] <= MAY_GO
     if goes:
@@ -221,9 +233,7 @@ def solids_row(table, pool, r, start, patience, point):
         status = track_row(table, pool, row, q, tracked, math.inf, records, tracked, r)
         if status != CONVERGED and status != SINGULAR:
             return False
-    residual[r] = records[r, GAP] - least_gap(table, pool, r, tracked)
-    tracked[r, PAIR_GAP] = records[r, GAP]
-    gradient_row(records, r, jacobian, r)
+    write_gap_row(table, pool, r, point)
     return True
 
 
@@ -234,7 +244,7 @@ def row_of_pair(table, pool, r, start, patience, point):
     A contact is carried from `start` to its extremal pair, by steps that turn no normal by more than `patience`. A
     one-sided row that loses its pair takes the nearest one there is.
     """
-    q, tracked, records, residual, jacobian = point
+    q, tracked, records, _residual, _jacobian = point
     row = table[ROW_TABLE] + ROW * r
     if table[row + SHELL_F] >= 0:
         return solids_row(table, pool, r, start, patience, point)
@@ -258,10 +268,8 @@ def row_of_pair(table, pool, r, start, patience, point):
             records[r, FOLD] = 1.0
         elif not records[r, GAP] > 0.0:
             return False
-    residual[r] = records[r, GAP] - least_gap(table, pool, r, tracked)
-    gradient_row(records, r, jacobian, r)
+    write_gap_row(table, pool, r, point)
     tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3] = x
-    tracked[r, PAIR_GAP] = records[r, GAP]
     return True
 
 

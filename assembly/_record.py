@@ -1,0 +1,66 @@
+"""Records in blocks of memory: fields with names at a place of a flat array.
+
+Tables and pools of a scene are flat arrays of integers and of doubles, so that a kernel takes one address. What stands
+where is told once, by a NumPy dtype; `record_view` makes of it a function that a kernel and Python call alike, whose
+result reads and writes the fields in the block itself. In a kernel it is the cast of a pointer, and costs nothing.
+
+A record does not keep its block: as with `_carve.py`, the block has to outlive it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numba.core import config
+from numba.extending import intrinsic, overload
+from numba.np import numpy_support
+from numba.np.arrayobj import make_array
+
+__all__ = ["record_dtype", "record_view", "size_of"]
+
+
+def record_dtype(item: str, /, **fields: int | tuple[int, ...]) -> np.dtype[Any]:
+    """The dtype of a record whose fields are all integers ("i8") or all doubles ("f8").
+
+    A field is one number (1), or an array of this length or shape.
+    """
+    parts = [(name, item) if shape == 1 else (name, item, shape) for name, shape in fields.items()]
+    return np.dtype(parts, align=True)
+
+
+def size_of(dtype: np.dtype[Any]) -> int:
+    """How many items of a block a record takes."""
+    return dtype.itemsize // 8
+
+
+def record_view(dtype: np.dtype[Any]) -> Callable[[Any, Any], Any]:
+    """A function (block, at): the record that begins at a place of a flat block, or in row `at` of one of two axes."""
+
+    def view(block: Any, at: Any) -> Any:
+        flat = block[at : at + size_of(dtype)] if block.ndim == 1 else block[at, : size_of(dtype)]
+        return flat.view(dtype).view(np.recarray)[0]
+
+    if not config.DISABLE_JIT:
+        kind = numpy_support.from_dtype(dtype)
+
+        @intrinsic
+        def cast(_typing: Any, block: Any, at: Any) -> Any:
+            def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+                array = make_array(signature.args[0])(context, builder, values[0])
+                place = values[1]
+                if signature.args[0].ndim == 2:
+                    place = builder.mul(place, builder.extract_value(array.shape, 1))
+                return builder.bitcast(builder.gep(array.data, [place]), context.get_value_type(kind))
+
+            return kind(block, at), generate
+
+        def cast_it(block: Any, at: Any) -> Any:
+            return cast(block, at)
+
+        @overload(view, inline="never")
+        def _view(block: Any, at: Any) -> Any:  # the same signature as the one above, as Numba asks
+            return cast_it
+
+    return view
