@@ -429,7 +429,12 @@ class Assembly:
         return Tracker(self, follow, **options)
 
     def mobility(
-        self, q: ArrayLike | Solution | None = None, *, drives: bool = True, tolerance: float | None = None
+        self,
+        q: ArrayLike | Solution | None = None,
+        *,
+        drives: bool = True,
+        tolerance: float | None = None,
+        time_limit: float | None = None,
     ) -> Mobility:
         """Degrees of freedom at a pose, free motions, redundant and conflicting constraints.
 
@@ -442,6 +447,9 @@ class Assembly:
             Whether driven values count as constraints.
         tolerance : float, optional
             Singular values below it count as zero; see `Mobility.tolerance`.
+        time_limit : float, optional
+            Seconds for the counts and free motions, and as many again for each of what is found when it is read:
+            `finite_dof`, `redundant_sets`, `conflicting_sets`, a `trajectory`.
 
         Returns
         -------
@@ -452,6 +460,8 @@ class Assembly:
         ------
         InputError
             Wrong shapes, a contact without a pair at the pose, a solution of another assembly.
+        TimeoutError
+            The time limit was over before: half of a rank says nothing.
         """
         from assembly.solve.mobility import Mobility
 
@@ -466,7 +476,16 @@ class Assembly:
         else:
             state = self._start(packed, None if q is None else pose_rows("q", q, len(self._bodies)), None)
             fit = Options.fit
-        return Mobility.at(self._scene, packed, state, solved=solved, drives=bool(drives), tolerance=tolerance, fit=fit)
+        return Mobility.at(
+            self._scene,
+            packed,
+            state,
+            solved=solved,
+            drives=bool(drives),
+            tolerance=tolerance,
+            fit=fit,
+            time_limit=time_limit,
+        )
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the scene as JSON; `asm.load` reads it back."""

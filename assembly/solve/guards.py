@@ -32,7 +32,9 @@ from assembly.proximity.solid_contact import FOLD, SLACK, TRACK
 from assembly.proximity.watch import USED
 from assembly.proximity.watch_memory import (
     ALLOWANCE,
+    CLOCK,
     CUT_SHORT,
+    DEADLINE,
     IN_PLACE,
     LAST_REACH,
     LENGTHS,
@@ -52,8 +54,10 @@ from assembly.proximity.watch_memory import (
     PLACE_NUMBER,
     REACH,
     TURN,
+    WHOM,
     memory_places,
 )
+from assembly.solve.pauses import ABORTED, SLICE
 from assembly.solve.rows import move
 
 # Where solids are in each other by no more, in sizes of the scene, the next look lists what is to part them.
@@ -121,8 +125,26 @@ def place_guards(table, memory, here, y, better_y, free, begins):
 
 @kernel(inner=True)
 def look_around(table, pool, memory, point, how):
-    """The watch's look at a point; whether rows changed."""
-    return call_address(table[LOOK_AT], (table, pool, table[WATCH], memory, point[0], point[1], how)) > 0
+    """The watch's look at a point; whether rows changed.
+
+    A long one asks between two slices whether it is to go on. Where what it is for is thrown away, it ends with that,
+    as one that is cut (`budget.py`), and says that rows changed: nothing is known to hold.
+    """
+    watch = table[WATCH]
+    asks = table[watch + WHOM] != 0 and table[watch + CLOCK] != 0
+    changed = False
+    going = True
+    while going:
+        if asks:
+            memory[DEADLINE] = call_address(table[watch + CLOCK], ()) + SLICE
+        found = call_address(table[LOOK_AT], (table, pool, watch, memory, point[0], point[1], how))
+        changed = changed or found > 0
+        going = asks and memory[DEADLINE] < 0.0
+        if going and call_address(table[watch + WHOM], ()) == ABORTED:
+            return True
+    if asks:
+        memory[DEADLINE] = math.inf
+    return changed
 
 
 @kernel(inner=True)

@@ -9,6 +9,8 @@ from assembly.solve.settings import ASK_AT, COUNT, OBJECTIVE, VIOLATION
 
 # Nanoseconds between two questions.
 SLICE = 50_000_000
+# Answers: to go on, to end with what there is, to end at once because an exception throws all away.
+GOES_ON, ENDS, ABORTED = 0, 1, 2
 # Steps of which a short solve has no more: it never looks at the clock, but in a large scene, where a step takes long.
 SHORT = 4
 

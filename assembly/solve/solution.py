@@ -27,6 +27,7 @@ from assembly.solve.settings import COUNT, CULPRIT, DUAL, IMPROPER, OBJECTIVE, V
 
 if TYPE_CHECKING:
     from assembly.kinematics.body import BodyFace
+    from assembly.solve.crossings import Crossings
     from assembly.solve.leave import Fit
     from assembly.solve.mobility import Mobility
     from assembly.solve.second_order import SecondOrder
@@ -145,9 +146,9 @@ class Solution(ReadOnlyArrays):
         Of a clearance every contact that is near, "clearance: a-b", "clearance: a-b 2" and so on.
     crossings : tuple of (name, name)
         Bodies that cross elsewhere than at their contacts, but pairs that a clearance excludes and those that a joint
-        ties directly.
+        ties directly, or a gear or a rack, whose teeth are in each other.
     crossings_of_joined : tuple of (name, name)
-        Of the pairs that a joint ties directly those that cross.
+        Of the pairs that a joint or a coupling ties directly those that cross.
     iterations : int
     seconds : float
         Time in the compiled loop.
@@ -372,19 +373,32 @@ class Solution(ReadOnlyArrays):
     def crossings(self) -> tuple[tuple[str, str], ...]:
         """Names of bodies that cross at `q` elsewhere than at their contacts, by a look at all pairs when it is read.
 
-        Pairs that a joint ties directly, one in the other as a rule, are in `crossings_of_joined`; those which a
-        clearance excludes may overlap. A body in the material of another one crosses it, too.
+        Pairs that a joint or a coupling ties directly, one in the other as a rule, are in `crossings_of_joined`; those
+        which a clearance excludes may overlap. A body in the material of another one crosses it, too.
         """
-        from assembly.solve.crossings import crossing_pairs, free_pairs
-
-        return crossing_pairs(self, free_pairs(self._scene.bodies, self._scene.constraints))
+        return self.find_crossings().pairs
 
     @cached_property
     def crossings_of_joined(self) -> tuple[tuple[str, str], ...]:
-        """The same of bodies that a joint ties directly: a pin in its bore, or links that are drawn too thick."""
-        from assembly.solve.crossings import crossing_pairs, joined_pairs
+        """The same of bodies that a joint or a coupling ties directly: a pin in its bore, teeth, links too thick."""
+        return self.find_crossings(joined=True).pairs
 
-        return crossing_pairs(self, joined_pairs(self._scene.bodies, self._scene.constraints))
+    def find_crossings(self, *, joined: bool = False, time_limit: float | None = None) -> Crossings:
+        """Bodies that cross at `q`, as far as a look of limited time tells: `crossings` has no limit.
+
+        Parameters
+        ----------
+        joined : bool
+            Whether it is the pairs that a joint or a coupling ties directly, as in `crossings_of_joined`, or others.
+        time_limit : float, optional
+            Seconds after which the pairs that were not looked at to the end are `unseen`.
+        """
+        from assembly.solve.crossings import crossings_of, free_pairs, joined_pairs
+        from assembly.solve.interruption import CTRL_C, Interruption
+
+        asked = CTRL_C if time_limit is None else Interruption(time_limit)
+        choose = joined_pairs if joined else free_pairs
+        return crossings_of(self, choose(self._scene.bodies, self._scene.constraints), asked)
 
     @cached_property
     def pose_error(self) -> float:
@@ -448,7 +462,7 @@ class Solution(ReadOnlyArrays):
         except InputError as error:
             return [f"  crossings are not known: {error}"]
         lines = [f"  {a} and {b} cross; asm.Clearance() keeps them apart" for a, b in apart]
-        return lines + [f"  {a} and {b} cross, which a joint ties" for a, b in joined]
+        return lines + [f"  {a} and {b} cross, which a joint or a coupling ties" for a, b in joined]
 
     def __str__(self) -> str:
         lines = [
