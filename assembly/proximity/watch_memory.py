@@ -49,6 +49,10 @@ from assembly.proximity.spine_curve import both_radii
 # between two parts of a long look whether it is to go on, 0 where nobody is asked.
 PAIRS, PLACES, PAIR_TABLE, FIRST, TRACK_SOLIDS, LENGTHS, LISTS, LIST_TABLE = 0, 1, 2, 3, 4, 5, 6, 7
 CORNERS, CLOCK, MARK_AT, WHOM, WATCH_RECORD = 8, 9, 10, 11, 12
+# Nanoseconds between two questions whether to go on, and answers: on, to an end with what there is, or nowhere, because
+# an exception throws all away.
+SLICE = 50_000_000
+GOES_ON, ENDS, ABORTED = 0, 1, 2
 # Its lengths: roots nearer to each other than the first, and along the surfaces, are one; the reach of a first look;
 # the largest.
 NEGLECT, FIRST_REACH, LAST_REACH, LENGTH_COUNT = 0, 1, 2, 3

@@ -22,8 +22,8 @@ from assembly.constraints.trim_contact import TrimContact
 from assembly.solve.interruption import CTRL_C, Interruption
 from assembly.solve.jacobian import NoPairError, rows_of
 from assembly.solve.rank import HELD
+from assembly.solve.scene import Scene, Status
 from assembly.solve.settings import VIOLATION
-from assembly.solve.solution import Scene, Status
 from assembly.solve.starts import far_starts, near_starts
 from assembly.solve.subset import Problem, Snapshot
 

@@ -28,7 +28,6 @@ from assembly.proximity import watch, watch_memory
 from assembly.proximity.facet_tree import FacetTree
 from assembly.proximity.solid_contact import PAIR_GAP, TRACK
 from assembly.solve.interruption import Interruption
-from assembly.solve.pauses import SLICE
 
 if TYPE_CHECKING:
     from assembly.solve.solution import Solution
@@ -190,7 +189,7 @@ def _seen(packed: Packed, solution: Solution, contacts: int, interruption: Inter
         tracked[:contacts] = solution._parameters[:contacts]
         is_cut = True
         while is_cut and not interruption.is_over():
-            memory[watch_memory.DEADLINE] = perf_counter_ns() + SLICE
+            memory[watch_memory.DEADLINE] = perf_counter_ns() + watch_memory.SLICE
             watch.look(packed.table, packed.pool, watch_at, memory, q, tracked, watch.EVERYTHING)
             is_cut = memory[watch_memory.DEADLINE] < 0.0
         found |= set(np.flatnonzero(pairs[:, watch_memory.CROSSED] == 1.0).tolist())

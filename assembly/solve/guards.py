@@ -53,11 +53,11 @@ from assembly.proximity.watch_memory import (
     PLACE_MEMORY,
     PLACE_NUMBER,
     REACH,
+    SLICE,
     TURN,
     WHOM,
     memory_places,
 )
-from assembly.solve.pauses import ABORTED, SLICE
 from assembly.solve.rows import move
 
 # Where solids are in each other by no more, in sizes of the scene, the next look lists what is to part them.
@@ -127,24 +127,18 @@ def place_guards(table, memory, here, y, better_y, free, begins):
 def look_around(table, pool, memory, point, how):
     """The watch's look at a point; whether rows changed.
 
-    A long one asks between two slices whether it is to go on. Where what it is for is thrown away, it ends with that,
-    as one that is cut (`budget.py`), and says that rows changed: nothing is known to hold.
+    A long one asks between two slices whether it is to go on. Where what it is for is thrown away, it ends as one that
+    is cut (`budget.py`), and says that rows changed: nothing is known to hold.
     """
     watch = table[WATCH]
     asks = table[watch + WHOM] != 0 and table[watch + CLOCK] != 0
-    changed = False
-    going = True
-    while going:
-        if asks:
-            memory[DEADLINE] = call_address(table[watch + CLOCK], ()) + SLICE
-        found = call_address(table[LOOK_AT], (table, pool, watch, memory, point[0], point[1], how))
-        changed = changed or found > 0
-        going = asks and memory[DEADLINE] < 0.0
-        if going and call_address(table[watch + WHOM], ()) == ABORTED:
-            return True
     if asks:
+        memory[DEADLINE] = call_address(table[watch + CLOCK], ()) + SLICE
+    changed = call_address(table[LOOK_AT], (table, pool, watch, memory, point[0], point[1], how)) > 0
+    aborted = asks and memory[DEADLINE] < 0.0
+    if asks and not aborted:
         memory[DEADLINE] = math.inf
-    return changed
+    return changed or aborted
 
 
 @kernel(inner=True)

@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 
 from assembly._address import callback_address
 from assembly.errors import InputError, number
-from assembly.solve.pauses import ABORTED, SLICE
+from assembly.proximity.watch_memory import ABORTED, ENDS, GOES_ON, SLICE
+from assembly.solve.scene import Status
 from assembly.solve.settings import ASK_AT, COUNT, OBJECTIVE, OUT_OF_TIME, VIOLATION
-from assembly.solve.solution import Status
 
 __all__ = ["CTRL_C", "Interruption"]
 
@@ -40,7 +40,8 @@ class Interruption:
     time_limit : float, optional
         Seconds from now.
     callback : callable, optional
-        Called with the iteration, the objective and the feasibility [the scene's unit]; True ends the solve.
+        Called with the iteration, the objective and the feasibility [the scene's unit]; True ends the solve. In a look
+        before the first iteration they are not known: nan and inf.
 
     Attributes
     ----------
@@ -128,7 +129,7 @@ class Interruption:
         return Status.STOPPED if self.reason == "callback" else Status.TIME_LIMIT
 
     def _answers(self) -> Iterator[int]:
-        answer = 0
+        answer = GOES_ON
         while True:
             try:
                 yield answer
@@ -142,12 +143,12 @@ class Interruption:
     def _ask(self) -> int:
         if perf_counter() > self._deadline:
             self.reason = "time limit"
-        elif self.callback is not None and self.watched is not None:
+        elif self.reason is None and self.callback is not None and self.watched is not None:
             state, results_at = self.watched
             progress = state[results_at:]
             if self.callback(int(progress[COUNT]), float(progress[OBJECTIVE]), float(progress[VIOLATION])):
                 self.reason = "callback"
-        return int(self.reason is not None)
+        return GOES_ON if self.reason is None else ENDS
 
 
 class _CtrlC(Interruption):

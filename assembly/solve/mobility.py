@@ -28,7 +28,7 @@ from assembly.solve.jacobian import Rows, rows_of
 from assembly.solve.nearby import finite_dof, path
 from assembly.solve.rank import HELD
 from assembly.solve.redundancy import dependent_sets
-from assembly.solve.solution import Scene
+from assembly.solve.scene import Scene
 from assembly.solve.subset import Problem, Snapshot
 
 __all__ = ["Mobility"]

@@ -5,12 +5,9 @@ from __future__ import annotations
 from assembly._address import call_address
 from assembly._kernel import kernel
 from assembly.constraints.layout import BLOCK_RECORD, CLOCK_AT, SCALE
+from assembly.proximity.watch_memory import GOES_ON, SLICE
 from assembly.solve.settings import ASK_AT, COUNT, OBJECTIVE, VIOLATION
 
-# Nanoseconds between two questions.
-SLICE = 50_000_000
-# Answers: to go on, to end with what there is, to end at once because an exception throws all away.
-GOES_ON, ENDS, ABORTED = 0, 1, 2
 # Steps of which a short solve has no more: it never looks at the clock, but in a large scene, where a step takes long.
 SHORT = 4
 
@@ -24,5 +21,5 @@ def pause(table, pool, settings, results, asked, iteration, value, violation):
     if asked == 0 or now - asked < SLICE:
         return now if asked == 0 else asked, False
     results[COUNT], results[OBJECTIVE], results[VIOLATION] = float(iteration), value, violation * pool[SCALE]
-    ends = call_address(int(settings[ASK_AT]), ()) != 0
+    ends = call_address(int(settings[ASK_AT]), ()) != GOES_ON
     return call_address(table[CLOCK_AT], ()) if table[CLOCK_AT] != 0 else now, ends

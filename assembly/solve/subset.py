@@ -16,7 +16,7 @@ from assembly.constraints.constraint import Constraint, Equation
 from assembly.constraints.contact import Contact
 from assembly.constraints.couplings import Coupling
 from assembly.constraints.expression import Expression
-from assembly.constraints.packing import Packed, pack
+from assembly.constraints.packing import Packed
 from assembly.constraints.trim_contact import TrimContact
 from assembly.proximity.solid_contact import TRACK
 from assembly.solve.attempts import begin
@@ -24,8 +24,9 @@ from assembly.solve.interruption import Interruption
 from assembly.solve.jacobian import Rows
 from assembly.solve.options import Options
 from assembly.solve.rank import HELD
+from assembly.solve.scene import Scene, Status
 from assembly.solve.settings import ANY_POSE, GATHER
-from assembly.solve.solution import Scene, Solution, Status
+from assembly.solve.solution import Solution
 
 __all__ = ["Problem", "Snapshot"]
 
@@ -71,7 +72,7 @@ class Problem:
     def __init__(
         self, scene: Scene, constraints: Sequence[Constraint], near: dict[str | int, Array], held: float = HELD
     ) -> None:
-        self.packed = pack(scene.bodies, constraints, ())
+        self.packed = Packed(scene.bodies, constraints, ())
         self._size = scene.scale
         self._scene = Scene(
             scene.bodies, tuple(constraints), tuple(self.packed.contacts), tuple(self.packed.sides), self.packed.scale

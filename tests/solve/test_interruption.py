@@ -12,8 +12,10 @@ import numpy as np
 import pytest
 
 import assembly as asm
+from assembly.constraints.packing import Packed
 from assembly.errors import InputError
-from assembly.solve import interruption, pauses
+from assembly.proximity import watch_memory
+from assembly.solve import interruption
 from assembly.solve.settings import ASK_AT
 
 
@@ -39,7 +41,7 @@ def scene() -> asm.Assembly:
 def whole(scene) -> asm.Solution:
     """The solve that nobody ends."""
     solution = scene.solve(**LIMIT)
-    assert solution.success and solution.seconds > 2 * pauses.SLICE / 1e9, "too short for what is tested here"
+    assert solution.success and solution.seconds > 2 * watch_memory.SLICE / 1e9, "too short for what is tested here"
     return solution
 
 
@@ -61,7 +63,7 @@ def test_asking_changes_nothing(scene, whole):
     np.testing.assert_array_equal(solution.q, whole.q)
     assert solution.iterations == whole.iterations and solution.status is asm.Status.SOLVED
     # Between slices: at most one question in each.
-    assert 1 <= len(asked) <= solution.seconds * 1e9 / pauses.SLICE + 1
+    assert 1 <= len(asked) <= solution.seconds * 1e9 / watch_memory.SLICE + 1
     iterations = [iteration for iteration, _, _ in asked]
     assert iterations == sorted(iterations) and iterations[-1] <= solution.iterations
     assert all(np.isfinite(value) and feasibility >= 0.0 for _, value, feasibility in asked)
@@ -181,3 +183,78 @@ def test_an_interruption_leaves_shared_settings_as_they_are():
     thread.start()
     thread.join()
     assert found == [0.0]
+
+
+def crowd(count: int = 40) -> asm.Assembly:
+    """Ellipsoids in each other, so that one look at their pairs takes longer than a slice."""
+    rng = np.random.default_rng(0)
+    shape = asm.shapes.ellipsoid(1.0, 0.9, 0.8)
+    scene = asm.Assembly(asm.Body(f"{k}", shape, rng.uniform(-1.0, 1.0, 3)) for k in range(count))
+    scene.constrain(asm.Clearance())
+    return scene
+
+
+def seen(packed: Packed, state: np.ndarray) -> int:
+    """How many pairs the watch of a state has looked at."""
+    pairs = state[packed.memory_at + watch_memory.MEMORY_HEADER :]
+    pairs = pairs[: watch_memory.PAIR_MEMORY * len(packed.guarded[0])].reshape(-1, watch_memory.PAIR_MEMORY)
+    return int((~np.isnan(pairs[:, watch_memory.TURN])).sum())
+
+
+def test_one_look_at_many_pairs_asks():
+    # With no iteration at all nobody but the look at the start can ask.
+    scene = crowd()
+    asked: list[tuple[int, float, float]] = []
+    solution = scene.solve(max_iterations=0, callback=lambda *progress: asked.append(progress))
+    assert solution.seconds > watch_memory.SLICE / 1e9, "too short for what is tested here"
+    assert asked and asked[0][0] == 0
+    # Nothing is known of the start yet: zeros would say that it holds.
+    assert np.isnan(asked[0][1]) and asked[0][2] == np.inf
+    other = scene.solve(max_iterations=0)
+    np.testing.assert_array_equal(solution.q, other.q)
+    assert solution.violations == other.violations and solution.contacts.keys() == other.contacts.keys()
+
+
+@pytest.mark.parametrize("options", [{"time_limit": 1e-6}, {"callback": lambda *_: True}], ids=["time", "callback"])
+def test_a_look_that_is_not_to_go_on_is_whole(options):
+    solution = crowd().solve(**options)
+    assert solution.status in (asm.Status.TIME_LIMIT, asm.Status.STOPPED) and not solution.success
+    # What crosses is told, and not left out with pairs that nobody looked at.
+    assert seen(solution._packed, solution._state) == 40 * 39 // 2 and solution.feasibility > 0.1
+
+
+def test_a_look_that_is_thrown_away_ends_at_once():
+    scene = crowd()
+    packed = scene.packed()
+    states: list[np.ndarray] = []
+
+    def callback(iteration, objective, feasibility):
+        states.append(asked.watched[0])
+        raise LookupError
+
+    asked = interruption.Interruption(callback=callback)
+    with pytest.raises(LookupError):
+        scene._from_start(None, None, {}, asked)
+    assert len(states) == 1 and 0 < seen(packed, states[0]) < 40 * 39 // 2
+    np.testing.assert_array_equal(crowd().solve(max_iterations=0).q, scene.solve(max_iterations=0).q)
+
+
+def test_what_is_waited_for():
+    limited = interruption.Interruption(time_limit=100.0)
+    assert limited.wait_for("a sum", lambda: 1 + 1) == 2
+    with pytest.raises(ZeroDivisionError):
+        limited.wait_for("a quotient", lambda: 1 // 0)
+    done = threading.Event()
+    with pytest.raises(TimeoutError, match="a rest is not known yet where time_limit is over"):
+        interruption.Interruption(time_limit=1e-3).wait_for("a rest", lambda: done.wait(60.0))
+    assert not done.is_set()
+    done.set()
+
+
+def test_ctrl_c_ends_what_is_waited_for(ctrl_c):
+    done = threading.Event()
+    timer = threading.Timer(0.1, lambda: os.kill(os.getpid(), signal.SIGINT))
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        interruption.CTRL_C.wait_for("a rest", lambda: done.wait(60.0))
+    done.set()
