@@ -55,6 +55,7 @@ if TYPE_CHECKING:
     from assembly.scene_file import load as load
     from assembly.solve import reference as reference
     from assembly.solve import statics as statics
+    from assembly.solve.crossings import Crossings as Crossings
     from assembly.solve.mobility import Mobility as Mobility
     from assembly.solve.scene import Status as Status
     from assembly.solve.second_order import SecondOrder as SecondOrder
@@ -81,6 +82,7 @@ else:
             "Clearance": "assembly.constraints.clearance",
             "Contact": "assembly.constraints.contact",
             "ContactPair": "assembly.proximity.pairs",
+            "Crossings": "assembly.solve.crossings",
             "Cylindrical": "assembly.constraints.joints",
             "Dexterity": "assembly.constraints.dexterity",
             "Distance": "assembly.constraints.placements",

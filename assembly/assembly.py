@@ -251,8 +251,9 @@ class Assembly(Contents):
         -------
         list of Solution
             The successful ones, the smallest objective first. Poses within 1e-6 of each other (lengths over the scene's
-            size, radians) are one. A `Posture` without a reference, and the objective of a scene that has none, are
-            measured from the bodies' poses in all of them.
+            size, radians) are one, and so are two between which all poses on the straight way are as good. A
+            `Posture` without a reference, and the objective of a scene that has none, are measured from the bodies'
+            poses in all of them.
         """
         from assembly.studies.multistart import solve_all
 

@@ -128,10 +128,12 @@ def look_around(table, pool, memory, point, how):
     """The watch's look at a point; whether rows changed.
 
     A long one asks between two slices whether it is to go on. Where what it is for is thrown away, it ends as one that
-    is cut (`budget.py`), and says that rows changed: nothing is known to hold.
+    is cut (`budget.py`), and so do those that come after it; they say that rows changed: nothing is known to hold.
     """
     watch = table[WATCH]
     asks = table[watch + WHOM] != 0 and table[watch + CLOCK] != 0
+    if asks and memory[DEADLINE] < 0.0:
+        return True
     if asks:
         memory[DEADLINE] = call_address(table[watch + CLOCK], ()) + SLICE
     changed = call_address(table[LOOK_AT], (table, pool, watch, memory, point[0], point[1], how)) > 0

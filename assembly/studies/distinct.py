@@ -52,6 +52,8 @@ def _objective_at(packed: Packed, solution: Solution, q: Array) -> float:
     """The objective at poses (n, 7) near a solution; infinite where constraints do not hold."""
     state = solution._state.copy()
     state[: packed.contacts_at] = q.ravel()
+    # A round body that turned is touched elsewhere: contacts are found anew.
+    state[packed.contacts_at : packed.angles_at] = np.nan
     try:
         rows = rows_of(packed, state)
     except InputError:
