@@ -162,7 +162,12 @@ def _box(body: Body, row: Array) -> tuple[Array, Array]:
 
 
 def _known_shapes(pairs: Iterable[Pair], interruption: Interruption) -> bool:
-    """Make what a look has to know of shapes, which takes longer than the look; whether there was time to."""
+    """Make what a look has to know of shapes, which takes longer than the look; whether there was time to.
+
+    Where there is no limit it is made as the scene is packed: of very many shapes it is not kept until then.
+    """
+    if not interruption.is_limited:
+        return True
     for faces in dict.fromkeys(side_faces(body) for pair in pairs for body in pair):
         FacetTree.of(faces)
         if interruption.is_over():

@@ -82,6 +82,11 @@ class Interruption:
         settings[ASK_AT] = self._address
         return settings
 
+    @property
+    def is_limited(self) -> bool:
+        """Whether there is a time limit."""
+        return self._deadline < np.inf
+
     def is_over(self) -> bool:
         """Whether no other attempt is to be made; the exception of a callback, or a signal's, is raised here."""
         if self._error is not None:

@@ -32,16 +32,24 @@ ALIKE, HELD = 1e-9, 1e-9
 def are_one(solution: Solution, other: Solution) -> bool:
     """Whether two solutions of a scene count as one."""
     packed = solution._packed
-    way = moves(solution.q, other.q, packed.scale)
-    if np.abs(way).max() <= SAME:
+    if _is_same(solution.q, other.q, packed.scale):
         return True
     value, unit = solution.objective, packed.unit
     # What bodies of a clearance may meet on the way is not known; of a dexterity no pose is as good by chance.
     if packed.guards or packed.tips is not None or not _alike(value, other.objective, unit):
         return False
-    sizes = np.repeat([packed.scale, 1.0], 3)
+    way, sizes = moves(solution.q, other.q, packed.scale), np.repeat([packed.scale, 1.0], 3)
     between = (_objective_at(packed, solution, retract(solution.q, part * way * sizes)) for part in BETWEEN)
     return all(_alike(value, there, unit) for there in between)
+
+
+def _is_same(q: Array, other: Array, size: float) -> bool:
+    """Whether all bodies are at the same place; a quaternion and its negative are the same turn."""
+    if np.abs(q[:, :3] - other[:, :3]).max() > SAME * size:
+        return False
+    # |e - f| is half the angle between them, where it is small.
+    signs = np.where((q[:, 3:] * other[:, 3:]).sum(axis=1, keepdims=True) < 0.0, -1.0, 1.0)
+    return bool(np.linalg.norm(q[:, 3:] - signs * other[:, 3:], axis=1).max() <= 0.5 * SAME)
 
 
 def _alike(value: float, other: float, unit: float) -> bool:
