@@ -60,6 +60,7 @@ from assembly.proximity.watch_memory import (
     FIRST,
     FIRST_REACH,
     GIVEN_COUNT,
+    GO_ON_AT,
     HIGH,
     LAST_REACH,
     LENGTHS,
@@ -95,7 +96,6 @@ from assembly.proximity.watch_memory import (
     TREE_F,
     TREE_G,
     TURN,
-    WHOM,
     any_listed,
     any_lost,
     known_roots,
@@ -362,7 +362,7 @@ def look_at_due(table, pool, watch, memory, q, tracked, how, first, most):
         if p != first and not is_due(table, watch, memory, p, tracked, how, most):
             continue
         if p != first and table[watch + CLOCK] != 0 and call_address(table[watch + CLOCK], ()) > memory[DEADLINE]:
-            if table[watch + WHOM] == 0 or call_address(table[watch + WHOM], ()) == ABORTED:
+            if table[watch + GO_ON_AT] == 0 or call_address(table[watch + GO_ON_AT], ()) == ABORTED:
                 # Who set it is told, and goes on in another call.
                 memory[DEADLINE] = -1.0
                 break

@@ -48,7 +48,7 @@ from assembly.proximity.spine_curve import both_radii
 # `mark_places` (`contact_place.py`), 0 where no contact's bodies have a least gap above zero; address of what says
 # between two parts of a long look whether it is to go on, 0 where nobody is asked.
 PAIRS, PLACES, PAIR_TABLE, FIRST, TRACK_SOLIDS, LENGTHS, LISTS, LIST_TABLE = 0, 1, 2, 3, 4, 5, 6, 7
-CORNERS, CLOCK, MARK_AT, WHOM, WATCH_RECORD = 8, 9, 10, 11, 12
+CORNERS, CLOCK, MARK_AT, GO_ON_AT, WATCH_RECORD = 8, 9, 10, 11, 12
 # Nanoseconds between two questions whether to go on, and answers: on, to an end with what there is, or nowhere, because
 # an exception throws all away.
 SLICE = 50_000_000

@@ -12,7 +12,7 @@ import math
 from assembly._address import call_address
 from assembly._kernel import kernel
 from assembly.constraints.layout import CLOCK_AT, WATCH
-from assembly.proximity.watch_memory import CLOCK, DEADLINE, EARLIER, LOOKS, PAIRS, WHOM
+from assembly.proximity.watch_memory import CLOCK, DEADLINE, EARLIER, GO_ON_AT, LOOKS, PAIRS
 from assembly.solve.settings import ASK_AT, BUDGET, CARRIED, CARRIES, TICK
 
 # No look begins, and no step from a pose that holds, where so much of a budget is spent: either may take as long as the
@@ -50,7 +50,7 @@ def begin_tick(table, settings, results, memory):
         memory[DEADLINE] = math.inf
         # Looks of ticks are short, and with a budget end by it.
         asks = settings[TICK] == 0.0
-        table[table[WATCH] + WHOM] = int(settings[ASK_AT]) if asks else 0
+        table[table[WATCH] + GO_ON_AT] = int(settings[ASK_AT]) if asks else 0
         if asks:
             table[table[WATCH] + CLOCK] = table[CLOCK_AT]
         if is_new:

@@ -39,6 +39,9 @@ Pair = tuple[Body, Body]
 # What counts as crossing where no more is called touching, and how deep looks see, in parts of the scene's size. A deep
 # look of wires that cross often finds so much that it lacks room for the rest, so that there are several.
 CROSSING, DEPTHS = 1e-8, (0.005, 0.015, 0.05)
+# Contacts of a pair, or of a body in many, that may be near at a time. What is beyond is known where bodies cross by
+# more than looks take for nothing.
+PLACES = 8
 # What rounding may make of boxes, in parts of where they end.
 ROUNDING = 1e-12
 
@@ -75,7 +78,8 @@ class _Watched(Clearance):
     corners = False
 
     def __init__(self, pairs: Sequence[Pair], name: str) -> None:
-        super().__init__(dict.fromkeys(body for pair in pairs for body in pair), name=name)
+        bodies = dict.fromkeys(body for pair in pairs for body in pair)
+        super().__init__(bodies, name=name, places=PLACES * (1 + min(len(pairs), len(bodies))))
         self._pairs = list(pairs)
 
     def pairs(self, bodies: Sequence[Body]) -> list[Pair]:

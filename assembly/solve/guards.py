@@ -35,6 +35,7 @@ from assembly.proximity.watch_memory import (
     CLOCK,
     CUT_SHORT,
     DEADLINE,
+    GO_ON_AT,
     IN_PLACE,
     LAST_REACH,
     LENGTHS,
@@ -55,7 +56,6 @@ from assembly.proximity.watch_memory import (
     REACH,
     SLICE,
     TURN,
-    WHOM,
     memory_places,
 )
 from assembly.solve.rows import move
@@ -131,7 +131,7 @@ def look_around(table, pool, memory, point, how):
     is cut (`budget.py`), and so do those that come after it; they say that rows changed: nothing is known to hold.
     """
     watch = table[WATCH]
-    asks = table[watch + WHOM] != 0 and table[watch + CLOCK] != 0
+    asks = table[watch + GO_ON_AT] != 0 and table[watch + CLOCK] != 0
     if asks and memory[DEADLINE] < 0.0:
         return True
     if asks:

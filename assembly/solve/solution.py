@@ -333,6 +333,11 @@ class Solution(ReadOnlyArrays):
             Whether it is the pairs that a joint or a coupling ties directly, as in `crossings_of_joined`, or others.
         time_limit : float, optional
             Seconds after which the pairs that were not looked at to the end are `unseen`.
+
+        Returns
+        -------
+        Crossings
+            `pairs` that cross and those that are `unseen`; `is_clear` where all were looked at and none crosses.
         """
         from assembly.solve.crossings import crossings_of, free_pairs, joined_pairs
         from assembly.solve.interruption import CTRL_C, Interruption

@@ -10,9 +10,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.constraints.layout import WATCH
 from assembly.constraints.packing import Packed
 from assembly.errors import InputError
 from assembly.kinematics.pose import retract
+from assembly.proximity.solid_contact import TRACK
+from assembly.proximity.watch import EVERYTHING, look
+from assembly.proximity.watch_memory import CROSSED, MEMORY_HEADER, PAIR_MEMORY
 from assembly.solve.jacobian import rows_of
 from assembly.solve.nearby import moves
 from assembly.solve.row_table import gradient_at
@@ -35,8 +39,9 @@ def are_one(solution: Solution, other: Solution) -> bool:
     if _is_same(solution.q, other.q, packed.scale):
         return True
     value, unit = solution.objective, packed.unit
-    # What bodies of a clearance may meet on the way is not known; of a dexterity no pose is as good by chance.
-    if packed.guards or packed.tips is not None or not _alike(value, other.objective, unit):
+    # Contacts that a clearance leaves out are not told from others where they are found anew; of a dexterity no pose is
+    # as good by chance.
+    if (packed.guards and packed.contacts) or packed.tips is not None or not _alike(value, other.objective, unit):
         return False
     way, sizes = moves(solution.q, other.q, packed.scale), np.repeat([packed.scale, 1.0], 3)
     between = (_objective_at(packed, solution, retract(solution.q, part * way * sizes)) for part in BETWEEN)
@@ -62,6 +67,8 @@ def _objective_at(packed: Packed, solution: Solution, q: Array) -> float:
     state[: packed.contacts_at] = q.ravel()
     # A round body that turned is touched elsewhere: contacts are found anew.
     state[packed.contacts_at : packed.angles_at] = np.nan
+    if packed.guards and _crosses(packed, state, q):
+        return np.inf
     try:
         rows = rows_of(packed, state)
     except InputError:
@@ -71,3 +78,15 @@ def _objective_at(packed: Packed, solution: Solution, q: Array) -> float:
         return np.inf
     free, gradient = np.empty(packed.pair_rows, dtype=np.int64), np.empty(6 * packed.count)
     return float(gradient_at(packed.table, packed.pool, rows.state, free, gradient, packed.tips)) * packed.unit
+
+
+def _crosses(packed: Packed, state: Array, q: Array) -> bool:
+    """Whether bodies of a clearance cross at poses (n, 7); what is near there is listed in the state."""
+    scaled = q.copy()
+    scaled[:, :3] = (q[:, :3] - packed.reference) / packed.scale
+    state[packed.memory_at :] = packed.new_state()[packed.memory_at :]
+    tracked = state[packed.contacts_at : packed.angles_at].reshape(-1, TRACK)
+    memory = state[packed.memory_at :]
+    look(packed.table, packed.pool, packed.table[WATCH], memory, scaled, tracked, EVERYTHING)
+    pairs = memory[MEMORY_HEADER:][: PAIR_MEMORY * sum(map(len, packed.guarded))].reshape(-1, PAIR_MEMORY)
+    return bool((pairs[:, CROSSED] == 1.0).any())

@@ -15,7 +15,7 @@ import assembly as asm
 from assembly.constraints.packing import Packed
 from assembly.errors import InputError
 from assembly.proximity import watch_memory
-from assembly.solve import interruption
+from assembly.solve import interruption, pauses
 from assembly.solve.settings import ASK_AT
 
 
@@ -221,6 +221,13 @@ def test_a_look_that_is_not_to_go_on_is_whole(options):
     assert solution.status in (asm.Status.TIME_LIMIT, asm.Status.STOPPED) and not solution.success
     # What crosses is told, and not left out with pairs that nobody looked at.
     assert seen(solution._packed, solution._state) == 40 * 39 // 2 and solution.feasibility > 0.1
+
+
+def test_scenes_of_many_pairs_look_at_the_clock_from_the_first_step():
+    assert pauses.is_large.py_func(crowd(24).packed().table)
+    assert not pauses.is_large.py_func(crowd(5).packed().table)
+    assert not pauses.is_large.py_func(long_arm(20).packed().table)
+    assert pauses.is_large.py_func(long_arm(40).packed().table)
 
 
 def test_a_look_that_is_thrown_away_ends_at_once():

@@ -8,6 +8,7 @@ import pytest
 
 import assembly as asm
 from assembly.errors import InputError
+from assembly.studies.distinct import are_one
 
 
 def four_bar():
@@ -140,3 +141,32 @@ def test_a_round_body_that_turned_is_at_the_same_place():
     found = scene.solve_all(starts=8)
     heights = {round(float(solution.q[1, 2]), 6) for solution in found}
     assert len(found) == len(heights) and 1.0 in heights
+
+
+def test_a_ball_that_keeps_off_a_box_is_at_one_place_however_it_is_turned():
+    box, ball = asm.Body("box", asm.shapes.box(2, 2, 2), fixed=True), asm.Body("ball", asm.shapes.sphere(1.0))
+    ball.pose = asm.Pose((0.5, 0.3, 4.0))
+    scene = asm.Assembly([box, ball])
+    scene.constrain(asm.Clearance(minimum=0.1))
+    scene.minimize(asm.PointDistance(ball.point(0, 0, 0), (0.5, 0.3, 0.2)))
+    found = scene.solve_all(starts=8)
+    places = {tuple(np.round(solution.q[1, :3], 6)) for solution in found}
+    assert len(found) == len(places) and (0.5, 0.3, 2.1) in places
+
+
+def test_solutions_with_something_between_them_are_two():
+    # On either side of a wall, as far from where the point is to be; between them it is in the wall.
+    wall, ball = asm.Body("wall", asm.shapes.box(8, 8, 1), fixed=True), asm.Body("ball", asm.shapes.sphere(0.5))
+    ball.pose = asm.Pose((0.0, 0.0, 2.0))
+    scene = asm.Assembly([wall, ball])
+    scene.constrain(asm.Clearance())
+    pose = ca.SX.sym("q", 7)
+    scene.minimize(asm.Expression(ca.Function("f", [pose], [ca.sumsqr(pose[:2])]), [ball]))
+    above = scene.solve()
+    ball.pose = asm.Pose((0.0, 0.0, -2.0))
+    below = scene.solve()
+    ball.pose = asm.Pose((0.0, 0.0, 3.0))
+    higher = scene.solve()
+    assert not are_one(above, below)
+    # Nothing asks how far above it is.
+    assert are_one(above, higher)
