@@ -224,10 +224,10 @@ def test_a_look_that_is_not_to_go_on_is_whole(options):
 
 
 def test_scenes_of_many_pairs_look_at_the_clock_from_the_first_step():
-    assert pauses.is_large.py_func(crowd(24).packed().table)
-    assert not pauses.is_large.py_func(crowd(5).packed().table)
-    assert not pauses.is_large.py_func(long_arm(20).packed().table)
-    assert pauses.is_large.py_func(long_arm(40).packed().table)
+    assert pauses.is_large(crowd(24).packed().table)
+    assert not pauses.is_large(crowd(5).packed().table)
+    assert not pauses.is_large(long_arm(20).packed().table)
+    assert pauses.is_large(long_arm(40).packed().table)
 
 
 def test_a_look_that_is_thrown_away_ends_at_once():
