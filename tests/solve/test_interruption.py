@@ -185,17 +185,22 @@ def test_an_interruption_leaves_shared_settings_as_they_are():
     assert found == [0.0]
 
 
-CROWD = 80
+CROWD = 60
 PAIRS = CROWD * (CROWD - 1) // 2
 
 
 def crowd(count: int = CROWD) -> asm.Assembly:
-    """Ellipsoids in each other, so that one look at their pairs takes longer than a slice."""
+    """Ellipsoids in each other, so that one look at their pairs takes longer than a slice; with places for all."""
     rng = np.random.default_rng(0)
     shape = asm.shapes.ellipsoid(1.0, 0.9, 0.8)
     scene = asm.Assembly(asm.Body(f"{k}", shape, rng.uniform(-1.0, 1.0, 3)) for k in range(count))
-    scene.constrain(asm.Clearance())
+    scene.constrain(asm.Clearance(places=600))
     return scene
+
+
+@pytest.fixture(scope="module")
+def crowded() -> asm.Assembly:
+    return crowd()
 
 
 def seen(packed: Packed, state: np.ndarray) -> int:
@@ -205,24 +210,22 @@ def seen(packed: Packed, state: np.ndarray) -> int:
     return int((~np.isnan(pairs[:, watch_memory.TURN])).sum())
 
 
-def test_one_look_at_many_pairs_asks():
+def test_one_look_at_many_pairs_asks(crowded):
     # With no iteration at all nobody but the look at the start can ask.
-    scene = crowd()
-    scene.solve(max_iterations=0)  # from now on there are places for all that is near
-    other = scene.solve(max_iterations=0)
+    other = crowded.solve(max_iterations=0)
     assert other.seconds > watch_memory.SLICE / 1e9, "too short for what is tested here"
     asked: list[tuple[int, float, float]] = []
-    solution = scene.solve(max_iterations=0, callback=lambda *progress: asked.append(progress))
+    solution = crowded.solve(max_iterations=0, callback=lambda *progress: asked.append(progress))
     assert asked and asked[0][0] == 0
     # Nothing is known of the start yet: zeros would say that it holds.
     assert np.isnan(asked[0][1]) and asked[0][2] == np.inf
     np.testing.assert_array_equal(solution.q, other.q)
-    assert solution.violations == other.violations and solution.contacts.keys() == other.contacts.keys()
+    assert solution.violations == other.violations
 
 
 @pytest.mark.parametrize("options", [{"time_limit": 1e-6}, {"callback": lambda *_: True}], ids=["time", "callback"])
-def test_a_look_that_is_not_to_go_on_is_whole(options):
-    solution = crowd().solve(**options)
+def test_a_look_that_is_not_to_go_on_is_whole(crowded, options):
+    solution = crowded.solve(**options)
     assert solution.status in (asm.Status.TIME_LIMIT, asm.Status.STOPPED) and not solution.success
     # What crosses is told, and not left out with pairs that nobody looked at.
     assert seen(solution._packed, solution._state) == PAIRS and solution.feasibility > 0.1
@@ -235,10 +238,9 @@ def test_scenes_of_many_pairs_look_at_the_clock_from_the_first_step():
     assert pauses.is_large(long_arm(40).packed().table)
 
 
-def test_a_look_that_is_thrown_away_ends_at_once():
-    scene = crowd()
-    whole = scene.solve(max_iterations=0)
-    packed = scene.packed()  # now with places for all that is near
+def test_a_look_that_is_thrown_away_ends_at_once(crowded):
+    whole = crowded.solve(max_iterations=0)
+    packed = crowded.packed()
     states: list[np.ndarray] = []
 
     def callback(iteration, objective, feasibility):
@@ -247,9 +249,9 @@ def test_a_look_that_is_thrown_away_ends_at_once():
 
     asked = interruption.Interruption(callback=callback)
     with pytest.raises(LookupError):
-        scene._from_start(None, None, {}, asked)
+        crowded._from_start(None, None, {}, asked)
     assert len(states) == 1 and 0 < seen(packed, states[0]) < PAIRS
-    again = scene.solve(max_iterations=0)
+    again = crowded.solve(max_iterations=0)
     np.testing.assert_array_equal(again.q, whole.q)
     assert again.violations == whole.violations
 
