@@ -122,7 +122,7 @@ class Mobility(ReadOnlyArrays):
         motions = np.zeros((unknowns - rank, packed.count, 6))
         k = 0
         for group in groups:
-            for motion in group.balanced.free:
+            for motion in group.balanced.free(interruption):
                 motions[k, list(group.places)] = motion.reshape(-1, 6) * np.repeat([packed.scale, 1.0], 3)
                 k += 1
         worst = float(np.abs(rows.residual[counted]).max(initial=0.0))

@@ -109,6 +109,7 @@ class Walks:
         self._q = q
         self._size = size
         self._interruption = interruption
+        self._free = [group.balanced.free(interruption) for group in groups]
         # For each group: the way that was meant, the way that bodies went, freedoms there.
         self._ends: list[list[tuple[Array, Array, int]]] = [[] for _ in groups]
 
@@ -118,7 +119,7 @@ class Walks:
         reach = np.ones(len(parts))
         for g, (group, part) in enumerate(zip(self.groups, parts, strict=True)):
             if part.any():
-                twists = (part @ group.balanced.free).reshape(-1, 6)
+                twists = (part @ self._free[g]).reshape(-1, 6)
                 reach[g] = REACH / np.linalg.norm(twists, axis=1).max()
                 motion[list(group.places)] = reach[g] * twists
         solution = self._problem.solve(moved(self._q, motion, self._size), self._interruption)
@@ -131,7 +132,7 @@ class Walks:
         gone = moves(self._q, solution.q, self._size)
         for g, (group, part) in enumerate(zip(self.groups, parts, strict=True)):
             if part.any():
-                way = group.balanced.free @ gone[list(group.places)].ravel() / reach[g]
+                way = self._free[g] @ gone[list(group.places)].ravel() / reach[g]
                 self._ends[g].append((part, way, there.get(group.places, group.dof)))
 
     def regular(self, g: int) -> bool:
@@ -197,6 +198,6 @@ def _onward(problem: Problem, solution: Solution, motion: Array, interruption: I
     onward = np.zeros_like(motion)
     for group in _at(problem, solution, interruption):
         places = list(group.places)
-        free = group.balanced.free
+        free = group.balanced.free(interruption)
         onward[places] = (free.T @ (free @ motion[places].ravel())).reshape(-1, 6)
     return onward

@@ -99,12 +99,11 @@ class Balanced:
         """How many singular values count."""
         return self._cut(self.singular_values)
 
-    @cached_property
-    def free(self) -> Array:
+    def free(self, interruption: Interruption = CTRL_C) -> Array:
         """Orthonormal motions that no row forbids, (d, 6 k): twists at the bodies' origins."""
         motions = self.right[self.rank :].reshape(-1, len(self.centers), 6).copy()
         motions[:, :, :3] -= np.cross(motions[:, :, 3:], self.centers[None])
-        return orthonormal(motions.reshape(len(motions), 6 * len(self.centers)))
+        return orthonormal(motions.reshape(len(motions), 6 * len(self.centers)), interruption)
 
     def _cut(self, values: Array) -> int:
         """How many of falling singular values count."""
@@ -149,7 +148,7 @@ def _centers(blocks: Array) -> Array:
     return centers
 
 
-def orthonormal(motions: Array) -> Array:
+def orthonormal(motions: Array, interruption: Interruption = CTRL_C) -> Array:
     """An orthonormal basis of the span of independent rows, near to coordinate axes and the same in every run.
 
     Each is the unit motion nearest to a coordinate axis, that which has most of it in what is left of the span.
@@ -157,6 +156,7 @@ def orthonormal(motions: Array) -> Array:
     left = np.linalg.qr(motions.T)[0].T
     basis = []
     while len(left):
+        interruption.check("free motions")
         most = np.linalg.norm(left, axis=0)
         # The first of those that are the same up to rounding.
         axis = int(np.flatnonzero(most >= (1.0 - 1e-6) * most.max())[0])
