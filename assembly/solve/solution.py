@@ -342,6 +342,8 @@ class Solution(ReadOnlyArrays):
         from assembly.solve.crossings import crossings_of, free_pairs, joined_pairs
         from assembly.solve.interruption import CTRL_C, Interruption
 
+        if not isinstance(joined, (bool, np.bool_)):
+            raise InputError(f"joined is {joined!r}; expected True or False")
         asked = CTRL_C if time_limit is None else Interruption(time_limit)
         choose = joined_pairs if joined else free_pairs
         return crossings_of(self, choose(self._scene.bodies, self._scene.constraints), asked)

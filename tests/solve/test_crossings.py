@@ -147,6 +147,18 @@ def test_what_a_time_limit_leaves_out_is_not_clear():
     assert apart.find_crossings(time_limit=1e-9).is_clear and apart.find_crossings(joined=True).is_clear
 
 
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"joined": "both"}, "joined is 'both'; expected True or False"),
+        ({"time_limit": -1.0}, "time_limit is -1; expected a number of seconds above 0"),
+    ],
+)
+def test_bad_input(options, message):
+    with pytest.raises(InputError, match=message):
+        row_of_blocks(2)[0].find_crossings(**options)
+
+
 def test_looks_in_slices_find_the_same(monkeypatch):
     solution, expected = row_of_blocks(6)
     looks = []
