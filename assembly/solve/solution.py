@@ -12,6 +12,7 @@ from assembly._read_only import ReadOnlyArrays, read_only
 from assembly.constraints.joint import Joint
 from assembly.constraints.layout import IMPLICIT
 from assembly.constraints.packing import Packed
+from assembly.errors import InputError
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import Pose
 from assembly.proximity.pairs import ContactPair
