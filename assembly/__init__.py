@@ -55,10 +55,11 @@ if TYPE_CHECKING:
     from assembly.scene_file import load as load
     from assembly.solve import reference as reference
     from assembly.solve import statics as statics
+    from assembly.solve.crossings import Crossings as Crossings
     from assembly.solve.mobility import Mobility as Mobility
+    from assembly.solve.scene import Status as Status
     from assembly.solve.second_order import SecondOrder as SecondOrder
     from assembly.solve.solution import Solution as Solution
-    from assembly.solve.solution import Status as Status
     from assembly.solve.statics import Wrench as Wrench
     from assembly.solve.tip import dexterity_ellipsoid as dexterity_ellipsoid
     from assembly.solve.tip import dexterity_value as dexterity_value
@@ -81,6 +82,7 @@ else:
             "Clearance": "assembly.constraints.clearance",
             "Contact": "assembly.constraints.contact",
             "ContactPair": "assembly.proximity.pairs",
+            "Crossings": "assembly.solve.crossings",
             "Cylindrical": "assembly.constraints.joints",
             "Dexterity": "assembly.constraints.dexterity",
             "Distance": "assembly.constraints.placements",
@@ -112,7 +114,7 @@ else:
             "SecondOrder": "assembly.solve.second_order",
             "Solution": "assembly.solve.solution",
             "Spherical": "assembly.constraints.joints",
-            "Status": "assembly.solve.solution",
+            "Status": "assembly.solve.scene",
             "Step": "assembly.tracking.tick",
             "Trace": "assembly.tracking.trace",
             "TrackLog": "assembly.tracking.log",

@@ -4,32 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
-from operator import is_
 from os import PathLike
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly._read_only import read_only
-from assembly.constraints.constraint import Constraint, structure_changes
-from assembly.constraints.expression import Expression
-from assembly.constraints.objectives import Objective
-from assembly.constraints.packing import Packed, lone_surfaces, pack, structure_of
+from assembly.constraints.constraint import structure_changes
+from assembly.constraints.contact import lone_surfaces
+from assembly.constraints.contents import Contents
+from assembly.constraints.packing import Packed, structure_of
 from assembly.constraints.scene_size import check_reach, scene_size
-from assembly.constraints.trim_contact import TrimContact
-from assembly.errors import InputError, items, vector
+from assembly.errors import InputError, vector
 from assembly.kinematics.body import Body, Frame, Point
-from assembly.kinematics.pose import Pose, pose_rows
+from assembly.kinematics.pose import pose_rows
 from assembly.proximity.pairs import inside
 from assembly.proximity.solid_contact import TRACK
 from assembly.solve.attempts import attempt, load
 from assembly.solve.interruption import CTRL_C, Interruption
 from assembly.solve.options import Options
 from assembly.solve.postures import postures_from
+from assembly.solve.scene import Scene, Status
 from assembly.solve.settings import ANY_POSE, GATHER, ITERATIONS, TOUCHING
-from assembly.solve.solution import Scene, Solution, Status
+from assembly.solve.solution import Solution
 
 if TYPE_CHECKING:
     from assembly.solve.mobility import Mobility
@@ -44,7 +42,7 @@ _WARM_SETTINGS = CTRL_C.fill(Options().settings(warm=True))
 MOST_CROWDING = 16
 
 
-class Assembly:
+class Assembly(Contents):
     """A scene: rigid bodies, constraints between them, an objective.
 
     Parameters
@@ -59,123 +57,17 @@ class Assembly:
     """
 
     def __init__(self, bodies: Iterable[Body] = ()) -> None:
-        self._bodies: list[Body] = []
-        self._named: dict[str, Body] = {}
-        self._constraints: list[Constraint] = []
-        self._taken: set[str] = set()  # names of constraints
-        self._objectives: list[tuple[float, Objective]] = []
         self._packed: Packed | None = None
         self._crowding = 1  # how many times as many places as clearances ask for
         self._scene: Scene | None = None
-        self._stood: tuple[list[Pose], Array] = [], np.empty((0, 7))
-        for body in items("bodies", bodies, "bodies, at least one"):
-            self.add(body)
+        super().__init__(bodies)
 
-    def __copy__(self) -> Self:
-        """A scene of the same bodies, constraints and terms, whose lists are its own."""
-        other = object.__new__(type(self))
-        other.__dict__.update(self.__dict__)
-        for name in ("_bodies", "_named", "_constraints", "_taken", "_objectives"):
-            setattr(other, name, self.__dict__[name].copy())
-        # Packed anew: what a solve of the one has changed there the other does not know.
-        other._packed = other._scene = None
-        return other
-
-    @property
-    def bodies(self) -> tuple[Body, ...]:
-        """Bodies in the order of q's rows."""
-        return tuple(self._bodies)
-
-    @property
-    def constraints(self) -> tuple[Constraint, ...]:
-        """Constraints in the order they were given."""
-        return tuple(self._constraints)
-
-    @property
-    def objectives(self) -> tuple[tuple[float, Objective], ...]:
-        """Terms with their signs: 1 minimized, -1 maximized."""
-        return tuple(self._objectives)
+    def _has_changed(self) -> None:
+        # Packed anew: of copies what a solve of the one has changed there the other does not know.
+        self._packed = self._scene = None
 
     def __repr__(self) -> str:
         return f"Assembly({len(self._bodies)} bodies, {len(self._constraints)} constraints)"
-
-    def body(self, name: str) -> Body:
-        """The body of that name."""
-        if isinstance(name, str) and name in self._named:
-            return self._named[name]
-        known = ", ".join(repr(body.name) for body in self._bodies)
-        raise InputError(f"name is {name!r}; expected " + (f"one of {known}" if known else "a body, but there is none"))
-
-    def add(self, body: Body) -> Body:
-        """Add a body and return it."""
-        if not isinstance(body, Body):
-            raise TypeError(f"body is {body!r}; expected a Body")
-        other = self._named.get(body.name)
-        if other is body:
-            raise InputError(f"body {body.name!r} is in the assembly already; expected each body once")
-        if other is not None:
-            raise InputError(f"body has the name {body.name!r} of another body; expected distinct names")
-        self._bodies.append(body)
-        self._named[body.name] = body
-        self._packed = None
-        return body
-
-    def constrain(self, *constraints: Constraint) -> None:
-        """Add constraints; their names must be distinct and their bodies in the assembly."""
-        for constraint in constraints:
-            if not isinstance(constraint, Constraint):
-                raise TypeError(
-                    f"constraint is {constraint!r}; expected a Contact or a trim of one, a Clearance, a joint, "
-                    "a coupling or an Expression"
-                )
-            self._check_bodies(constraint.name, constraint.bodies)
-            if constraint.name in self._taken:
-                raise InputError(f"constraint name {constraint.name!r} is taken; expected distinct names, say name=...")
-            if isinstance(constraint, TrimContact) and constraint.contact not in self._constraints:
-                raise InputError(
-                    f"constraint {constraint.name!r} keeps contact {constraint.contact.name!r}, which is not in the "
-                    "assembly; expected its contact to be constrained before it"
-                )
-            if constraint.bodies and all(body.fixed for body in constraint.bodies):
-                raise InputError(f"constraint {constraint.name!r} is between two fixed bodies; expected one that moves")
-            self._constraints.append(constraint)
-            self._taken.add(constraint.name)
-            self._packed = None
-
-    def minimize(self, *objectives: Objective) -> None:
-        """Add terms to the objective."""
-        self._add_terms(1.0, objectives)
-
-    def maximize(self, *objectives: Objective) -> None:
-        """Subtract terms from the objective."""
-        self._add_terms(-1.0, objectives)
-
-    def _add_terms(self, sign: float, objectives: Iterable[Objective]) -> None:
-        for objective in objectives:
-            if not isinstance(objective, Objective):
-                raise TypeError(f"objective is {objective!r}; expected an objective such as PointDistance or Posture")
-            if isinstance(objective, Expression) and objective.count != 1:
-                raise InputError(f"objective {objective.name!r} has {objective.count} values; expected one")
-            self._check_bodies(repr(objective), objective.bodies)
-            self._objectives.append((sign, objective))
-            self._packed = None
-
-    def _check_bodies(self, what: str, bodies: Iterable[Body]) -> None:
-        for body in bodies:
-            if self._named.get(body.name) is not body:
-                known = ", ".join(repr(other.name) for other in self._bodies) or "no bodies yet"
-                raise InputError(f"{what} is on body {body.name!r}; expected a body of this assembly: {known}")
-
-    @property
-    def q(self) -> Array:
-        """Where the bodies stand, (n, 7), read-only; set the pose of a body instead."""
-        poses = [body.pose for body in self._bodies]
-        before, q = self._stood
-        # Poses do not change, bodies get others: those of the last call are compared in a fraction of the time.
-        if len(before) != len(poses) or not all(map(is_, before, poses)):
-            q = np.array([pose.row for pose in poses]).reshape(-1, 7)
-            self._stood = poses, q
-        return read_only(q)
 
     def packed(self) -> Packed:
         """The scene as the compiled loop reads it; made at first use."""
@@ -193,7 +85,7 @@ class Assembly:
         if self._packed is None:
             if all(body.fixed for body in self._bodies):
                 raise InputError(f"bodies are {[body.name for body in self._bodies]}, none moving; expected one")
-            packed = pack(self._bodies, self._constraints, self._objectives, self._crowding)
+            packed = Packed(self._bodies, self._constraints, self._objectives, self._crowding)
             self._scene = Scene(
                 self.bodies, self.constraints, tuple(packed.contacts), tuple(packed.sides), packed.scale
             )
@@ -226,9 +118,10 @@ class Assembly:
         time_limit : float, optional
             Seconds after which the solve ends with `Status.TIME_LIMIT`, at the last pose that held if there was one.
         callback : callable, optional
-            Called with the iteration, the objective and the feasibility (in the scene's unit) every 50 ms, or after a
-            step that takes longer; where it returns True the solve ends with `Status.STOPPED`. What it raises is
-            raised here. Ctrl-C is answered as often, with or without a callback; the scene stays usable.
+            Called with the iteration, the objective and the feasibility (in the scene's unit; nan and inf before they
+            are known) every 50 ms, or after a step that takes longer; where it returns True the solve ends with
+            `Status.STOPPED`. What it raises is raised here. Ctrl-C is answered as often, with or without a callback;
+            the scene stays usable.
         **options
             See `Options`.
 
@@ -358,8 +251,9 @@ class Assembly:
         -------
         list of Solution
             The successful ones, the smallest objective first. Poses within 1e-6 of each other (lengths over the scene's
-            size, radians) are one. A `Posture` without a reference, and the objective of a scene that has none, are
-            measured from the bodies' poses in all of them.
+            size, radians) are one, and so are two between which all poses on the straight way are as good. A
+            `Posture` without a reference, and the objective of a scene that has none, are measured from the bodies'
+            poses in all of them.
         """
         from assembly.studies.multistart import solve_all
 
@@ -429,7 +323,12 @@ class Assembly:
         return Tracker(self, follow, **options)
 
     def mobility(
-        self, q: ArrayLike | Solution | None = None, *, drives: bool = True, tolerance: float | None = None
+        self,
+        q: ArrayLike | Solution | None = None,
+        *,
+        drives: bool = True,
+        tolerance: float | None = None,
+        time_limit: float | None = None,
     ) -> Mobility:
         """Degrees of freedom at a pose, free motions, redundant and conflicting constraints.
 
@@ -442,6 +341,9 @@ class Assembly:
             Whether driven values count as constraints.
         tolerance : float, optional
             Singular values below it count as zero; see `Mobility.tolerance`.
+        time_limit : float, optional
+            Seconds for the counts and free motions, and as many again for each of what is found when it is read:
+            `finite_dof`, `redundant_sets`, `conflicting_sets`, a `trajectory`.
 
         Returns
         -------
@@ -452,6 +354,8 @@ class Assembly:
         ------
         InputError
             Wrong shapes, a contact without a pair at the pose, a solution of another assembly.
+        TimeoutError
+            The time limit was over before: half of a rank says nothing.
         """
         from assembly.solve.mobility import Mobility
 
@@ -466,7 +370,16 @@ class Assembly:
         else:
             state = self._start(packed, None if q is None else pose_rows("q", q, len(self._bodies)), None)
             fit = Options.fit
-        return Mobility.at(self._scene, packed, state, solved=solved, drives=bool(drives), tolerance=tolerance, fit=fit)
+        return Mobility.at(
+            self._scene,
+            packed,
+            state,
+            solved=solved,
+            drives=bool(drives),
+            tolerance=tolerance,
+            fit=fit,
+            time_limit=time_limit,
+        )
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the scene as JSON; `asm.load` reads it back."""

@@ -9,9 +9,10 @@ from assembly.constraints.tracked_sizes import check_parameters
 from assembly.errors import InputError
 from assembly.geometry.face import Face
 from assembly.geometry.smooth_faces import has_creases
+from assembly.geometry.surface import NurbsSurface
 from assembly.kinematics.body import Body, BodyFace
 
-__all__ = ["Contact", "side_faces"]
+__all__ = ["Contact", "lone_surfaces", "side_face", "side_faces"]
 
 
 class Contact(Constraint):
@@ -108,6 +109,17 @@ class Contact(Constraint):
 def side_faces(side: Body | BodyFace) -> tuple[Face, ...]:
     """The faces that take part on a side of a contact."""
     return (side.face,) if isinstance(side, BodyFace) else tuple(part.face for part in side.faces)
+
+
+def side_face(side: Body | BodyFace) -> BodyFace:
+    """The only face of a side."""
+    return side if isinstance(side, BodyFace) else side.faces[0]
+
+
+def lone_surfaces(sides: tuple[Body | BodyFace, Body | BodyFace]) -> tuple[NurbsSurface, NurbsSurface] | None:
+    """The two surfaces of a contact, if each of its sides has one face."""
+    f, g = (side_faces(side) for side in sides)
+    return (f[0].surface, g[0].surface) if len(f) == len(g) == 1 else None
 
 
 def _has_edges(face: Face) -> bool:

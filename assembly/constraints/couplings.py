@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from itertools import product
 from typing import Any
 
 from assembly.constraints.constraint import Constraint, Coordinate, Equation, Freedom, words
 from assembly.constraints.joint import Joint, Offset
 from assembly.constraints.primitives import SLIDE
 from assembly.errors import InputError, bounded, number
+from assembly.kinematics.body import Body
 
 __all__ = ["Coupling", "Gear", "RackPinion"]
 
@@ -63,6 +65,21 @@ class Coupling(Constraint):
     def follower(self) -> Freedom:
         """The freedom that follows."""
         return self._follower
+
+    @property
+    def meshing(self) -> tuple[tuple[Body, Body], ...]:
+        """The pairs of bodies that may be in each other as wheels are: the one that turns in each of the two joints.
+
+        Where the joints have a body in common, a frame or an arm, these are the others; where they have none, those
+        that are not fixed, all of them.
+        """
+        first, second = ({id(body): body for body in side.joint.bodies} for side in (self._leader, self._follower))
+        shared = first.keys() & second.keys()
+
+        def turning(bodies: dict[int, Body]) -> list[Body]:
+            return [body for key, body in bodies.items() if key not in shared and (shared or not body.fixed)]
+
+        return tuple(product(turning(first), turning(second)))
 
     @property
     def equations(self) -> tuple[Equation, ...]:

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly._address import clock_address
-from assembly.constraints import addresses, layout
+from assembly.constraints import addresses, layout, watch_packing
 from assembly.constraints.blocks import FACTORIZE_AT, SOLVE_AT
 from assembly.constraints.clearance import Clearance
 from assembly.constraints.constraint import Constraint, structure_changes
-from assembly.constraints.contact import Contact, side_faces
+from assembly.constraints.contact import Contact, side_face
 from assembly.constraints.coordinates_at import coordinates_at
 from assembly.constraints.couplings import Coupling
 from assembly.constraints.elimination import FEW, block_record
@@ -30,15 +30,13 @@ from assembly.constraints.scene_writer import SceneWriter
 from assembly.constraints.term_packing import TermPacking, natural_unit
 from assembly.constraints.trim_contact import TrimContact
 from assembly.constraints.turns import Turns
-from assembly.constraints.watch_packing import LAST_REACH, guarded_pairs, is_of_surfaces, pack_watch, place_count
 from assembly.errors import FARTHEST, InputError
-from assembly.geometry.surface import NurbsSurface
-from assembly.kinematics.body import Body, BodyFace
+from assembly.kinematics.body import Body
 from assembly.proximity import watch_memory
 from assembly.proximity.events import fresh_memory, listed_places
 from assembly.proximity.solid_contact import TRACK
 
-__all__ = ["Packed", "lone_surfaces", "pack", "structure_of"]
+__all__ = ["Packed", "structure_of"]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
@@ -50,6 +48,14 @@ OUTGROWN = 1e4
 
 class Packed:
     """A packed scene: arrays for the loop, and what is needed to refresh them between solves.
+
+    Parameters
+    ----------
+    bodies, constraints
+    objectives : sequence of (sign, term)
+        1 to minimize, -1 to maximize; a posture where there is none.
+    places : int
+        Clearances have so many times the places they ask for.
 
     Attributes
     ----------
@@ -109,13 +115,13 @@ class Packed:
         trimmed = {item.contact.name for item in constraints if isinstance(item, TrimContact)}
         self.whole = [contact.name in trimmed or not contact.edges for contact in self.contacts]
         self.sides = [
-            (_face(contact.a), _face(contact.b)) if whole else (contact.a, contact.b)
+            (side_face(contact.a), side_face(contact.b)) if whole else (contact.a, contact.b)
             for contact, whole in zip(self.contacts, self.whole, strict=True)
         ]
         self.clearances = [constraint for constraint in constraints if isinstance(constraint, Clearance)]
-        self.guarded = guarded_pairs(self.clearances, bodies)
+        self.guarded = watch_packing.guarded_pairs(self.clearances, bodies)
         self.places = [
-            places * place_count(clearance, pairs)
+            places * watch_packing.place_count(clearance, pairs)
             for clearance, pairs in zip(self.clearances, self.guarded, strict=True)
         ]
         self.guards = sum(self.places)
@@ -131,7 +137,7 @@ class Packed:
         self._memory = np.empty(0)
         if self.guards:
             # The first look sees what crosses at the start as well, if it is no deeper than this.
-            self._memory = fresh_memory(sum(map(len, self.guarded)), self.guards, LAST_REACH)
+            self._memory = fresh_memory(sum(map(len, self.guarded)), self.guards, watch_packing.LAST_REACH)
 
     def _write(
         self,
@@ -199,7 +205,9 @@ class Packed:
         writer.header[layout.WATCH] = -1
         if self.guards:
             given = list(zip(self.contacts, self.sides, self.whole, strict=True))
-            writer.header[layout.WATCH] = pack_watch(writer, self.clearances, self.guarded, self.places, given)
+            writer.header[layout.WATCH] = watch_packing.pack_watch(
+                writer, self.clearances, self.guarded, self.places, given
+            )
         rows.add_trims(self.contacts)
         rows.add_joints(slots)
         rows.add_expressions()
@@ -244,25 +252,8 @@ class Packed:
 
     def table_at(self, state: Array) -> Table:
         """The table with the rows of clearances as a state has them; in the packed one they have no contacts."""
-        table = self.table
-        if self.guards and state.size > self.memory_at:
-            table = table.copy()
-            record = table[layout.WATCH]
-            rows = table[table[layout.ROW_TABLE] + layout.ROW * table[layout.FIRST_GUARD] :][: layout.ROW * self.guards]
-            pairs = table[table[record + watch_memory.PAIR_TABLE] :][
-                : watch_memory.PAIR_RECORD * table[record + watch_memory.PAIRS]
-            ]
-            pairs = pairs.reshape(-1, watch_memory.PAIR_RECORD)
-            for row, (place, number, given) in zip(rows.reshape(-1, layout.ROW), self._placed(state), strict=True):
-                if place >= 0:
-                    pair = pairs[place]
-                    row[[layout.BODY_F, layout.BODY_G]] = pair[[watch_memory.PAIR_F, watch_memory.PAIR_G]]
-                    row[layout.SURFACE_F : layout.SHELL_G + 1] = pair[
-                        watch_memory.PAIR_SURFACE_F : watch_memory.PAIR_SHELL_G + 1
-                    ]
-                    least = pair[watch_memory.PAIR_MINIMUM] + watch_memory.IN_PLACE * given
-                    row[layout.MINIMUM], row[layout.GUARD_NUMBER] = least, number
-        return table
+        has_guards = self.guards > 0 and state.size > self.memory_at
+        return watch_packing.table_with_guards(self.table, self._placed(state)) if has_guards else self.table
 
     def may_have_outgrown(self) -> bool:
         """Whether the size rests on values and places alone and the values have become others by far."""
@@ -302,7 +293,7 @@ class Packed:
             record[[FACTORIZE_AT, SOLVE_AT]] = addresses.blocks()
         if self.pair_rows:
             table[layout.CONTACT_ROWS_AT] = addresses.contacts()
-        if any(self.whole) or any(is_of_surfaces(pair) for pairs in self.guarded for pair in pairs):
+        if any(self.whole) or any(watch_packing.is_of_surfaces(pair) for pairs in self.guarded for pair in pairs):
             table[layout.START_AT : layout.EXTREMAL_AT + 1] = addresses.surfaces()
         if self.shells:
             table[[layout.TRACK_AT, layout.SEARCH_AT, layout.NEAREST_AT]] = addresses.solids()
@@ -403,27 +394,3 @@ def structure_of(constraints: Sequence[Constraint]) -> tuple[tuple[object, ...],
         if isinstance(item, (Joint, Coupling))
         for equation in item.equations
     )
-
-
-def lone_surfaces(sides: tuple[Body | BodyFace, Body | BodyFace]) -> tuple[NurbsSurface, NurbsSurface] | None:
-    """The two surfaces of a contact, if each of its sides has one face."""
-    f, g = (side_faces(side) for side in sides)
-    return (f[0].surface, g[0].surface) if len(f) == len(g) == 1 else None
-
-
-def _face(side: Body | BodyFace) -> BodyFace:
-    """The only face of a side."""
-    return side if isinstance(side, BodyFace) else side.faces[0]
-
-
-def pack(
-    bodies: Sequence[Body],
-    constraints: Sequence[Constraint],
-    objectives: Sequence[tuple[float, Objective]],
-    places: int = 1,
-) -> Packed:
-    """Pack a scene. `objectives` are (sign, term): 1 to minimize, -1 to maximize; a posture where there is none.
-
-    Clearances have so many times the places they ask for.
-    """
-    return Packed(bodies, constraints, objectives, places)

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
+from assembly.constraints import layout
 from assembly.constraints.clearance import Clearance
 from assembly.constraints.contact import Contact, side_faces
 from assembly.constraints.scene_writer import SceneWriter
@@ -21,8 +23,9 @@ from assembly.proximity.solid import is_one_smooth
 from assembly.proximity.spine_packing import pack_spine
 from assembly.proximity.tree_packing import pack_tree
 
-__all__ = ["LAST_REACH", "guarded_pairs", "is_of_surfaces", "pack_watch", "place_count"]
+__all__ = ["LAST_REACH", "guarded_pairs", "is_of_surfaces", "pack_watch", "place_count", "table_with_guards"]
 
+Table = NDArray[np.int64]
 Pair = tuple[Body, Body]
 Side = Body | BodyFace
 # A contact of the scene, its sides, and whether it is one of their whole surfaces, without edges.
@@ -103,6 +106,29 @@ def pack_watch(
     # Where one is asked for, its address is written when the scene is ready.
     record[watch_memory.MARK_AT] = pairs.any_in_place
     return writer.add(record)[0]
+
+
+def table_with_guards(table: Table, placed: Sequence[Sequence[int]]) -> Table:
+    """A table whose rows of clearances have contacts.
+
+    `placed` has for every row its pair or -1, the number of its contact, and 1 where that is in the place of a given
+    one.
+    """
+    table = table.copy()
+    record = table[layout.WATCH]
+    first = table[layout.ROW_TABLE] + layout.ROW * table[layout.FIRST_GUARD]
+    rows = table[first:][: layout.ROW * len(placed)].reshape(-1, layout.ROW)
+    size = watch_memory.PAIR_RECORD * table[record + watch_memory.PAIRS]
+    pairs = table[table[record + watch_memory.PAIR_TABLE] :][:size].reshape(-1, watch_memory.PAIR_RECORD)
+    for row, (place, number, given) in zip(rows, placed, strict=True):
+        if place >= 0:
+            pair = pairs[place]
+            row[[layout.BODY_F, layout.BODY_G]] = pair[[watch_memory.PAIR_F, watch_memory.PAIR_G]]
+            shapes = pair[watch_memory.PAIR_SURFACE_F : watch_memory.PAIR_SHELL_G + 1]
+            row[layout.SURFACE_F : layout.SHELL_G + 1] = shapes
+            row[layout.MINIMUM] = pair[watch_memory.PAIR_MINIMUM] + watch_memory.IN_PLACE * given
+            row[layout.GUARD_NUMBER] = number
+    return table
 
 
 class _PairPacking:

@@ -45,6 +45,7 @@ from assembly.proximity.spine_minima import MINIMA
 from assembly.proximity.spine_parts import near_parts, parts_beyond
 from assembly.proximity.spine_search import BOX, BOXES, search_spines
 from assembly.proximity.watch_memory import (
+    ABORTED,
     ALLOWANCE,
     CALLS,
     CLOCK,
@@ -59,6 +60,7 @@ from assembly.proximity.watch_memory import (
     FIRST,
     FIRST_REACH,
     GIVEN_COUNT,
+    GO_ON_AT,
     HIGH,
     LAST_REACH,
     LENGTHS,
@@ -84,6 +86,7 @@ from assembly.proximity.watch_memory import (
     PLACE_MEMORY,
     REACH,
     ROOTS,
+    SLICE,
     SPINE_F,
     SPINE_G,
     STATE,
@@ -359,9 +362,11 @@ def look_at_due(table, pool, watch, memory, q, tracked, how, first, most):
         if p != first and not is_due(table, watch, memory, p, tracked, how, most):
             continue
         if p != first and table[watch + CLOCK] != 0 and call_address(table[watch + CLOCK], ()) > memory[DEADLINE]:
-            # Who set it is told, and goes on in another call.
-            memory[DEADLINE] = -1.0
-            break
+            if table[watch + GO_ON_AT] == 0 or call_address(table[watch + GO_ON_AT], ()) == ABORTED:
+                # Who set it is told, and goes on in another call.
+                memory[DEADLINE] = -1.0
+                break
+            memory[DEADLINE] = call_address(table[watch + CLOCK], ()) + SLICE
         if is_by_patches(table, watch, p) and not with_patches:
             with_patches = True
             candidates = np.empty((CANDIDATES, 2), np.int64)

@@ -45,10 +45,14 @@ from assembly.proximity.spine_curve import both_radii
 # The record of a watch: counts; where pairs begin; the row of `tracked` that is the first place; address of
 # `track_solids`; where its lengths are in the pool; how many lists there are, where they begin; whether corners are
 # listed (`corners.py`); address of what tells the time, 0 where looks have as much as they need; address of
-# `mark_places` (`contact_place.py`), 0 where no contact's bodies have a least gap above zero.
-PAIRS, PLACES, PAIR_TABLE, FIRST, TRACK_SOLIDS, LENGTHS, LISTS, LIST_TABLE, CORNERS, CLOCK, MARK_AT, WATCH_RECORD = (
-    0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11
-)  # fmt: skip
+# `mark_places` (`contact_place.py`), 0 where no contact's bodies have a least gap above zero; address of what says
+# between two parts of a long look whether it is to go on, 0 where nobody is asked.
+PAIRS, PLACES, PAIR_TABLE, FIRST, TRACK_SOLIDS, LENGTHS, LISTS, LIST_TABLE = 0, 1, 2, 3, 4, 5, 6, 7
+CORNERS, CLOCK, MARK_AT, GO_ON_AT, WATCH_RECORD = 8, 9, 10, 11, 12
+# Nanoseconds between two questions whether to go on, and answers: on, to an end with what there is, or nowhere, because
+# an exception throws all away.
+SLICE = 50_000_000
+GOES_ON, ENDS, ABORTED = 0, 1, 2
 # Its lengths: roots nearer to each other than the first, and along the surfaces, are one; the reach of a first look;
 # the largest.
 NEGLECT, FIRST_REACH, LAST_REACH, LENGTH_COUNT = 0, 1, 2, 3

@@ -24,9 +24,11 @@ from assembly.solve.settings import (
     GATHER,
     HISTORY,
     ITERATIONS,
+    OBJECTIVE,
     SCATTER,
     SOLVED,
     UNSURE,
+    VIOLATION,
 )
 
 __all__ = ["attempt", "begin", "load"]
@@ -127,6 +129,7 @@ def _holds(outcome: Outcome) -> bool:
 def _run(packed: Packed, interruption: Interruption, table: Table, settings: Array, state: Array) -> Outcome:
     history = np.empty((min(int(settings[ITERATIONS]), MOST_HISTORY) + 1, HISTORY))
     if interruption.callback is not None:
+        state[packed.results_at + OBJECTIVE], state[packed.results_at + VIOLATION] = np.nan, np.inf
         interruption.watched = (state, packed.results_at)
     return Outcome(solve_program(table, packed.pool, settings, state, history, packed.tips), state, history)
 

@@ -12,8 +12,8 @@ import math
 from assembly._address import call_address
 from assembly._kernel import kernel
 from assembly.constraints.layout import CLOCK_AT, WATCH
-from assembly.proximity.watch_memory import DEADLINE, EARLIER, LOOKS, PAIRS
-from assembly.solve.settings import BUDGET, CARRIED, CARRIES
+from assembly.proximity.watch_memory import CLOCK, DEADLINE, EARLIER, GO_ON_AT, LOOKS, PAIRS
+from assembly.solve.settings import ASK_AT, BUDGET, CARRIED, CARRIES, TICK
 
 # No look begins, and no step from a pose that holds, where so much of a budget is spent: either may take as long as the
 # rest of it.
@@ -38,7 +38,8 @@ def is_cut(table, memory):
 def begin_tick(table, settings, results, memory):
     """When this call began; how many steps it goes on from; how many looks there were before it.
 
-    These are infinitely many where there is no budget, or a tick has to make a step: then looks take their time.
+    These are infinitely many where there is no budget, or a tick has to make a step: then looks take their time. Those
+    of solves ask whether they are to go on (`guards.py`).
     """
     begin = call_address(table[CLOCK_AT], ()) if settings[BUDGET] > 0.0 else 0
     is_new = results[CARRIED] == 0.0
@@ -47,6 +48,11 @@ def begin_tick(table, settings, results, memory):
     looks = math.inf
     if table[WATCH] >= 0:
         memory[DEADLINE] = math.inf
+        # Looks of ticks are short, and with a budget end by it.
+        asks = settings[TICK] == 0.0
+        table[table[WATCH] + GO_ON_AT] = int(settings[ASK_AT]) if asks else 0
+        if asks:
+            table[table[WATCH] + CLOCK] = table[CLOCK_AT]
         if is_new:
             memory[EARLIER] = memory[LOOKS]
         if settings[CARRIES] == 1.0 and memory[LOOKS] - memory[EARLIER] < LOOKS_ALONE * table[table[WATCH] + PAIRS]:

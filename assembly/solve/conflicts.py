@@ -11,6 +11,7 @@ near to holding all without an end, that was not seen.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -18,10 +19,11 @@ from numpy.typing import NDArray
 
 from assembly.constraints.packing import Packed
 from assembly.constraints.trim_contact import TrimContact
+from assembly.solve.interruption import CTRL_C, Interruption
 from assembly.solve.jacobian import NoPairError, rows_of
 from assembly.solve.rank import HELD
+from assembly.solve.scene import Scene, Status
 from assembly.solve.settings import VIOLATION
-from assembly.solve.solution import Scene, Status
 from assembly.solve.starts import far_starts, near_starts
 from assembly.solve.subset import Problem, Snapshot
 
@@ -47,8 +49,12 @@ class _Start(NamedTuple):
     gathers: bool
 
 
-def conflicting_sets(snapshot: Snapshot) -> list[tuple[int, ...]]:
-    """Disjoint minimal sets of constraints that cannot hold together, by their places; [] where all can."""
+def conflicting_sets(snapshot: Snapshot, interruption: Interruption) -> list[tuple[int, ...]]:
+    """Disjoint minimal sets of constraints that cannot hold together, by their places; [] where all can.
+
+    TimeoutError where the interruption's time is over before: what was found by then may not be all there is.
+    """
+    attempt = partial(_attempt, snapshot, interruption)
     bodies, size = snapshot.scene.bodies, snapshot.scene.scale
     far = far_starts(bodies, snapshot.q, size, SCATTERED)
     starts = [_Start(q, gathers=False) for q in near_starts(bodies, snapshot.q, size)]
@@ -57,7 +63,7 @@ def conflicting_sets(snapshot: Snapshot) -> list[tuple[int, ...]]:
     left = list(range(len(snapshot.scene.constraints)))
     found: list[tuple[int, ...]] = []
     while left:
-        violations = _attempt(snapshot, left, starts)
+        violations = attempt(left, starts)
         if violations is None:
             break
         least = max(IDLE * violations.max(), LEAST)
@@ -67,14 +73,14 @@ def conflicting_sets(snapshot: Snapshot) -> list[tuple[int, ...]]:
         contacts = {item.contact.name for item in (items[k] for k in loaded) if isinstance(item, TrimContact)}
         core = [k for k in left if k in loaded or items[k].name in contacts]
         # What is violated and can hold was only stuck, at a pole of an angle say, and shows nothing of the others.
-        if len(core) < len(left) and _attempt(snapshot, core, starts) is None:
+        if len(core) < len(left) and attempt(core, starts) is None:
             break
         for k in list(core):
             without = [other for other in core if other != k]
-            if without and _attempt(snapshot, without, starts) is not None:
+            if without and attempt(without, starts) is not None:
                 core = without
         # What can hold together is stuck at some places and not at others: few constraints are asked from many starts.
-        if _attempt(snapshot, core, more) is None:
+        if attempt(core, more) is None:
             break
         found.append(tuple(core))
         left = [k for k in left if k not in core]
@@ -92,11 +98,13 @@ def conflicts_at(scene: Scene, packed: Packed, state: Array, fit: float) -> list
     off = float(state[packed.results_at + VIOLATION]) / packed.scale
     held = max(min(max(fit, HELD) if off > fit else HELD, PART * off), LEAST)
     there = state if rows is None else rows.state
-    found = conflicting_sets(Snapshot(scene, packed, there, rows, solved=True, held=held))
+    found = conflicting_sets(Snapshot(scene, packed, there, rows, solved=True, held=held), CTRL_C)
     return [tuple(scene.constraints[k].name for k in places) for places in sorted(found)]
 
 
-def _attempt(snapshot: Snapshot, which: Sequence[int], starts: Sequence[_Start]) -> Array | None:
+def _attempt(
+    snapshot: Snapshot, interruption: Interruption, which: Sequence[int], starts: Sequence[_Start]
+) -> Array | None:
     """Least violations of some constraints, from the start where they were least; None if they may hold.
 
     They may where a solve that found no end came nearer to it than all that ended at a least violation; but where a
@@ -106,7 +114,7 @@ def _attempt(snapshot: Snapshot, which: Sequence[int], starts: Sequence[_Start])
     best: Array | None = None
     ended = unended = np.inf
     for start in starts:
-        solution = problem.solve(start.q, gathers=start.gathers)
+        solution = problem.solve(start.q, interruption, gathers=start.gathers)
         if problem.holds(solution):
             return None
         violations = _of_places(problem, problem.violations(solution), snapshot, which)

@@ -1,32 +1,75 @@
-"""Bodies that cross at the pose of a solution."""
+"""Bodies that cross at the pose of a solution.
+
+Of all pairs of bodies those are looked at whose boxes meet: bodies are within the hulls of their control points. Looks
+go on in slices, between which the interpreter runs, so that Ctrl-C and a time limit are answered.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from itertools import combinations
+from time import perf_counter_ns
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from assembly.constraints import layout
 from assembly.constraints.clearance import Clearance
 from assembly.constraints.constraint import Constraint
-from assembly.constraints.contact import Contact
+from assembly.constraints.contact import Contact, side_faces
+from assembly.constraints.couplings import Coupling
 from assembly.constraints.joint import Joint
 from assembly.constraints.packing import Packed
 from assembly.kinematics.body import Body
+from assembly.kinematics.pose import rotation_matrix
 from assembly.proximity import watch, watch_memory
+from assembly.proximity.facet_tree import FacetTree
 from assembly.proximity.solid_contact import PAIR_GAP, TRACK
+from assembly.solve.interruption import Interruption
 
 if TYPE_CHECKING:
     from assembly.solve.solution import Solution
 
-__all__ = ["crossing_pairs", "free_pairs", "joined_pairs"]
+__all__ = ["Crossings", "crossings_of", "free_pairs", "joined_pairs"]
 
+Array = NDArray[np.float64]
 Pair = tuple[Body, Body]
 # What counts as crossing where no more is called touching, and how deep looks see, in parts of the scene's size. A deep
 # look of wires that cross often finds so much that it lacks room for the rest, so that there are several.
 CROSSING, DEPTHS = 1e-8, (0.005, 0.015, 0.05)
+# Contacts of a pair, or of a body in many, that may be near at a time. What is beyond is known where bodies cross by
+# more than looks take for nothing.
+PLACES = 8
+# What rounding may make of boxes, in parts of where they end.
+ROUNDING = 1e-12
+
+
+@dataclass(frozen=True)
+class Crossings:
+    """Which bodies cross at a pose, as far as it was looked at.
+
+    Attributes
+    ----------
+    pairs : tuple of (name, name)
+        Bodies that cross elsewhere than at their contacts.
+    unseen : tuple of (name, name)
+        Bodies of which nobody knows, because the time limit was over: they may cross.
+    """
+
+    pairs: tuple[tuple[str, str], ...]
+    unseen: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether all pairs were looked at."""
+        return not self.unseen
+
+    @property
+    def is_clear(self) -> bool:
+        """Whether all pairs were looked at and none crosses."""
+        return not self.pairs and not self.unseen
 
 
 class _Watched(Clearance):
@@ -35,7 +78,8 @@ class _Watched(Clearance):
     corners = False
 
     def __init__(self, pairs: Sequence[Pair], name: str) -> None:
-        super().__init__(dict.fromkeys(body for pair in pairs for body in pair), name=name)
+        bodies = dict.fromkeys(body for pair in pairs for body in pair)
+        super().__init__(bodies, name=name, places=PLACES * (1 + min(len(pairs), len(bodies))))
         self._pairs = list(pairs)
 
     def pairs(self, bodies: Sequence[Body]) -> list[Pair]:
@@ -56,48 +100,95 @@ def _shaped_pairs(bodies: Iterable[Body], constraints: Iterable[Constraint]) -> 
 
 
 def _ties(constraints: Iterable[Constraint]) -> set[frozenset[int]]:
-    return {_key(*item.bodies) for item in constraints if isinstance(item, Joint)}
+    """Pairs of bodies that a joint ties, or a coupling, whose teeth are in each other."""
+    ties = {_key(*item.bodies) for item in constraints if isinstance(item, Joint)}
+    return ties | {_key(*pair) for item in constraints if isinstance(item, Coupling) for pair in item.meshing}
 
 
 def free_pairs(bodies: Iterable[Body], constraints: Sequence[Constraint]) -> list[Pair]:
-    """Pairs of bodies that no joint ties directly, but those that a clearance lets overlap."""
+    """Pairs of bodies that no joint or coupling ties directly, but those that a clearance lets overlap."""
     ties = _ties(constraints)
     return [pair for pair in _shaped_pairs(bodies, constraints) if _key(*pair) not in ties]
 
 
 def joined_pairs(bodies: Iterable[Body], constraints: Sequence[Constraint]) -> list[Pair]:
-    """Pairs of bodies that a joint ties directly, but those that a clearance lets overlap."""
+    """Pairs of bodies that a joint or a coupling ties directly, but those that a clearance lets overlap."""
     ties = _ties(constraints)
     return [pair for pair in _shaped_pairs(bodies, constraints) if _key(*pair) in ties]
 
 
-def crossing_pairs(solution: Solution, pairs: Sequence[Pair]) -> tuple[tuple[str, str], ...]:
-    """Names of those pairs whose bodies cross elsewhere than at contacts that the scene has, or are in each other.
+def crossings_of(solution: Solution, pairs: Sequence[Pair], interruption: Interruption) -> Crossings:
+    """Which of those pairs cross elsewhere than at contacts that the scene has, or are in each other.
 
     Raises
     ------
     InputError
         Bodies of sizes that clearances cannot have.
     """
-    if not pairs:
-        return ()
+    near = _near(solution, pairs)
+    if not near:
+        return Crossings(())
     bodies = solution._scene.bodies
     contacts = [item for item in solution._scene.constraints if isinstance(item, Contact)]
     name = "crossings"
     while any(item.name == name for item in contacts):
         name += "'"
-    packed = Packed(bodies, [*contacts, _Watched(pairs, name)], ())
-    found = _seen(packed, solution, len(contacts))
-    return tuple((a.name, b.name) for k, (a, b) in enumerate(pairs) if k in found)
+    watched = _Watched(near, name)
+    if not _known_shapes(near, interruption):
+        return Crossings((), _named(near))
+    packed = Packed(bodies, [*contacts, watched], ())
+    found, is_complete = _seen(packed, solution, len(contacts), interruption)
+    crossing = [pair for k, pair in enumerate(near) if k in found]
+    unseen = [] if is_complete else [pair for k, pair in enumerate(near) if k not in found]
+    return Crossings(_named(crossing), _named(unseen))
 
 
-def _seen(packed: Packed, solution: Solution, contacts: int) -> set[int]:
-    """Places of pairs that looks of several depths find to cross."""
+def _named(pairs: Sequence[Pair]) -> tuple[tuple[str, str], ...]:
+    return tuple((a.name, b.name) for a, b in pairs)
+
+
+def _near(solution: Solution, pairs: Sequence[Pair]) -> list[Pair]:
+    """Those pairs of bodies with shapes whose boxes, along the world's axes, meet."""
+    placed = zip(solution._scene.bodies, solution.q, strict=True)
+    boxes = {id(body): _box(body, row) for body, row in placed if body.faces}
+    low = np.array([[boxes[id(a)][0], boxes[id(b)][0]] for a, b in pairs]).reshape(-1, 2, 3)
+    high = np.array([[boxes[id(a)][1], boxes[id(b)][1]] for a, b in pairs]).reshape(-1, 2, 3)
+    meet = (low.max(axis=1) <= high.min(axis=1)).all(axis=1)
+    return [pair for pair, near in zip(pairs, meet.tolist(), strict=True) if near]
+
+
+def _box(body: Body, row: Array) -> tuple[Array, Array]:
+    """The lower and the upper corner of a box around a body at a pose."""
+    points = np.concatenate([face.face.surface.control_points.reshape(-1, 3) for face in body.faces])
+    points = points @ rotation_matrix(row[3:]).T + row[:3]
+    margin = ROUNDING * np.abs(points).max()
+    return points.min(axis=0) - margin, points.max(axis=0) + margin
+
+
+def _known_shapes(pairs: Iterable[Pair], interruption: Interruption) -> bool:
+    """Make what a look has to know of shapes, which takes longer than the look; whether there was time to.
+
+    Where there is no limit it is made as the scene is packed: of very many shapes it is not kept until then.
+    """
+    if not interruption.is_limited:
+        return True
+    for faces in dict.fromkeys(side_faces(body) for pair in pairs for body in pair):
+        FacetTree.of(faces)
+        if interruption.is_over():
+            return False
+    return True
+
+
+def _seen(packed: Packed, solution: Solution, contacts: int, interruption: Interruption) -> tuple[set[int], bool]:
+    """Places of pairs that looks of several depths find to cross, and whether all were looked at."""
     q = solution.q.copy()
     q[:, :3] = (q[:, :3] - packed.reference) / packed.scale
     count = watch_memory.PAIR_MEMORY * len(packed.guarded[0])
     deep = max(CROSSING, solution._touching)
-    found = set()
+    watch_at = packed.table[layout.WATCH]
+    # Where there is no clock looks are not cut.
+    packed.table[watch_at + watch_memory.CLOCK] = packed.table[layout.CLOCK_AT]
+    found: set[int] = set()
     for depth in DEPTHS:
         state = packed.new_state()
         memory = state[packed.memory_at :]
@@ -105,8 +196,14 @@ def _seen(packed: Packed, solution: Solution, contacts: int) -> set[int]:
         pairs[:, watch_memory.REACH] = depth
         tracked = np.full((packed.pair_rows, TRACK), np.nan)
         tracked[:contacts] = solution._parameters[:contacts]
-        watch.look(packed.table, packed.pool, packed.table[layout.WATCH], memory, q, tracked, watch.EVERYTHING)
+        is_cut = True
+        while is_cut and not interruption.is_over():
+            memory[watch_memory.DEADLINE] = perf_counter_ns() + watch_memory.SLICE
+            watch.look(packed.table, packed.pool, watch_at, memory, q, tracked, watch.EVERYTHING)
+            is_cut = memory[watch_memory.DEADLINE] < 0.0
         found |= set(np.flatnonzero(pairs[:, watch_memory.CROSSED] == 1.0).tolist())
         gaps = tracked[contacts:, PAIR_GAP]
         found |= {pair for gap, (pair, _) in zip(gaps, packed.listed(state), strict=True) if pair >= 0 and gap < -deep}
-    return found
+        if is_cut:
+            return found, False
+    return found, True

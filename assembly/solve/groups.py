@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from assembly.constraints.constraint import Constraint
 from assembly.kinematics.body import Body
+from assembly.solve.interruption import CTRL_C, Interruption
 from assembly.solve.jacobian import Rows, moving_columns
 from assembly.solve.rank import Balanced
 
@@ -46,11 +47,12 @@ def groups_of(
     counted: NDArray[np.bool_],
     tolerance: float | None = None,
     fit: float = 0.0,
+    interruption: Interruption = CTRL_C,
 ) -> list[Group]:
     """The groups of a scene, in the order of their first bodies, with those rows that are counted.
 
     A tolerance decides on rank if it is given, else what the rows' residuals make of the pose: up to `fit` they may be
-    what rows that repeat each other disagree by.
+    what rows that repeat each other disagree by. TimeoutError where the interruption's time is over before.
     """
     worst = float(np.abs(rows.residual[counted]).max(initial=0.0))
     places = {id(body): k for k, body in enumerate(bodies)}
@@ -74,5 +76,6 @@ def groups_of(
             dtype=np.int64,
         )
         jacobian = rows.jacobian[np.ix_(own, moving_columns(members))]
-        found.append(Group(members, own, Balanced.of(jacobian, worst, tolerance, fit)))
+        interruption.check("rank")
+        found.append(Group(members, own, Balanced.of(jacobian, worst, tolerance, fit, interruption)))
     return found

@@ -32,7 +32,10 @@ from assembly.proximity.solid_contact import FOLD, SLACK, TRACK
 from assembly.proximity.watch import USED
 from assembly.proximity.watch_memory import (
     ALLOWANCE,
+    CLOCK,
     CUT_SHORT,
+    DEADLINE,
+    GO_ON_AT,
     IN_PLACE,
     LAST_REACH,
     LENGTHS,
@@ -51,6 +54,7 @@ from assembly.proximity.watch_memory import (
     PLACE_MEMORY,
     PLACE_NUMBER,
     REACH,
+    SLICE,
     TURN,
     memory_places,
 )
@@ -121,8 +125,22 @@ def place_guards(table, memory, here, y, better_y, free, begins):
 
 @kernel(inner=True)
 def look_around(table, pool, memory, point, how):
-    """The watch's look at a point; whether rows changed."""
-    return call_address(table[LOOK_AT], (table, pool, table[WATCH], memory, point[0], point[1], how)) > 0
+    """The watch's look at a point; whether rows changed.
+
+    A long one asks between two slices whether it is to go on. Where what it is for is thrown away, it ends as one that
+    is cut (`budget.py`), and so do those that come after it; they say that rows changed: nothing is known to hold.
+    """
+    watch = table[WATCH]
+    asks = table[watch + GO_ON_AT] != 0 and table[watch + CLOCK] != 0
+    if asks and memory[DEADLINE] < 0.0:
+        return True
+    if asks:
+        memory[DEADLINE] = call_address(table[watch + CLOCK], ()) + SLICE
+    changed = call_address(table[LOOK_AT], (table, pool, watch, memory, point[0], point[1], how)) > 0
+    aborted = asks and memory[DEADLINE] < 0.0
+    if asks and not aborted:
+        memory[DEADLINE] = math.inf
+    return changed or aborted
 
 
 @kernel(inner=True)

@@ -1,7 +1,10 @@
 """What ends a solve before it is done: a time limit, a callback of the user's, Ctrl-C.
 
 The compiled loop runs without the interpreter. Every 50 ms at most (`pauses.py`) it calls an address in its settings:
-there the interpreter runs again, so that handlers of signals do, and an answer other than 0 ends the loop.
+there the interpreter runs again, so that handlers of signals do, and an answer other than 0 ends the loop. A look at
+very many pairs of bodies asks as often; what it returns is whole, but where an exception throws it away.
+
+Decompositions of large matrices run in a thread of their own, as they let nobody ask (`wait_for`).
 """
 
 from __future__ import annotations
@@ -10,19 +13,22 @@ import ctypes
 import threading
 from collections.abc import Callable, Iterator
 from time import perf_counter
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assembly._address import callback_address
 from assembly.errors import InputError, number
+from assembly.proximity.watch_memory import ABORTED, ENDS, GOES_ON, SLICE
+from assembly.solve.scene import Status
 from assembly.solve.settings import ASK_AT, COUNT, OBJECTIVE, OUT_OF_TIME, VIOLATION
-from assembly.solve.solution import Status
 
 __all__ = ["CTRL_C", "Interruption"]
 
 Array = NDArray[np.float64]
 Callback = Callable[[int, float, float], object]
+Answer = TypeVar("Answer")
 STATUSES = tuple(Status)
 
 
@@ -34,7 +40,8 @@ class Interruption:
     time_limit : float, optional
         Seconds from now.
     callback : callable, optional
-        Called with the iteration, the objective and the feasibility [the scene's unit]; True ends the solve.
+        Called with the iteration, the objective and the feasibility [the scene's unit]; True ends the solve. In a look
+        before the first iteration they are not known: nan and inf.
 
     Attributes
     ----------
@@ -68,9 +75,17 @@ class Interruption:
 
     def settings(self, settings: Array) -> Array:
         """Settings of a loop that asks here."""
-        settings = settings.copy()
+        return self.fill(settings.copy())
+
+    def fill(self, settings: Array) -> Array:
+        """The settings themselves, with the address to ask at."""
         settings[ASK_AT] = self._address
         return settings
+
+    @property
+    def is_limited(self) -> bool:
+        """Whether there is a time limit."""
+        return self._deadline < np.inf
 
     def is_over(self) -> bool:
         """Whether no other attempt is to be made; the exception of a callback, or a signal's, is raised here."""
@@ -81,6 +96,37 @@ class Interruption:
             self.reason = "time limit"
         return self.reason is not None
 
+    def check(self, what: str) -> None:
+        """Raise TimeoutError where the time limit is over before `what` is known; what a signal raised is raised, too.
+
+        For what has no part that means anything by itself, as a rank has none.
+        """
+        if self.is_over():
+            raise TimeoutError(f"{what} is not known yet where time_limit is over; raise time_limit or leave it out")
+
+    def wait_for(self, what: str, compute: Callable[[], Answer]) -> Answer:
+        """The answer of a call that is long and without the interpreter's lock, as decompositions are; see `check`.
+
+        It runs in another thread. One that is not waited for any more goes on to its end, and nobody hears of it.
+        """
+        answers: list[Answer] = []
+        errors: list[BaseException] = []
+
+        def work() -> None:
+            try:
+                answers.append(compute())
+            except BaseException as error:
+                errors.append(error)
+
+        thread = threading.Thread(target=work, daemon=True)
+        thread.start()
+        while thread.is_alive():
+            thread.join(1e-9 * SLICE)
+            self.check(what)
+        if errors:
+            raise errors[0]
+        return answers[0]
+
     def status(self, code: int) -> Status:
         """The status of a solve by the loop's code."""
         if code != OUT_OF_TIME:
@@ -88,40 +134,39 @@ class Interruption:
         return Status.STOPPED if self.reason == "callback" else Status.TIME_LIMIT
 
     def _answers(self) -> Iterator[int]:
-        answer = 0
+        answer = GOES_ON
         while True:
             try:
                 yield answer
-                answer = self._ask()
+                # What threw a solve away throws away all that it asks for on its way out.
+                answer = self._ask() if self._error is None else ABORTED
             except GeneratorExit:
                 return
             except BaseException as error:
-                self._error, answer = error, 1
+                self._error, answer = error, ABORTED
 
     def _ask(self) -> int:
         if perf_counter() > self._deadline:
             self.reason = "time limit"
-        elif self.callback is not None and self.watched is not None:
+        elif self.reason is None and self.callback is not None and self.watched is not None:
             state, results_at = self.watched
             progress = state[results_at:]
             if self.callback(int(progress[COUNT]), float(progress[OBJECTIVE]), float(progress[VIOLATION])):
                 self.reason = "callback"
-        return int(self.reason is not None)
+        return GOES_ON if self.reason is None else ENDS
 
 
 class _CtrlC(Interruption):
-    """That of solves without a limit or a callback: in the main thread alone, where handlers of signals run."""
+    """That of solves without a limit or a callback: in the main thread alone, where handlers of signals run.
+
+    Settings that many solves share are filled once.
+    """
 
     def settings(self, settings: Array) -> Array:
         if threading.get_ident() == threading.main_thread().ident:
             return settings
         settings = settings.copy()
         settings[ASK_AT] = 0.0
-        return settings
-
-    def fill(self, settings: Array) -> Array:
-        """Settings that many solves share, with the address to ask at."""
-        settings[ASK_AT] = self._address
         return settings
 
 

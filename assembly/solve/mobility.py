@@ -10,7 +10,7 @@ independent. One-sided rows do not count: they take away no freedom until they b
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import pi
@@ -23,11 +23,12 @@ from assembly.constraints.packing import Packed
 from assembly.errors import integer, positive
 from assembly.solve.conflicts import conflicting_sets
 from assembly.solve.groups import Group, groups_of
+from assembly.solve.interruption import CTRL_C, Interruption
 from assembly.solve.jacobian import Rows, rows_of
 from assembly.solve.nearby import finite_dof, path
 from assembly.solve.rank import HELD
 from assembly.solve.redundancy import dependent_sets
-from assembly.solve.solution import Scene
+from assembly.solve.scene import Scene
 from assembly.solve.subset import Problem, Snapshot
 
 __all__ = ["Mobility"]
@@ -68,6 +69,11 @@ class Mobility(ReadOnlyArrays):
         The scene's size, which lengths are divided by.
     q : (n, 7)
         The pose.
+
+    Notes
+    -----
+    `finite_dof`, `redundant_sets`, `conflicting_sets` and `trajectory` are found when they are read. Where the time
+    limit of `Assembly.mobility` is over before, they raise TimeoutError, and the table says that they are not known.
     """
 
     dof: int
@@ -87,6 +93,7 @@ class Mobility(ReadOnlyArrays):
     _held: float = field(repr=False)
     _snapshot: Snapshot = field(repr=False)
     _drives: bool = field(repr=False)
+    _time_limit: float | None = field(repr=False)
 
     @classmethod
     def at(
@@ -99,21 +106,23 @@ class Mobility(ReadOnlyArrays):
         drives: bool = True,
         tolerance: float | None = None,
         fit: float,
+        time_limit: float | None = None,
     ) -> Mobility:
         """The mobility of a packed scene at a state; `solved` as of `Snapshot`, the rest as of `Assembly.mobility`.
 
         Rows that repeat each other and disagree by no more than `fit` count once.
         """
+        interruption = _interruption(time_limit)
         rows = rows_of(packed, state)
         counted = ~rows.one_sided & (drives | ~rows.drives)
         limit = None if tolerance is None else positive("tolerance", tolerance)
-        groups = tuple(groups_of(scene.bodies, scene.constraints, rows, counted, limit, fit))
+        groups = tuple(groups_of(scene.bodies, scene.constraints, rows, counted, limit, fit, interruption))
         rank = sum(group.balanced.rank for group in groups)
         unknowns = 6 * sum(len(group.places) for group in groups)
         motions = np.zeros((unknowns - rank, packed.count, 6))
         k = 0
         for group in groups:
-            for motion in group.balanced.free:
+            for motion in group.balanced.free(interruption):
                 motions[k, list(group.places)] = motion.reshape(-1, 6) * np.repeat([packed.scale, 1.0], 3)
                 k += 1
         worst = float(np.abs(rows.residual[counted]).max(initial=0.0))
@@ -137,6 +146,7 @@ class Mobility(ReadOnlyArrays):
             _held=held,
             _snapshot=Snapshot(scene, packed, rows.state, rows, solved, held),
             _drives=drives,
+            _time_limit=time_limit,
         )
 
     @cached_property
@@ -146,11 +156,12 @@ class Mobility(ReadOnlyArrays):
         Constraints are taken in the order they were given; all the others of a set are needed to say what its last one
         repeats. A single name repeats itself. Dependencies are those at the pose, to first order.
         """
-        found = [places for group in self._groups for places in self._dependent(group)]
+        asked = _interruption(self._time_limit)
+        owners = self._rows.owners
+        found = [
+            places for group in self._groups for places in dependent_sets(group.balanced, owners[group.rows], asked)
+        ]
         return [self._names(places) for places in sorted(found, key=lambda places: (places[-1], len(places)))]
-
-    def _dependent(self, group: Group) -> list[tuple[int, ...]]:
-        return dependent_sets(group.balanced, self._rows.owners[group.rows])
 
     @property
     def redundant(self) -> list[str]:
@@ -164,7 +175,8 @@ class Mobility(ReadOnlyArrays):
         Found by solves that leave out one constraint after the other, when this is first read. Driven values, limits
         and one-sided constraints take part.
         """
-        return [self._names(found) for found in sorted(conflicting_sets(self._snapshot))]
+        found = conflicting_sets(self._snapshot, _interruption(self._time_limit))
+        return [self._names(places) for places in sorted(found)]
 
     @property
     def conflicting(self) -> list[str]:
@@ -185,7 +197,7 @@ class Mobility(ReadOnlyArrays):
         """
         if self.dof == 0 or not self._worst <= self._held:
             return self.dof
-        return finite_dof(self._problem, self._groups, self.q, self.size)
+        return finite_dof(self._problem, self._groups, self.q, self.size, _interruption(self._time_limit))
 
     @property
     def singular(self) -> bool:
@@ -222,14 +234,24 @@ class Mobility(ReadOnlyArrays):
         reach = positive("amplitude", amplitude)
         count = integer("frames", frames, 5, 10**6)
         motion = self.free_motions[k] / np.repeat([self.size, 1.0], 3)
+        interruption = _interruption(self._time_limit)
         level = reach * np.sin(2.0 * pi * np.arange(count) / (count - 1))
         level[-1] = 0.0
         poses = np.repeat(self.q[None], count, axis=0)
         for side in (1.0, -1.0):
             there = np.flatnonzero(side * level > 1e-9 * reach)
             rising = there[np.argsort(side * level[there], kind="stable")]
-            poses[rising] = path(self._problem, self.q, side * motion, self.size, side * level[rising])
+            poses[rising] = path(self._problem, self.q, side * motion, self.size, side * level[rising], interruption)
         return poses
+
+    def _singular_lines(self) -> list[str]:
+        return [f"  singular: {self.finite_dof} at poses nearby"] if self.singular else []
+
+    def _redundant_lines(self) -> list[str]:
+        return [f"  redundant: {_listed(names)}" for names in self.redundant_sets]
+
+    def _conflicting_lines(self) -> list[str]:
+        return [f"  conflicting: {_listed(names)}" for names in self.conflicting_sets]
 
     def __str__(self) -> str:
         many = "degree" if self.dof == 1 else "degrees"
@@ -237,14 +259,13 @@ class Mobility(ReadOnlyArrays):
             f"{self.dof} {many} of freedom; Grubler's count is {self.grubler}: {self.rows} rows of rank {self.rank}"
         ]
         if self._worst <= self._held:
-            if self.singular:
-                lines.append(f"  singular: {self.finite_dof} at poses nearby")
-            lines += [f"  redundant: {_listed(names)}" for names in self.redundant_sets]
+            lines += _known("freedoms of poses nearby", self._singular_lines)
+            lines += _known("redundant constraints", self._redundant_lines)
         if HELD < self._worst <= self._held:
             lines.append(f"  redundant constraints disagree by up to {self.feasibility:.3g}")
         if not self._worst <= self._held:
             lines.append(f"  the pose violates constraints by {self.feasibility:.3g}; counts are those of this pose")
-            lines += [f"  conflicting: {_listed(names)}" for names in self.conflicting_sets]
+            lines += _known("conflicting constraints", self._conflicting_lines)
         for k, motion in enumerate(self.free_motions[:MOST_MOTIONS]):
             for body, twist, place in zip(self._scene.bodies, motion, self.q[:, :3], strict=True):
                 words = _words(twist, place, self.size)
@@ -253,6 +274,19 @@ class Mobility(ReadOnlyArrays):
         if self.dof > MOST_MOTIONS:
             lines.append(f"  and {self.dof - MOST_MOTIONS} motions more")
         return "\n".join(lines)
+
+
+def _interruption(time_limit: float | None) -> Interruption:
+    """Whom is asked whether to go on: CTRL_C where there is no limit, else one whose time begins now."""
+    return CTRL_C if time_limit is None else Interruption(time_limit)
+
+
+def _known(what: str, lines: Callable[[], list[str]]) -> list[str]:
+    """Lines of a table; where the time limit is over before they are known, one that says so."""
+    try:
+        return lines()
+    except TimeoutError:
+        return [f"  {what} are not known: time_limit was over"]
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from assembly.kinematics.pose import multiply, retract
 from assembly.solve.groups import Group, groups_of
+from assembly.solve.interruption import Interruption
 from assembly.solve.jacobian import rows_of
 from assembly.solve.solution import Solution
 from assembly.solve.subset import Problem
@@ -51,14 +52,16 @@ def moves(q: Array, other: Array, size: float) -> Array:
     return twists
 
 
-def _at(problem: Problem, solution: Solution) -> list[Group]:
+def _at(problem: Problem, solution: Solution, interruption: Interruption) -> list[Group]:
     """The groups at a solution of a problem of two-sided rows."""
     rows = rows_of(problem.packed, solution._state)
     counted = np.ones(len(rows.owners), dtype=bool)
-    return groups_of(solution._scene.bodies, problem.constraints, rows, counted, fit=problem.held)
+    return groups_of(
+        solution._scene.bodies, problem.constraints, rows, counted, fit=problem.held, interruption=interruption
+    )
 
 
-def finite_dof(problem: Problem, groups: Sequence[Group], q: Array, size: float) -> int:
+def finite_dof(problem: Problem, groups: Sequence[Group], q: Array, size: float, interruption: Interruption) -> int:
     """The least degrees of freedom found near a pose, group by group.
 
     Where rows are independent the poses that hold them are a smooth surface of that dimension. Else bodies are moved
@@ -74,8 +77,10 @@ def finite_dof(problem: Problem, groups: Sequence[Group], q: Array, size: float)
     q : (n, 7)
     size : float
         The scene's size.
+    interruption : Interruption
+        TimeoutError where its time is over before.
     """
-    walks = Walks(problem, [group for group in groups if group.balanced.rank < len(group.rows)], q, size)
+    walks = Walks(problem, [group for group in groups if group.balanced.rank < len(group.rows)], q, size, interruption)
     rng = np.random.default_rng(0)
     for _ in range(MIXTURES if walks.groups else 0):
         parts = [rng.normal(size=group.dof) for group in walks.groups]
@@ -96,11 +101,15 @@ def finite_dof(problem: Problem, groups: Sequence[Group], q: Array, size: float)
 class Walks:
     """Short ways along free motions of groups, and what was found at their ends."""
 
-    def __init__(self, problem: Problem, groups: Sequence[Group], q: Array, size: float) -> None:
+    def __init__(
+        self, problem: Problem, groups: Sequence[Group], q: Array, size: float, interruption: Interruption
+    ) -> None:
         self.groups = groups
         self._problem = problem
         self._q = q
         self._size = size
+        self._interruption = interruption
+        self._free = [group.balanced.free(interruption) for group in groups]
         # For each group: the way that was meant, the way that bodies went, freedoms there.
         self._ends: list[list[tuple[Array, Array, int]]] = [[] for _ in groups]
 
@@ -110,19 +119,20 @@ class Walks:
         reach = np.ones(len(parts))
         for g, (group, part) in enumerate(zip(self.groups, parts, strict=True)):
             if part.any():
-                twists = (part @ group.balanced.free).reshape(-1, 6)
+                twists = (part @ self._free[g]).reshape(-1, 6)
                 reach[g] = REACH / np.linalg.norm(twists, axis=1).max()
                 motion[list(group.places)] = reach[g] * twists
-        solution = self._problem.solve(moved(self._q, motion, self._size))
+        solution = self._problem.solve(moved(self._q, motion, self._size), self._interruption)
         violation = self._problem.violations(solution).max(initial=0.0)
         if not violation <= ROUGH:
             return
         holds = self._problem.holds(solution)
-        there = {group.places: group.dof for group in _at(self._problem, solution)} if holds else {}
+        found = _at(self._problem, solution, self._interruption) if holds else []
+        there = {group.places: group.dof for group in found}
         gone = moves(self._q, solution.q, self._size)
         for g, (group, part) in enumerate(zip(self.groups, parts, strict=True)):
             if part.any():
-                way = group.balanced.free @ gone[list(group.places)].ravel() / reach[g]
+                way = self._free[g] @ gone[list(group.places)].ravel() / reach[g]
                 self._ends[g].append((part, way, there.get(group.places, group.dof)))
 
     def regular(self, g: int) -> bool:
@@ -141,7 +151,7 @@ class Walks:
         return least
 
 
-def path(problem: Problem, q: Array, motion: Array, size: float, levels: Array) -> Array:
+def path(problem: Problem, q: Array, motion: Array, size: float, levels: Array, interruption: Interruption) -> Array:
     """Poses at rising distances along a motion that goes on as the constraints let it, (levels, n, 7).
 
     Where it cannot go on, the poses stay.
@@ -157,6 +167,8 @@ def path(problem: Problem, q: Array, motion: Array, size: float, levels: Array) 
     size : float
     levels : (k,)
         Distances, in lengths of the motion, rising from 0.
+    interruption : Interruption
+        TimeoutError where its time is over before.
     """
     poses = np.empty((len(levels), *q.shape))
     solution: Solution | None = None
@@ -169,23 +181,23 @@ def path(problem: Problem, q: Array, motion: Array, size: float, levels: Array) 
         count = int(np.ceil((level - gone) * length * widest / STEP - 1e-9))
         for _ in range(0 if blocked else count):
             step = (level - gone) * length / count
-            trial = problem.solve(moved(q, step / np.linalg.norm(motion) * motion, size), solution)
+            trial = problem.solve(moved(q, step / np.linalg.norm(motion) * motion, size), interruption, solution)
             way = moves(q, trial.q, size)
             if not problem.holds(trial) or not np.vdot(way, motion) >= ARRIVED * step * np.linalg.norm(motion):
                 blocked = True
                 break
             q, solution = trial.q, trial
-            motion = _onward(problem, solution, motion)
+            motion = _onward(problem, solution, motion, interruption)
         gone = level
         poses[k] = q
     return poses
 
 
-def _onward(problem: Problem, solution: Solution, motion: Array) -> Array:
+def _onward(problem: Problem, solution: Solution, motion: Array, interruption: Interruption) -> Array:
     """What of a motion is free at the next pose."""
     onward = np.zeros_like(motion)
-    for group in _at(problem, solution):
+    for group in _at(problem, solution, interruption):
         places = list(group.places)
-        free = group.balanced.free
+        free = group.balanced.free(interruption)
         onward[places] = (free.T @ (free @ motion[places].ravel())).reshape(-1, 6)
     return onward

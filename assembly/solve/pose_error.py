@@ -28,8 +28,8 @@ from assembly.constraints.packing import Packed
 from assembly.errors import InputError
 from assembly.kinematics.pose import retract
 from assembly.solve.jacobian import Rows, moving_columns, rows_of
+from assembly.solve.scene import Scene
 from assembly.solve.settings import ROUNDING
-from assembly.solve.solution import Scene
 
 __all__ = ["pose_error"]
 

@@ -8,11 +8,12 @@ singular values of the result are of order one, or tell of dependent rows.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.solve.interruption import CTRL_C, Interruption
 from assembly.solve.settings import NEIGHBORHOOD
 
 __all__ = ["HELD", "SMALLEST", "Balanced", "centered", "orthonormal", "tolerance_at"]
@@ -24,6 +25,8 @@ SMALLEST = 1e-7
 HELD = 1e-9
 # Within this factor of the tolerance the largest gap between singular values decides.
 NEAR = 10.0
+# A decomposition of so many rows or columns takes as long as nobody should wait unasked.
+LARGE = 200
 
 
 def tolerance_at(residual: float, fit: float) -> float:
@@ -48,6 +51,10 @@ class Balanced:
         In the twists of k bodies, each at its own center; of length one, or zero.
     centers : (k, 3)
         From the bodies' origins, world axes.
+    singular_values : (6 k,)
+        Of the rows, falling, as many as there are columns.
+    right : (6 k, 6 k)
+        Right singular vectors as rows.
     tolerance : float
         Singular values below count as zero.
     near : float
@@ -56,47 +63,47 @@ class Balanced:
 
     rows: Array
     centers: Array
+    singular_values: Array
+    right: Array
     tolerance: float
     near: float
 
     @classmethod
-    def of(cls, jacobian: Array, residual: float, tolerance: float | None = None, fit: float = 0.0) -> Balanced:
+    def of(
+        cls,
+        jacobian: Array,
+        residual: float,
+        tolerance: float | None = None,
+        fit: float = 0.0,
+        interruption: Interruption = CTRL_C,
+    ) -> Balanced:
         """Balance rows in twists at the bodies' origins that hold to a residual; a tolerance decides if it is given.
 
-        `fit` as of `tolerance_at`.
+        `fit` as of `tolerance_at`. TimeoutError where the interruption's time is over before.
         """
         rows, centers = centered(jacobian)
         lengths = np.linalg.norm(rows, axis=1, keepdims=True)
         expected = tolerance_at(residual, fit)
         counts = lengths > expected
         rows = np.where(counts, rows / np.where(counts, lengths, 1.0), 0.0)
-        return cls(rows, centers, expected, NEAR) if tolerance is None else cls(rows, centers, tolerance, 1.0)
-
-    @cached_property
-    def _svd(self) -> tuple[Array, Array]:
-        """Singular values, as many as columns, and right singular vectors as rows."""
-        m, n = self.rows.shape
-        if m == 0 or n == 0:
-            return np.zeros(n), np.eye(n)
-        values, right = np.linalg.svd(self.rows, full_matrices=m < n)[1:]
-        return np.pad(values, (0, n - len(values))), right
-
-    @property
-    def singular_values(self) -> Array:
-        """Singular values of the rows, falling, (6 k,)."""
-        return self._svd[0]
+        m, n = rows.shape
+        values, right = np.zeros(n), np.eye(n)
+        if m > 0 and n > 0:
+            found, right = _decomposed(rows, m < n, interruption)[1:]
+            values[: len(found)] = found
+        decides = (expected, NEAR) if tolerance is None else (tolerance, 1.0)
+        return cls(rows, centers, values, right, *decides)
 
     @cached_property
     def rank(self) -> int:
         """How many singular values count."""
         return self._cut(self.singular_values)
 
-    @cached_property
-    def free(self) -> Array:
+    def free(self, interruption: Interruption = CTRL_C) -> Array:
         """Orthonormal motions that no row forbids, (d, 6 k): twists at the bodies' origins."""
-        motions = self._svd[1][self.rank :].reshape(-1, len(self.centers), 6).copy()
+        motions = self.right[self.rank :].reshape(-1, len(self.centers), 6).copy()
         motions[:, :, :3] -= np.cross(motions[:, :, 3:], self.centers[None])
-        return orthonormal(motions.reshape(len(motions), 6 * len(self.centers)))
+        return orthonormal(motions.reshape(len(motions), 6 * len(self.centers)), interruption)
 
     def _cut(self, values: Array) -> int:
         """How many of falling singular values count."""
@@ -108,11 +115,17 @@ class Balanced:
         logs = np.log(np.maximum(np.append(values, 0.0), 1e-16))
         return low + int(np.argmax(logs[low - 1 : high] - logs[low : high + 1]))
 
-    @cached_property
-    def dependencies(self) -> Array:
+    def dependencies(self, interruption: Interruption = CTRL_C) -> Array:
         """Orthonormal combinations of rows that vanish, (m - rank, m)."""
-        left = np.linalg.svd(self.rows)[0]
+        left = _decomposed(self.rows, True, interruption)[0]
         return left[:, self.rank :].T
+
+
+def _decomposed(matrix: Array, full: bool, interruption: Interruption) -> tuple[Array, Array, Array]:
+    """The singular value decomposition of a matrix, with square factors on both sides if it is to be full."""
+    compute = partial(np.linalg.svd, matrix, full_matrices=full)
+    left, values, right = interruption.wait_for("rank", compute) if max(matrix.shape) >= LARGE else compute()
+    return left, values, right
 
 
 def centered(jacobian: Array) -> tuple[Array, Array]:
@@ -135,7 +148,7 @@ def _centers(blocks: Array) -> Array:
     return centers
 
 
-def orthonormal(motions: Array) -> Array:
+def orthonormal(motions: Array, interruption: Interruption = CTRL_C) -> Array:
     """An orthonormal basis of the span of independent rows, near to coordinate axes and the same in every run.
 
     Each is the unit motion nearest to a coordinate axis, that which has most of it in what is left of the span.
@@ -143,6 +156,7 @@ def orthonormal(motions: Array) -> Array:
     left = np.linalg.qr(motions.T)[0].T
     basis = []
     while len(left):
+        interruption.check("free motions")
         most = np.linalg.norm(left, axis=0)
         # The first of those that are the same up to rounding.
         axis = int(np.flatnonzero(most >= (1.0 - 1e-6) * most.max())[0])

@@ -16,6 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.solve.interruption import Interruption
 from assembly.solve.rank import Balanced
 
 __all__ = ["dependent_sets"]
@@ -24,11 +25,11 @@ __all__ = ["dependent_sets"]
 ABSENT = 1e-5
 
 
-def dependent_sets(balanced: Balanced, owners: NDArray[np.int64]) -> list[tuple[int, ...]]:
+def dependent_sets(balanced: Balanced, owners: NDArray[np.int64], interruption: Interruption) -> list[tuple[int, ...]]:
     """Sets of owners of rows: the last of a set repeats what the others say, or a single one repeats itself."""
     if balanced.rank == len(balanced.rows):
         return []
-    combinations = balanced.dependencies
+    combinations = balanced.dependencies(interruption)
     # Rows that are tilted against each other turn combinations by about as much.
     absent = max(ABSENT, balanced.tolerance)
     # A row that is in no combination is independent of all others.
@@ -36,6 +37,7 @@ def dependent_sets(balanced: Balanced, owners: NDArray[np.int64]) -> list[tuple[
     rows = {int(owner): np.flatnonzero(owners == owner) for owner in np.unique(owners[taking_part])}
 
     def rank(which: Sequence[int]) -> int:
+        interruption.check("redundant_sets")
         inside = np.concatenate([*(rows[k] for k in which), np.empty(0, dtype=np.int64)])
         beyond = np.delete(combinations, inside, axis=1)
         sizes = np.linalg.svd(beyond, compute_uv=False) if beyond.size else np.empty(0)

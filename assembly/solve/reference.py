@@ -35,8 +35,9 @@ from assembly.solve.measure import Near
 from assembly.solve.reference_rows import Poses, Rows
 from assembly.solve.reference_surfaces import Pair, Patch
 from assembly.solve.reference_terms import Terms
+from assembly.solve.scene import Status
 from assembly.solve.settings import COUNT, CULPRIT, DUAL, IMPROPER, OBJECTIVE, VIOLATION
-from assembly.solve.solution import Iteration, Solution, Status
+from assembly.solve.solution import Iteration, Solution
 
 if TYPE_CHECKING:
     from assembly.assembly import Assembly

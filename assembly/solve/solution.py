@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from enum import Enum
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -10,12 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly._read_only import ReadOnlyArrays, read_only
-from assembly.constraints.constraint import Constraint
-from assembly.constraints.contact import Contact
 from assembly.constraints.joint import Joint
-from assembly.constraints.layout import IMPLICIT, TERM_TABLE, TERMS
+from assembly.constraints.layout import IMPLICIT
 from assembly.constraints.packing import Packed
-from assembly.constraints.terms import POINT_DISTANCE, POSTURE, POSTURE_PARAMETERS, TERM
 from assembly.errors import InputError
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import Pose
@@ -23,74 +19,21 @@ from assembly.proximity.pairs import ContactPair
 from assembly.proximity.solid_contact import TRACK
 from assembly.solve.measure import measure, standing
 from assembly.solve.options import Options
-from assembly.solve.settings import COUNT, CULPRIT, DUAL, IMPROPER, OBJECTIVE, VIOLATION
+from assembly.solve.scene import Scene, Status
+from assembly.solve.settings import COUNT, DUAL, OBJECTIVE, VIOLATION
 
 if TYPE_CHECKING:
-    from assembly.kinematics.body import BodyFace
+    from assembly.solve.crossings import Crossings
     from assembly.solve.leave import Fit
     from assembly.solve.mobility import Mobility
     from assembly.solve.second_order import SecondOrder
     from assembly.solve.statics import Wrench
 
-__all__ = ["Iteration", "Scene", "Solution", "Status"]
+__all__ = ["Iteration", "Solution"]
 
 Array = NDArray[np.float64]
-# Moving bodies whose freedoms are printed: counting takes a second for some 300, and grows with the cube.
-MOST_COUNTED = 200
-# Bodies with shapes all pairs of which are looked at when a solution is printed; their number grows with the square.
-MOST_LOOKED = 40
 # A constraint that is off by less than this part of the worst is not one of those that disagree.
 IDLE = 1e-3
-
-
-class Status(Enum):
-    """How a solve ended; the value says what to do."""
-
-    SOLVED = "every constraint holds and the objective, if there is one, is at a local minimum"
-    INFEASIBLE = "the constraints cannot all hold near this start; the pose violates them least: drop or move one"
-    STALLED = "no further progress; look at the worst violation, start elsewhere or loosen the tolerance"
-    ITERATION_LIMIT = "out of iterations; raise max_iterations or start nearer"
-    CONTACT_LOST = "a contact has no extremal pair at the start; move the bodies or name the faces"
-    TIME_LIMIT = "the time limit ended it; the pose is the last that held, if one did: raise time_limit or start nearer"
-    STOPPED = "the callback ended it; the pose is the last that held, if one did"
-    UNBOUNDED = "the objective is unbounded, it falls on and on along poses that hold; bound it by a limit or a term"
-    FITTED = "constraints that repeat each other disagree by a little and hold as well as they can; all others hold"
-
-
-class Scene:
-    """The bodies, contacts and faces that a solution speaks of."""
-
-    def __init__(
-        self,
-        bodies: tuple[Body, ...],
-        constraints: tuple[Constraint, ...],
-        contacts: tuple[Contact, ...],
-        sides: tuple[tuple[Body | BodyFace, Body | BodyFace], ...],
-        scale: float,
-    ) -> None:
-        self.bodies = bodies
-        self.constraints = constraints
-        self.contacts = contacts
-        self.sides = sides
-        self.scale = scale
-        self._wished: NDArray[np.int64] | None = None
-
-    def wished(self, packed: Packed) -> NDArray[np.int64]:
-        """Where the pool has what the objective asks for and may change between solves: targets and postures."""
-        if self._wished is None:
-            records = packed.table[packed.table[TERM_TABLE] :][: TERM * packed.table[TERMS]].reshape(-1, TERM)
-            sizes = {POINT_DISTANCE: 7, POSTURE: POSTURE_PARAMETERS}
-            places = [np.arange(sizes.get(kind, 0)) + at for kind, _, at, *_ in records.tolist()]
-            self._wished = np.concatenate([*places, np.empty(0, dtype=np.int64)]).astype(np.int64)
-        return self._wished
-
-    def index(self, body: Body | str) -> int:
-        """Place of a body, given itself or its name."""
-        for k, other in enumerate(self.bodies):
-            if other is body or (isinstance(body, str) and other.name == body):
-                return k
-        known = ", ".join(repr(other.name) for other in self.bodies)
-        raise InputError(f"body is {body!r}; expected one of {known}")
 
 
 class Iteration(tuple[float, ...]):
@@ -145,9 +88,9 @@ class Solution(ReadOnlyArrays):
         Of a clearance every contact that is near, "clearance: a-b", "clearance: a-b 2" and so on.
     crossings : tuple of (name, name)
         Bodies that cross elsewhere than at their contacts, but pairs that a clearance excludes and those that a joint
-        ties directly.
+        ties directly, or a gear or a rack, whose teeth are in each other.
     crossings_of_joined : tuple of (name, name)
-        Of the pairs that a joint ties directly those that cross.
+        Of the pairs that a joint or a coupling ties directly those that cross.
     iterations : int
     seconds : float
         Time in the compiled loop.
@@ -372,19 +315,39 @@ class Solution(ReadOnlyArrays):
     def crossings(self) -> tuple[tuple[str, str], ...]:
         """Names of bodies that cross at `q` elsewhere than at their contacts, by a look at all pairs when it is read.
 
-        Pairs that a joint ties directly, one in the other as a rule, are in `crossings_of_joined`; those which a
-        clearance excludes may overlap. A body in the material of another one crosses it, too.
+        Pairs that a joint or a coupling ties directly, one in the other as a rule, are in `crossings_of_joined`; those
+        which a clearance excludes may overlap. A body in the material of another one crosses it, too.
         """
-        from assembly.solve.crossings import crossing_pairs, free_pairs
-
-        return crossing_pairs(self, free_pairs(self._scene.bodies, self._scene.constraints))
+        return self.find_crossings().pairs
 
     @cached_property
     def crossings_of_joined(self) -> tuple[tuple[str, str], ...]:
-        """The same of bodies that a joint ties directly: a pin in its bore, or links that are drawn too thick."""
-        from assembly.solve.crossings import crossing_pairs, joined_pairs
+        """The same of bodies that a joint or a coupling ties directly: a pin in its bore, teeth, links too thick."""
+        return self.find_crossings(joined=True).pairs
 
-        return crossing_pairs(self, joined_pairs(self._scene.bodies, self._scene.constraints))
+    def find_crossings(self, *, joined: bool = False, time_limit: float | None = None) -> Crossings:
+        """Bodies that cross at `q`, as far as a look of limited time tells: `crossings` has no limit.
+
+        Parameters
+        ----------
+        joined : bool
+            Whether it is the pairs that a joint or a coupling ties directly, as in `crossings_of_joined`, or others.
+        time_limit : float, optional
+            Seconds after which the pairs that were not looked at to the end are `unseen`.
+
+        Returns
+        -------
+        Crossings
+            `pairs` that cross and those that are `unseen`; `is_clear` where all were looked at and none crosses.
+        """
+        from assembly.solve.crossings import crossings_of, free_pairs, joined_pairs
+        from assembly.solve.interruption import CTRL_C, Interruption
+
+        if not isinstance(joined, (bool, np.bool_)):
+            raise InputError(f"joined is {joined!r}; expected True or False")
+        asked = CTRL_C if time_limit is None else Interruption(time_limit)
+        choose = joined_pairs if joined else free_pairs
+        return crossings_of(self, choose(self._scene.bodies, self._scene.constraints), asked)
 
     @cached_property
     def pose_error(self) -> float:
@@ -406,68 +369,20 @@ class Solution(ReadOnlyArrays):
     @property
     def message(self) -> str:
         """The status in a sentence; what is violated, worst first, and what contradicts what."""
-        text = self.status.value
-        culprit = int(self._result(CULPRIT))
-        if self.status is Status.CONTACT_LOST and culprit >= 0:
-            return f"{self._packed.pair_name(culprit)!r}: {text}"
-        if self.restarted:
-            text += "; found from another start: near the one given constraints did not hold"
-        scale = self._scene.scale
-        # Of a contact that was lost there are lengths alone.
-        parts = {k: v / scale for k, v in self.violations.items()} if self._is_lost else self._largest(scale)
-        held_off = sorted((name for name, part in parts.items() if not part <= 1e-9), key=lambda name: -parts[name])
-        # Of what ran away rounding of its coordinates alone is violated.
-        if held_off and not self.success and self.status is not Status.UNBOUNDED:
-            named = ", ".join(f"{name!r} ({self.violations[name]:.3g})" for name in held_off)
-            text += f"; violated: {named}"
-        if self.status is Status.FITTED:
-            text += "; disagreeing: " + ", ".join(f"{name!r} ({off:.3g})" for name, off in self.disagreeing.items())
-        if self.status is Status.INFEASIBLE:
-            named = " and ".join(", ".join(map(repr, names)) for names in self.conflicting_sets)
-            text += f"; conflicting: {named or 'none was shown to be'}"
-        if self._result(IMPROPER) > 0.0:
-            text += "; at a contact the surfaces cross beside the point (indefinite relative curvature)"
-        return text
+        from assembly.solve.words import message
+
+        return message(self)
 
     def iteration_table(self) -> str:
         """The history as text, a line an iteration."""
-        lines = ["   " + "".join(f"{name:>15}" for name in Iteration.COLUMNS)]
-        lines += [f"{k:>3}" + "".join(f"{value:>15.6e}" for value in row) for k, row in enumerate(self.history)]
-        return "\n".join(lines)
+        from assembly.solve.words import iteration_table
+
+        return iteration_table(self)
 
     def __repr__(self) -> str:
         return f"Solution({self.status.name}, feasibility={self.feasibility:.1e}, iterations={self.iterations})"
 
-    def _crossing_lines(self) -> list[str]:
-        """What `print` says of bodies that cross."""
-        shaped = sum(bool(body.faces) for body in self._scene.bodies)
-        if shaped > MOST_LOOKED and not {"crossings", "crossings_of_joined"} <= self.__dict__.keys():
-            return [f"  {shaped} bodies were not looked at for crossings; read `crossings` and `crossings_of_joined`"]
-        try:
-            apart, joined = self.crossings, self.crossings_of_joined
-        except InputError as error:
-            return [f"  crossings are not known: {error}"]
-        lines = [f"  {a} and {b} cross; asm.Clearance() keeps them apart" for a, b in apart]
-        return lines + [f"  {a} and {b} cross, which a joint ties" for a, b in joined]
-
     def __str__(self) -> str:
-        lines = [
-            f"{self.status.name}: {self.message}",
-            f"objective {self.objective:.6g}   feasibility {self.feasibility:.1e}   "
-            f"stationarity {self.stationarity:.1e}   {self.iterations} iterations   {1e6 * self.seconds:.0f} us",
-        ]
-        if sum(not body.fixed for body in self._scene.bodies) <= MOST_COUNTED:
-            try:
-                freedoms = self.mobility.dof
-            except InputError:
-                # A contact without a pair has no rows to count.
-                pass
-            else:
-                lines[1] += f"   {freedoms} degree{'' if freedoms == 1 else 's'} of freedom"
-        lines += self._crossing_lines()
-        worst = sorted(self.violations.items(), key=lambda item: -item[1])[:5]
-        lines += [f"  {name:<24} violation {value:.1e}" for name, value in worst]
-        for body, row in zip(self._scene.bodies, self.q, strict=True):
-            place = " ".join(f"{value:9.4f}" for value in row)
-            lines.append(f"  {body.name:<24} {place}{'   fixed' if body.fixed else ''}")
-        return "\n".join(lines)
+        from assembly.solve.words import table
+
+        return table(self)

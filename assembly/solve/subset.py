@@ -16,16 +16,17 @@ from assembly.constraints.constraint import Constraint, Equation
 from assembly.constraints.contact import Contact
 from assembly.constraints.couplings import Coupling
 from assembly.constraints.expression import Expression
-from assembly.constraints.packing import Packed, pack
+from assembly.constraints.packing import Packed
 from assembly.constraints.trim_contact import TrimContact
 from assembly.proximity.solid_contact import TRACK
 from assembly.solve.attempts import begin
-from assembly.solve.interruption import CTRL_C
+from assembly.solve.interruption import Interruption
 from assembly.solve.jacobian import Rows
 from assembly.solve.options import Options
 from assembly.solve.rank import HELD
+from assembly.solve.scene import Scene, Status
 from assembly.solve.settings import ANY_POSE, GATHER
-from assembly.solve.solution import Scene, Solution, Status
+from assembly.solve.solution import Solution
 
 __all__ = ["Problem", "Snapshot"]
 
@@ -71,7 +72,7 @@ class Problem:
     def __init__(
         self, scene: Scene, constraints: Sequence[Constraint], near: dict[str | int, Array], held: float = HELD
     ) -> None:
-        self.packed = pack(scene.bodies, constraints, ())
+        self.packed = Packed(scene.bodies, constraints, ())
         self._size = scene.scale
         self._scene = Scene(
             scene.bodies, tuple(constraints), tuple(self.packed.contacts), tuple(self.packed.sides), self.packed.scale
@@ -102,18 +103,21 @@ class Problem:
             packed.start_angles(q, state, warm=False)
         return state
 
-    def solve(self, q: Array, after: Solution | None = None, gathers: bool = False) -> Solution:
+    def solve(
+        self, q: Array, interruption: Interruption, after: Solution | None = None, gathers: bool = False
+    ) -> Solution:
         """The nearest poses that hold the constraints, from poses (n, 7); tracked values go on from a solution's.
 
-        Or any poses that hold them, from where scattered bodies were gathered.
+        Or any poses that hold them, from where scattered bodies were gathered. TimeoutError where the interruption's
+        time is over before.
         """
         packed = self.packed
-        settings = CTRL_C.settings(CTRL_C.fill(Options().settings()))
+        settings = interruption.settings(interruption.fill(Options().settings()))
         if gathers:
             settings[GATHER] = settings[ANY_POSE] = 1.0
         turns = np.array([self._near[id(angle)][0] for angle in packed._angles])
-        outcome = begin(packed, CTRL_C, packed.table, settings, self.start(q, after), turns)
-        CTRL_C.is_over()  # raises what ended it
+        outcome = begin(packed, interruption, packed.table, settings, self.start(q, after), turns)
+        interruption.check("what constraints allow")
         return Solution(self._scene, packed, outcome.state, _STATUSES[outcome.code], 0.0, outcome.history)
 
     def violations(self, solution: Solution) -> Array:

@@ -24,7 +24,7 @@ from assembly.constraints.clearance import Clearance
 from assembly.constraints.constraint import Constraint
 from assembly.constraints.contact import Contact
 from assembly.constraints.objectives import Objective
-from assembly.constraints.packing import Packed, pack
+from assembly.constraints.packing import Packed
 from assembly.constraints.trim_contact import TrimContact
 from assembly.errors import InputError
 from assembly.kinematics.body import Body
@@ -34,8 +34,8 @@ from assembly.solve.interruption import Interruption
 from assembly.solve.jacobian import rows_of
 from assembly.solve.options import Options
 from assembly.solve.row_table import gradient_at
+from assembly.solve.scene import Status
 from assembly.solve.settings import ANY_POSE, COUNT, ITERATIONS, SOLVED
-from assembly.solve.solution import Status
 
 __all__ = ["Asked", "status_of"]
 
@@ -155,7 +155,7 @@ def _put_back(asked: Asked, place: Place, interruption: Interruption) -> Place |
     """The nearest place where constraints that last hold; None where none is found."""
     if not asked.lasting:
         return place
-    rows = pack(asked.bodies, asked.lasting, ())
+    rows = Packed(asked.bodies, asked.lasting, ())
     rows.refresh()
     settings = Options().settings(warm=True)
     settings[ANY_POSE] = 1.0
@@ -173,7 +173,7 @@ def _slides(asked: Asked, line: Line) -> bool:
 
 def _falls(asked: Asked, line: Line) -> bool:
     """Whether all holds on the line, and the objective falls on it without end."""
-    alone = pack(asked.bodies, asked.lasting, asked.objectives)
+    alone = Packed(asked.bodies, asked.lasting, asked.objectives)
     alone.refresh()
     gradient, free = np.empty(6 * alone.count), np.empty(0, dtype=np.int64)
     last, fall = np.inf, 0.0

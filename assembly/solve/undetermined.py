@@ -37,7 +37,7 @@ def complaint(scene: Assembly, packed: Packed, state: Array, task: TipTask) -> s
     rows = rows_of(packed, state)
     counted = ~rows.one_sided & ~rows.drives
     worst = float(np.abs(rows.residual[counted]).max(initial=0.0))
-    motions = Balanced.of(rows.jacobian[np.ix_(counted, columns)], worst).free.T
+    motions = Balanced.of(rows.jacobian[np.ix_(counted, columns)], worst).free().T
     poses = _scaled(packed, rows.state)
     rates = np.array([_gradient(packed, freedom.coordinate, poses)[columns] for freedom in task.inputs]) @ motions
     left, sizes, right = np.linalg.svd(rates)

@@ -6,22 +6,18 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from assembly.errors import integer
 from assembly.solve.interruption import Interruption
 from assembly.solve.postures import postures_from
 from assembly.solve.solution import Solution
 from assembly.solve.starts import moving_rows, scattered
+from assembly.studies.distinct import are_one
 
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
 
 __all__ = ["solve_all"]
-
-Array = NDArray[np.float64]
-# Poses that differ by less are the same: lengths over the scene's size, radians.
-SAME = 1e-6
 
 
 def solve_all(
@@ -37,18 +33,9 @@ def solve_all(
         for start in range(count):
             q = scene.q if start == 0 else scattered(rng, scene.q, moving, packed.scale)
             solution = scene._from_start(q, None, dict(options), interruption)
-            if solution.success and not any(_is_same(solution.q, other.q, packed.scale) for other in found):
+            if solution.success and not any(are_one(solution, other) for other in found):
                 found.append(solution)
             if interruption.is_over():
                 break
     # Of equal objectives, which are so up to rounding only where a scene is symmetric, the first found comes first.
     return sorted(found, key=lambda solution: solution.objective)
-
-
-def _is_same(q: Array, other: Array, size: float) -> bool:
-    """Whether all bodies are at the same place; a quaternion and its negative are the same turn."""
-    if np.abs(q[:, :3] - other[:, :3]).max() > SAME * size:
-        return False
-    # |e - f| is half the angle between them, where it is small.
-    signs = np.where((q[:, 3:] * other[:, 3:]).sum(axis=1, keepdims=True) < 0.0, -1.0, 1.0)
-    return bool(np.linalg.norm(q[:, 3:] - signs * other[:, 3:], axis=1).max() <= 0.5 * SAME)

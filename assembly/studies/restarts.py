@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from assembly.proximity.solid_contact import TRACK
 from assembly.solve.interruption import Interruption
 from assembly.solve.rank import HELD
+from assembly.solve.scene import Status
 from assembly.solve.settings import GATHER, ITERATIONS, VIOLATION
-from assembly.solve.solution import Solution, Status
+from assembly.solve.solution import Solution
 from assembly.solve.starts import far_starts, near_starts
 
 if TYPE_CHECKING:

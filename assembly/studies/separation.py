@@ -62,8 +62,15 @@ def separated(scene: Assembly, q: Array, options: Mapping[str, Any], interruptio
     poses: list[Array] = []
     touching = options.get("touching", Options.touching) * scene.packed().scale
     for _ in range(ROUNDS):
-        found = [crossing for a, b in guarded if (crossing := _crossing(a, b, q, rows, touching)) is not None]
-        if not found or interruption.is_over():
+        found: list[_Crossing] = []
+        for a, b in guarded:
+            # Of very many pairs this takes longer than a solve.
+            if interruption.is_over():
+                return poses
+            crossing = _crossing(a, b, q, rows, touching)
+            if crossing is not None:
+                found.append(crossing)
+        if not found:
             return poses
         before, q = q, q.copy()
         for crossing in found:

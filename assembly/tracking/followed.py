@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from assembly.constraints.objectives import FrameDistance, PointDistance
 from assembly.constraints.packing import Packed
 from assembly.kinematics.pose import Pose, rotation_matrix
-from assembly.solve.solution import Scene, Status
+from assembly.solve.scene import Scene, Status
 
 __all__ = ["Followed"]
 

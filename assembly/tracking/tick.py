@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from assembly._read_only import ReadOnlyArrays, read_only
 from assembly.proximity.events import Event, events_of
 from assembly.proximity.watch_memory import EVENT_COUNT
+from assembly.solve.scene import Status
 from assembly.solve.settings import COUNT, CURVED, DUAL, HISTORY, OBJECTIVE, VIOLATION
-from assembly.solve.solution import Solution, Status
+from assembly.solve.solution import Solution
 from assembly.tracking.followed import Followed
 
 __all__ = ["Step", "TrackStatus"]

@@ -32,6 +32,7 @@ from assembly.proximity.watch_memory import (
 from assembly.solve.augmented_lagrangian import solve_program
 from assembly.solve.options import Options
 from assembly.solve.recall import recall_size
+from assembly.solve.scene import Scene
 from assembly.solve.settings import (
     BUDGET,
     CARRIED,
@@ -53,7 +54,7 @@ from assembly.solve.settings import (
     TOUCHING,
     VIOLATION,
 )
-from assembly.solve.solution import Scene, Solution
+from assembly.solve.solution import Solution
 from assembly.tracking.followed import Followed
 from assembly.tracking.log import TrackLog
 from assembly.tracking.tick import Step, TrackStatus

@@ -141,7 +141,7 @@ def test_ranks_of_sets_from_the_combinations_that_vanish():
     rng = np.random.default_rng(10)
     rows = rng.normal(size=(9, 4)) @ rng.normal(size=(4, 12))
     balanced = Balanced.of(rows, 0.0)
-    combinations = balanced.dependencies
+    combinations = balanced.dependencies()
     assert combinations.shape == (5, 9)
     for size in range(10):
         chosen = rng.permutation(9)[:size]

@@ -10,15 +10,18 @@ from assembly.kinematics.pose import retract
 from assembly.solve.look import Look, null_space
 from tests.solve.lower_poses import random_scene
 
-SEEDS = range(40)
+# Seed 11 ends at a fold, where there are other unknowns than those of bodies.
+SEEDS = [seed for seed in range(40) if seed != 11]
 
 
 def solved(seed):
-    """A look at the solution of a random scene that has one, and unknowns of bodies alone; or None."""
+    """A look at the solution of a random scene."""
     scene, _ = random_scene(np.random.default_rng([seed, 11]), seed % 3 == 0)
     solution = scene.solve()
-    look = Look.at(solution._packed, solution._state) if solution.success else None
-    return look if look is not None and len(look.gradient) == 6 * look.table[layout.MOVING] else None
+    assert solution.success
+    look = Look.at(solution._packed, solution._state)
+    assert len(look.gradient) == 6 * look.table[layout.MOVING]
+    return look
 
 
 def moved(look, step):
@@ -34,8 +37,6 @@ def moved(look, step):
 @pytest.mark.parametrize("seed", SEEDS)
 def test_derivatives_are_those_of_values(seed):
     look = solved(seed)
-    if look is None:
-        pytest.skip("no solution without folds")
     rng = np.random.default_rng(seed)
     for _ in range(3):
         d = rng.normal(size=len(look.gradient))
@@ -57,8 +58,6 @@ def test_derivatives_are_those_of_values(seed):
 @pytest.mark.parametrize("seed", SEEDS)
 def test_neighbors_hold_and_rise_by_curvature(seed):
     look = solved(seed)
-    if look is None:
-        pytest.skip("no solution without folds")
     basis = null_space(look.jacobian[look.touching], len(look.gradient))
     found = 0
     for d in basis.T:
@@ -80,8 +79,6 @@ def test_neighbors_hold_and_rise_by_curvature(seed):
 def test_the_least_curvature_is_that_of_the_reduced_form(seed):
     # Inverse iteration with the penalty's matrix finds what dense decompositions do where it is negative, and no other.
     look = solved(seed)
-    if look is None:
-        pytest.skip("no solution without folds")
     curvature, direction = look.least_curvature()
     basis = null_space(look.jacobian[look.pushing], len(look.gradient))
     if basis.shape[1]:
@@ -91,18 +88,20 @@ def test_the_least_curvature_is_that_of_the_reduced_form(seed):
         assert np.linalg.norm(direction) == pytest.approx(1.0, rel=1e-12)
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-def test_the_least_curvature_of_a_saddle_is_negative(seed):
-    scene, _ = random_scene(np.random.default_rng([seed, 12]), True)
-    solution = scene.solve(max_iterations=0)
-    if solution.second_order != "saddle":
-        pytest.skip("the start is no saddle")
-    look = Look.at(solution._packed, solution._state)
-    if len(look.gradient) != 6 * look.table[layout.MOVING]:
-        pytest.skip("a fold")
-    curvature, direction = look.least_curvature()
-    basis = null_space(look.jacobian[look.pushing], len(look.gradient))
-    least = np.linalg.eigvalsh(basis.T @ look.hessian @ basis)[0]
-    # Iterations end near it, from above; the penalty lets rows be broken by as much as its inverse.
-    assert least - 1e-4 <= curvature <= 0.5 * least
-    assert np.abs(look.jacobian[look.pushing] @ direction).max() < 1e-4
+def test_the_least_curvature_of_a_saddle_is_negative():
+    saddles = 0
+    for seed in range(40):
+        scene, _ = random_scene(np.random.default_rng([seed, 12]), True)
+        solution = scene.solve(max_iterations=0)
+        look = Look.at(solution._packed, solution._state)
+        # Others start at a minimum, or where rows do not hold.
+        if solution.second_order != "saddle" or len(look.gradient) != 6 * look.table[layout.MOVING]:
+            continue
+        saddles += 1
+        curvature, direction = look.least_curvature()
+        basis = null_space(look.jacobian[look.pushing], len(look.gradient))
+        least = np.linalg.eigvalsh(basis.T @ look.hessian @ basis)[0]
+        # Iterations end near it, from above; the penalty lets rows be broken by as much as its inverse.
+        assert least - 1e-4 <= curvature <= 0.5 * least
+        assert np.abs(look.jacobian[look.pushing] @ direction).max() < 1e-4
+    assert saddles >= 20

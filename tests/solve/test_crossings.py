@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 import assembly as asm
 from assembly.errors import InputError
+from assembly.solve import crossings
+from assembly.solve.interruption import Interruption
 
 
 def block(name, x, size=1.0, **others):
@@ -29,7 +32,7 @@ def test_joints_alone_have_crossings():
     assert solution.crossings_of_joined == (("ground", "a"), ("a", "b"))
     lines = str(solution).splitlines()
     assert "  ground and c cross; asm.Clearance() keeps them apart" in lines
-    assert "  a and b cross, which a joint ties" in lines
+    assert "  a and b cross, which a joint or a coupling ties" in lines
 
 
 def test_a_scene_without_constraints_has_crossings_and_apart_there_are_none():
@@ -88,3 +91,110 @@ def test_many_bodies_are_looked_at_when_it_is_read():
     assert "42 bodies were not looked at" in str(solution)
     assert len(solution.crossings) == 41 and solution.crossings_of_joined == ()
     assert str(solution).count(" cross;") == 41
+
+
+def wheel(name, x, **others):
+    return asm.Body(name, asm.shapes.solid_cylinder(1.0, 0.5), (x, 0.0, 0.0), **others)
+
+
+def test_wheels_that_mesh_are_tied():
+    # Pitch circles overlap by the height of the teeth.
+    frame, a, b, c = asm.Body("frame", fixed=True), wheel("a", 0.0), wheel("b", 1.9), wheel("c", 3.8)
+    hinges = [asm.Revolute(frame.frame((x, 0, 0)), body) for x, body in ((0.0, a), (1.9, b), (3.8, c))]
+    gear = asm.Gear(hinges[0], hinges[1], -1.0)
+    assert gear.meshing == ((a, b),)
+    solution = scene_of([frame, a, b, c], *hinges, gear).solve()
+    assert solution.success
+    assert solution.crossings_of_joined == (("a", "b"),)
+    # Nothing says that b and c mesh.
+    assert solution.crossings == (("b", "c"),)
+
+
+def test_a_sun_that_is_fixed_meshes_with_its_planet():
+    sun, arm, planet = wheel("sun", 0.0, fixed=True), asm.Body("arm"), wheel("planet", 1.9)
+    hinges = [asm.Revolute(sun, arm), asm.Revolute(arm.frame((1.9, 0, 0)), planet)]
+    assert asm.Gear(*hinges, -1.0).meshing == ((sun, planet),)
+
+
+def test_wheels_on_frames_of_their_own_and_racks_mesh():
+    frames = [asm.Body(f"frame {k}", fixed=True) for k in range(2)]
+    a, b, rack = wheel("a", 0.0), wheel("b", 1.9), block("rack", 0.0)
+    hinges = [asm.Revolute(frames[0], a), asm.Revolute(frames[1].frame((1.9, 0, 0)), b)]
+    assert asm.Gear(*hinges, -1.0).meshing == ((a, b),)
+    slide = asm.Prismatic(frames[0].frame((0, -1.4, 0), z=(1, 0, 0)), rack)
+    assert asm.RackPinion(hinges[0], slide, 1.0).meshing == ((a, rack),)
+    # A screw of one joint ties no other bodies than the joint.
+    both = asm.Cylindrical(frames[0], a)
+    assert asm.RackPinion(both.freedom("angle"), both.freedom("slide"), 1.0).meshing == ()
+
+
+def row_of_blocks(count):
+    """Blocks of which each crosses the next, and no other one."""
+    solution = asm.Assembly([block(f"{k}", 0.7 * k) for k in range(count)]).solve()
+    return solution, tuple((f"{k}", f"{k + 1}") for k in range(count - 1))
+
+
+def test_what_a_time_limit_leaves_out_is_not_clear():
+    solution, expected = row_of_blocks(6)
+    nothing = solution.find_crossings(time_limit=1e-9)
+    # Boxes of the others do not meet: that is known at once.
+    assert nothing.pairs == () and nothing.unseen == expected
+    assert not nothing.is_complete and not nothing.is_clear
+    for found in (solution.find_crossings(), solution.find_crossings(time_limit=1e6)):
+        assert found.pairs == expected and found.unseen == ()
+        assert found.is_complete and not found.is_clear
+    apart = asm.Assembly([block("a", 0.0), block("b", 9.0)]).solve()
+    assert apart.find_crossings(time_limit=1e-9).is_clear and apart.find_crossings(joined=True).is_clear
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"joined": "both"}, "joined is 'both'; expected True or False"),
+        ({"time_limit": -1.0}, "time_limit is -1; expected a number of seconds above 0"),
+    ],
+)
+def test_bad_input(options, message):
+    with pytest.raises(InputError, match=message):
+        row_of_blocks(2)[0].find_crossings(**options)
+
+
+def test_looks_in_slices_find_the_same(monkeypatch):
+    solution, expected = row_of_blocks(6)
+    looks = []
+    look = crossings.watch.look
+    # A slice that is over when it begins: every look is at one pair.
+    monkeypatch.setattr(crossings.watch_memory, "SLICE", -1)
+    monkeypatch.setattr(crossings.watch, "look", lambda *arguments: looks.append(arguments) or look(*arguments))
+    assert solution.find_crossings().pairs == expected
+    assert len(looks) == len(crossings.DEPTHS) * len(expected)
+
+    def later(*arguments):
+        looks.append(arguments)
+        if len(looks) == 4:
+            monkeypatch.setattr(limit, "_deadline", 0.0)
+        return look(*arguments)
+
+    limit = Interruption(time_limit=1e6)
+    looks.clear()
+    monkeypatch.setattr(crossings.watch, "look", later)
+    pairs = crossings.free_pairs(solution._scene.bodies, ())
+    partly = crossings.crossings_of(solution, pairs, limit)
+    # What was found by then crosses for certain, and the rest is not known.
+    assert len(looks) == 4 and partly.pairs == expected[:4] and partly.unseen == expected[4:]
+
+
+def test_bodies_are_where_their_boxes_are(cases):
+    # Turned and far from the origin: looked at only where hulls meet, and where bodies meet hulls do.
+    rng = np.random.default_rng(3)
+    for _ in range(cases(20, 400)):
+        turns = rng.normal(size=(2, 4))
+        turns /= np.linalg.norm(turns, axis=1)[:, None]
+        bodies = [
+            asm.Body(name, asm.shapes.sphere(1.0), quaternion=turn) for name, turn in zip("ab", turns, strict=True)
+        ]
+        way = rng.normal(size=3)
+        distance = rng.choice([1.999, 2.001])
+        bodies[0].pose = asm.Pose(100.0 * rng.normal(size=3), turns[0])
+        bodies[1].pose = asm.Pose(bodies[0].pose.position + distance * way / np.linalg.norm(way), turns[1])
+        assert bool(asm.Assembly(bodies).solve().crossings) == (distance < 2.0)

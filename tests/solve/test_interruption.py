@@ -12,7 +12,9 @@ import numpy as np
 import pytest
 
 import assembly as asm
+from assembly.constraints.packing import Packed
 from assembly.errors import InputError
+from assembly.proximity import watch_memory
 from assembly.solve import interruption, pauses
 from assembly.solve.settings import ASK_AT
 
@@ -39,7 +41,7 @@ def scene() -> asm.Assembly:
 def whole(scene) -> asm.Solution:
     """The solve that nobody ends."""
     solution = scene.solve(**LIMIT)
-    assert solution.success and solution.seconds > 2 * pauses.SLICE / 1e9, "too short for what is tested here"
+    assert solution.success and solution.seconds > 2 * watch_memory.SLICE / 1e9, "too short for what is tested here"
     return solution
 
 
@@ -61,7 +63,7 @@ def test_asking_changes_nothing(scene, whole):
     np.testing.assert_array_equal(solution.q, whole.q)
     assert solution.iterations == whole.iterations and solution.status is asm.Status.SOLVED
     # Between slices: at most one question in each.
-    assert 1 <= len(asked) <= solution.seconds * 1e9 / pauses.SLICE + 1
+    assert 1 <= len(asked) <= solution.seconds * 1e9 / watch_memory.SLICE + 1
     iterations = [iteration for iteration, _, _ in asked]
     assert iterations == sorted(iterations) and iterations[-1] <= solution.iterations
     assert all(np.isfinite(value) and feasibility >= 0.0 for _, value, feasibility in asked)
@@ -181,3 +183,95 @@ def test_an_interruption_leaves_shared_settings_as_they_are():
     thread.start()
     thread.join()
     assert found == [0.0]
+
+
+CROWD = 60
+PAIRS = CROWD * (CROWD - 1) // 2
+
+
+def crowd(count: int = CROWD) -> asm.Assembly:
+    """Ellipsoids in each other, so that one look at their pairs takes longer than a slice; with places for all."""
+    rng = np.random.default_rng(0)
+    shape = asm.shapes.ellipsoid(1.0, 0.9, 0.8)
+    scene = asm.Assembly(asm.Body(f"{k}", shape, rng.uniform(-1.0, 1.0, 3)) for k in range(count))
+    scene.constrain(asm.Clearance(places=600))
+    return scene
+
+
+@pytest.fixture(scope="module")
+def crowded() -> asm.Assembly:
+    return crowd()
+
+
+def seen(packed: Packed, state: np.ndarray) -> int:
+    """How many pairs the watch of a state has looked at."""
+    pairs = state[packed.memory_at + watch_memory.MEMORY_HEADER :]
+    pairs = pairs[: watch_memory.PAIR_MEMORY * len(packed.guarded[0])].reshape(-1, watch_memory.PAIR_MEMORY)
+    return int((~np.isnan(pairs[:, watch_memory.TURN])).sum())
+
+
+def test_one_look_at_many_pairs_asks(crowded):
+    # With no iteration at all nobody but the look at the start can ask.
+    other = crowded.solve(max_iterations=0)
+    assert other.seconds > watch_memory.SLICE / 1e9, "too short for what is tested here"
+    asked: list[tuple[int, float, float]] = []
+    solution = crowded.solve(max_iterations=0, callback=lambda *progress: asked.append(progress))
+    assert asked and asked[0][0] == 0
+    # Nothing is known of the start yet: zeros would say that it holds.
+    assert np.isnan(asked[0][1]) and asked[0][2] == np.inf
+    np.testing.assert_array_equal(solution.q, other.q)
+    assert solution.violations == other.violations
+
+
+@pytest.mark.parametrize("options", [{"time_limit": 1e-6}, {"callback": lambda *_: True}], ids=["time", "callback"])
+def test_a_look_that_is_not_to_go_on_is_whole(crowded, options):
+    solution = crowded.solve(**options)
+    assert solution.status in (asm.Status.TIME_LIMIT, asm.Status.STOPPED) and not solution.success
+    # What crosses is told, and not left out with pairs that nobody looked at.
+    assert seen(solution._packed, solution._state) == PAIRS and solution.feasibility > 0.1
+
+
+def test_scenes_of_many_pairs_look_at_the_clock_from_the_first_step():
+    assert pauses.is_large(crowd(24).packed().table)
+    assert not pauses.is_large(crowd(5).packed().table)
+    assert not pauses.is_large(long_arm(20).packed().table)
+    assert pauses.is_large(long_arm(40).packed().table)
+
+
+def test_a_look_that_is_thrown_away_ends_at_once(crowded):
+    whole = crowded.solve(max_iterations=0)
+    packed = crowded.packed()
+    states: list[np.ndarray] = []
+
+    def callback(iteration, objective, feasibility):
+        states.append(asked.watched[0])
+        raise LookupError
+
+    asked = interruption.Interruption(callback=callback)
+    with pytest.raises(LookupError):
+        crowded._from_start(None, None, {}, asked)
+    assert len(states) == 1 and 0 < seen(packed, states[0]) < PAIRS
+    again = crowded.solve(max_iterations=0)
+    np.testing.assert_array_equal(again.q, whole.q)
+    assert again.violations == whole.violations
+
+
+def test_what_is_waited_for():
+    limited = interruption.Interruption(time_limit=100.0)
+    assert limited.wait_for("a sum", lambda: 1 + 1) == 2
+    with pytest.raises(ZeroDivisionError):
+        limited.wait_for("a quotient", lambda: 1 // 0)
+    done = threading.Event()
+    with pytest.raises(TimeoutError, match="a rest is not known yet where time_limit is over"):
+        interruption.Interruption(time_limit=1e-3).wait_for("a rest", lambda: done.wait(60.0))
+    assert not done.is_set()
+    done.set()
+
+
+def test_ctrl_c_ends_what_is_waited_for(ctrl_c):
+    done = threading.Event()
+    timer = threading.Timer(0.1, lambda: os.kill(os.getpid(), signal.SIGINT))
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        interruption.CTRL_C.wait_for("a rest", lambda: done.wait(60.0))
+    done.set()

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import threading
+
 import numpy as np
 import pytest
 
 import assembly as asm
 from assembly.errors import InputError
+from assembly.solve import rank
 from assembly.solve.mobility import Mobility
 from tests.solve.mechanisms import bennett, bricard, chain, parallelograms, planar_four_bar
 
@@ -398,3 +403,62 @@ def test_nothing_moves_where_nothing_is_free():
 
 def test_public_name():
     assert asm.Mobility is Mobility
+
+
+def lazy(mobility):
+    """What is found when it is read."""
+    return {
+        "finite_dof": lambda: mobility.finite_dof,
+        "redundant_sets": lambda: mobility.redundant_sets,
+        "conflicting_sets": lambda: mobility.conflicting_sets,
+        "trajectory": lambda: mobility.trajectory(frames=5),
+    }
+
+
+def test_a_time_limit_gives_no_halves():
+    scene = planar_four_bar()
+    with pytest.raises(TimeoutError, match="rank is not known yet where time_limit is over"):
+        scene.mobility(time_limit=1e-9)
+    with pytest.raises(InputError, match="time_limit is 0; expected a number of seconds above 0"):
+        scene.mobility(time_limit=0.0)
+    plain, limited = scene.mobility(), scene.mobility(time_limit=1e6)
+    object.__setattr__(limited, "_time_limit", 1e-9)
+    for read in lazy(limited).values():
+        with pytest.raises(TimeoutError):
+            read()
+    lines = str(limited).splitlines()
+    assert "  freedoms of poses nearby are not known: time_limit was over" in lines
+    assert "  redundant constraints are not known: time_limit was over" in lines
+    # Each has a time of its own, and what was not known may be asked for again.
+    object.__setattr__(limited, "_time_limit", 1e6)
+    assert str(limited) == str(plain)
+    for read, expected in zip(lazy(limited).values(), lazy(plain).values(), strict=True):
+        np.testing.assert_array_equal(read(), expected())
+
+
+def test_ranks_of_large_matrices_are_those_of_small_ones(monkeypatch):
+    scene = planar_four_bar()
+    plain = scene.mobility()
+    monkeypatch.setattr(rank, "LARGE", 1)
+    other = scene.mobility()
+    np.testing.assert_array_equal(other.singular_values, plain.singular_values)
+    np.testing.assert_array_equal(other.free_motions, plain.free_motions)
+    assert other.redundant_sets == plain.redundant_sets
+
+
+def test_ctrl_c_ends_a_rank(monkeypatch):
+    # As if a decomposition took for ever: the thread that it runs in does not keep anybody.
+    done = threading.Event()
+    monkeypatch.setattr(rank, "LARGE", 1)
+    monkeypatch.setattr(rank.np.linalg, "svd", lambda *_, **__: done.wait(60.0))
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    timer = threading.Timer(0.2, lambda: os.kill(os.getpid(), signal.SIGINT))
+    timer.start()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            planar_four_bar().mobility()
+    finally:
+        signal.signal(signal.SIGINT, before)
+        done.set()
+    monkeypatch.undo()
+    assert planar_four_bar().mobility().dof == 1

@@ -8,7 +8,8 @@ import assembly as asm
 from assembly.geometry import shapes
 from assembly.solve.reference import ReferenceSolver
 from assembly.solve.reference_surfaces import spline_function
-from assembly.solve.solution import Iteration, Status
+from assembly.solve.scene import Status
+from assembly.solve.solution import Iteration
 from tests.geometry.reference import knot_vector
 
 

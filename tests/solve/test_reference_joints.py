@@ -15,7 +15,7 @@ from assembly.solve import reference
 from assembly.solve.reference import ReferenceSolver
 from assembly.solve.reference_rows import Poses, Rows
 from assembly.solve.reference_terms import Terms
-from assembly.solve.solution import Status
+from assembly.solve.scene import Status
 
 
 def unit(*e):

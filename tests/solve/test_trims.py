@@ -8,7 +8,7 @@ import pytest
 import assembly as asm
 from assembly.constraints.trim_contact import FORMS
 from assembly.proximity.pairs import extremal_pair
-from assembly.solve.solution import Status
+from assembly.solve.scene import Status
 from tests.laws.scenes import dome
 from tests.laws.trim_scenes import circle, polygon, spline
 

@@ -6,7 +6,7 @@ import casadi as ca
 import pytest
 
 import assembly as asm
-from assembly.solve.solution import Status
+from assembly.solve.scene import Status
 
 
 def balls(unit=1.0, far=0.0):

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import casadi as ca
 import numpy as np
 import pytest
 
 import assembly as asm
 from assembly.errors import InputError
+from assembly.studies.distinct import are_one
 
 
 def four_bar():
@@ -95,3 +97,76 @@ def test_what_cannot_be_has_no_solutions():
 def test_bad_input(options, text):
     with pytest.raises(InputError, match=text):
         four_bar().solve_all(**options)
+
+
+def free_points(objective, count=2):
+    """Points of bodies whose turns nothing asks for; the objective is of all their coordinates."""
+    poses = [ca.SX.sym(f"q{k}", 7) for k in range(count)]
+    bodies = [asm.Body(f"point {k}", position=(0.01, -0.2, 0.5 * k)) for k in range(count)]
+    scene = asm.Assembly(bodies)
+    coordinates = ca.vertcat(*(pose[:3] for pose in poses))
+    scene.minimize(asm.Expression(ca.Function("f", poses, [objective(coordinates)]), bodies))
+    return scene
+
+
+def test_turns_that_nothing_asks_for_make_no_solutions_of_their_own():
+    target = np.array([1.0, 2.0, 3.0, -1.0, 0.5, 0.0])
+    scene = free_points(lambda x: ca.sumsqr(x - target))
+    (best,) = scene.solve_all(starts=12)
+    np.testing.assert_allclose(best.q[:, :3].ravel(), target, rtol=0, atol=1e-9)
+    # The one that stays is that of the bodies' own poses.
+    np.testing.assert_array_equal(best.q, scene.solve().q)
+
+
+def test_an_optimum_that_is_flat_is_one():
+    # Of a fourth power solves end where they are near enough, each from its side.
+    found = free_points(lambda x: ca.sum1((x - 1.0) ** 4)).solve_all(starts=12)
+    assert len(found) == 1 and found[0].objective < 1e-9
+
+
+@pytest.mark.parametrize("tilt", [0.0, 1e-3])
+def test_two_optima_are_two_however_alike(tilt):
+    # Along x a double well; where it is level both have the same objective, and the poses between have not.
+    found = free_points(lambda x: (x[0] ** 2 - 1.0) ** 2 + tilt * x[0] + ca.sumsqr(x[1:])).solve_all(starts=12)
+    places = sorted(float(solution.q[0, 0]) for solution in found)
+    assert places == pytest.approx([-1.0, 1.0], abs=2e-3)
+
+
+def test_a_round_body_that_turned_is_at_the_same_place():
+    plane = asm.Body("plane", asm.shapes.plane(20.0, 20.0), fixed=True)
+    ball = asm.Body("ball", asm.shapes.sphere(1.0), (0.0, 0.0, 3.0))
+    scene = asm.Assembly([plane, ball])
+    scene.constrain(asm.Contact(plane, ball))
+    scene.minimize(asm.PointDistance(ball.point(0, 0, 0), (1.0, 2.0, 5.0)))
+    found = scene.solve_all(starts=8)
+    heights = {round(float(solution.q[1, 2]), 6) for solution in found}
+    assert len(found) == len(heights) and 1.0 in heights
+
+
+def test_a_ball_that_keeps_off_a_box_is_at_one_place_however_it_is_turned():
+    box, ball = asm.Body("box", asm.shapes.box(2, 2, 2), fixed=True), asm.Body("ball", asm.shapes.sphere(1.0))
+    ball.pose = asm.Pose((0.5, 0.3, 4.0))
+    scene = asm.Assembly([box, ball])
+    scene.constrain(asm.Clearance(minimum=0.1))
+    scene.minimize(asm.PointDistance(ball.point(0, 0, 0), (0.5, 0.3, 0.2)))
+    found = scene.solve_all(starts=8)
+    places = {tuple(np.round(solution.q[1, :3], 6)) for solution in found}
+    assert len(found) == len(places) and (0.5, 0.3, 2.1) in places
+
+
+def test_solutions_with_something_between_them_are_two():
+    # On either side of a wall, as far from where the point is to be; between them it is in the wall.
+    wall, ball = asm.Body("wall", asm.shapes.box(8, 8, 1), fixed=True), asm.Body("ball", asm.shapes.sphere(0.5))
+    ball.pose = asm.Pose((0.0, 0.0, 2.0))
+    scene = asm.Assembly([wall, ball])
+    scene.constrain(asm.Clearance())
+    pose = ca.SX.sym("q", 7)
+    scene.minimize(asm.Expression(ca.Function("f", [pose], [ca.sumsqr(pose[:2])]), [ball]))
+    above = scene.solve()
+    ball.pose = asm.Pose((0.0, 0.0, -2.0))
+    below = scene.solve()
+    ball.pose = asm.Pose((0.0, 0.0, 3.0))
+    higher = scene.solve()
+    assert not are_one(above, below)
+    # Nothing asks how far above it is.
+    assert are_one(above, higher)

@@ -295,18 +295,18 @@ def test_a_clearance_is_kept_while_a_hand_pushes_through():
     scene = asm.Assembly([a, b])
     scene.constrain(asm.Clearance())
     tracker = scene.tracker(b.point(0, 0, 0))
-    seen = []
-    for x in np.linspace(3.0, -3.0, 400):
+    seen, pushed = [], 0
+    for k, x in enumerate(np.linspace(3.0, -3.0, 400)):
         step = tracker.step((x, 0.1, 0.0))
         seen += [event.kind.value for event in step.events]
         assert np.linalg.norm(step.q[1, :3]) >= 2.0 - 1e-11
         assert step.status is not TrackStatus.VIOLATED
-    assert "added" in seen
-    # It is drawn around the fixed one, or stands before it; a contact that is listed pushes as hard as the hand.
-    names = list(step.solution.contacts)
-    if names:
-        assert names == ["clearance: a-b"]
-        assert np.abs(step.solution.wrenches["clearance"]["b"].force - step.force).max() < 1e-4
+        if k % 20 == 0 and np.linalg.norm(step.q[1, :3]) < 2.0 + 1e-9 and step.status is TrackStatus.FOLLOWED:
+            # It stands before the fixed one: the contact pushes as hard as the hand.
+            pushed += 1
+            assert list(step.solution.contacts) == ["clearance: a-b"]
+            assert np.abs(step.solution.wrenches["clearance"]["b"].force - step.force).max() < 1e-4
+    assert "added" in seen and pushed > 0
 
 
 def hinge(**values):

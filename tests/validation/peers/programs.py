@@ -22,7 +22,7 @@ objective are CasADi expressions of them. What is left of the poses, turns and u
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
@@ -40,7 +40,7 @@ class Program:
     Attributes
     ----------
     name : str
-        Number in the collection.
+        Number in the collection; several where a problem stands there more than once.
     start : sequence of float
         The collection's standard start.
     objective : callable, optional
@@ -58,6 +58,8 @@ class Program:
         by digits that were printed, or by an optimum that is flat.
     scale : float
         One unit of violation of the values that are to be zero.
+    others : sequence of sequences of float
+        Starts that the collections have for the same problem elsewhere.
     """
 
     name: str
@@ -72,6 +74,7 @@ class Program:
     close: float = 1e-8
     close_x: float = 1e-7
     scale: float = 1.0
+    others: Sequence[Sequence[float]] = ()
 
     def __str__(self) -> str:
         return self.name
@@ -113,15 +116,15 @@ def variables(program: Program, solution: asm.Solution) -> np.ndarray:
     return np.asarray(solution.q)[:, :3].ravel()[: len(program.start)]
 
 
-def check(program: Program) -> asm.Solution:
-    """Solve from the standard start: solved, at the published optimum, and the variables as published."""
-    solution = scene_of(program).solve()
-    x = variables(program, solution)
-    assert solution.status is asm.Status.SOLVED, f"{solution.message} at {x}"
-    if program.objective:
-        optimum = float(ca.DM(program.objective(ca.DM(x))))
-        assert abs(optimum - program.optimum) <= program.close * max(1.0, abs(program.optimum)), (optimum, x)
-    if program.x is not None:
-        size = max(1.0, float(np.abs(program.x).max()))
-        assert np.abs(x - program.x).max() <= program.close_x * size, x
-    return solution
+def check(program: Program) -> None:
+    """Solve from every standard start: solved, at the published optimum, and the variables as published."""
+    for start in (program.start, *program.others):
+        solution = scene_of(replace(program, start=start)).solve()
+        x = variables(program, solution)
+        assert solution.status is asm.Status.SOLVED, f"{solution.message} at {x} from {start}"
+        if program.objective:
+            optimum = float(ca.DM(program.objective(ca.DM(x))))
+            assert abs(optimum - program.optimum) <= program.close * max(1.0, abs(program.optimum)), (optimum, x)
+        if program.x is not None:
+            size = max(1.0, float(np.abs(program.x).max()))
+            assert np.abs(x - program.x).max() <= program.close_x * size, x

@@ -157,7 +157,7 @@ def test_a_corner_over_a_face(frame):
     # the suite, at (0.60947571, 0.01175873).
     pair = nearest(("box", 6, 10, 2), ("box", 2, 2, 2), EIGHTH, frame)
     a, b, c = ((1 + 2 * cos(pi / 4)) / 3, *((1 - cos(pi / 4)) / 3 + sign * sin(pi / 4) / sqrt(3) for sign in (1, -1)))
-    low = max(abs(a) + abs(b) + abs(c), 0.0)
+    low = abs(a) + abs(b) + abs(c)
     assert abs(low - 1.62123444) < 1e-8
     assert abs(pair.gap - (10 - 1 - low)) < CLOSE
     corner = np.array((0.60947571, 0.01175873))

@@ -169,7 +169,7 @@ TWO = (
         positive=lambda x: [2 - x[0] - x[1], x[1] - x[0] ** 2],
     ),
     Program(
-        "23",
+        "23, 225",
         (3, 1),
         lambda x: x[0] ** 2 + x[1] ** 2,
         2.0,
@@ -185,13 +185,14 @@ TWO = (
         high=(50, 50),
     ),
     Program(
-        "24",
+        "24, 232",
         (1, 0.5),
         lambda x: ((x[0] - 3) ** 2 - 9) * x[1] ** 3 / (27 * R3),
         -1.0,
         (3, R3),
         positive=lambda x: [x[0] / R3 - x[1], x[0] + R3 * x[1], 6 - x[0] - R3 * x[1]],
         low=(0, 0),
+        others=[(2, 0.5)],
     ),
 )
 
@@ -262,12 +263,13 @@ THREE = (
         close_x=2e-3,  # the fourth power is flat
     ),
     Program(
-        "27",
+        "27, 235",
         (2, 2, 2),
         lambda x: 0.01 * (x[0] - 1) ** 2 + (x[1] - x[0] ** 2) ** 2,
         0.04,
         (-1, 1, 0),
         zero=lambda x: [x[0] + x[2] ** 2 + 1],
+        others=[(-2, 3, 1)],
     ),
     Program(
         "28",
@@ -286,7 +288,7 @@ THREE = (
         positive=lambda x: [48 - x[0] ** 2 - 2 * x[1] ** 2 - 4 * x[2] ** 2],
     ),
     Program(
-        "30",
+        "30, 249",
         (1, 1, 1),
         lambda x: x[0] ** 2 + x[1] ** 2 + x[2] ** 2,
         1.0,

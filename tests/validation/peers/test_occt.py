@@ -170,7 +170,7 @@ def test_surfaces(first, second, pose, gap):
     """The nearest pair over all features, and the same by both orders."""
     there = np.array(pose, dtype=float)
     forward, back = closest_features(first, second, q_b=there), closest_features(second, first, q_a=there)
-    assert abs(abs(forward.gap) - gap) < 1e-12 and abs(abs(back.gap) - gap) < 1e-12
+    assert abs(forward.gap - gap) < 1e-12 and abs(back.gap - gap) < 1e-12
 
 
 @pytest.mark.parametrize(

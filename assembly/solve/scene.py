@@ -1,0 +1,72 @@
+"""What a solve is of, and how it ended: the bodies, contacts and faces that a solution speaks of; its status."""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.constraints.constraint import Constraint
+from assembly.constraints.contact import Contact
+from assembly.constraints.layout import TERM_TABLE, TERMS
+from assembly.constraints.packing import Packed
+from assembly.constraints.terms import POINT_DISTANCE, POSTURE, POSTURE_PARAMETERS, TERM
+from assembly.errors import InputError
+from assembly.kinematics.body import Body
+
+if TYPE_CHECKING:
+    from assembly.kinematics.body import BodyFace
+
+__all__ = ["Scene", "Status"]
+
+
+class Status(Enum):
+    """How a solve ended; the value says what to do."""
+
+    SOLVED = "every constraint holds and the objective, if there is one, is at a local minimum"
+    INFEASIBLE = "the constraints cannot all hold near this start; the pose violates them least: drop or move one"
+    STALLED = "no further progress; look at the worst violation, start elsewhere or loosen the tolerance"
+    ITERATION_LIMIT = "out of iterations; raise max_iterations or start nearer"
+    CONTACT_LOST = "a contact has no extremal pair at the start; move the bodies or name the faces"
+    TIME_LIMIT = "the time limit ended it; the pose is the last that held, if one did: raise time_limit or start nearer"
+    STOPPED = "the callback ended it; the pose is the last that held, if one did"
+    UNBOUNDED = "the objective is unbounded, it falls on and on along poses that hold; bound it by a limit or a term"
+    FITTED = "constraints that repeat each other disagree by a little and hold as well as they can; all others hold"
+
+
+class Scene:
+    """The bodies, contacts and faces that a solution speaks of."""
+
+    def __init__(
+        self,
+        bodies: tuple[Body, ...],
+        constraints: tuple[Constraint, ...],
+        contacts: tuple[Contact, ...],
+        sides: tuple[tuple[Body | BodyFace, Body | BodyFace], ...],
+        scale: float,
+    ) -> None:
+        self.bodies = bodies
+        self.constraints = constraints
+        self.contacts = contacts
+        self.sides = sides
+        self.scale = scale
+        self._wished: NDArray[np.int64] | None = None
+
+    def wished(self, packed: Packed) -> NDArray[np.int64]:
+        """Where the pool has what the objective asks for and may change between solves: targets and postures."""
+        if self._wished is None:
+            records = packed.table[packed.table[TERM_TABLE] :][: TERM * packed.table[TERMS]].reshape(-1, TERM)
+            sizes = {POINT_DISTANCE: 7, POSTURE: POSTURE_PARAMETERS}
+            places = [np.arange(sizes.get(kind, 0)) + at for kind, _, at, *_ in records.tolist()]
+            self._wished = np.concatenate([*places, np.empty(0, dtype=np.int64)]).astype(np.int64)
+        return self._wished
+
+    def index(self, body: Body | str) -> int:
+        """Place of a body, given itself or its name."""
+        for k, other in enumerate(self.bodies):
+            if other is body or (isinstance(body, str) and other.name == body):
+                return k
+        known = ", ".join(repr(other.name) for other in self.bodies)
+        raise InputError(f"body is {body!r}; expected one of {known}")
