@@ -64,7 +64,9 @@ def track_contact(table, pool, row, q, start, patience, records, k):
         h = curvature[1]
         det = h[0] * h[3] - h[1] * h[2]
         norm2 = h[0] * h[0] + h[1] * h[1] + h[2] * h[2] + h[3] * h[3]
-        records[k, PROPER] = 1.0 if det > -1e-9 * norm2 and h[0] + h[3] <= 0.0 else 0.0
+        # Of conforming surfaces it is rounding, and they do not cross.
+        proper = norm2 <= 1e-18 or (det > -1e-9 * norm2 and h[0] + h[3] <= 0.0)
+        records[k, PROPER] = 1.0 if proper else 0.0
         records[k, FOLD] = det / norm2 if norm2 > 1e-18 else 0.0
     return status, x, distance if frame[10] > 0.0 else -distance
 
@@ -122,9 +124,8 @@ def is_guard(table, r):
 
 @kernel(inline=True)
 def least_gap(table, pool, r, tracked):
-    """The least gap of row r: of a clearance's, less by what the bodies were in each other where the solve began."""
-    least = pool[table[table[ROW_TABLE] + ROW * r + MINIMUM]]
-    return least - tracked[r, ALLOWED] if is_guard(table, r) else least
+    """The least gap of row r, less by what the bodies were in each other where the solve began and still touched."""
+    return pool[table[table[ROW_TABLE] + ROW * r + MINIMUM]] - tracked[r, ALLOWED]
 
 
 @kernel(inline=True)

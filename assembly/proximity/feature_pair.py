@@ -28,7 +28,8 @@ def two_face_frame(frame, curvature):
     det = h[0] * h[3] - h[1] * h[2]
     norm2 = h[0] * h[0] + h[1] * h[1] + h[2] * h[2] + h[3] * h[3]
     # Relative curvature -H (I + beta A)^-1: indefinite means the surfaces cross beside the point.
-    proper = det > -1e-9 * norm2 and h[0] + h[3] <= 0.0
+    # Of conforming surfaces it is rounding, and they do not cross.
+    proper = norm2 <= 1e-18 or (det > -1e-9 * norm2 and h[0] + h[3] <= 0.0)
     fold = det / norm2 if norm2 > 1e-18 else 0.0
     rate = (e[0], e[1], 0.0, e[2])
     return n, tx, ty, pf, pg, beta, face_side(a), face_side(c), rate, t, i, r, regular, isolated, proper, fold

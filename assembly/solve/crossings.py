@@ -7,6 +7,7 @@ from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from assembly.constraints import layout
 from assembly.constraints.clearance import Clearance
@@ -21,12 +22,15 @@ from assembly.proximity.solid_contact import PAIR_GAP, TRACK
 if TYPE_CHECKING:
     from assembly.solve.solution import Solution
 
-__all__ = ["crossing_pairs", "free_pairs", "joined_pairs"]
+__all__ = ["crossing_pairs", "free_pairs", "joined_pairs", "pairs_that_cross"]
 
+Array = NDArray[np.float64]
 Pair = tuple[Body, Body]
-# What counts as crossing where no more is called touching, and how deep looks see, in parts of the scene's size. A deep
-# look of wires that cross often finds so much that it lacks room for the rest, so that there are several.
-CROSSING, DEPTHS = 1e-8, (0.005, 0.015, 0.05)
+# What is in each other by less, in parts of the scene's size, may be so by rounding.
+ROUNDED = 1e-10
+# How deep looks see, in parts of that size. A deep look of wires that cross often finds so much that it lacks room for
+# the rest, so that there are several.
+DEPTHS = (0.005, 0.015, 0.05)
 
 
 class _Watched(Clearance):
@@ -79,32 +83,55 @@ def crossing_pairs(solution: Solution, pairs: Sequence[Pair]) -> tuple[tuple[str
     InputError
         Bodies of sizes that clearances cannot have.
     """
+    contacts = [item for item in solution._scene.constraints if isinstance(item, Contact)]
+    given = solution._parameters[: len(contacts)]
+    return pairs_that_cross(solution._scene.bodies, pairs, solution.q, solution._touching, contacts, given)
+
+
+def pairs_that_cross(
+    bodies: Sequence[Body],
+    pairs: Sequence[Pair],
+    q: Array,
+    touching: float,
+    contacts: Sequence[Contact] = (),
+    given: Array | None = None,
+) -> tuple[tuple[str, str], ...]:
+    """Names of those pairs whose bodies are in each other at poses q, (n, 7), by more than touching.
+
+    Contacts of the scene, `given` as tracked, (k, TRACK), are no crossings.
+
+    Raises
+    ------
+    InputError
+        Bodies of sizes that clearances cannot have.
+    """
     if not pairs:
         return ()
-    bodies = solution._scene.bodies
-    contacts = [item for item in solution._scene.constraints if isinstance(item, Contact)]
     name = "crossings"
     while any(item.name == name for item in contacts):
         name += "'"
     packed = Packed(bodies, [*contacts, _Watched(pairs, name)], ())
-    found = _seen(packed, solution, len(contacts))
+    q = q.copy()
+    q[:, :3] = (q[:, :3] - packed.reference) / packed.scale
+    tracked = np.full((packed.pair_rows, TRACK), np.nan)
+    if given is not None:
+        tracked[: len(given)] = given
+    found = _seen(packed, q, tracked, len(contacts), touching)
     return tuple((a.name, b.name) for k, (a, b) in enumerate(pairs) if k in found)
 
 
-def _seen(packed: Packed, solution: Solution, contacts: int) -> set[int]:
+def _seen(packed: Packed, q: Array, known: Array, contacts: int, touching: float) -> set[int]:
     """Places of pairs that looks of several depths find to cross."""
-    q = solution.q.copy()
-    q[:, :3] = (q[:, :3] - packed.reference) / packed.scale
     count = watch_memory.PAIR_MEMORY * len(packed.guarded[0])
-    deep = max(CROSSING, solution._touching)
+    deep = max(ROUNDED, touching)
     found = set()
     for depth in DEPTHS:
         state = packed.new_state()
         memory = state[packed.memory_at :]
+        memory[watch_memory.OVERLAP] = touching
         pairs = memory[watch_memory.MEMORY_HEADER :][:count].reshape(-1, watch_memory.PAIR_MEMORY)
         pairs[:, watch_memory.REACH] = depth
-        tracked = np.full((packed.pair_rows, TRACK), np.nan)
-        tracked[:contacts] = solution._parameters[:contacts]
+        tracked = known.copy()
         watch.look(packed.table, packed.pool, packed.table[layout.WATCH], memory, q, tracked, watch.EVERYTHING)
         found |= set(np.flatnonzero(pairs[:, watch_memory.CROSSED] == 1.0).tolist())
         gaps = tracked[contacts:, PAIR_GAP]
