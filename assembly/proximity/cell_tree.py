@@ -17,10 +17,7 @@ from assembly.proximity.box_model import (
     HALF_V,
     LINEAR_U,
     LINEAR_V,
-    MIXED,
     RADIUS,
-    SQUARE_U,
-    SQUARE_V,
     U0,
     V0,
     face_model,
@@ -64,9 +61,6 @@ UNKNOWN, INSIDE, OUTSIDE, MIXED_SIDE = 0, 1, 2, 3
 TOGETHER = 8
 # A box longer than this times its width is halved, not quartered.
 SLENDER = 1.5
-# A box whose terms of second order are this part of the linear ones is straight; one is bent down to the second part,
-# from where on what its model leaves out is rounding.
-STRAIGHT, BENT = 1e-9, 1e-3
 # Faces and edges of so many spans are looked at span by span; of more, by their cells.
 SPANS = 4
 # Room for parts of cells.
@@ -308,21 +302,14 @@ def give_model(table, pool, turn, shift, nodes, info, i, work):
 
 @kernel(inner=True)
 def split_cell(nodes, info, i, count):
-    """Two or four parts of a cell that has its model. Returns the number of nodes.
-
-    A cell that is straight along one parameter and bent along the other one is cut across the bend alone, however long
-    it is: the bound of a box does not gain by more, and walls that are equally near all along would be cut everywhere.
-    """
-    uu = dot(get(nodes, i, LINEAR_U), get(nodes, i, LINEAR_U))
-    vv = dot(get(nodes, i, LINEAR_V), get(nodes, i, LINEAR_V))
-    bent_u = math.sqrt(dot(get(nodes, i, SQUARE_U), get(nodes, i, SQUARE_U)))
-    bent_v = math.sqrt(dot(get(nodes, i, SQUARE_V), get(nodes, i, SQUARE_V)))
-    mixed = math.sqrt(dot(get(nodes, i, MIXED), get(nodes, i, MIXED)))
+    """Two or four parts of a cell that has its model. Returns the number of nodes."""
+    p = get(nodes, i, LINEAR_U)
+    q = get(nodes, i, LINEAR_V)
+    uu = dot(p, p)
+    vv = dot(q, q)
     is_edge = info[i, KIND] == EDGE
-    along_v = bent_v + mixed <= STRAIGHT * math.sqrt(vv) and bent_u > BENT * math.sqrt(uu)
-    along_u = bent_u + mixed <= STRAIGHT * math.sqrt(uu) and bent_v > BENT * math.sqrt(vv)
-    in_u = is_edge or along_v or (SLENDER * SLENDER * uu >= vv and not along_u)
-    in_v = not is_edge and not along_v and (along_u or SLENDER * SLENDER * vv >= uu)
+    in_u = is_edge or SLENDER * SLENDER * uu >= vv
+    in_v = not is_edge and SLENDER * SLENDER * vv >= uu
     info[i, CHILD] = count
     parts_u = 2 if in_u else 1
     parts_v = 2 if in_v else 1
