@@ -17,14 +17,27 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly.geometry.spline import SIGN
 from assembly.geometry.vec import add, dot, matvec, scale, sub
-from assembly.proximity.borders import feature_at, feature_kind
+from assembly.proximity.borders import feature_at, feature_kind, on_surface, other_parameter
 from assembly.proximity.cell_tree import feature_cells, used_cell
 from assembly.proximity.crossing import tangents
 from assembly.proximity.extremal import CONVERGED, SINGULAR
 from assembly.proximity.feature_pair import solve_features
 from assembly.proximity.nearest import CROSSING, search
-from assembly.proximity.shell import FACES
+from assembly.proximity.shell import (
+    EDGE,
+    EDGE_CURVE,
+    EDGE_CURVE_B,
+    EDGE_FACE_A,
+    EDGE_FACE_B,
+    EDGE_RECORD,
+    EDGE_SURFACE,
+    EDGE_SURFACE_B,
+    EDGE_TABLE,
+    FACES,
+)
+from assembly.proximity.tips import unit
 from assembly.proximity.ways_apart import WAYS, add_ways
 
 # Points of shells that are deeper in each other than this part of the size tell a crossing from conforming faces.
@@ -86,6 +99,38 @@ def leans(table, pool, shell, code, u, v, turn, n, size, ways):
     return s
 
 
+@kernel(inner=True)
+def face_beside(table, pool, shell, code, u, v, turn, n):
+    """The face that leans most along n at a point of an edge, and the point on it; what is no edge stays as it is."""
+    if feature_kind(table, shell, code) != EDGE:
+        return code, u, v
+    edge = table[shell + EDGE_TABLE] + EDGE_RECORD * (code - table[shell + FACES])
+    surface = table[edge + EDGE_SURFACE]
+    face = table[edge + EDGE_FACE_A]
+    a, b, p, _along, m = on_surface(table, pool, surface, table[edge + EDGE_CURVE], u)
+    if table[edge + EDGE_FACE_B] >= 0:
+        other = table[edge + EDGE_SURFACE_B]
+        s = other_parameter(table, pool, edge, u, p)
+        c, d, _p, _along, k = on_surface(table, pool, other, table[edge + EDGE_CURVE_B], s)
+        lean = float(table[surface + SIGN]) * dot(unit(matvec(turn, m)), n)
+        if float(table[other + SIGN]) * dot(unit(matvec(turn, k)), n) > lean:
+            return table[edge + EDGE_FACE_B], c, d
+    return face, a, b
+
+
+@kernel(inner=True)
+def pair_from(table, pool, shells, pose, codes, x, n, size):
+    """The pair of two features of shells from x, and whether it is one at which they touch with a normal near n."""
+    f, g = codes
+    kind_f = feature_kind(table, shells[0], f)
+    kind_g = feature_kind(table, shells[1], g)
+    a = feature_at(table, shells[0], f)
+    b = feature_at(table, shells[1], g)
+    status, y, frame = solve_features(table, pool, kind_f, a, kind_g, b, pose[0], pose[1], x, n, size, math.inf)
+    found = (status == CONVERGED or status == SINGULAR) and abs(frame[5]) <= NEARLY * size and dot(frame[0], n) > 0.5
+    return found, y, frame[0], frame[5]
+
+
 @kernel(inner=True, allocates=True)
 def conforming_pair(table, pool, shell_f, shell_g, turn, shift, size):
     """The pair at which two shells that have points in common touch along conforming faces.
@@ -122,9 +167,13 @@ def conforming_pair(table, pool, shell_f, shell_g, turn, shift, size):
             continue
         if not leans(table, pool, shell_g, g, x[2], x[3], turn, n, size, ways) < 0.0:
             continue
-        a = feature_at(table, shell_f, f)
-        b = feature_at(table, shell_g, g)
-        status, y, frame = solve_features(table, pool, kind_f, a, kind_g, b, turn, shift, x, n, size, math.inf)
-        if (status == CONVERGED or status == SINGULAR) and abs(frame[5]) <= NEARLY * size and dot(frame[0], n) > 0.5:
-            return True, f, g, y, frame[0], frame[5]
+        shells, pose = (shell_f, shell_g), (turn, shift)
+        found, y, m, gap = pair_from(table, pool, shells, pose, (f, g), x, n, size)
+        if not found:
+            # Edges that lie on each other have no normal: the faces beside them do.
+            f, u, v = face_beside(table, pool, shell_f, f, x[0], x[1], same, n)
+            g, s, w = face_beside(table, pool, shell_g, g, x[2], x[3], turn, scale(-1.0, n))
+            found, y, m, gap = pair_from(table, pool, shells, pose, (f, g), (u, v, s, w), n, size)
+        if found:
+            return True, f, g, y, m, gap
     return False, -1, -1, (0.0, 0.0, 0.0, 0.0), none, 0.0
