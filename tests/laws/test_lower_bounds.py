@@ -14,7 +14,6 @@ from tests.laws.scenes import random_quaternion
 CYLINDER = asm.shapes.solid_cylinder(5.0, 10.0)
 CONE = (asm.Face(asm.shapes.cone(5.0, 10.0)), CYLINDER[-2])
 BOX = asm.shapes.box(3.0, 4.0, 5.0)
-CAPSULE = asm.shapes.pipe(asm.shapes.Path((0, 0, -5)).line(10), 2.0)
 # Sizes of the shapes are up to this.
 SIZE = 15.0
 # What counts as proven.
@@ -48,13 +47,12 @@ def beside(kind, rng):
     off = rng.uniform(-2.0, 2.0, 2)
     a, b, place = {
         "parallel cylinders": (CYLINDER, CYLINDER, (10.0 + gap) * np.array([np.cos(angle), np.sin(angle), 0.0])),
-        "a cylinder beside a capsule": (CYLINDER, CAPSULE, np.array([7.0 + gap, 0.0, 0.0])),
         "a tip under a disk": (CONE, CYLINDER, np.array([*off, 10.0 + gap])),
         "a tip under a box": (CONE, BOX, np.array([*(0.5 * off), 7.5 + gap])),
         "a tip under a tip's disk": (CONE, CONE, np.array([*off, 10.0 + gap])),
         "faces of boxes": (BOX, BOX, np.array([*(0.5 * off), 5.0 + gap])),
     }[kind]
-    if kind in ("parallel cylinders", "a cylinder beside a capsule"):
+    if kind == "parallel cylinders":
         place = place + [0.0, 0.0, along]
     frame = asm.Pose(rng.uniform(-20.0, 20.0, 3), turn)
     return a, b, frame.q, (frame @ asm.Pose(place)).q, gap
@@ -64,7 +62,6 @@ def beside(kind, rng):
     "kind",
     [
         "parallel cylinders",
-        "a cylinder beside a capsule",
         "a tip under a disk",
         "a tip under a box",
         "a tip under a tip's disk",
