@@ -28,11 +28,24 @@ def two_face_frame(frame, curvature):
     det = h[0] * h[3] - h[1] * h[2]
     norm2 = h[0] * h[0] + h[1] * h[1] + h[2] * h[2] + h[3] * h[3]
     # Relative curvature -H (I + beta A)^-1: indefinite means the surfaces cross beside the point.
-    # Of conforming surfaces it is rounding, and they do not cross.
-    proper = norm2 <= 1e-18 or (det > -1e-9 * norm2 and h[0] + h[3] <= 0.0)
+    proper = det > -1e-9 * norm2 and h[0] + h[3] <= 0.0
     fold = det / norm2 if norm2 > 1e-18 else 0.0
     rate = (e[0], e[1], 0.0, e[2])
     return n, tx, ty, pf, pg, beta, face_side(a), face_side(c), rate, t, i, r, regular, isolated, proper, fold
+
+
+@kernel(inline=True)
+def conforms(frame):
+    """Whether the relative curvature of a pair is rounding: two faces that are equally near all around it."""
+    beta, f, g = frame[5], frame[6], frame[7]
+    square = 0.0
+    for i in range(2):
+        for j in range(2):
+            # Y_g^T (X_f + beta Y_f) - X_g^T Y_f
+            h = g[4 + i] * (f[j] + beta * f[4 + j]) + g[6 + i] * (f[2 + j] + beta * f[6 + j])
+            h -= g[i] * f[4 + j] + g[2 + i] * f[6 + j]
+            square += h * h
+    return square <= 1e-18
 
 
 @kernel(inline=True)
