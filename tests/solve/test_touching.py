@@ -7,6 +7,7 @@ import pytest
 
 import assembly as asm
 from assembly.errors import InputError
+from assembly.proximity import FeatureStatus, closest_features
 from tests.proximity.test_contact_place import CORNER, prism
 from tests.proximity.test_touching import bolt_and_plate
 
@@ -227,3 +228,42 @@ def test_touching_of_a_manager_is_a_number_of_the_size():
     for touching in (-1e-9, 0.1, np.nan):
         with pytest.raises(InputError, match="touching is"):
             asm.Manager(flush(1.0, 0.0, (0, 0, 0))["edges"], touching=touching)
+
+
+@pytest.mark.parametrize("at", [(0, 0, 6), (1.5, -2, 9), (0, 0, 2.0)])
+def test_boxes_come_to_touch_along_parallel_faces(at):
+    """Of all pairs of points of two parallel faces any will do, and no other pose is asked for."""
+    a = asm.Body("a", asm.shapes.box(10, 10, 2), fixed=True)
+    b = asm.Body("b", asm.shapes.box(4, 4, 2), position=at)
+    scene = asm.Assembly([a, b])
+    scene.constrain(asm.Contact(a, b))
+    solution = scene.solve()
+    assert solution.success
+    pair = closest_features(a, b, solution.q[0], solution.q[1])
+    # Faces that lean by less than 1e-9 have any of their points for the nearest one.
+    assert pair.status is FeatureStatus.APART and abs(pair.gap) < 1e-8
+    assert scene.solve(solution).success
+
+
+@pytest.mark.parametrize("solid", [False, True])
+@pytest.mark.parametrize("heights", [(2.0, 1.0), (1.0, 2.0), (2.0, 2.5)])
+def test_a_warm_solve_keeps_the_contact_of_parallel_cylinders(heights, solid):
+    """An eccentric cam and its follower, of which one is shorter: the pair stays inside both."""
+    make = asm.shapes.solid_cylinder if solid else asm.shapes.cylinder
+    ground = asm.Body("ground", fixed=True)
+    cam, follower = asm.Body("cam", make(3.0, heights[0])), asm.Body("follower", make(0.5, heights[1]), (0, 4.5, 0))
+    drive = asm.Revolute(ground.frame(x=(0, 1, 0)), cam.frame(at=(0, -1, 0), x=(0, 1, 0)), "drive", angle=0.0)
+    guide = asm.Prismatic(ground.frame(z=(0, 1, 0)), follower.frame(z=(0, 1, 0)), "guide")
+    scene = asm.Assembly([ground, cam, follower])
+    walls = (cam.face("wall"), follower.face("wall")) if solid else (cam, follower)
+    scene.constrain(drive, guide, asm.Contact(*walls, "touch"))
+    solution = scene.solve()
+    for degrees in range(0, 100, 7):
+        drive.angle = np.radians(degrees)
+        solution = scene.solve(solution)
+        assert solution.success and solution.contacts["touch"].status.name in ("CONVERGED", "SINGULAR")
+        # The height of a circle of radius 3.5 about the cam's middle, over the guide.
+        off = np.sin(drive.angle)
+        assert solution.pose(follower).position[1] == pytest.approx(
+            np.cos(drive.angle) + np.sqrt(3.5**2 - off**2), abs=1e-10
+        )
