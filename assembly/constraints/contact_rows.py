@@ -34,7 +34,18 @@ from assembly.constraints.layout import (
 from assembly.geometry.vec import dot, sub
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.extremal import CLOSE, CONVERGED, LEFT_PATCH, SINGULAR, solve_pair
-from assembly.proximity.solid_contact import ALLOWED, CONTACT_RECORD, FOLD, IDLE, PAIR_GAP, PROPER, SLACK, STAYS, TRACK
+from assembly.proximity.solid_contact import (
+    ALLOWED,
+    CONFORMING,
+    CONTACT_RECORD,
+    FOLD,
+    IDLE,
+    PAIR_GAP,
+    PROPER,
+    SLACK,
+    STAYS,
+    TRACK,
+)
 from assembly.proximity.velocity import GAP, RATES, RECORD, gradient_row, store_record
 
 # A clearance's contact of solids that are hardly in each other may be given up where its pair ends: then MAY_GO - k
@@ -64,7 +75,8 @@ def track_contact(table, pool, row, q, start, patience, records, k):
         h = curvature[1]
         det = h[0] * h[3] - h[1] * h[2]
         norm2 = h[0] * h[0] + h[1] * h[1] + h[2] * h[2] + h[3] * h[3]
-        records[k, PROPER] = 1.0 if det > -1e-9 * norm2 and h[0] + h[3] <= 0.0 else 0.0
+        proper = 1.0 if det > -1e-9 * norm2 and h[0] + h[3] <= 0.0 else 0.0
+        records[k, PROPER] = CONFORMING if norm2 <= 1e-18 else proper
         records[k, FOLD] = det / norm2 if norm2 > 1e-18 else 0.0
     return status, x, distance if frame[10] > 0.0 else -distance
 
@@ -122,9 +134,8 @@ def is_guard(table, r):
 
 @kernel(inline=True)
 def least_gap(table, pool, r, tracked):
-    """The least gap of row r: of a clearance's, less by what the bodies were in each other where the solve began."""
-    least = pool[table[table[ROW_TABLE] + ROW * r + MINIMUM]]
-    return least - tracked[r, ALLOWED] if is_guard(table, r) else least
+    """The least gap of row r, less by what the bodies were in each other where the solve began and still touched."""
+    return pool[table[table[ROW_TABLE] + ROW * r + MINIMUM]] - tracked[r, ALLOWED]
 
 
 @kernel(inline=True)
@@ -217,7 +228,7 @@ def solids_row(table, pool, r, start, patience, point):
         start[r, STAYS] = MAY_GO - start[r, STAYS]
         tracked[r, STAYS] = start[r, STAYS]
     status = track_row(table, pool, row, q, start, patience, records, tracked, r)
-    found = (status == CONVERGED or status == SINGULAR) and (records[r, PROPER] == 1.0 or is_guard(table, r))
+    found = (status == CONVERGED or status == SINGULAR) and (records[r, PROPER] != 0.0 or is_guard(table, r))
     if not found:
         if is_guard(table, r):
             past = start[r, STAYS] > 0.0 and status == LEFT_PATCH

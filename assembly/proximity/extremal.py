@@ -32,7 +32,7 @@ from assembly.geometry.spline import (
     surface_point,
 )
 from assembly.geometry.vec import add, blend, cross, dot, matvec, matvec_t, scale, sub
-from assembly.proximity.pair_matrix import across_first, curvature_bound, pair_matrix, right_side
+from assembly.proximity.pair_matrix import across_first, curvature_bound, null_ways, pair_matrix, right_side
 from assembly.proximity.pole import CHART, limits, nearest_pole, polar_step, pole_frame
 
 # A step that turns about a pole by more than this part of the domain is taken in the pole's plane.
@@ -227,6 +227,29 @@ def pair_step(a, c, r, k, inverse, size):
 
 
 @kernel(inline=True)
+def step_of_other(a, c, k, h, step, size):
+    """A step of a pair of a continuum, without its part along the continuum on g: f makes that one, backwards.
+
+    Where an end of g is in the way the pair may go on along the continuum, to where both surfaces are. Along it H = 0,
+    so that f moved by s and g by K s, K = I + beta A, leave what the step solves as it is. Returns as `pair_step`.
+    """
+    ax, ay, bx, by = step
+    if abs(h[0]) + abs(h[1]) + abs(h[2]) + abs(h[3]) <= 1e-9 / size:
+        # Two planes: all ways are along it.
+        ax, ay, bx, by = ax - bx, ay - by, 0.0, 0.0
+    else:
+        _v, w = null_ways(h)
+        kx = k[0] * w[0] + k[1] * w[1]
+        ky = k[1] * w[0] + k[2] * w[1]
+        stretch = w[0] * kx + w[1] * ky
+        s = -(bx * w[0] + by * w[1]) / stretch if abs(stretch) > 1e-9 else 0.0
+        ax, ay, bx, by = ax + s * w[0], ay + s * w[1], bx + s * kx, by + s * ky
+    bend_f = (abs(ax) + abs(ay)) * max(curvature_bound(a), 2.0 / size)
+    bend_g = (abs(bx) + abs(by)) * max(curvature_bound(c), 2.0 / size)
+    return ax, ay, bx, by, bend_f, bend_g
+
+
+@kernel(inline=True)
 def bent_at_most(bend):
     """The part of a step that turns a normal by `BEND` at most."""
     return 1.0 if bend <= BEND else BEND / bend
@@ -287,6 +310,9 @@ def solve_pair(table, pool, f, g, rotation, shift, x, size, turn, close, downhil
     previous = 1e300
     status = NOT_CONVERGED
     level = False
+    # Whether it is f that goes along a continuum, because an end of g is in the way; steps in a row that ends undid.
+    by_other = False
+    stills = 0
     iteration = 0
     while True:
         n, tx, ty, pf, pg, e, t, a, c, r, beta, regular = pair_frame(table, pool, f, g, rotation, shift, x)
@@ -298,6 +324,8 @@ def solve_pair(table, pool, f, g, rotation, shift, x, size, turn, close, downhil
             inverse, levels = across_first(a, c, r, k, h, inverse, flat)
             level = level or levels
         ax, ay, bx, by, bend_f, bend_g = pair_step(a, c, r, k, inverse, size)
+        if by_other and not isolated:
+            ax, ay, bx, by, bend_f, bend_g = step_of_other(a, c, k, h, (ax, ay, bx, by), size)
         step = max(abs(ax) + abs(ay), abs(bx) + abs(by))
         bend = max(bend_f, bend_g)
         small = bend < close and isolated
@@ -324,9 +352,14 @@ def solve_pair(table, pool, f, g, rotation, shift, x, size, turn, close, downhil
         status = NOT_CONVERGED
         if clamped:
             status = LEFT_PATCH
-            # Held at the end of the patch and nothing else moves: the pair has left.
-            if abs(y[0] - x[0]) + abs(y[1] - x[1]) + abs(y[2] - x[2]) + abs(y[3] - x[3]) <= 1e-12 * way:
+            still = abs(y[0] - x[0]) + abs(y[1] - x[1]) + abs(y[2] - x[2]) + abs(y[3] - x[3]) <= 1e-12 * way
+            stills = stills + 1 if still else 0
+            # Held at the end of the patch and nothing else moves, nor the other surface's point: the pair has left.
+            if stills == 2 or (still and isolated):
                 break
+            if not isolated:
+                by_other = not by_other
+                previous = 1e300
         elif small:
             wx = a[0] * ax + a[1] * ay
             wy = a[1] * ax + a[2] * ay

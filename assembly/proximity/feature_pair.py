@@ -35,6 +35,20 @@ def two_face_frame(frame, curvature):
 
 
 @kernel(inline=True)
+def conforms(frame):
+    """Whether the relative curvature of a pair is rounding: two faces that are equally near all around it."""
+    beta, f, g = frame[5], frame[6], frame[7]
+    square = 0.0
+    for i in range(2):
+        for j in range(2):
+            # Y_g^T (X_f + beta Y_f) - X_g^T Y_f
+            h = g[4 + i] * (f[j] + beta * f[4 + j]) + g[6 + i] * (f[2 + j] + beta * f[6 + j])
+            h -= g[i] * f[4 + j] + g[2 + i] * f[6 + j]
+            square += h * h
+    return square <= 1e-18
+
+
+@kernel(inline=True)
 def transposed(m):
     return (m[0], m[3], m[6], m[1], m[4], m[7], m[2], m[5], m[8])
 

@@ -98,7 +98,8 @@ class FeaturePair(ReadOnlyArrays):
         normal . (b - a): positive apart, negative interpenetrating; of a body inside the other one, whose surfaces are
         apart, the side of a's face on which b is.
     lower : float
-        No points of the two are nearer than this; 0 where the bodies cross. Of a tracked pair, NaN.
+        No points of the two are nearer than this; 0 where the bodies cross. Where they are APART it is less than the
+        gap by 1e-9 of the larger one's size at most. Of a tracked pair, NaN.
     status : FeatureStatus
     """
 
@@ -214,7 +215,8 @@ def closest_features(
         Poses; a body's own by default, else the identity.
     touching : float
         What the bodies may be in each other and still touch, in parts of the larger one's size. So do those whose flat
-        faces lie on each other, where as small a move off these faces parts them.
+        faces lie on each other, where as small a move off these faces parts them, and those with conforming faces, a
+        peg in a bore of its own radius, that are no deeper.
 
     Returns
     -------

@@ -60,6 +60,8 @@ APART, CROSSING, UNPROVEN = 0, 1, 2
 WAITING = 65536
 # Extrema kept.
 EXTREMA = 256
+# Pairs of cells that are smaller, in parts of the size, are not cut: what they bound is the proof's end.
+TINY = 2.5e-10
 # Newton's method is tried where normals turn by less.
 SMOOTH = 1.2
 
@@ -179,6 +181,8 @@ def search(table, pool, shell_f, shell_g, turn, shift, size, rough):
     owners = np.empty((EXTREMA, 2), np.int64)
     known = 0
     tolerance = 1e-13 * size
+    # The least bound of a pair that was too small to be cut.
+    uncut = math.inf
     status = APART
     upper = math.inf
     best = (-1, -1)
@@ -321,7 +325,8 @@ def search(table, pool, shell_f, shell_g, turn, shift, size, rough):
                 continue
             if side_of(table, pool, a, ai, i) == OUTSIDE or side_of(table, pool, b, bi, j) == OUTSIDE:
                 continue
-            if max(a[i, RADIUS], b[j, RADIUS]) < 1e-9 * size:
+            if max(a[i, RADIUS], b[j, RADIUS]) < TINY * size:
+                uncut = min(uncut, key)
                 continue
         if larger_first(a, ai, i, b, bi, j):
             count_f = grow(table, pool, shell_f, same, origin, a, ai, i, count_f)
@@ -367,4 +372,4 @@ def search(table, pool, shell_f, shell_g, turn, shift, size, rough):
         # Out of room before any point inside the trims: where the search began.
         best = (ai[first_f, FEATURE], bi[first_g, FEATURE])
         at = (a[first_f, U0], a[first_f, V0], b[first_g, U0], b[first_g, V0])
-    return status, best[0], best[1], at, gap, max(lower, 0.0), effort
+    return status, best[0], best[1], at, gap, max(min(lower, uncut), 0.0), effort

@@ -11,6 +11,7 @@ from assembly.geometry.vec import add, dot, matvec, matvec_t, scale, sub
 from assembly.kinematics.motion import position, relative_pose, rotation
 from assembly.proximity.borders import feature_at, feature_kind
 from assembly.proximity.cell_tree import feature_cells
+from assembly.proximity.conforming import NEARLY, conforming_pair
 from assembly.proximity.crossing import tangents
 from assembly.proximity.extremal import CONVERGED, SINGULAR
 from assembly.proximity.feature_pair import solve_features
@@ -22,6 +23,9 @@ from assembly.proximity.ways_apart import WAYS, overlap_at
 # What is written of a pair: parameters (4), point of f, point of g, normal, gap, lower bound, pairs of cells looked
 # at, switches.
 PARAMETERS, POINT_F, POINT_G, NORMAL, GAP, LOWER, EFFORT, SWITCHES, PAIR = 0, 4, 7, 10, 13, 14, 15, 16, 17
+# Where no pair is nearer than the one found by more than this part of the size, it counts as the nearest one: in a
+# continuum, or beside a tip, a search has no room to prove more.
+PROVEN = 1e-9
 # Statuses of a tracked pair, beside those of a search.
 TRACKED, LOST = 4, 5
 
@@ -72,10 +76,6 @@ def find_nearest(table, pool, shell_f, shell_g, q, size, codes, out):
     turn, shift = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
     status, f, g, x, gap, lower, effort = search(table, pool, shell_f, shell_g, turn, shift, size, 0.0)
     none = (0.0, 0.0, 0.0)
-    if status == APART and abs(gap) <= TOUCHING * size:
-        # Solids whose faces are flush have points in common before a search comes to where they cross.
-        if overlap_at(table, pool, shell_f, shell_g, turn, f, g, x, size, np.empty((WAYS, 3))):
-            status = CROSSING
     if status == UNPROVEN:
         # The search was over before it came to the nearest one; beside what it found there may be nearer ones.
         found, near_f, near_g, y, frame, _switches = track_features(
@@ -83,6 +83,12 @@ def find_nearest(table, pool, shell_f, shell_g, q, size, codes, out):
         )
         if (found == CONVERGED or found == SINGULAR) and lower <= abs(frame[5]) < abs(gap):
             f, g, x, gap = near_f, near_g, y, frame[5]
+        if abs(gap) - lower <= PROVEN * size:
+            status = APART
+    if status == APART and abs(gap) <= TOUCHING * size:
+        # Solids whose faces are flush have points in common before a search comes to where they cross.
+        if overlap_at(table, pool, shell_f, shell_g, turn, f, g, x, size, np.empty((WAYS, 3))):
+            status = CROSSING
     write_features(table, pool, shell_f, shell_g, q, turn_f, turn, shift, f, g, x, none, gap, size, codes, out)
     out[LOWER] = lower
     out[EFFORT] = effort
@@ -93,12 +99,17 @@ def find_nearest(table, pool, shell_f, shell_g, q, size, codes, out):
 def find_deepest(table, pool, shell_f, shell_g, q, size, codes, out):
     """The pair of two shells that cross at the features and coordinates in codes and out. Returns the status.
 
-    APART where they turn out to touch, and rounding said that they cross.
+    APART where they turn out to touch, and rounding said that they cross. Where what leads out is long it is seen
+    whether only conforming faces have points in common.
     """
     turn_f = rotation(q, 0)
     turn, shift = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
     x = (out[0], out[1], out[2], out[3])
     found, f, g, y, n, gap = deepest(table, pool, shell_f, shell_g, turn, shift, codes[0], codes[1], x, size)
+    if not found or gap < -NEARLY * size:
+        touches, near_f, near_g, z, m, off = conforming_pair(table, pool, shell_f, shell_g, turn, shift, size)
+        if touches:
+            found, f, g, y, n, gap = True, near_f, near_g, z, m, off
     if not found:
         return CROSSING
     write_features(table, pool, shell_f, shell_g, q, turn_f, turn, shift, f, g, y, n, gap, size, codes, out)

@@ -18,7 +18,7 @@ from assembly._kernel import kernel
 from assembly.geometry.vec import matvec_t
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.extremal import CONVERGED, SINGULAR
-from assembly.proximity.feature_pair import feature_record
+from assembly.proximity.feature_pair import conforms, feature_record
 from assembly.proximity.holding import hold_features
 from assembly.proximity.nearest import CROSSING
 from assembly.proximity.nearest_query import NORMAL, PAIR
@@ -29,6 +29,8 @@ FEATURE_F, FEATURE_G, PAIR_NORMAL, PAIR_GAP, STAYS, IDLE, ALLOWED, TRACK = 4, 5,
 # Behind a record: whether surfaces do not cross at the pair, how far it is from a fold, and how far the bodies may move
 # until a row that is open needs its pair again.
 PROPER, FOLD, SLACK, CONTACT_RECORD = RECORD, RECORD + 1, RECORD + 2, RECORD + 3
+# What `PROPER` is, beside 1 and 0, where the surfaces are equally near all around: then no point is that of a minimum.
+CONFORMING = 2.0
 
 
 @kernel(inline=True)
@@ -69,7 +71,7 @@ def track_solids(table, pool, shell_f, shell_g, i, j, q, start, patience, record
     )
     if status == CONVERGED or status == SINGULAR:
         feature_record(turn, shift, frame, records, r)
-        records[r, PROPER] = 1.0 if frame[14] else 0.0
+        records[r, PROPER] = CONFORMING if conforms(frame) else (1.0 if frame[14] else 0.0)
         records[r, FOLD] = frame[15]
         write_tracked(x, feature_f, feature_g, frame[0], tracked, r)
         tracked[r, STAYS] = start[r, STAYS]

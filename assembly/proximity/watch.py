@@ -71,6 +71,7 @@ from assembly.proximity.watch_memory import (
     MARK_AT,
     NEAR,
     NEGLECT,
+    OVERLAP,
     PAIR_F,
     PAIR_G,
     PAIR_MEMORY,
@@ -125,7 +126,7 @@ WAYS = 64
 # Whether a look tells if bodies cross where no contact says so. A contact that lost its root is a reason to ask in a
 # solve; a tick has no time for it.
 NEVER, WHERE_LOST, ALWAYS = 0, 1, 2
-# Bodies cross that are in each other by more than this.
+# Bodies cross that are in each other by more than this, or than what is called touching where that is known.
 CROSSING = 1e-6
 
 
@@ -161,14 +162,15 @@ def crosses_elsewhere(table, pool, watch, memory, p, scene, roots, count, least,
     """Whether the bodies of pair p are in each other where no contact says so."""
     pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
     places = memory_places(table, watch)[1]
+    margin = max(CROSSING, memory[OVERLAP])
     deep = False
     for k in range(count):
         asked = least if roots[k, ORIGIN] > GIVEN_CONTACT and roots[k, ROOT_PLACE] == ELSEWHERE else 0.0
-        deep = deep or (roots[k, GAP] < asked - CROSSING and roots[k, ORIGIN] != USELESS)
+        deep = deep or (roots[k, GAP] < asked - margin and roots[k, ORIGIN] != USELESS)
     for k in range(table[pair + LOW], table[pair + HIGH]):
         if memory[places + PLACE_MEMORY * k] == p:
-            deep = deep or tracked[table[watch + FIRST] + k, PAIR_GAP] < -CROSSING
-    return not deep and crosses(table, pool, scene, stack, candidates, CROSSING, offsets)
+            deep = deep or tracked[table[watch + FIRST] + k, PAIR_GAP] < -margin
+    return not deep and crosses(table, pool, scene, stack, candidates, margin, offsets)
 
 
 @kernel(inner=True)
@@ -289,7 +291,7 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, rooms, roots, asks):
     memory[at + CROSSED] = math.nan
     if wires and asks != NEVER:
         # All that is as near as this is known, and most of it is listed.
-        memory[at + CROSSED] = 1.0 if lowest < -CROSSING else 0.0
+        memory[at + CROSSED] = 1.0 if lowest < -max(CROSSING, memory[OVERLAP]) else 0.0
     elif asks == ALWAYS or (asks == WHERE_LOST and any_gone):
         crossed = crosses_elsewhere(
             table, pool, watch, memory, p, scene, roots, count, least, offsets, rooms[0], rooms[1], tracked

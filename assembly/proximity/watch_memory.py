@@ -67,7 +67,8 @@ PAIR_MINIMUM, LOW, HIGH, GIVEN, GIVEN_COUNT, SMALLER, SPINE_F, SPINE_G, PAIR_REC
 IN_PLACE = 6
 # Memory. Header: events, looks and contacts so far, the time of the caller, whether a near root ever found no place,
 # calls so far; of a tick with a budget, when a look is to end after the pair that it is at, and how many looks there
-# were before it; by how much less than the least gap a new contact may stay, as where a solve begins.
+# were before it; what bodies may be in each other and still touch: by so much less than the least gap a new contact may
+# stay, as where a solve begins.
 EVENT_COUNT, LOOKS, BORN, TIME, CROWDED, CALLS, DEADLINE, EARLIER, OVERLAP, MEMORY_HEADER = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9
 # Of a pair: how the smaller body was turned, seen from the other, at its last look (a quaternion, NaN before there was
 # one), and where the middle of its tree was; how far it may go from there, its reach, its state, calls at its last

@@ -89,8 +89,11 @@ from assembly.solve.settings import (
     TICK,
     VIOLATION,
 )
+from assembly.solve.settings import (
+    TOUCHING as TOUCHING_AT,
+)
 from assembly.solve.standstill import contradicts, is_stuck, next_floor, stands_still, stays_off
-from assembly.solve.start import read_state, rearrange, set_out
+from assembly.solve.start import let_touch, read_state, rearrange, set_out
 from assembly.solve.step import CLOSE, aim, cut_step, leave_saddle, propose, short_share
 from assembly.solve.tangency import off_rows
 
@@ -240,6 +243,8 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         if m + 4 * count != rows or changed:
             changed = False
             rows, n, system, lost = rearrange(program, count, rows, here, y, better_y, active)
+            if iteration == 0 and lost < 0:
+                let_touch(table, here, settings[TOUCHING_AT])
             gradient, lines, lagrangian, _factor = system
             kept = False
             # What was hard for other rows need not be for these.

@@ -26,7 +26,7 @@ from assembly.constraints.layout import (
 )
 from assembly.proximity.extremal import CONVERGED, SINGULAR
 from assembly.proximity.pole import limits
-from assembly.proximity.solid_contact import FEATURE_F, FOLD, TRACK
+from assembly.proximity.solid_contact import ALLOWED, FEATURE_F, FOLD, IDLE, TRACK
 
 # A parameter along which a point moves less, from end to end and over the scene's size, is one at a pole.
 POLAR = 1e-6
@@ -69,6 +69,8 @@ def start_contacts(table, pool, q, contacts, free, lengths):
         if not math.isnan(contacts[k, 0]) or table[row + BODY_F] < 0 or is_guard(table, k):
             continue
         if table[row + SHELL_F] >= 0:
+            contacts[k, IDLE] = 0.0
+            contacts[k, ALLOWED] = 0.0
             if not search_row(table, pool, row, q, contacts, k, True):
                 return k
             continue

@@ -32,13 +32,15 @@ from assembly.solve.interruption import Interruption
 if TYPE_CHECKING:
     from assembly.solve.solution import Solution
 
-__all__ = ["Crossings", "crossings_of", "free_pairs", "joined_pairs"]
+__all__ = ["Crossings", "PosedBodies", "crossings_of", "find_crossings", "free_pairs", "joined_pairs"]
 
 Array = NDArray[np.float64]
 Pair = tuple[Body, Body]
-# What counts as crossing where no more is called touching, and how deep looks see, in parts of the scene's size. A deep
-# look of wires that cross often finds so much that it lacks room for the rest, so that there are several.
-CROSSING, DEPTHS = 1e-8, (0.005, 0.015, 0.05)
+# What is in each other by less, in parts of the scene's size, may be so by rounding.
+ROUNDED = 1e-10
+# How deep looks see, in parts of that size. A deep look of wires that cross often finds so much that it lacks room for
+# the rest, so that there are several.
+DEPTHS = (0.005, 0.015, 0.05)
 # Contacts of a pair, or of a body in many, that may be near at a time. What is beyond is known where bodies cross by
 # more than looks take for nothing.
 PLACES = 8
@@ -70,6 +72,28 @@ class Crossings:
     def is_clear(self) -> bool:
         """Whether all pairs were looked at and none crosses."""
         return not self.pairs and not self.unseen
+
+
+@dataclass(frozen=True, eq=False)
+class PosedBodies:
+    """Bodies at poses, and what of them is no crossing.
+
+    Attributes
+    ----------
+    bodies : sequence of Body
+    q : (n, 7)
+    touching : float
+        What may be in each other and still touch, in parts of the scene's size.
+    contacts : sequence of Contact
+    given : (k, TRACK), optional
+        Pairs of the contacts, as they are tracked.
+    """
+
+    bodies: Sequence[Body]
+    q: Array
+    touching: float
+    contacts: Sequence[Contact] = ()
+    given: Array | None = None
 
 
 class _Watched(Clearance):
@@ -118,26 +142,31 @@ def joined_pairs(bodies: Iterable[Body], constraints: Sequence[Constraint]) -> l
 
 
 def crossings_of(solution: Solution, pairs: Sequence[Pair], interruption: Interruption) -> Crossings:
-    """Which of those pairs cross elsewhere than at contacts that the scene has, or are in each other.
+    """Which of those pairs cross elsewhere than at contacts that the scene has, or are in each other."""
+    contacts = [item for item in solution._scene.constraints if isinstance(item, Contact)]
+    given = solution._parameters[: len(contacts)]
+    posed = PosedBodies(solution._scene.bodies, solution.q, solution._touching, contacts, given)
+    return find_crossings(posed, pairs, interruption)
+
+
+def find_crossings(posed: PosedBodies, pairs: Sequence[Pair], interruption: Interruption) -> Crossings:
+    """Which of those pairs of bodies are in each other by more than touching, elsewhere than at the contacts.
 
     Raises
     ------
     InputError
         Bodies of sizes that clearances cannot have.
     """
-    near = _near(solution, pairs)
+    near = _near(posed, pairs)
     if not near:
         return Crossings(())
-    bodies = solution._scene.bodies
-    contacts = [item for item in solution._scene.constraints if isinstance(item, Contact)]
     name = "crossings"
-    while any(item.name == name for item in contacts):
+    while any(item.name == name for item in posed.contacts):
         name += "'"
-    watched = _Watched(near, name)
     if not _known_shapes(near, interruption):
         return Crossings((), _named(near))
-    packed = Packed(bodies, [*contacts, watched], ())
-    found, is_complete = _seen(packed, solution, len(contacts), interruption)
+    packed = Packed(posed.bodies, [*posed.contacts, _Watched(near, name)], ())
+    found, is_complete = _seen(packed, posed, interruption)
     crossing = [pair for k, pair in enumerate(near) if k in found]
     unseen = [] if is_complete else [pair for k, pair in enumerate(near) if k not in found]
     return Crossings(_named(crossing), _named(unseen))
@@ -147,9 +176,9 @@ def _named(pairs: Sequence[Pair]) -> tuple[tuple[str, str], ...]:
     return tuple((a.name, b.name) for a, b in pairs)
 
 
-def _near(solution: Solution, pairs: Sequence[Pair]) -> list[Pair]:
+def _near(posed: PosedBodies, pairs: Sequence[Pair]) -> list[Pair]:
     """Those pairs of bodies with shapes whose boxes, along the world's axes, meet."""
-    placed = zip(solution._scene.bodies, solution.q, strict=True)
+    placed = zip(posed.bodies, posed.q, strict=True)
     boxes = {id(body): _box(body, row) for body, row in placed if body.faces}
     low = np.array([[boxes[id(a)][0], boxes[id(b)][0]] for a, b in pairs]).reshape(-1, 2, 3)
     high = np.array([[boxes[id(a)][1], boxes[id(b)][1]] for a, b in pairs]).reshape(-1, 2, 3)
@@ -179,12 +208,12 @@ def _known_shapes(pairs: Iterable[Pair], interruption: Interruption) -> bool:
     return True
 
 
-def _seen(packed: Packed, solution: Solution, contacts: int, interruption: Interruption) -> tuple[set[int], bool]:
+def _seen(packed: Packed, posed: PosedBodies, interruption: Interruption) -> tuple[set[int], bool]:
     """Places of pairs that looks of several depths find to cross, and whether all were looked at."""
-    q = solution.q.copy()
+    q, contacts = posed.q.copy(), len(posed.contacts)
     q[:, :3] = (q[:, :3] - packed.reference) / packed.scale
     count = watch_memory.PAIR_MEMORY * len(packed.guarded[0])
-    deep = max(CROSSING, solution._touching)
+    deep = max(ROUNDED, posed.touching)
     watch_at = packed.table[layout.WATCH]
     # Where there is no clock looks are not cut.
     packed.table[watch_at + watch_memory.CLOCK] = packed.table[layout.CLOCK_AT]
@@ -192,10 +221,12 @@ def _seen(packed: Packed, solution: Solution, contacts: int, interruption: Inter
     for depth in DEPTHS:
         state = packed.new_state()
         memory = state[packed.memory_at :]
+        memory[watch_memory.OVERLAP] = posed.touching
         pairs = memory[watch_memory.MEMORY_HEADER :][:count].reshape(-1, watch_memory.PAIR_MEMORY)
         pairs[:, watch_memory.REACH] = depth
         tracked = np.full((packed.pair_rows, TRACK), np.nan)
-        tracked[:contacts] = solution._parameters[:contacts]
+        if posed.given is not None:
+            tracked[:contacts] = posed.given
         is_cut = True
         while is_cut and not interruption.is_over():
             memory[watch_memory.DEADLINE] = perf_counter_ns() + watch_memory.SLICE

@@ -23,7 +23,17 @@ from assembly.solve.settings import (
     TOUCHING,
 )
 
-__all__ = ["Options"]
+__all__ = ["Options", "touching_part"]
+# The most that may be called touching.
+_MOST_TOUCHING = 1e-3
+
+
+def touching_part(value: float) -> float:
+    """What may be called touching, in parts of a size; raises for what is not from 0 to 0.001."""
+    touching = number("touching", value)
+    if not 0.0 <= touching <= _MOST_TOUCHING:
+        raise InputError(f"touching is {touching:g}; expected a number from 0 to {_MOST_TOUCHING:g}")
+    return touching
 
 
 @dataclass(frozen=True)
@@ -49,8 +59,8 @@ class Options:
         What constraints of joints, couplings and driven values that repeat each other may disagree by, as those of CAD
         files do; such a solve ends FITTED. 0: they are to agree to the tolerance.
     touching : float
-        What bodies that a clearance keeps apart may be in each other where the solve begins: so much is called
-        touching, they need not be parted, and no contact of these goes deeper. For parts of files 1e-6 is right, say.
+        What bodies of a contact or a clearance may be in each other where the solve begins: so much is called touching,
+        they need not be parted, and no contact of these goes deeper. For parts of files 1e-6 is right, say.
     verbose : int
         1 prints a table of the iterations after the solve; nothing is printed at 0.
     """
@@ -75,9 +85,7 @@ class Options:
         fit = number("fit", self.fit)
         if not 0.0 <= fit <= 1e-2:
             raise InputError(f"fit is {fit:g}; expected a number from 0 to 0.01")
-        touching = number("touching", self.touching)
-        if not 0.0 <= touching <= 1e-3:
-            raise InputError(f"touching is {touching:g}; expected a number from 0 to 0.001")
+        touching_part(self.touching)
         floor = number("penalty_floor", self.penalty_floor)
         if not 1e-12 <= floor <= self.penalty:
             raise InputError(f"penalty_floor is {floor:g}; expected a number from 1e-12 to penalty {self.penalty:g}")

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly.constraints.contact_rows import is_guard
 from assembly.constraints.layout import (
     BODIES,
     CONTACTS,
@@ -21,7 +22,7 @@ from assembly.constraints.layout import (
 )
 from assembly.constraints.program import evaluate
 from assembly.constraints.terms import recenter
-from assembly.proximity.solid_contact import FOLD, TRACK
+from assembly.proximity.solid_contact import ALLOWED, FOLD, TRACK
 from assembly.proximity.watch import AS_NEEDED, SPARING
 from assembly.proximity.watch_memory import OVERLAP
 from assembly.solve.contacts import free_folds, is_of_surfaces, start_contacts
@@ -74,11 +75,23 @@ def read_state(table, pool, state, here, trial, y, better_y):
         better_y[r] = y[r]
 
 
+@kernel(inner=True)
+def let_touch(table, here, touching):
+    """Let contacts of bodies that are in each other by no more than `touching` stay so: their rows hold."""
+    for k in range(table[CONTACTS]):
+        if is_guard(table, k) or not here[3][k] < 0.0:
+            continue
+        allowed = here[1][k, ALLOWED] - here[3][k]
+        if allowed <= touching:
+            here[1][k, ALLOWED] = allowed
+            here[3][k] = 0.0
+
+
 @kernel(inline=True)
 def find_contacts(program, state, recalled, here, by_row, n, free_trims, sparing, touching):
     """Find the contacts of the start and evaluate its rows, unless the last tick left them at `recalled`.
 
-    Bodies of a clearance that are in each other by no more than `touching` there may stay so.
+    Bodies of a contact or a clearance that are in each other by no more than `touching` there may stay so.
     Returns the contact that has no pair, or -1, and whether that was told by evaluating the rows: which are not
     evaluated yet where a contact has no pair to begin with, or is at a fold.
     """
@@ -102,6 +115,8 @@ def find_contacts(program, state, recalled, here, by_row, n, free_trims, sparing
         arrange(table, free, shape, table[ROWS], n)
     if recalled == 0 or came or not recall(table, state, recalled, here):
         lost = evaluate(table, pool, here[1], math.inf, loose, room, here)
+        if lost < 0:
+            let_touch(table, here, touching)
     return lost, True
 
 

@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 ROUNDS, TRIES = 12, 4
 # Bodies are moved this part farther than to where they touch: there a search may find no place but that one.
 FARTHER = 1e-3
-# A closed body with another one in it has a gap that is more negative, in parts of its size.
+# A closed body with another one in it has a gap that is more negative than touching, and than this part of its size.
 WITHIN = -1e-9
 
 
@@ -106,11 +106,11 @@ def _crossing(a: Body, b: Body, q: Array, rows: Mapping[str, int], touching: flo
     pair = closest_features(a, b, row_a, row_b, touching=part)
     if pair.status in (FeatureStatus.PENETRATING, FeatureStatus.CROSSING):
         return _Crossing(a, b, pair, nested=False)
-    if _is_closed(a) and pair.gap < WITHIN * a.size:
+    if _is_closed(a) and pair.gap < min(WITHIN, -part) * max(a.size, b.size):
         return _Crossing(a, b, pair, nested=True)
     if _is_closed(b):
         pair = closest_features(b, a, row_b, row_a, touching=part)
-        if pair.gap < WITHIN * b.size:
+        if pair.gap < min(WITHIN, -part) * max(a.size, b.size):
             return _Crossing(b, a, pair, nested=True)
     return None
 

@@ -21,6 +21,9 @@ from assembly.proximity import watch_memory
 from assembly.proximity.events import Event, PairState, events_of
 from assembly.proximity.solid_contact import CONTACT_RECORD, TRACK
 from assembly.proximity.velocity import ARM_F, GAP, NORMAL
+from assembly.solve.crossings import PosedBodies, find_crossings
+from assembly.solve.interruption import CTRL_C
+from assembly.solve.options import Options, touching_part
 from assembly.tracking.follow import follow
 
 __all__ = ["ListedContact", "Manager"]
@@ -93,6 +96,9 @@ class Manager(OwnState):
         all kept, also across a wire thinner than the radius.
     places : int, optional
         How many contacts may be near at a time, to begin with; twice as many when they do not do.
+    touching : float
+        What bodies may be in each other and still touch, in parts of the scene's size: only what is deeper crosses. For
+        parts of files 1e-6 is right, say.
 
     Raises
     ------
@@ -101,7 +107,13 @@ class Manager(OwnState):
     """
 
     def __init__(
-        self, bodies: Iterable[Body], *, reach: float | None = None, neglect: float = 1e-6, places: int | None = None
+        self,
+        bodies: Iterable[Body],
+        *,
+        reach: float | None = None,
+        neglect: float = 1e-6,
+        places: int | None = None,
+        touching: float = Options.touching,
     ) -> None:
         try:
             self._bodies = tuple(bodies)
@@ -120,6 +132,7 @@ class Manager(OwnState):
                 "a fifth of the largest body"
             )
         self._neglect = clearance.neglect
+        self._touching = touching_part(touching)
         self._pairs = list(combinations(names, 2))
         self._seen = 0.0
         self._set_up(places)
@@ -191,6 +204,26 @@ class Manager(OwnState):
     def neglect(self) -> float:
         """Radius of the spheres of neglect, in parts of the scene's size."""
         return self._neglect
+
+    @property
+    def touching(self) -> float:
+        """What bodies may be in each other and still touch, in parts of the scene's size."""
+        return self._touching
+
+    @property
+    def crossings(self) -> tuple[tuple[str, str], ...]:
+        """Names of the pairs of bodies that are in each other by more than `touching`, or wholly; () before an update.
+
+        Where the last update put them. All pairs are looked at anew when this is read, which takes longer than an
+        update.
+        """
+        if np.isnan(self._poses).any():
+            return ()
+        q = self._poses.copy()
+        q[:, :3] = q[:, :3] * self._packed.scale + self._packed.reference
+        shaped = [body for body in self._bodies if body.faces]
+        posed = PosedBodies(self._bodies, q, self._touching)
+        return find_crossings(posed, list(combinations(shaped, 2)), CTRL_C).pairs
 
     def update(self, q: ArrayLike) -> tuple[Event, ...]:
         """Bodies stand here now.

@@ -330,6 +330,36 @@ def test_parallel_planes():
         close(pair.points[1], [0.4, 0.5, gap], 1e-9)
 
 
+@pytest.mark.parametrize("swapped", [False, True])
+@pytest.mark.parametrize("offset", [0.0, 0.3, -0.9, 1.49, 1.51, -1.6])
+def test_a_pair_of_a_continuum_is_one_inside_both_patches(offset, swapped):
+    """Parallel cylinders of heights 2 and 1: a pair at the end of one goes on where both are, if they are anywhere."""
+    long, short = shapes.cylinder(3.0, 2.0), shapes.cylinder(0.5, 1.0)
+    q = at(0.0, 3.6, offset)
+    for v in (0.0, 0.5, 2.0):
+        for w in (0.0, 0.4, 1.0):
+            start = (0.25 * long.domain[0][1] + 0.05, v, 0.75 * short.domain[0][1] - 0.02, w)
+            if swapped:
+                pair = extremal_pair(short, q, long, HOME, start[2:] + start[:2])
+            else:
+                pair = extremal_pair(long, HOME, short, q, start)
+            reach = abs(offset) < 1.5
+            assert pair.status is (PairStatus.SINGULAR if reach else PairStatus.LEFT_PATCH)
+            if reach:
+                close(pair.gap, 0.1)
+                close(pair.points[1] - pair.points[0], -0.1 * pair.normal if pair.gap < 0.0 else 0.1 * pair.normal)
+
+
+@pytest.mark.parametrize("offset", [0.0, 1.9, -1.2])
+def test_a_pair_of_planes_is_one_inside_both_patches(offset):
+    large, small = shapes.plane(4.0, 4.0), shapes.plane(1.0, 1.0)
+    q = at(offset, -0.2, 0.3, (0.0, 1.0, 0.0, 0.0))
+    for start in ((-2.0, 2.0, 0.5, 0.5), (2.0, -2.0, -0.5, 0.1), (0.0, 0.0, 0.0, 0.0)):
+        pair = extremal_pair(large, HOME, small, q, start)
+        assert pair.status is PairStatus.SINGULAR
+        close(pair.points[1], pair.points[0] + [0.0, 0.0, 0.3])
+
+
 @pytest.mark.parametrize("shift", [1e-9, 1e-7, 1e-5, 1e-3])
 def test_nearly_a_continuum(shift):
     # A ball a little smaller than its socket: whatever the status, the answer is finite and no step runs away.

@@ -7,6 +7,7 @@ import pytest
 
 import assembly as asm
 from assembly.errors import InputError
+from assembly.proximity import FeatureStatus, closest_features
 from tests.proximity.test_contact_place import CORNER, prism
 from tests.proximity.test_touching import bolt_and_plate
 
@@ -87,6 +88,62 @@ def test_a_head_that_lies_on_a_plate_is_not_moved(order):
     stays(bolt_and_plate(9.0)[::order])
 
 
+CONTACTS = ["whole faces", "a face in a face", "parts of faces", "a cylinder on a plate", "edges", "a ball"]
+
+
+@pytest.mark.parametrize("unilateral", [False, True])
+@pytest.mark.parametrize("kind", CONTACTS)
+@pytest.mark.parametrize(("over", "touching"), [(0.0, 1e-9), (1e-10, 1e-9), (1e-7, 1e-6)])
+def test_a_contact_that_touches_is_not_moved(kind, over, touching, unilateral):
+    """Flush, or hardly in each other: alone, on a guide, and where a weld leaves no way apart."""
+    for tie in (None, asm.Prismatic, asm.Fixed):
+        a, b = flush(1.0, over, (0, 0, 0))[kind][:2]
+        scene = asm.Assembly([a, b])
+        scene.constrain(asm.Contact(a, b, "touch", unilateral=unilateral))
+        if tie is not None:
+            scene.constrain(tie(a.frame(at=b.pose.position), b.frame(), "tie"))
+        before = np.array(scene.q)
+        solution = scene.solve(touching=touching)
+        assert solution.status is asm.Status.SOLVED, (tie, solution.message)
+        assert np.array_equal(solution.q, before)
+        again = scene.solve(solution, touching=touching)
+        assert again.status is asm.Status.SOLVED and np.array_equal(again.q, before)
+
+
+def test_a_contact_that_is_deeper_is_parted():
+    a, b = flush(1.0, 1e-7, (0, 0, 0))["a ball"]
+    for unilateral in (False, True):
+        scene = asm.Assembly([a, b])
+        scene.constrain(asm.Contact(a, b, unilateral=unilateral))
+        solution = scene.solve(touching=1e-9)
+        assert solution.success and solution.pose(b).position[2] == pytest.approx(7.0, abs=1e-11)
+
+
+def test_a_contact_goes_no_deeper_than_it_was():
+    """Drawn down, a ball that was in the box by less than touching stays as deep; a warm solve allows no more."""
+    a, b = flush(1.0, 1e-9, (0, 0, 0))["a ball"]
+    scene = asm.Assembly([a, b])
+    scene.constrain(asm.Contact(a, b, unilateral=True))
+    scene.minimize(asm.PointDistance(b.point(0, 0, 0), target=(0.5, 0, 3)))
+    solution = scene.solve()
+    for _ in range(3):
+        assert solution.success and solution.pose(b).position == pytest.approx([0.5, 0, 7 - 1e-8], abs=1e-11)
+        solution = scene.solve(solution)
+
+
+@pytest.mark.parametrize("unilateral", [False, True])
+@pytest.mark.parametrize("over", [0.0, 1e-7])
+@pytest.mark.parametrize("kind", ["a peg in a bore", "a ball in a bore"])
+def test_a_contact_of_conforming_walls_does_not_lead_out_of_the_bore(kind, over, unilateral):
+    plate = asm.Body("plate", asm.shapes.plate(80, 40, 10, holes=[(0, 0, 4.5)]), fixed=True)
+    inner = asm.shapes.solid_cylinder(4.5 + over, 30) if "peg" in kind else asm.shapes.sphere(4.5 + over)
+    scene = asm.Assembly([plate, asm.Body("inner", inner)])
+    scene.constrain(asm.Contact(*scene.bodies, "touch", unilateral=unilateral))
+    before = np.array(scene.q)
+    solution = scene.solve(touching=1e-6)
+    assert solution.success and np.array_equal(solution.q, before)
+
+
 def test_what_is_deeper_is_parted():
     """And not a hair's breadth is left: touching is for what a solve begins with."""
     bodies = flush(1.0, 1e-5, (0, 0, 0))["parts of faces"]
@@ -150,3 +207,63 @@ def test_a_tracker_begins_where_bodies_touch():
     for _ in range(20):
         step = tracker.step(before[1, :3] - np.array([0.0, 0.0, 0.5]))
     assert step.q[1, 2] > before[1, 2] - 1e-10
+
+
+@pytest.mark.parametrize(("over", "touching", "crosses"), [(0.0, 1e-9, False), (1e-7, 1e-6, False), (1e-7, 1e-9, True)])
+def test_a_managers_crossings_are_more_than_touching(over, touching, crosses):
+    bodies = flush(1.0, over, (0, 0, 0))["parts of faces"]
+    manager = asm.Manager(bodies, touching=touching)
+    assert manager.touching == touching and manager.crossings == ()
+    q = np.array([body.pose.q for body in bodies])
+    manager.update(q)
+    assert manager.crossings == ((("body 0", "body 1"),) if crosses else ())
+    # And of where the bodies are now.
+    manager.update(q + np.array([[0.0] * 7, [0, 0, 1.0, 0, 0, 0, 0]]))
+    assert manager.crossings == ()
+    manager.update(q - np.array([[0.0] * 7, [0, 0, 9.0, 0, 0, 0, 0]]))
+    assert manager.crossings == (("body 0", "body 1"),)
+
+
+def test_touching_of_a_manager_is_a_number_of_the_size():
+    for touching in (-1e-9, 0.1, np.nan):
+        with pytest.raises(InputError, match="touching is"):
+            asm.Manager(flush(1.0, 0.0, (0, 0, 0))["edges"], touching=touching)
+
+
+@pytest.mark.parametrize("at", [(0, 0, 6), (1.5, -2, 9), (0, 0, 2.0)])
+def test_boxes_come_to_touch_along_parallel_faces(at):
+    """Of all pairs of points of two parallel faces any will do, and no other pose is asked for."""
+    a = asm.Body("a", asm.shapes.box(10, 10, 2), fixed=True)
+    b = asm.Body("b", asm.shapes.box(4, 4, 2), position=at)
+    scene = asm.Assembly([a, b])
+    scene.constrain(asm.Contact(a, b))
+    solution = scene.solve()
+    assert solution.success
+    pair = closest_features(a, b, solution.q[0], solution.q[1])
+    # Faces that lean by less than 1e-9 have any of their points for the nearest one.
+    assert pair.status is FeatureStatus.APART and abs(pair.gap) < 1e-8
+    assert scene.solve(solution).success
+
+
+@pytest.mark.parametrize("solid", [False, True])
+@pytest.mark.parametrize("heights", [(2.0, 1.0), (1.0, 2.0), (2.0, 2.5)])
+def test_a_warm_solve_keeps_the_contact_of_parallel_cylinders(heights, solid):
+    """An eccentric cam and its follower, of which one is shorter: the pair stays inside both."""
+    make = asm.shapes.solid_cylinder if solid else asm.shapes.cylinder
+    ground = asm.Body("ground", fixed=True)
+    cam, follower = asm.Body("cam", make(3.0, heights[0])), asm.Body("follower", make(0.5, heights[1]), (0, 4.5, 0))
+    drive = asm.Revolute(ground.frame(x=(0, 1, 0)), cam.frame(at=(0, -1, 0), x=(0, 1, 0)), "drive", angle=0.0)
+    guide = asm.Prismatic(ground.frame(z=(0, 1, 0)), follower.frame(z=(0, 1, 0)), "guide")
+    scene = asm.Assembly([ground, cam, follower])
+    walls = (cam.face("wall"), follower.face("wall")) if solid else (cam, follower)
+    scene.constrain(drive, guide, asm.Contact(*walls, "touch"))
+    solution = scene.solve()
+    for degrees in range(0, 100, 7):
+        drive.angle = np.radians(degrees)
+        solution = scene.solve(solution)
+        assert solution.success and solution.contacts["touch"].status.name in ("CONVERGED", "SINGULAR")
+        # The height of a circle of radius 3.5 about the cam's middle, over the guide.
+        off = np.sin(drive.angle)
+        assert solution.pose(follower).position[1] == pytest.approx(
+            np.cos(drive.angle) + np.sqrt(3.5**2 - off**2), abs=1e-10
+        )
