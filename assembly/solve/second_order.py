@@ -97,16 +97,17 @@ def judge_look(look: Look, sample: bool) -> Verdict:
     values, vectors = np.linalg.eigh(form)
     flat = (DIFFERENCED if look.packed.tips else FLAT) * max(1.0, float(np.abs(look.hessian).max()))
     depends = False
+    closed = look.touching & ~pushing
+    closed[closed] = np.linalg.norm(look.jacobian[closed] @ basis, axis=1) <= DEPENDENT
     if values[0] < -flat:
-        bends = _bends(look, pushing, basis)
+        bends = _bends(look, pushing | closed, basis)
         depends = bool(bends)
         if depends:
             form = _least_negative(look, form, bends)
             values, vectors = np.linalg.eigh(form)
     if values[0] > flat:
         return Verdict(SecondOrder.MINIMUM)
-    cone = look.jacobian[look.touching & ~pushing]
-    cone = cone[np.linalg.norm(cone @ basis, axis=1) > DEPENDENT]
+    cone = look.jacobian[look.touching & ~pushing & ~closed]
     ways = list(_downward(form, basis, cone, flat)) if values[0] < -flat else []
     if ways and depends:
         # A way may exist to first order only, and lead nowhere; motions that exist are found by trying.
