@@ -45,7 +45,7 @@ from assembly.proximity.watch import (
     SPARING,
     any_crossed,
 )
-from assembly.solve.arrival import has_arrived, rounding_at
+from assembly.solve.arrival import GAIN, has_arrived, rounding_at, slope_rounding
 from assembly.solve.budget import HALF, begin_tick, is_cut, is_spent, may_end, set_deadline
 from assembly.solve.contacts import free_folds, is_of_surfaces
 from assembly.solve.ending import finish, return_to
@@ -265,7 +265,8 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         shortened = iteration > 0 and (alpha < 1.0 or vectors)
         # Which rows push is not known at a first start, nor of contacts, and a least move has none where all holds.
         first = iteration == 0 and violation <= feasible and (mu > floor or table[IMPLICIT] == 1)
-        touches = first or (watched and not tick and violation <= TOUCHING)
+        restored_now = restoring and violation <= feasible
+        touches = first or restored_now or (watched and not tick and violation <= TOUCHING)
         good = max(0.0 if first else 0.1 * last_dual, settings[STATIONARITY] if touches else 0.0)
         dual = choose_multipliers(
             shape, rows, here, shortened, vectors, touches, good, active, gradient, lines[0], gram, y, better_y
@@ -290,7 +291,12 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         retreats = sunk and holds and ended == RUNNING and iteration < limit
         looks_last = watched and settings[LAST_LOOK] == 1.0
         # Where every last look finds other contacts, the limit ends it.
-        arrived = has_arrived(program, settings, results, here, violation, last_violation, feasible, dual)
+        # Where neither a whole step of Newton's gains any of the slope nor what holds it by force, it may be rounding.
+        whole = restored_now or (alpha * cut == 1.0 and dual > GAIN * last_dual)
+        rounds = whole and violation <= feasible and dual > settings[STATIONARITY]
+        rounds = rounds and dual <= slope_rounding(program, here, lagrangian, n, rows, y)
+        left = 0.0 if rounds else dual
+        arrived = has_arrived(program, settings, results, here, violation, last_violation, feasible, left)
         if arrived and not retreats and not (looks_last and iteration > limit):
             # A contact that ends right here is lost and found again, however often it is looked for.
             if looks_last and iteration != looked_at:
@@ -358,10 +364,11 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             alpha = 1.0
             iteration += 1
             continue
-        # At a pose where rows depend on each other a wish only leads away: then they are restored until they hold.
-        is_singular = any_pose and not watched and entered < CLOSE
+        # Next to a pose where rows depend on each other what is asked for only leads away: they are restored until they
+        # hold. A wish ends there, and of an objective the forces are found that hold it there.
+        is_singular = not watched and entered < CLOSE
         if restoring and violation <= (feasible if is_singular else max(0.1 * entered, feasible)):
-            if is_singular:
+            if is_singular and any_pose:
                 status = STALLED
                 continue
             restoring = False
@@ -449,7 +456,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         cuts = cuts + 1 if watched and cut < 0.5 and violation <= TOUCHING else 0
         room_left = 2.0 * longest if cuts > 0 else math.inf
         base = 0.0 if restoring else value
-        leave = (not tick, may_go)
+        leave = (not tick, may_go, cut)
         accepted, alpha, lost = search(
             program, tips, here, trial, rows, y, base, value, restoring, leave, mu, slope, longest, weights, system
         )

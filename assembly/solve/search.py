@@ -82,12 +82,12 @@ def search(program, tips, here, trial, rows, y, base, value, restoring, leave, m
 
     The trial point is left in `trial`. Returns whether one was accepted, alpha, and the contact lost by the last trial
     or -1. `base` is the objective's part of the merit here, `longest` the largest component of the step. The `leave`
-    says whether a contact that ends where solids are in each other may be given up, and whether bodies may go all the
-    way for certain.
+    says whether a contact that ends where solids are in each other may be given up, whether bodies may go all the way
+    for certain, and what share of Newton's step the step is.
     """
     table, pool, shape, loose, room = program
     active, forces, _foreseen = weights
-    lets_go, may_go_all = leave
+    lets_go, may_go_all, cut = leave
     gradient, (descent, step, straight), lagrangian, matrix = system
     bases, one_sided, order, _of_rows = shape
     n = descent.size
@@ -129,7 +129,7 @@ def search(program, tips, here, trial, rows, y, base, value, restoring, leave, m
                 for i in range(n):
                     descent[i] = 0.0
                 for r in range(rows):
-                    forces[r] = -(trial[3][r] - (1.0 - alpha) * residual[r]) * active[r]
+                    forces[r] = -(trial[3][r] - (1.0 - alpha * cut) * residual[r]) * active[r]
                 add_transposed(bases, here[4], rows, forces, descent)
                 solve_step(matrix, n, order, descent)
                 for i in range(n):
