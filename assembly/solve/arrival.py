@@ -44,7 +44,7 @@ def rounding_at(table, pool, settings, here):
 
 @kernel(inner=True)
 def slope_rounding(program, here, lagrangian, n, rows, y):
-    """What rounding leaves of the Lagrangian's slope: of poses by the objective's curvature, and of the rows' forces."""
+    """What rounding leaves of the Lagrangian's slope: poses' by the objective's curvature, and that of forces."""
     table, pool, shape, _loose, _room = program
     reach = max(1.0, reach_of(table, pool, here[0]))
     return ROUNDING * (reach * greatest_on_diagonal(lagrangian, n, shape[2]) + strongest(y, rows))

@@ -295,8 +295,8 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         whole = restored_now or (alpha * cut == 1.0 and dual > GAIN * last_dual)
         rounds = whole and violation <= feasible and dual > settings[STATIONARITY]
         rounds = rounds and dual <= slope_rounding(program, here, lagrangian, n, rows, y)
-        left = 0.0 if rounds else dual
-        arrived = has_arrived(program, settings, results, here, violation, last_violation, feasible, left)
+        unbalanced = 0.0 if rounds else dual
+        arrived = has_arrived(program, settings, results, here, violation, last_violation, feasible, unbalanced)
         if arrived and not retreats and not (looks_last and iteration > limit):
             # A contact that ends right here is lost and found again, however often it is looked for.
             if looks_last and iteration != looked_at:

@@ -99,7 +99,9 @@ def search(program, tips, here, trial, rows, y, base, value, restoring, leave, m
     for i in range(n):
         noise += 4e-16 * abs(gradient[i])
     for r in range(rows):
-        noise += 4e-16 * (abs(y[r]) + abs(residual[r]) / mu)
+        # Not through those that are open.
+        if one_sided[r] == 0 or y[r] + residual[r] / mu < 0.0:
+            noise += 4e-16 * (abs(y[r]) + abs(residual[r]) / mu)
     alpha = 1.0
     bends = 0
     lost = -1
@@ -128,8 +130,10 @@ def search(program, tips, here, trial, rows, y, base, value, restoring, leave, m
                 bends += 1
                 for i in range(n):
                     descent[i] = 0.0
+                # Once onto what the step would leave of them, then to where they hold, if it is only a part of one.
+                left = 1.0 - alpha * (cut if bends == 1 else 1.0)
                 for r in range(rows):
-                    forces[r] = -(trial[3][r] - (1.0 - alpha * cut) * residual[r]) * active[r]
+                    forces[r] = -(trial[3][r] - left * residual[r]) * active[r]
                 add_transposed(bases, here[4], rows, forces, descent)
                 solve_step(matrix, n, order, descent)
                 for i in range(n):

@@ -141,6 +141,40 @@ def test_a_closed_loop_that_is_stretched_moves_the_way_that_exists(target, best)
     assert solution.success and solution.objective == pytest.approx(best, abs=1e-9)
 
 
+def is_lowest(solution, scene, model, rng):
+    """Whether a solution is SOLVED, and no pose beside it is lower that the tests' own Newton finds."""
+    for row, constraint in zip(model.rows, scene.constraints, strict=True):
+        if isinstance(row, Joint):
+            row.near = solution.values.get(f"{constraint.name}.angle", 0.0)
+    lower = lowest_neighbor(model, solution.q, rng, 4)
+    return solution.success and lower <= 1e-9 * (abs(solution.objective) + scene.packed().scale ** 2)
+
+
+@pytest.mark.parametrize(
+    ("seed", "k"),
+    [
+        # A stretched arm that touches a ball without a force: what it touches forbids ways by its curvature alone.
+        (0, 760),
+        (1, 3810),
+        # A loop that is stretched, and comes to be so again: with multipliers that are open no form has to be shifted.
+        (1, 2830),
+        # Arms on a floor that is many times as large: steps are cut while rows are still off by as much as they go.
+        (0, 210),
+        (0, 3080),
+        (0, 5400),
+        (0, 9440),
+        # The only poses that hold are those of an arm that is stretched: rows are restored until they do.
+        (0, 3020),
+        (1, 3290),
+    ],
+)
+def test_starts_that_are_hard_to_leave(seed, k):
+    rng = np.random.default_rng([seed, k])
+    scene, model = random_scene(rng, True)
+    solution = scene.solve()
+    assert is_lowest(solution, scene, model, rng) and solution.iterations < 250
+
+
 @pytest.mark.parametrize(
     ("term", "limits", "best", "kind"),
     [
