@@ -265,8 +265,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         shortened = iteration > 0 and (alpha < 1.0 or vectors)
         # Which rows push is not known at a first start, nor of contacts, and a least move has none where all holds.
         first = iteration == 0 and violation <= feasible and (mu > floor or table[IMPLICIT] == 1)
-        restored_now = restoring and violation <= feasible
-        touches = first or restored_now or (watched and not tick and violation <= TOUCHING)
+        touches = first or (watched and not tick and violation <= TOUCHING)
         good = max(0.0 if first else 0.1 * last_dual, settings[STATIONARITY] if touches else 0.0)
         dual = choose_multipliers(
             shape, rows, here, shortened, vectors, touches, good, active, gradient, lines[0], gram, y, better_y
@@ -290,13 +289,12 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             holds, leash = False, math.inf
         retreats = sunk and holds and ended == RUNNING and iteration < limit
         looks_last = watched and settings[LAST_LOOK] == 1.0
-        # Where every last look finds other contacts, the limit ends it.
-        # Where neither a whole step of Newton's gains any of the slope nor what holds it by force, it may be rounding.
-        whole = restored_now or (alpha * cut == 1.0 and dual > GAIN * last_dual)
-        rounds = whole and violation <= feasible and dual > settings[STATIONARITY]
-        rounds = rounds and dual <= slope_rounding(program, here, lagrangian, n, rows, y)
-        unbalanced = 0.0 if rounds else dual
+        # What a whole step gains nothing of may be rounding.
+        stands = alpha * cut == 1.0 and dual > max(GAIN * last_dual, settings[STATIONARITY]) and violation <= feasible
+        rounded = stands and dual <= slope_rounding(program, here, lagrangian, n, rows, y)
+        unbalanced = 0.0 if rounded else dual
         arrived = has_arrived(program, settings, results, here, violation, last_violation, feasible, unbalanced)
+        # Where every last look finds other contacts, the limit ends it.
         if arrived and not retreats and not (looks_last and iteration > limit):
             # A contact that ends right here is lost and found again, however often it is looked for.
             if looks_last and iteration != looked_at:
@@ -364,11 +362,10 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             alpha = 1.0
             iteration += 1
             continue
-        # Next to a pose where rows depend on each other what is asked for only leads away: they are restored until they
-        # hold. A wish ends there, and of an objective the forces are found that hold it there.
-        is_singular = not watched and entered < CLOSE
+        # At a pose where rows depend on each other a wish only leads away: then they are restored until they hold.
+        is_singular = any_pose and not watched and entered < CLOSE
         if restoring and violation <= (feasible if is_singular else max(0.1 * entered, feasible)):
-            if is_singular and any_pose:
+            if is_singular:
                 status = STALLED
                 continue
             restoring = False

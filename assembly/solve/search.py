@@ -26,6 +26,9 @@ TURN = 1.0
 SHORTENINGS = 4
 # A clearance's contact that no longer step, nor one halved so far, finds again is given up.
 LETS_GO, HALVED = 1e-5, 0.0625
+# How often a step is bent, counted: twice onto what it leaves of the rows, where it is a part of Newton's, and twice to
+# where they hold. After that the straight one is shortened.
+TO_A_PART, TO_ROWS, BENT, STRAIGHT = 0, 2, 4, 5
 
 
 @kernel(inner=True)
@@ -103,21 +106,22 @@ def search(program, tips, here, trial, rows, y, base, value, restoring, leave, m
         if one_sided[r] == 0 or y[r] + residual[r] / mu < 0.0:
             noise += 4e-16 * (abs(y[r]) + abs(residual[r]) / mu)
     alpha = 1.0
-    bends = 0
+    first = TO_ROWS if cut == 1.0 else TO_A_PART
+    bends = first
     lost = -1
     while alpha * longest > 1e-9 * SHORTEST or alpha == 1.0:
         move(table, here[0], step, alpha, trial[0])
         carry(table, pool, bases, loose, here, trial, step, alpha)
-        known = may_go_all and alpha == 1.0 and bends == 0
+        known = may_go_all and alpha == 1.0 and bends == first
         if table[WATCH] >= 0 and not known and is_too_far(table, pool, loose[5], trial):
             # Bent, it would go farther than is known to be free.
-            bends = 2
+            bends = BENT
             alpha *= 0.5
             continue
         lost = evaluate(table, pool, loose[4], BEND, loose, room, trial)
         if table[WATCH] >= 0 and not lets_go and lost < 0 and ends_unseen(table, pool, loose[5], here, trial):
             # A tick has no last look, which would tell of what it led through.
-            bends = 2
+            bends = BENT
             alpha *= 0.5
             continue
         if lost < 0:
@@ -126,12 +130,11 @@ def search(program, tips, here, trial, rows, y, base, value, restoring, leave, m
                 there += goal(table, pool, shape, rows, loose, room, tips, trial, 0, gradient, lagrangian)
             if there <= here_merit + 1e-4 * alpha * slope + noise:
                 return True, alpha, lost
-            if bends < 2:
-                bends += 1
+            if bends < BENT:
                 for i in range(n):
                     descent[i] = 0.0
-                # Once onto what the step would leave of them, then to where they hold, if it is only a part of one.
-                left = 1.0 - alpha * (cut if bends == 1 else 1.0)
+                left = 1.0 - alpha * (cut if bends < TO_ROWS else 1.0)
+                bends += 1
                 for r in range(rows):
                     forces[r] = -(trial[3][r] - left * residual[r]) * active[r]
                 add_transposed(bases, here[4], rows, forces, descent)
@@ -139,12 +142,12 @@ def search(program, tips, here, trial, rows, y, base, value, restoring, leave, m
                 for i in range(n):
                     step[i] += descent[i] / alpha
                 continue
-            if bends == 2:
-                bends = 3
+            if bends == BENT:
+                bends = STRAIGHT
                 for i in range(n):
                     step[i] = straight[i]
         # A bent step may be longer than it was.
-        short = lets_go and bends % 3 == 0 and alpha <= HALVED and alpha * longest < LETS_GO
+        short = lets_go and (bends == first or bends == STRAIGHT) and alpha <= HALVED and alpha * longest < LETS_GO
         if lost >= 0 and short and may_go(table, lost, residual) and here[1][lost, STAYS] >= 0.0:
             here[1][lost, STAYS] = MAY_GO - here[1][lost, STAYS]
             continue
