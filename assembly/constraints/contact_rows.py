@@ -31,17 +31,9 @@ from assembly.constraints.layout import (
     SURFACE_G,
     TRACK_AT,
 )
-from assembly.geometry.vec import dot, matvec_t, sub
+from assembly.geometry.vec import dot, sub
 from assembly.kinematics.motion import relative_pose, rotation
-from assembly.proximity.extremal import (
-    CLOSE,
-    CONVERGED,
-    LEFT_PATCH,
-    NOT_CONVERGED,
-    SINGULAR,
-    own_frame,
-    solve_pair,
-)
+from assembly.proximity.extremal import CLOSE, CONVERGED, LEFT_PATCH, SINGULAR, solve_pair
 from assembly.proximity.solid_contact import ALLOWED, CONTACT_RECORD, FOLD, IDLE, PAIR_GAP, PROPER, SLACK, STAYS, TRACK
 from assembly.proximity.velocity import GAP, RATES, RECORD, gradient_row, store_record
 
@@ -85,29 +77,14 @@ def start_row(table, pool, row, q, tracked, r):
 
 
 @kernel(inner=True)
-def opposes(table, pool, row, q, x):
-    """Whether the outward normals of a row's surfaces oppose each other at parameters x."""
-    i, j = table[row + BODY_F], table[row + BODY_G]
-    turn, _shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
-    normal_f = own_frame(table, pool, table[row + SURFACE_F], x[0], x[1])[1]
-    normal_g = own_frame(table, pool, table[row + SURFACE_G], x[2], x[3])[1]
-    return dot(normal_g, matvec_t(turn, normal_f)) < 0.0
-
-
-@kernel(inner=True)
 def restart_contact(table, pool, row, q, tracked, records, k):
-    """As `track_contact`, from a global start; tracked[k] is written meanwhile.
-
-    A pair on the other side of one of the surfaces is none: it is open where bodies are in each other.
-    """
+    """As `track_contact`, from a global start; tracked[k] is written meanwhile."""
     was = (tracked[k, 0], tracked[k, 1], tracked[k, 2], tracked[k, 3])
     status = start_row(table, pool, row, q, tracked, k)
     x = (tracked[k, 0], tracked[k, 1], tracked[k, 2], tracked[k, 3])
     tracked[k, 0], tracked[k, 1], tracked[k, 2], tracked[k, 3] = was
     if status == CONVERGED or status == SINGULAR:
         status, x, _distance = track_contact(table, pool, row, q, x, math.inf, records, k)
-        if opposes(table, pool, row, q, x) != opposes(table, pool, row, q, was):
-            return NOT_CONVERGED, x
     return status, x
 
 

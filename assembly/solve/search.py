@@ -26,9 +26,9 @@ TURN = 1.0
 SHORTENINGS = 4
 # A clearance's contact that no longer step, nor one halved so far, finds again is given up.
 LETS_GO, HALVED = 1e-5, 0.0625
-# How often a step was bent: twice to where rows hold, then, where it is a part of Newton's, the straight one anew, and
-# twice onto what that leaves of them. After that the straight one is shortened.
-ANEW, BENT, STRAIGHT = 2, 5, 6
+# How often a step is bent, counted: twice onto what it leaves of the rows, where it is a part of Newton's, and twice to
+# where they hold. After that the straight one is shortened.
+TO_A_PART, TO_ROWS, BENT, STRAIGHT = 0, 2, 4, 5
 
 
 @kernel(inner=True)
@@ -102,16 +102,15 @@ def search(program, tips, here, trial, rows, y, base, value, restoring, leave, m
     for i in range(n):
         noise += 4e-16 * abs(gradient[i])
     for r in range(rows):
-        # Not through those that are open.
-        if one_sided[r] == 0 or y[r] + residual[r] / mu < 0.0:
-            noise += 4e-16 * (abs(y[r]) + abs(residual[r]) / mu)
+        noise += 4e-16 * (abs(y[r]) + abs(residual[r]) / mu)
     alpha = 1.0
-    bends = 0
+    first = TO_ROWS if cut == 1.0 else TO_A_PART
+    bends = first
     lost = -1
     while alpha * longest > 1e-9 * SHORTEST or alpha == 1.0:
         move(table, here[0], step, alpha, trial[0])
         carry(table, pool, bases, loose, here, trial, step, alpha)
-        known = may_go_all and alpha == 1.0 and bends == 0
+        known = may_go_all and alpha == 1.0 and bends == first
         if table[WATCH] >= 0 and not known and is_too_far(table, pool, loose[5], trial):
             # Bent, it would go farther than is known to be free.
             bends = BENT
@@ -129,15 +128,10 @@ def search(program, tips, here, trial, rows, y, base, value, restoring, leave, m
                 there += goal(table, pool, shape, rows, loose, room, tips, trial, 0, gradient, lagrangian)
             if there <= here_merit + 1e-4 * alpha * slope + noise:
                 return True, alpha, lost
-            if bends == ANEW and cut < 1.0:
-                bends += 1
-                for i in range(n):
-                    step[i] = straight[i]
-                continue
-            if bends < (BENT if cut < 1.0 else ANEW):
+            if bends < BENT:
                 for i in range(n):
                     descent[i] = 0.0
-                left = 1.0 - alpha * (cut if bends > ANEW else 1.0)
+                left = 1.0 - alpha * (cut if bends < TO_ROWS else 1.0)
                 bends += 1
                 for r in range(rows):
                     forces[r] = -(trial[3][r] - left * residual[r]) * active[r]
@@ -146,12 +140,12 @@ def search(program, tips, here, trial, rows, y, base, value, restoring, leave, m
                 for i in range(n):
                     step[i] += descent[i] / alpha
                 continue
-            if bends < STRAIGHT:
+            if bends == BENT:
                 bends = STRAIGHT
                 for i in range(n):
                     step[i] = straight[i]
         # A bent step may be longer than it was.
-        short = lets_go and (bends == 0 or bends == STRAIGHT) and alpha <= HALVED and alpha * longest < LETS_GO
+        short = lets_go and (bends == first or bends == STRAIGHT) and alpha <= HALVED and alpha * longest < LETS_GO
         if lost >= 0 and short and may_go(table, lost, residual) and here[1][lost, STAYS] >= 0.0:
             here[1][lost, STAYS] = MAY_GO - here[1][lost, STAYS]
             continue
