@@ -26,9 +26,10 @@ TURN = 1.0
 SHORTENINGS = 4
 # A clearance's contact that no longer step, nor one halved so far, finds again is given up.
 LETS_GO, HALVED = 1e-5, 0.0625
-# How often a step is bent, counted: twice onto what it leaves of the rows, where it is a part of Newton's, and twice to
-# where they hold. After that the straight one is shortened.
+# How often a step is bent, counted: twice onto what it leaves of the rows, where it is a small part of Newton's, and
+# twice to where they hold. After that the straight one is shortened.
 TO_A_PART, TO_ROWS, BENT, STRAIGHT = 0, 2, 4, 5
+SMALL_PART = 0.1
 
 
 @kernel(inner=True)
@@ -104,7 +105,7 @@ def search(program, tips, here, trial, rows, y, base, value, restoring, leave, m
     for r in range(rows):
         noise += 4e-16 * (abs(y[r]) + abs(residual[r]) / mu)
     alpha = 1.0
-    first = TO_ROWS if cut == 1.0 else TO_A_PART
+    first = TO_A_PART if cut < SMALL_PART else TO_ROWS
     bends = first
     lost = -1
     while alpha * longest > 1e-9 * SHORTEST or alpha == 1.0:
