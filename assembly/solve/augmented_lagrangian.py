@@ -453,7 +453,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         cuts = cuts + 1 if watched and cut < 0.5 and violation <= TOUCHING else 0
         room_left = 2.0 * longest if cuts > 0 else math.inf
         base = 0.0 if restoring else value
-        leave = (not tick, may_go, cut)
+        leave = (not tick, may_go)
         accepted, alpha, lost = search(
             program, tips, here, trial, rows, y, base, value, restoring, leave, mu, slope, longest, weights, system
         )

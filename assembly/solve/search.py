@@ -26,10 +26,6 @@ TURN = 1.0
 SHORTENINGS = 4
 # A clearance's contact that no longer step, nor one halved so far, finds again is given up.
 LETS_GO, HALVED = 1e-5, 0.0625
-# How often a step is bent, counted: twice onto what it leaves of the rows, where it is a small part of Newton's, and
-# twice to where they hold. After that the straight one is shortened.
-TO_A_PART, TO_ROWS, BENT, STRAIGHT = 0, 2, 4, 5
-SMALL_PART = 0.1
 
 
 @kernel(inner=True)
@@ -86,12 +82,12 @@ def search(program, tips, here, trial, rows, y, base, value, restoring, leave, m
 
     The trial point is left in `trial`. Returns whether one was accepted, alpha, and the contact lost by the last trial
     or -1. `base` is the objective's part of the merit here, `longest` the largest component of the step. The `leave`
-    says whether a contact that ends where solids are in each other may be given up, whether bodies may go all the way
-    for certain, and what share of Newton's step the step is.
+    says whether a contact that ends where solids are in each other may be given up, and whether bodies may go all the
+    way for certain.
     """
     table, pool, shape, loose, room = program
     active, forces, _foreseen = weights
-    lets_go, may_go_all, cut = leave
+    lets_go, may_go_all = leave
     gradient, (descent, step, straight), lagrangian, matrix = system
     bases, one_sided, order, _of_rows = shape
     n = descent.size
@@ -105,22 +101,21 @@ def search(program, tips, here, trial, rows, y, base, value, restoring, leave, m
     for r in range(rows):
         noise += 4e-16 * (abs(y[r]) + abs(residual[r]) / mu)
     alpha = 1.0
-    first = TO_A_PART if cut < SMALL_PART else TO_ROWS
-    bends = first
+    bends = 0
     lost = -1
     while alpha * longest > 1e-9 * SHORTEST or alpha == 1.0:
         move(table, here[0], step, alpha, trial[0])
         carry(table, pool, bases, loose, here, trial, step, alpha)
-        known = may_go_all and alpha == 1.0 and bends == first
+        known = may_go_all and alpha == 1.0 and bends == 0
         if table[WATCH] >= 0 and not known and is_too_far(table, pool, loose[5], trial):
             # Bent, it would go farther than is known to be free.
-            bends = BENT
+            bends = 2
             alpha *= 0.5
             continue
         lost = evaluate(table, pool, loose[4], BEND, loose, room, trial)
         if table[WATCH] >= 0 and not lets_go and lost < 0 and ends_unseen(table, pool, loose[5], here, trial):
             # A tick has no last look, which would tell of what it led through.
-            bends = BENT
+            bends = 2
             alpha *= 0.5
             continue
         if lost < 0:
@@ -129,24 +124,23 @@ def search(program, tips, here, trial, rows, y, base, value, restoring, leave, m
                 there += goal(table, pool, shape, rows, loose, room, tips, trial, 0, gradient, lagrangian)
             if there <= here_merit + 1e-4 * alpha * slope + noise:
                 return True, alpha, lost
-            if bends < BENT:
+            if bends < 2:
+                bends += 1
                 for i in range(n):
                     descent[i] = 0.0
-                left = 1.0 - alpha * (cut if bends < TO_ROWS else 1.0)
-                bends += 1
                 for r in range(rows):
-                    forces[r] = -(trial[3][r] - left * residual[r]) * active[r]
+                    forces[r] = -(trial[3][r] - (1.0 - alpha) * residual[r]) * active[r]
                 add_transposed(bases, here[4], rows, forces, descent)
                 solve_step(matrix, n, order, descent)
                 for i in range(n):
                     step[i] += descent[i] / alpha
                 continue
-            if bends == BENT:
-                bends = STRAIGHT
+            if bends == 2:
+                bends = 3
                 for i in range(n):
                     step[i] = straight[i]
         # A bent step may be longer than it was.
-        short = lets_go and (bends == first or bends == STRAIGHT) and alpha <= HALVED and alpha * longest < LETS_GO
+        short = lets_go and bends % 3 == 0 and alpha <= HALVED and alpha * longest < LETS_GO
         if lost >= 0 and short and may_go(table, lost, residual) and here[1][lost, STAYS] >= 0.0:
             here[1][lost, STAYS] = MAY_GO - here[1][lost, STAYS]
             continue
