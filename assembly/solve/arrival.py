@@ -5,6 +5,8 @@ from __future__ import annotations
 from assembly._kernel import kernel
 from assembly.constraints.layout import BODIES, IMPLICIT, REFERENCE, SCALE
 from assembly.solve.inertia import DOWNWARD
+from assembly.solve.linear import greatest_on_diagonal
+from assembly.solve.multipliers import strongest
 from assembly.solve.rows import turned
 from assembly.solve.settings import (
     CURVED,
@@ -38,6 +40,14 @@ def rounding_at(table, pool, settings, here):
     """The violation that is none: what is asked for, or what rounding of coordinates and of whole turns violates."""
     reach = max(reach_of(table, pool, here[0]), turned(table, pool, here[1]))
     return max(settings[FEASIBILITY], min(ROUNDING * reach, MOST_ROUNDING))
+
+
+@kernel(inner=True)
+def slope_rounding(program, here, lagrangian, n, rows, y):
+    """What rounding leaves of the Lagrangian's slope: poses' by the objective's curvature, and that of forces."""
+    table, pool, shape, _loose, _room = program
+    reach = max(1.0, reach_of(table, pool, here[0]))
+    return ROUNDING * (reach * greatest_on_diagonal(lagrangian, n, shape[2]) + strongest(y, rows))
 
 
 @kernel(inner=True)

@@ -45,7 +45,7 @@ from assembly.proximity.watch import (
     SPARING,
     any_crossed,
 )
-from assembly.solve.arrival import has_arrived, rounding_at
+from assembly.solve.arrival import GAIN, has_arrived, rounding_at, slope_rounding
 from assembly.solve.budget import HALF, begin_tick, is_cut, is_spent, may_end, set_deadline
 from assembly.solve.contacts import free_folds, is_of_surfaces
 from assembly.solve.ending import finish, return_to
@@ -294,8 +294,12 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             holds, leash = False, math.inf
         retreats = sunk and holds and ended == RUNNING and iteration < limit
         looks_last = watched and settings[LAST_LOOK] == 1.0
+        # What a whole step gains nothing of may be rounding.
+        stands = alpha * cut == 1.0 and dual > max(GAIN * last_dual, settings[STATIONARITY]) and violation <= feasible
+        rounded = stands and dual <= slope_rounding(program, here, lagrangian, n, rows, y)
+        unbalanced = 0.0 if rounded else dual
+        arrived = has_arrived(program, settings, results, here, violation, last_violation, feasible, unbalanced)
         # Where every last look finds other contacts, the limit ends it.
-        arrived = has_arrived(program, settings, results, here, violation, last_violation, feasible, dual)
         if arrived and not retreats and not (looks_last and iteration > limit):
             # A contact that ends right here is lost and found again, however often it is looked for.
             if looks_last and iteration != looked_at:

@@ -110,11 +110,11 @@ def settle(packed: Packed, settings: Array, outcome: Outcome, run: Run) -> Outco
             elif verdict.kind is SecondOrder.SADDLE:
                 return outcome._replace(code=ITERATION_LIMIT, order=verdict.kind)
         if left is None and stands and onward[SECOND_ORDER] != REACHED and not _is_at_end(packed, settings, outcome):
-            # It was taken for a saddle on the way to it.
+            # It was taken for a saddle on the way to it: multipliers that leave the form positive need no shift.
             onward[ITERATIONS], onward[SECOND_ORDER] = settings[ITERATIONS] - spent - 1, REACHED
             if onward[ITERATIONS] < 0.0:
                 return outcome._replace(code=ITERATION_LIMIT, order=verdict.kind)
-            left = run(onward, outcome.state.copy())
+            left = run(onward, _with_forces(packed, outcome.state, verdict.forces))
         if left is None and not stands:
             return outcome
         if left is None:
@@ -124,6 +124,14 @@ def settle(packed: Packed, settings: Array, outcome: Outcome, run: Run) -> Outco
         left.state[at + COUNT] += spent + 1
         outcome = left._replace(history=np.concatenate([outcome.history[: spent + 1], left.history]))
     return outcome
+
+
+def _with_forces(packed: Packed, state: Array, forces: Array | None) -> Array:
+    """A copy of a state, with multipliers of its rows where they are given."""
+    state = state.copy()
+    if forces is not None:
+        state[packed.multipliers_at : packed.residuals_at] = forces[: packed.rows]
+    return state
 
 
 def _is_at_end(packed: Packed, settings: Array, outcome: Outcome) -> bool:

@@ -122,15 +122,21 @@ def solve_step(matrix, n, order, b):
 
 
 @kernel(inner=True)
+def greatest_on_diagonal(lagrangian, n, order):
+    """The largest entry on the diagonal, without its sign, but at least one; not finite if one is not."""
+    if is_blocked(order):
+        return greatest_diagonal(lagrangian, order[3])
+    greatest = 1.0
+    for i in range(n):
+        greatest = max(greatest, abs(lagrangian[i, i]))
+    return greatest
+
+
+@kernel(inner=True)
 def factorize_shifted(lagrangian, n, order, shift, matrix):
     """Factorize lagrangian + d I with the first d from `shift` up that makes it positive definite; -1: none."""
     blocked = is_blocked(order)
-    scale = 1.0
-    if blocked:
-        scale = greatest_diagonal(lagrangian, order[3])
-    else:
-        for i in range(n):
-            scale = max(scale, abs(lagrangian[i, i]))
+    scale = greatest_on_diagonal(lagrangian, n, order)
     if not math.isfinite(scale):
         return -1.0
     while shift <= 1e8 * scale:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from assembly.constraints.layout import MOVING
 from assembly.constraints.packing import Packed
-from assembly.solve.look import DEPENDENT, Look, null_space
+from assembly.solve.look import CUT, DEPENDENT, Look, null_space
 from assembly.solve.rank import orthonormal
 
 __all__ = ["SecondOrder", "Verdict", "Way", "judge", "judge_kink"]
@@ -72,10 +72,14 @@ class Way:
 
 @dataclass(frozen=True, eq=False)
 class Verdict:
-    """What a point is, and the ways along which lower poses are expected, the steepest first."""
+    """What a point is, and the ways along which lower poses are expected, the steepest first.
+
+    Where rows depend on each other, so that multipliers are open, `forces` are those (m,) with the least negative form.
+    """
 
     kind: SecondOrder
     ways: list[Way] = field(default_factory=list)
+    forces: Array | None = None
 
 
 def judge(packed: Packed, state: Array, sample: bool) -> tuple[Verdict, Look | None]:
@@ -96,17 +100,19 @@ def judge_look(look: Look, sample: bool) -> Verdict:
     form = _symmetric(basis.T @ look.hessian @ basis)
     values, vectors = np.linalg.eigh(form)
     flat = (DIFFERENCED if look.packed.tips else FLAT) * max(1.0, float(np.abs(look.hessian).max()))
-    depends = False
+    # Rows without a force that no such motion changes to first order say by their curvature which ones exist.
+    closed = look.touching & ~pushing
+    closed[closed] = np.linalg.norm(look.jacobian[closed] @ basis, axis=1) <= DEPENDENT
+    forces: Array | None = None
     if values[0] < -flat:
-        bends = _bends(look, pushing, basis)
-        depends = bool(bends)
-        if depends:
-            form = _least_negative(look, form, bends)
+        bends = _bends(look, pushing | closed, basis)
+        if bends:
+            form, forces = _least_negative(look, form, bends)
             values, vectors = np.linalg.eigh(form)
+    depends = forces is not None
     if values[0] > flat:
-        return Verdict(SecondOrder.MINIMUM)
-    cone = look.jacobian[look.touching & ~pushing]
-    cone = cone[np.linalg.norm(cone @ basis, axis=1) > DEPENDENT]
+        return Verdict(SecondOrder.MINIMUM, forces=forces)
+    cone = look.jacobian[look.touching & ~pushing & ~closed]
     ways = list(_downward(form, basis, cone, flat)) if values[0] < -flat else []
     if ways and depends:
         # A way may exist to first order only, and lead nowhere; motions that exist are found by trying.
@@ -118,9 +124,9 @@ def judge_look(look: Look, sample: bool) -> Verdict:
         return Verdict(SecondOrder.UNDECIDED)
     zeros = vectors[:, np.abs(values) <= flat]
     if not zeros.shape[1]:
-        return Verdict(SecondOrder.MINIMUM)
+        return Verdict(SecondOrder.MINIMUM, forces=forces)
     if not sample:
-        return Verdict(SecondOrder.NOT_ISOLATED)
+        return Verdict(SecondOrder.NOT_ISOLATED, forces=forces)
     return _sampled(look, _canonical(basis @ zeros), cone, MIXTURES, FASTER)
 
 
@@ -184,28 +190,43 @@ def _bends(look: Look, pushing: NDArray[np.bool_], basis: Array) -> list[_Bend]:
     return bends
 
 
-def _least_negative(look: Look, form: Array, bends: list[_Bend]) -> Array:
-    """The form with those multipliers of which its least eigenvalue, which is concave in them, is greatest."""
+def _least_negative(look: Look, form: Array, bends: list[_Bend]) -> tuple[Array, Array]:
+    """The form with those multipliers of which its least eigenvalue, concave in them, is greatest; and these."""
     if len(bends) == 1:
-        return _along(look, form, bends[0])
+        share = _along(look, form, bends[0])
+        return form + share * bends[0].form, look.forces + share * bends[0].forces
     forces = look.forces
-    best, highest = form, -np.inf
+    best, highest = (form, forces), -np.inf
     for _ in range(CLIMBS):
         values, vectors = np.linalg.eigh(form)
         least = float(values[0])
         if least > highest:
-            best, highest = form, least
+            best, highest = (form, forces), least
         slopes = np.array([vectors[:, 0] @ bend.form @ vectors[:, 0] for bend in bends])
         square = float(slopes @ slopes)
         if least > 0.0 or square < BENDS**2:
             break
         # As far as makes this direction positive by as much as it was negative.
         wanted = (0.1 - 2.0 * least) / square
-        whole = _Bend(_mixed(slopes, [b.forces for b in bends]), _mixed(slopes, [b.form for b in bends]))
+        whole = _upward(look, forces, slopes, bends)
         share = min(wanted, whole.share_left(look, forces))
         form = form + share * whole.form
         forces = forces + share * whole.forces
     return best
+
+
+def _upward(look: Look, forces: Array, slopes: Array, bends: list[_Bend]) -> _Bend:
+    """The combination along slopes, without what would make a one-sided row pull that has no force to lose."""
+    all_forces = [bend.forces for bend in bends]
+    mixed = _mixed(slopes, all_forces)
+    for _ in bends:
+        held = look.one_sided & (forces >= 0.0) & (mixed > BENDS)
+        if not held.any():
+            break
+        grows = np.array(all_forces)[:, held].T
+        slopes = slopes - np.linalg.lstsq(grows, grows @ slopes, rcond=CUT)[0]
+        mixed = _mixed(slopes, all_forces)
+    return _Bend(mixed, _mixed(slopes, [bend.form for bend in bends]))
 
 
 def _mixed(shares: Array, parts: list[Array]) -> Array:
@@ -213,15 +234,14 @@ def _mixed(shares: Array, parts: list[Array]) -> Array:
     return mixed
 
 
-def _along(look: Look, form: Array, bend: _Bend) -> Array:
-    """The same of one combination, by bisection on the slope of the least eigenvalue."""
+def _along(look: Look, form: Array, bend: _Bend) -> float:
+    """How much of one combination does so, by bisection on the slope of the least eigenvalue."""
     low, high = -bend.share_left(look, look.forces, -1.0), bend.share_left(look, look.forces)
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         vector = np.linalg.eigh(form + middle * bend.form)[1][:, 0]
         low, high = (middle, high) if vector @ bend.form @ vector > 0.0 else (low, middle)
-    best: Array = form + 0.5 * (low + high) * bend.form
-    return best
+    return 0.5 * (low + high)
 
 
 def _downward(form: Array, basis: Array, cone: Array, flat: float) -> Iterator[Way]:
