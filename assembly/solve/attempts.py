@@ -12,6 +12,7 @@ from assembly.constraints.layout import DEEPEST_AT
 from assembly.constraints.packing import Packed
 from assembly.solve.assembled import run_gathered
 from assembly.solve.augmented_lagrangian import solve_program
+from assembly.solve.balance import balanced
 from assembly.solve.fit import Loop, fitted, fitted_again
 from assembly.solve.interruption import Interruption
 from assembly.solve.leave import Fit, Outcome, settle
@@ -78,6 +79,8 @@ def attempt(
         table[DEEPEST_AT] = packed.table[DEEPEST_AT]
         outcome = begin(packed, interruption, table, settings, start(), turns)
     outcome = fitted(packed, settings, outcome, loop)
+    if not interruption.is_over():
+        outcome = balanced(packed, settings, outcome, loop.go_on)
     if packed.trims and not _holds(outcome) and not interruption.is_over():
         # With the coordinates of contacts as unknowns trims have exact second derivatives, except at poles.
         settings = settings.copy()
