@@ -30,7 +30,7 @@ from assembly.solve.settings import (
     UNSURE,
 )
 
-__all__ = ["attempt", "begin", "load"]
+__all__ = ["attempt", "begin", "go_on_once", "load"]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
@@ -95,7 +95,7 @@ def attempt(
         other = again(settings)
         outcome = other if _holds(other) else outcome
     if not interruption.is_over():
-        outcome = settle(packed, settings, outcome, partial(_go_on_once, interruption, packed))
+        outcome = settle(packed, settings, outcome, partial(go_on_once, interruption, packed))
     return outcome._replace(fit=outcome.fit or Fit(float(settings[FIT])))
 
 
@@ -113,11 +113,11 @@ def _loop(interruption: Interruption, turns: Array | None) -> Loop:
 
     def first(packed: Packed, settings: Array, state: Array) -> Outcome:
         outcome = begin(packed, interruption, packed.table.copy(), settings, state, turns)
-        return settle(packed, settings, outcome, partial(_go_on_once, interruption, packed))
+        return settle(packed, settings, outcome, partial(go_on_once, interruption, packed))
 
     def go_on(packed: Packed, settings: Array, state: Array) -> Outcome:
-        outcome = _go_on_once(interruption, packed, settings, state)
-        return settle(packed, settings, outcome, partial(_go_on_once, interruption, packed))
+        outcome = go_on_once(interruption, packed, settings, state)
+        return settle(packed, settings, outcome, partial(go_on_once, interruption, packed))
 
     return Loop(first, go_on)
 
@@ -134,6 +134,6 @@ def _run(packed: Packed, interruption: Interruption, table: Table, settings: Arr
     return Outcome(solve_program(table, packed.pool, settings, state, history, packed.tips), state, history)
 
 
-def _go_on_once(interruption: Interruption, packed: Packed, settings: Array, state: Array) -> Outcome:
+def go_on_once(interruption: Interruption, packed: Packed, settings: Array, state: Array) -> Outcome:
     """The loop from a state that a solve has led to, with postures measured from where they were."""
     return _run(packed, interruption, following_none(packed), settings, state)

@@ -19,7 +19,7 @@ from assembly.solve.interruption import Interruption
 from assembly.solve.rank import HELD
 from assembly.solve.settings import GATHER, ITERATIONS, VIOLATION
 from assembly.solve.solution import Solution, Status
-from assembly.solve.starts import far_starts, near_starts
+from assembly.solve.starts import Spread, far_starts, near_starts
 
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
@@ -71,10 +71,10 @@ def restarted(
     # From each start as it is, and with its bodies gathered where that fails: the one often does where the other one
     # does not.
     settings[GATHER] = 0.0
-    bodies, size = failed._scene.bodies, failed._scene.scale
-    rounds = islice(far_starts(bodies, failed.q, size, SCATTERED), ROUNDS)
+    bodies, spread = failed._scene.bodies, Spread.of(failed._packed, failed.q)
+    rounds = islice(far_starts(bodies, failed.q, spread, SCATTERED), ROUNDS)
     best, seconds = failed, failed.seconds
-    for starts in (near_starts(bodies, failed.q, size), *rounds):
+    for starts in (near_starts(bodies, failed.q, spread), *rounds):
         ends: list[Solution] = []
         for start in starts:
             ends.append(scene._solved(settings, start, None, interruption, reference, turns))
