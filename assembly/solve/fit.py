@@ -151,6 +151,9 @@ def _disagreement(packed: Packed, state: Array) -> Array | None:
     jacobian = centered(rows.jacobian[:, columns])[0]
     movable = np.isin(rows.program_rows, packed.value_rows) & ~rows.one_sided
     counted = ~rows.one_sided | (rows.residual < TOUCHING)
+    # An angle at its pole has no value and no slope: what its row is off by no other row says.
+    if (np.abs(rows.residual[counted & ~np.any(rows.jacobian, axis=1)]) > TOUCHING).any():
+        return None
     apart = np.zeros(packed.rows)
     while True:
         which = np.flatnonzero(counted)
