@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from assembly.proximity.solid_contact import TRACK
 from assembly.solve.interruption import Interruption
-from assembly.solve.rank import HELD
 from assembly.solve.settings import GATHER, ITERATIONS, VIOLATION
 from assembly.solve.solution import Solution, Status
 from assembly.solve.starts import Spread, far_starts, near_starts
@@ -29,6 +28,8 @@ __all__ = ["may_hold_elsewhere", "restarted"]
 Array = NDArray[np.float64]
 # Scattered starts of a round, and rounds.
 SCATTERED, ROUNDS = 4, 2
+# A violation, over the size, that rounding may leave of what holds.
+ROUNDED = 1e-11
 # Steps of each start.
 STEPS = 100.0
 
@@ -42,7 +43,7 @@ def may_hold_elsewhere(solution: Solution) -> bool:
     if solution._packed.guards or solution._packed.contacts:
         return False
     ended = solution.status in (Status.INFEASIBLE, Status.STALLED)
-    return ended and not solution._result(VIOLATION) <= HELD * solution._packed.scale
+    return ended and not solution._result(VIOLATION) <= ROUNDED * solution._packed.scale
 
 
 def restarted(
