@@ -39,18 +39,18 @@ from assembly.solve.interruption import Interruption
 from assembly.solve.jacobian import rows_of
 from assembly.solve.options import Options
 from assembly.solve.row_table import gradient_at
-from assembly.solve.settings import ANY_POSE, COUNT, ITERATIONS, SOLVED
+from assembly.solve.settings import ANY_POSE, COUNT, ITERATIONS, SOLVED, STRAYS
 from assembly.solve.solution import Status
 
-__all__ = ["Asked", "status_of"]
+__all__ = ["Asked", "has_strayed", "status_of"]
 
 Array = NDArray[np.float64]
 # A solve that ends otherwise has an answer, or nothing to go on from.
 OPEN = (Status.ITERATION_LIMIT, Status.STALLED, Status.INFEASIBLE)
 # Least way of a motion, in sizes of the scene.
 LEAST_WAY = 1.0
-# A motion goes on by ten to the powers up to this; where bodies turn, only as far as doubles count whole turns, and what
-# it does as long as going around matters more than going away is not looked at.
+# A motion goes on by ten to the powers up to this; where bodies turn, only as far as doubles count whole turns. On a
+# helix what it does as long as going around matters more than going away is not looked at.
 POWERS, TURNING_POWERS, SETTLED = 40, 12, 4
 # Violations that count as held, and moves of bodies of a contact against each other, in parts of the way.
 HELD = 1e-6
@@ -97,6 +97,7 @@ class Place:
         """The state of a packed scene there."""
         state = packed.new_state()
         state[: packed.contacts_at] = self.q.ravel()
+        state[packed.contacts_at : packed.angles_at] = np.nan
         state[packed.angles_at : packed.multipliers_at : TRACK] = [self.angles[id(angle)] for angle in packed._angles]
         return state
 
@@ -158,7 +159,7 @@ class Line:
 
 @dataclass(frozen=True, eq=False)
 class Helix:
-    """From a place on by the displacement of every body from another one: turns about axes (n, 3), and moves on them."""
+    """From a place on by the displacement of every body from another one: a turn about an axis, and a move on it."""
 
     end: Place
     axes: Array
@@ -210,6 +211,11 @@ class Helix:
         return Place(q, {key: angle + part * self.turns[key] for key, angle in self.end.angles.items()})
 
 
+def has_strayed(packed: Packed, settings: Array, state: Array) -> bool:
+    """Whether a solve has steps left, and ended only because its bodies went away."""
+    return bool(settings[STRAYS] == 1.0 and state[packed.results_at + COUNT] < settings[ITERATIONS])
+
+
 def status_of(
     status: Status,
     asked: Asked,
@@ -227,6 +233,7 @@ def status_of(
     if not Line.through(first, end).way > least:
         return status
     half = settings.copy()
+    half[STRAYS] = 0.0
     half[ITERATIONS] = state[packed.results_at + COUNT] // 2
     before = Place.of(packed, attempt(packed, half, start, interruption).state)
     held = _put_back(asked, asked.lasting, before, interruption)
@@ -286,6 +293,7 @@ def _falls(asked: Asked, motion: Motion) -> bool:
     """Whether all holds along a motion, and the objective falls on it without end."""
     alone = pack(asked.bodies, asked.lasting, asked.objectives)
     alone.refresh()
+    gradient, free = np.empty(6 * alone.count), np.empty(0, dtype=np.int64)
 
     def value_at(part: float) -> float:
         """The objective after so many parts; NaN where what is asked does not hold."""
@@ -297,8 +305,7 @@ def _falls(asked: Asked, motion: Motion) -> bool:
         off = np.where(rows.one_sided, np.maximum(-rows.residual, 0.0), np.abs(rows.residual))
         if not off.max(initial=0.0) * alone.scale <= HELD * max(part, 1.0) * motion.way:
             return np.nan
-        gradient, free = np.empty(6 * alone.count), np.empty(0, dtype=np.int64)
-        return gradient_at(alone.table, alone.pool, state, free, gradient, alone.tips)
+        return float(gradient_at(alone.table, alone.pool, state, free, gradient, alone.tips))
 
     last, fall = np.inf, 0.0
     for power in motion.powers:
