@@ -36,8 +36,8 @@ UNDEFINED = 1e-12
 CLOSE = 1e-6
 # The same for SWING where the axes are opposed: its gradient grows there, too.
 OPPOSED = 1e-3
-# The slope of TURN is no steeper than where |z_a + z_b| is this, that of AZIMUTH than where the sine of v to z_a is, and
-# neither has curvature nearer to its pole. At the pole, but for rounding, they have no value and keep the last one.
+# The slope of TURN is no steeper than where |z_a + z_b| is this, that of AZIMUTH than where the sine of v to z_a is.
+# Neither has curvature nearer to its pole. At the pole, but for rounding, they have no value and keep the last one.
 POLE = 1e-6
 # SWING is a series in 1 - cos(theta) below this.
 SERIES = 1e-3

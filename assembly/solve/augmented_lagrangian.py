@@ -375,11 +375,12 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             restoring = False
             mu = 1e-4
             check_at, check_violation = iteration + PATIENCE, violation
-        gains_nothing = violation > feasible and mu <= floor and not (restoring or watched or tick)
+        is_open = violation > feasible and not (restoring or watched or tick)
+        gains_nothing = is_open and mu <= floor
         force = strongest(y, rows) if gains_nothing else 0.0
         left = violation / max(last_violation, feasible) if alpha * cut == 1.0 else 0.0
         still = gains_nothing and stands_still(way, settings, feasible, violation, left, dual, force, mu)
-        if gains_nothing and (still or drags(way, violation, last_violation)):
+        if still or (is_open and (any_pose or mu <= floor) and drags(way, violation, last_violation)):
             check_at, check_violation = iteration, violation
         if not restoring and iteration >= check_at:
             # The rows gain nothing: see whether they can hold at all. One that has just closed has had no time to.

@@ -16,7 +16,7 @@ not hold, or rises. Such motions are
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from math import pi
 from typing import Protocol
@@ -228,31 +228,42 @@ def status_of(
     """The status of a solve that ended so in a state: UNBOUNDED where it is, else as it came."""
     if status not in OPEN or not asked.objectives:
         return status
-    least = LEAST_WAY * packed.scale
     first, end = Place.of(packed, start()), Place.of(packed, state)
-    if not Line.through(first, end).way > least:
+    if not Line.through(first, end).way > LEAST_WAY * packed.scale:
         return status
     half = settings.copy()
     half[STRAYS] = 0.0
     half[ITERATIONS] = state[packed.results_at + COUNT] // 2
-    before = Place.of(packed, attempt(packed, half, start, interruption).state)
-    held = _put_back(asked, asked.lasting, before, interruption)
+    middle = Place.of(packed, attempt(packed, half, start, interruption).state)
+    motions = _motions(asked, (first, middle, end), interruption)
+    return Status.UNBOUNDED if any(_goes_on(asked, motion, packed.scale) for motion in motions) else status
+
+
+def _motions(asked: Asked, places: tuple[Place, Place, Place], interruption: Interruption) -> Iterator[Motion]:
+    """Motions that may have no end, of a solve that was at three places one after the other."""
+    first, middle, end = places
     last = _put_back(asked, asked.lasting, end, interruption)
-    motions: list[Motion] = []
-    if held is not None and last is not None:
-        motions = [line for line in (Line.through(held, last),) if not _slides(asked, line)]
-        if not asked.touching:
-            motions.append(Helix.through(held, last))
+    for place in (middle, first) if last is not None else ():
+        before = _put_back(asked, asked.lasting, place, interruption)
+        if before is not None and last is not None:
+            line = Line.through(before, last)
+            if not _slides(asked, line):
+                yield line
+            if not asked.touching:
+                yield Helix.through(before, last)
     if asked.touching:
         base = _put_back(asked, asked.constraints, first, interruption)
-        motions += [] if base is None else [_towed(asked, base, end)]
-    # The line is from far away to far away, a helix advances by a part of its turns.
-    if any(
-        motion.way > least * (LEAST_ADVANCE if isinstance(motion, Helix) else 1.0) and _falls(asked, motion)
-        for motion in motions
-    ):
-        return Status.UNBOUNDED
-    return status
+        if base is not None:
+            yield _towed(asked, base, end)
+
+
+def _goes_on(asked: Asked, motion: Motion, size: float) -> bool:
+    """Whether a motion goes far enough, and the objective falls on it without end."""
+    least = LEAST_WAY
+    if isinstance(motion, Helix):
+        # It may have gone around for the most part.
+        least *= LEAST_ADVANCE if motion.angles.any() else np.inf
+    return motion.way > least * size and _falls(asked, motion)
 
 
 def _put_back(

@@ -274,3 +274,11 @@ def test_a_linkage_out_of_reach(off):
     assert set(named) == {"drive", "guide", "pin", "wrist"}
     if solution.success:
         assert sum(named.values()) == pytest.approx(3.0 * off, rel=1e-3)
+
+
+@pytest.mark.parametrize("off", [-4.7e-6, 2e-6, 4.9e-6])
+def test_only_what_is_mended_nearby_is_no_disagreement(off):
+    # Nothing drives it: along its freedom slopes of a few parts of what it is off would mend a part of it, far away.
+    solution = free_four_bar({"shift": (0.0, 0.0, 6.0 * off)}).solve()
+    assert solution.status is asm.Status.FITTED and solution.iterations <= 6
+    assert set(solution.disagreeing) == {"drive", "elbow", "wrist", "swing"}
