@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from assembly.constraints.clearance import Clearance
 from assembly.constraints.constraint import Constraint
 from assembly.constraints.contact import Contact
+from assembly.constraints.expression import Expression
 from assembly.constraints.objectives import Objective
 from assembly.constraints.packing import Packed, pack
 from assembly.constraints.trim_contact import TrimContact
@@ -321,9 +322,9 @@ def _falls(asked: Asked, motion: Motion) -> bool:
     last, fall = np.inf, 0.0
     for power in motion.powers:
         value = value_at(10.0**power)
-        if value == -np.inf:
-            # Past all doubles, where it fell faster and faster before.
-            first, middle, end = (value_at(part) for part in ((-1.0, -0.5, 0.0)))
+        if value == np.inf and _is_past_doubles(asked, motion.at(10.0**power)):
+            # It fell faster and faster before.
+            first, middle, end = (value_at(part) for part in (-1.0, -0.5, 0.0))
             return fall > 0.0 or 0.0 < first - middle < middle - end
         if not value < last:
             return False
@@ -332,3 +333,14 @@ def _falls(asked: Asked, motion: Motion) -> bool:
         fall = last - value if last < np.inf else 0.0
         last = value
     return True
+
+
+def _is_past_doubles(asked: Asked, place: Place) -> bool:
+    """Whether the objective is minus infinity at a place; the loop has one infinity for all that is not finite."""
+    index = {id(body): k for k, body in enumerate(asked.bodies)}
+    total = 0.0
+    for sign, term in asked.objectives:
+        if isinstance(term, Expression):
+            (value,) = term.values(place.q[[index[id(body)] for body in term.bodies]])
+            total += sign * float(value)
+    return total == -np.inf
