@@ -9,9 +9,9 @@ not hold, or rises. Such motions are
 - the line on which the solve ran, from where it was after half its steps to where it stopped, both put back onto the
   constraints. Angles that went around go on around by whole turns, and bodies with them, as a wheel on a rack;
 - the displacement between these places, body by body, done again and again: a helix, as of what is on a screw;
-- from where all holds near the start: the way to where the solve stopped, for bodies that touch that of the one of them
-  that went farthest. Contacts of two surfaces end somewhere, so that bodies of one must not move against each other;
-  clearances and one-sided contacts hold where bodies are far apart.
+- from where all holds, near the start or the end, the way of the whole solve; of bodies that touch that of the one of
+  them that went farthest. Contacts of two surfaces end somewhere, so that bodies of one must not move against each
+  other; clearances and one-sided contacts hold where bodies are far apart.
 """
 
 from __future__ import annotations
@@ -230,7 +230,8 @@ def status_of(
     if status not in OPEN or not asked.objectives:
         return status
     first, end = Place.of(packed, start()), Place.of(packed, state)
-    if not Line.through(first, end).way > LEAST_WAY * packed.scale:
+    went = Line.through(first, end)
+    if not (went.way > LEAST_WAY * packed.scale or went.most_turned > 0.0):
         return status
     half = settings.copy()
     half[STRAYS] = 0.0
@@ -252,10 +253,10 @@ def _motions(asked: Asked, places: tuple[Place, Place, Place], interruption: Int
                 yield line
             if not asked.touching:
                 yield Helix.through(before, last)
-    if asked.touching:
-        base = _put_back(asked, asked.constraints, first, interruption)
+    for place in (first, end) if asked.touching else ():
+        base = _put_back(asked, asked.constraints, place, interruption)
         if base is not None:
-            yield _towed(asked, base, end)
+            yield _towed(asked, base, (end.q - first.q)[:, :3])
 
 
 def _goes_on(asked: Asked, motion: Motion, size: float) -> bool:
@@ -275,20 +276,22 @@ def _put_back(
         return place
     rows = pack(asked.bodies, constraints, ())
     rows.refresh()
-    settings = Options().settings(warm=True)
-    settings[ANY_POSE] = 1.0
-    outcome = attempt(rows, settings, lambda: place.state(rows), interruption)
-    return Place.of(rows, outcome.state) if outcome.code == SOLVED else None
+    for warm in (True, False):
+        settings = Options().settings(warm)
+        settings[ANY_POSE] = 1.0
+        outcome = attempt(rows, settings, lambda: place.state(rows), interruption)
+        if outcome.code == SOLVED:
+            return Place.of(rows, outcome.state)
+    return None
 
 
-def _towed(asked: Asked, base: Place, end: Place) -> Line:
-    """The line from a place toward another one; bodies that touch go with the one of them that goes farthest."""
+def _towed(asked: Asked, base: Place, move: Array) -> Line:
+    """The line from a place by moves (n, 3); bodies that touch go with the one of them that goes farthest."""
     index = {id(body): k for k, body in enumerate(asked.bodies)}
     group = np.arange(len(asked.bodies))
     for one in asked.touching:
         a, b = (group[index[id(body)]] for body in (one.body_a, one.body_b))
         group[group == a] = b
-    move = (end.q - base.q)[:, :3]
     far = np.where([body.fixed for body in asked.bodies], np.inf, np.abs(move).max(axis=1))
     leaders = [int(np.argmax(np.where(group == label, far, -1.0))) for label in group]
     return Line(base, move[leaders], dict.fromkeys(base.angles, 0.0))

@@ -13,6 +13,7 @@ from tests.solve.redundant import (
     contradiction,
     fixed_twice,
     four_bar,
+    free_four_bar,
     least_squares_step,
     parallelogram,
 )
