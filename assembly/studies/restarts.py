@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.proximity.solid_contact import TRACK
+from assembly.solve.contradiction import is_certain
 from assembly.solve.interruption import Interruption
 from assembly.solve.settings import GATHER, ITERATIONS, VIOLATION
 from assembly.solve.solution import Solution, Status
@@ -38,12 +39,15 @@ def may_hold_elsewhere(solution: Solution) -> bool:
     """Whether a solve ended where constraints do not hold, and not for want of steps or of a contact's pair.
 
     With contacts or clearances it is not tried elsewhere: scattered bodies would come to be on other sides of each
-    other, a ball under the floor that it is to touch, linked rings apart.
+    other, a ball under the floor that it is to touch, linked rings apart. Nor where equations contradict each other
+    wherever bodies are.
     """
     if solution._packed.guards or solution._packed.contacts:
         return False
     ended = solution.status in (Status.INFEASIBLE, Status.STALLED)
-    return ended and not solution._result(VIOLATION) <= ROUNDED * solution._packed.scale
+    if not ended or is_certain(solution._packed):
+        return False
+    return not solution._result(VIOLATION) <= ROUNDED * solution._packed.scale
 
 
 def restarted(
