@@ -54,7 +54,8 @@ def drags(way, violation, before):
     A linkage with a freedom may be off by less and less along it, for as long as it moves: each step goes as far as
     the rows' curvature lets it, and gains nothing.
     """
-    way[DRAGS] = way[DRAGS] + 1.0 if STILL * before < violation <= LITTLE else 0.0
+    by_little = TOUCHING < violation <= LITTLE
+    way[DRAGS] = way[DRAGS] + 1.0 if by_little and violation > STILL * before else 0.0
     if way[DRAGS] < DRAGGED:
         return False
     way[DRAGS] = 0.0
