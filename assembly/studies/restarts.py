@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 # Scattered starts of a round, and rounds.
 SCATTERED, ROUNDS = 4, 2
 # A violation, over the size, that rounding may leave of what holds.
-ROUNDED = 1e-11
+ROUNDED = 1e-12
 # Steps of each start.
 STEPS = 100.0
 
