@@ -380,7 +380,8 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         force = strongest(y, rows) if gains_nothing else 0.0
         left = violation / max(last_violation, feasible) if alpha * cut == 1.0 else 0.0
         still = gains_nothing and stands_still(way, settings, feasible, violation, left, dual, force, mu)
-        if still or (is_open and any_pose and drags(way, violation, last_violation)):
+        # Contacts bend as much as a step is long, and may gain little for a while.
+        if still or (is_open and any_pose and pairs == 0 and drags(way, violation, last_violation)):
             check_at, check_violation = iteration, violation
         if not restoring and iteration >= check_at:
             # The rows gain nothing: see whether they can hold at all. One that has just closed has had no time to.
