@@ -26,7 +26,7 @@ from assembly.solve.interruption import CTRL_C, Interruption
 from assembly.solve.options import Options
 from assembly.solve.postures import postures_from
 from assembly.solve.scene import Scene, Status
-from assembly.solve.settings import ANY_POSE, GATHER, ITERATIONS, TOUCHING
+from assembly.solve.settings import ANY_POSE, GATHER, ITERATIONS, STRAYS, TOUCHING
 from assembly.solve.solution import Solution
 
 if TYPE_CHECKING:
@@ -152,6 +152,9 @@ class Assembly(Contents):
             settings = settings.copy()
             settings[ANY_POSE] = 1.0
             settings[GATHER] = 0.0 if warm else 1.0
+        elif not warm:
+            settings = settings.copy()
+            settings[STRAYS] = 1.0
         return interruption.settings(settings)
 
     def _given(self, q0: ArrayLike | None) -> Array:
@@ -220,10 +223,16 @@ class Assembly(Contents):
                 code, state, history, order, fit = outcome
                 status = Status.FITTED if fit is not None and fit.apart is not None else interruption.status(code)
                 if status is not Status.SOLVED and self._objectives:
-                    from assembly.solve.unbounded import Asked, status_of
+                    from assembly.solve.unbounded import Asked, has_strayed, status_of
 
                     asked = Asked(self.bodies, self.constraints, self._objectives)
                     status = status_of(status, asked, packed, settings, start, state, interruption)
+                    ended_early = status is Status.ITERATION_LIMIT and has_strayed(packed, settings, state)
+                    if ended_early and not interruption.is_over():
+                        # It comes back, perhaps.
+                        settings = settings.copy()
+                        settings[STRAYS] = 0.0
+                        continue
                 solution = Solution(self._scene, packed, state, status, spent, history, order, fit)
                 solution._touching = float(settings[TOUCHING])
                 return solution

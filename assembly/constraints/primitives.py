@@ -36,7 +36,8 @@ UNDEFINED = 1e-12
 CLOSE = 1e-6
 # The same for SWING where the axes are opposed: its gradient grows there, too.
 OPPOSED = 1e-3
-# TURN has no value where |z_a + z_b| is below this, AZIMUTH where the sine of v to z_a is: it keeps the last one.
+# The slope of TURN is no steeper than where |z_a + z_b| is this, that of AZIMUTH than where the sine of v to z_a is.
+# Neither has curvature nearer to its pole. At the pole, but for rounding, they have no value and keep the last one.
 POLE = 1e-6
 # SWING is a series in 1 - cos(theta) below this.
 SERIES = 1e-3
@@ -155,10 +156,10 @@ def coordinate(kind, component, records, k, near):
         yb = load(records, k, AXES_B + 3)
         # h = (z_a + z_b) / (1 + z_a.z_b), and 1 + z_a.z_b = |z_a + z_b|^2 / 2.
         m = add(load(records, k, AXES_A + 6), load(records, k, AXES_B + 6))
-        square = dot(m, m)
-        if square >= POLE * POLE:
+        length = math.sqrt(dot(m, m))
+        if length > UNDEFINED:
             value = unwrap(math.atan2(dot(y, xb) - dot(x, yb), dot(x, xb) + dot(y, yb)), near)
-            h = scale(2.0 / square, m)
+            h = scale(2.0 / (length * max(length, POLE)), m)
     elif kind == DOT:
         u = load(records, k, AXES_A + 3 * (component // 3))
         v = load(records, k, AXES_B + 3 * (component % 3))
@@ -167,10 +168,10 @@ def coordinate(kind, component, records, k, near):
     elif kind == AZIMUTH:
         v = load(records, k, AXES_B + 3 * component)
         across = cross(load(records, k, AXES_A + 6), v)
-        square = dot(across, across)
-        if square >= POLE * POLE:
+        sine = math.sqrt(dot(across, across))
+        if sine > UNDEFINED:
             value = unwrap(math.atan2(dot(load(records, k, AXES_A + 3), v), dot(load(records, k, AXES_A), v)), near)
-            h = scale(1.0 / square, cross(v, across))
+            h = scale(1.0 / (sine * max(sine, POLE)), cross(v, across))
     elif kind == ANGLE:
         c, s, h = tilt(records, k)
         value = math.atan2(s, c)

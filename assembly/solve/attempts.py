@@ -12,6 +12,7 @@ from assembly.constraints.layout import DEEPEST_AT
 from assembly.constraints.packing import Packed
 from assembly.solve.assembled import run_gathered
 from assembly.solve.augmented_lagrangian import solve_program
+from assembly.solve.balance import balanced
 from assembly.solve.fit import Loop, fitted, fitted_again
 from assembly.solve.interruption import Interruption
 from assembly.solve.leave import Fit, Outcome, settle
@@ -31,7 +32,7 @@ from assembly.solve.settings import (
     VIOLATION,
 )
 
-__all__ = ["attempt", "begin", "load"]
+__all__ = ["attempt", "begin", "go_on_once", "load"]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
@@ -80,6 +81,8 @@ def attempt(
         table[DEEPEST_AT] = packed.table[DEEPEST_AT]
         outcome = begin(packed, interruption, table, settings, start(), turns)
     outcome = fitted(packed, settings, outcome, loop)
+    if not interruption.is_over():
+        outcome = balanced(packed, settings, outcome, loop.go_on)
     if packed.trims and not _holds(outcome) and not interruption.is_over():
         # With the coordinates of contacts as unknowns trims have exact second derivatives, except at poles.
         settings = settings.copy()
@@ -94,7 +97,7 @@ def attempt(
         other = again(settings)
         outcome = other if _holds(other) else outcome
     if not interruption.is_over():
-        outcome = settle(packed, settings, outcome, partial(_go_on_once, interruption, packed))
+        outcome = settle(packed, settings, outcome, partial(go_on_once, interruption, packed))
     return outcome._replace(fit=outcome.fit or Fit(float(settings[FIT])))
 
 
@@ -112,11 +115,11 @@ def _loop(interruption: Interruption, turns: Array | None) -> Loop:
 
     def first(packed: Packed, settings: Array, state: Array) -> Outcome:
         outcome = begin(packed, interruption, packed.table.copy(), settings, state, turns)
-        return settle(packed, settings, outcome, partial(_go_on_once, interruption, packed))
+        return settle(packed, settings, outcome, partial(go_on_once, interruption, packed))
 
     def go_on(packed: Packed, settings: Array, state: Array) -> Outcome:
-        outcome = _go_on_once(interruption, packed, settings, state)
-        return settle(packed, settings, outcome, partial(_go_on_once, interruption, packed))
+        outcome = go_on_once(interruption, packed, settings, state)
+        return settle(packed, settings, outcome, partial(go_on_once, interruption, packed))
 
     return Loop(first, go_on)
 
@@ -134,6 +137,6 @@ def _run(packed: Packed, interruption: Interruption, table: Table, settings: Arr
     return Outcome(solve_program(table, packed.pool, settings, state, history, packed.tips), state, history)
 
 
-def _go_on_once(interruption: Interruption, packed: Packed, settings: Array, state: Array) -> Outcome:
+def go_on_once(interruption: Interruption, packed: Packed, settings: Array, state: Array) -> Outcome:
     """The loop from a state that a solve has led to, with postures measured from where they were."""
     return _run(packed, interruption, following_none(packed), settings, state)

@@ -45,7 +45,7 @@ from assembly.proximity.watch import (
     SPARING,
     any_crossed,
 )
-from assembly.solve.arrival import GAIN, has_arrived, rounding_at, slope_rounding
+from assembly.solve.arrival import GAIN, has_arrived, reach_of, rounding_at, slope_rounding
 from assembly.solve.budget import HALF, begin_tick, is_cut, is_spent, may_end, set_deadline
 from assembly.solve.contacts import free_folds, is_of_surfaces
 from assembly.solve.ending import finish, return_to
@@ -86,13 +86,14 @@ from assembly.solve.settings import (
     STALLED,
     STATIONARITY,
     STATUS,
+    STRAYS,
     TICK,
     VIOLATION,
 )
 from assembly.solve.settings import (
     TOUCHING as TOUCHING_AT,
 )
-from assembly.solve.standstill import contradicts, is_stuck, next_floor, stands_still, stays_off
+from assembly.solve.standstill import bound_nearby, contradicts, drags, is_stuck, next_floor, stands_still, stays_off
 from assembly.solve.start import let_touch, read_state, rearrange, set_out
 from assembly.solve.step import CLOSE, aim, cut_step, leave_saddle, propose, short_share
 from assembly.solve.tangency import off_rows
@@ -106,6 +107,9 @@ SETTLING = 30
 LINGERS = 40
 # A tick that does not hold after its iterations has so many times more of them.
 EXTRA_TIME = 4
+# Where a solve may stray, and its bodies are so many times farther out, or sizes, after so many steps, it is looked at
+# whether that goes on.
+FAR, STRAYING = 1e3, 60
 # So often at most a solve leaves a saddle of its violations.
 KICKS = 3
 
@@ -150,6 +154,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
     gradient, lines, lagrangian, _factor = system
 
     feasible = rounding_at(table, pool, settings, here)
+    farthest = FAR * (1.0 + reach_of(table, pool, here[0])) if settings[STRAYS] == 1.0 else math.inf
     tick = settings[TICK] == 1.0
     # A tick goes on with the last one, if that one's time was spent.
     begin, done, looks = begin_tick(table, settings, results, memory)
@@ -321,6 +326,9 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             keep(here, y, rows, held)
             if watched:
                 numbers_of(table, numbers)
+        if iteration == STRAYING and settings[STRAYS] == 1.0 and not reach_of(table, pool, here[0]) <= farthest:
+            status = ITERATION_LIMIT
+            break
         if iteration >= limit and (not tick or violation <= feasible or iteration >= longest_tick):
             if watched and not tick and ended == RUNNING:
                 ended = ITERATION_LIMIT
@@ -376,10 +384,13 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             restoring = False
             mu = 1e-4
             check_at, check_violation = iteration + PATIENCE, violation
-        gains_nothing = violation > feasible and mu <= floor and not (restoring or watched or tick)
+        is_open = violation > feasible and not (restoring or watched or tick)
+        gains_nothing = is_open and mu <= floor
         force = strongest(y, rows) if gains_nothing else 0.0
         left = violation / max(last_violation, feasible) if alpha * cut == 1.0 else 0.0
-        if gains_nothing and stands_still(way, settings, feasible, violation, left, dual, force, mu):
+        still = gains_nothing and stands_still(way, settings, feasible, violation, left, dual, force, mu)
+        # Contacts bend as much as a step is long, and may gain little for a while.
+        if still or (is_open and any_pose and pairs == 0 and drags(way, violation, last_violation)):
             check_at, check_violation = iteration, violation
         if not restoring and iteration >= check_at:
             # The rows gain nothing: see whether they can hold at all. One that has just closed has had no time to.
@@ -398,6 +409,8 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         gain = 2.0 * max(violation / max(last_violation, feasible), dual / max(last_dual, settings[STATIONARITY]))
         is_fresh = not (kept and gain * violation <= feasible and gain * dual <= settings[STATIONARITY])
         reach = min(radius, leash)
+        if restoring:
+            reach = min(reach, bound_nearby(way, violation, restored))
         shift, used, longest, turn = aim(
             program, here, rows, y, mu, shift, min(reach, room_left), cuts, dual, violation, restoring, is_fresh,
             weights, system,
@@ -427,7 +440,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         slope, steepest = cut_step(shape, here, rows, y, mu, cut, foreseen, lines)
         if restoring:
             ends = steepest <= 1e-9 * violation or longest < 1e-12
-            ends = ends or stays_off(feasible, steepest, violation, restored)
+            ends = ends or stays_off(way, feasible, steepest, violation, restored)
             slows = iteration >= check_at and violation > 0.99 * check_violation
             if (ends or slows) and watched and iteration < limit:
                 # A contact may have come to where a given one stands, of which no clearance asks anything.

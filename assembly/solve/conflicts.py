@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.constraints.layout import TAPES
 from assembly.constraints.packing import Packed
 from assembly.constraints.trim_contact import TrimContact
 from assembly.solve.interruption import CTRL_C, Interruption
@@ -55,9 +56,9 @@ def conflicting_sets(snapshot: Snapshot, interruption: Interruption) -> list[tup
     TimeoutError where the interruption's time is over before: what was found by then may not be all there is.
     """
     attempt = partial(_attempt, snapshot, interruption)
-    bodies, size = snapshot.scene.bodies, snapshot.scene.scale
-    far = far_starts(bodies, snapshot.q, size, SCATTERED)
-    starts = [_Start(q, gathers=False) for q in near_starts(bodies, snapshot.q, size)]
+    bodies, spread = snapshot.scene.bodies, snapshot.spread
+    far = far_starts(bodies, snapshot.q, spread, SCATTERED)
+    starts = [_Start(q, gathers=False) for q in near_starts(bodies, snapshot.q, spread)]
     starts += [_Start(q, gathers) for q in next(far) for gathers in (True, False)]
     more = [_Start(q, gathers) for _ in range(ROUNDS) for q in next(far) for gathers in (True, False)]
     left = list(range(len(snapshot.scene.constraints)))
@@ -107,8 +108,9 @@ def _attempt(
 ) -> Array | None:
     """Least violations of some constraints, from the start where they were least; None if they may hold.
 
-    They may where a solve that found no end came nearer to it than all that ended at a least violation; but where a
-    contact nears a fold of its pair, its violation vanishes there and tells nothing.
+    They may where a solve that found no end came nearer to it than all that ended at a least violation, by far where
+    violations are lengths and angles; but where a contact nears a fold of its pair, its violation vanishes there and
+    tells nothing.
     """
     problem = snapshot.problem(which)
     best: Array | None = None
@@ -124,7 +126,7 @@ def _attempt(
             unended = min(unended, violations.max())
         if best is None or violations.max() < best.max():
             best = violations
-    return None if unended < ENDED * ended else best
+    return None if unended < (ENDED if not problem.packed.table[TAPES] else 1.0) * ended else best
 
 
 def _of_places(problem: Problem, violations: Array, snapshot: Snapshot, which: Sequence[int]) -> Array:

@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 
 from assembly.constraints.layout import IMPLICIT, SLOTS
 from assembly.constraints.packing import Packed
+from assembly.constraints.primitives import AZIMUTH, TURN
 from assembly.errors import InputError
-from assembly.solve.jacobian import moving_columns, rows_of
+from assembly.solve.jacobian import Rows, moving_columns, rows_of
 from assembly.solve.leave import Fit, Outcome
 from assembly.solve.rank import centered
 from assembly.solve.settings import (
@@ -146,6 +147,8 @@ def _disagreement(packed: Packed, state: Array) -> Array | None:
         rows = rows_of(packed, state)
     except InputError:
         return None
+    if _nears_pole(packed, rows):
+        return None
     slots = packed.table[packed.table[SLOTS] :][: packed.count]
     columns = moving_columns(np.flatnonzero(slots >= 0).tolist())
     jacobian = centered(rows.jacobian[:, columns])[0]
@@ -165,6 +168,21 @@ def _disagreement(packed: Packed, state: Array) -> Array | None:
     off = which[movable[which]]
     apart[rows.program_rows[off]] = combined[movable[which]]
     return apart
+
+
+def _nears_pole(packed: Packed, rows: Rows) -> bool:
+    """Whether an angle is so near to where it has no value that its slope is another one within a neighborhood.
+
+    It grows as the inverse of the distance to the pole, where there is none. Any value can be had beside it: whatever
+    rows are off there, they do not repeat each other.
+    """
+    slopes = np.zeros(packed.rows)
+    slopes[rows.program_rows] = np.linalg.norm(rows.jacobian, axis=1)
+    for row, (equation, _, _) in zip(packed.value_rows, packed._values, strict=True):
+        factors = [abs(factor) for factor, coordinate in equation.terms if coordinate.kind in (TURN, AZIMUTH)]
+        if factors and not 0.0 < slopes[row] <= max(factors) / NEIGHBORHOOD:
+            return True
+    return False
 
 
 def _unmoved(jacobian: Array, residual: Array, movable: NDArray[np.bool_]) -> Array | None:

@@ -18,8 +18,9 @@ FEASIBILITY, STATIONARITY, ITERATIONS, PENALTY, PENALTY_FLOOR, RADIUS, GATHER, F
 # rows that repeat each other may disagree by (`fit.py`). What bodies may be in each other where a solve begins, and may
 # stay.
 LAST_LOOK, TICK, BUDGET, SECOND_ORDER, RECALL, ANY_POSE, CARRIES, FIT, TOUCHING = 8, 9, 10, 11, 12, 13, 14, 15, 16
-# The address at which a solve asks whether it is to go on (0: nowhere).
-ASK_AT, SETTINGS = 17, 18
+# The address at which a solve asks whether it is to go on (0: nowhere). Whether a solve ends early whose bodies go away
+# without bound.
+ASK_AT, STRAYS, SETTINGS = 17, 18, 19
 # Whether the end is tested for a minimum (TESTED: and saddles are left before they are reached to the last digit).
 TESTED, REACHED = 1.0, 2.0
 # Whether scattered bodies are gathered (ASSEMBLES: and the loop ends there).

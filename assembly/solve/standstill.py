@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 from assembly._kernel import kernel
 from assembly.constraints.contact_rows import TOUCHING
-from assembly.solve.restoration import SLOW_STEPS, STILLS
+from assembly.solve.restoration import DRAGS, NEARBY, SLOW_STEPS, STILLS
 from assembly.solve.settings import NEIGHBORHOOD, STATIONARITY
 
 # So many whole steps in a row that leave this part of the largest violation tell that rows contradict each other; one
@@ -14,6 +16,9 @@ STUCK, STILL = 2.0, 0.99
 LITTLE, MOST_TILTED, ROUNDED = 1e-2, 1e-3, 0.01
 # What is off by so many times what counts as held is not so by rounding.
 MUCH = 2.0
+# So many steps in a row, however long, that leave as much begin to restore, in steps no longer than a neighborhood; so
+# many of these tell that what rows are off is mended far away, if at all.
+DRAGGED, SETTLED = 4.0, 2.0
 # Where so many whole steps in a row do not halve the violation, the floor of the penalty gives way, down to here:
 # rounding, times its inverse, must stay small against the objective's curvature.
 SLOW, HARDEST = 3.0, 1e-10
@@ -43,11 +48,42 @@ def stands_still(way, settings, feasible, violation, left, dual, force, mu):
 
 
 @kernel(inline=True)
-def stays_off(feasible, steepest, violation, before):
+def drags(way, violation, before):
+    """Whether steps in a row, long or short, left what rows are off by a little; `before` is what it was a step ago.
+
+    A linkage with a freedom may be off by less and less along it, for as long as it moves: each step goes as far as
+    the rows' curvature lets it, and gains nothing.
+    """
+    by_little = TOUCHING < violation <= LITTLE
+    way[DRAGS] = way[DRAGS] + 1.0 if by_little and violation > STILL * before else 0.0
+    if way[DRAGS] < DRAGGED:
+        return False
+    way[DRAGS] = 0.0
+    way[NEARBY] = 1.0
+    return True
+
+
+@kernel(inline=True)
+def bound_nearby(way, violation, before):
+    """How long steps may be that restore rows, of which `drags` told; as long as steps gain nothing."""
+    if way[NEARBY] == 0.0:
+        return math.inf
+    if violation <= STILL * before < math.inf:
+        way[NEARBY] = 0.0
+        way[DRAGS] = 0.0
+        return math.inf
+    way[DRAGS] += 1.0 if before < math.inf else 0.0
+    return NEIGHBORHOOD
+
+
+@kernel(inline=True)
+def stays_off(way, feasible, steepest, violation, before):
     """Whether what restored rows are off is what no motion nearby changes; `before` is what they were off a step ago.
 
     Near a dead center |J^T c| falls faster than |c|, below its rounding in the end, but every step still gains.
     """
+    if way[NEARBY] == 1.0 and way[DRAGS] >= SETTLED:
+        return True
     gains = violation <= STILL * before
     return steepest <= out_of_reach(violation) + (0.0 if gains else ROUNDED * feasible)
 

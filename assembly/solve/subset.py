@@ -7,6 +7,7 @@ values, limits and faces are those of the state.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,8 @@ from assembly.constraints.expression import Expression
 from assembly.constraints.packing import Packed
 from assembly.constraints.trim_contact import TrimContact
 from assembly.proximity.solid_contact import TRACK
-from assembly.solve.attempts import begin
+from assembly.solve.attempts import begin, go_on_once
+from assembly.solve.balance import balanced
 from assembly.solve.interruption import Interruption
 from assembly.solve.jacobian import Rows
 from assembly.solve.options import Options
@@ -27,6 +29,7 @@ from assembly.solve.rank import HELD
 from assembly.solve.scene import Scene, Status
 from assembly.solve.settings import ANY_POSE, GATHER
 from assembly.solve.solution import Solution
+from assembly.solve.starts import Spread
 
 __all__ = ["Problem", "Snapshot"]
 
@@ -117,6 +120,7 @@ class Problem:
             settings[GATHER] = settings[ANY_POSE] = 1.0
         turns = np.array([self._near[id(angle)][0] for angle in packed._angles])
         outcome = begin(packed, interruption, packed.table, settings, self.start(q, after), turns)
+        outcome = balanced(packed, settings, outcome, partial(go_on_once, interruption))
         interruption.check("what constraints allow")
         return Solution(self._scene, packed, outcome.state, _STATUSES[outcome.code], 0.0, outcome.history)
 
@@ -165,6 +169,7 @@ class Snapshot:
         self.scene = scene
         self._held = held
         self.q = state[: packed.contacts_at].reshape(-1, 7)
+        self.spread = Spread.of(packed, self.q)
         tracked = state[packed.contacts_at : packed.multipliers_at].reshape(-1, TRACK)
         self._near: dict[str | int, Array] = {contact.name: tracked[k] for k, contact in enumerate(packed.contacts)}
         self._near |= {id(angle): tracked[packed.pair_rows + k] for k, angle in enumerate(packed._angles)}

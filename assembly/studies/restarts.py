@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.proximity.solid_contact import TRACK
+from assembly.solve.contradiction import is_certain
 from assembly.solve.interruption import Interruption
-from assembly.solve.rank import HELD
 from assembly.solve.scene import Status
 from assembly.solve.settings import GATHER, ITERATIONS, VIOLATION
 from assembly.solve.solution import Solution
-from assembly.solve.starts import far_starts, near_starts
+from assembly.solve.starts import Spread, far_starts, near_starts
 
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
@@ -30,6 +30,8 @@ __all__ = ["may_hold_elsewhere", "restarted"]
 Array = NDArray[np.float64]
 # Scattered starts of a round, and rounds.
 SCATTERED, ROUNDS = 4, 2
+# A violation, over the size, that rounding may leave of what holds.
+ROUNDED = 1e-12
 # Steps of each start.
 STEPS = 100.0
 
@@ -38,12 +40,15 @@ def may_hold_elsewhere(solution: Solution) -> bool:
     """Whether a solve ended where constraints do not hold, and not for want of steps or of a contact's pair.
 
     With contacts or clearances it is not tried elsewhere: scattered bodies would come to be on other sides of each
-    other, a ball under the floor that it is to touch, linked rings apart.
+    other, a ball under the floor that it is to touch, linked rings apart. Nor where equations contradict each other
+    wherever bodies are.
     """
     if solution._packed.guards or solution._packed.contacts:
         return False
     ended = solution.status in (Status.INFEASIBLE, Status.STALLED)
-    return ended and not solution._result(VIOLATION) <= HELD * solution._packed.scale
+    if not ended or is_certain(solution._packed):
+        return False
+    return not solution._result(VIOLATION) <= ROUNDED * solution._packed.scale
 
 
 def restarted(
@@ -72,10 +77,10 @@ def restarted(
     # From each start as it is, and with its bodies gathered where that fails: the one often does where the other one
     # does not.
     settings[GATHER] = 0.0
-    bodies, size = failed._scene.bodies, failed._scene.scale
-    rounds = islice(far_starts(bodies, failed.q, size, SCATTERED), ROUNDS)
+    bodies, spread = failed._scene.bodies, Spread.of(failed._packed, failed.q)
+    rounds = islice(far_starts(bodies, failed.q, spread, SCATTERED), ROUNDS)
     best, seconds = failed, failed.seconds
-    for starts in (near_starts(bodies, failed.q, size), *rounds):
+    for starts in (near_starts(bodies, failed.q, spread), *rounds):
         ends: list[Solution] = []
         for start in starts:
             ends.append(scene._solved(settings, start, None, interruption, reference, turns))

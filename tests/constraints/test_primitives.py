@@ -348,13 +348,26 @@ def test_an_angle_between_parallel_axes(opposed):
 @pytest.mark.parametrize(
     ("kind", "component", "flip"), [(P.TURN, 0, True), (P.AZIMUTH, 2, True), (P.AZIMUTH, 2, False)]
 )
-def test_poles_keep_the_last_value(kind, component, flip):
+def test_slopes_end_beside_poles_and_values_at_them(kind, component, flip):
     axes = np.diag([1.0, -1.0, -1.0]) if flip else np.eye(3)
-    for away, kept in ((0.0, True), (1e-9, True), (0.9 * P.POLE, True), (1.1 * P.POLE, False)):
+    # What is undefined by rounding keeps the number it had; nearer than POLE slopes are as steep as there.
+    for away, kept, curves in (
+        (0.0, True, False),
+        (0.9 * P.UNDEFINED, True, False),
+        (1e-9, False, False),
+        (0.9 * P.POLE, False, False),
+        (1.1 * P.POLE, False, True),
+    ):
         records = record(turn((0.6, 0.8, 0.0), away) @ axes)
-        assert (value(kind, component, records, 0, 40.0) == 40.0) == kept
-        assert (np.abs(gradient(kind, component, records, 0)).max() == 0.0) == kept
-        assert (np.abs(hessian(kind, component, records, 0)).max() == 0.0) == kept
+        found, slope = value(kind, component, records, 0, 40.0), np.abs(gradient(kind, component, records, 0)).max()
+        assert (found == 40.0) == kept and abs(found - 40.0) <= math.pi
+        assert (slope == 0.0) == kept and slope <= 2.0 / P.POLE * (1.0 + 1e-6)
+        assert kept or slope > 0.5 / P.POLE
+        assert (np.abs(hessian(kind, component, records, 0)).max() == 0.0) != curves
+        if not kept and kind == P.AZIMUTH:
+            # z_b goes from the axis at right angles to what it is turned about.
+            way = np.array([0.8, -0.6]) if axes[2, 2] > 0.0 else np.array([-0.8, 0.6])
+            assert math.remainder(found - math.atan2(way[1], way[0]), 2.0 * math.pi) == pytest.approx(0.0, abs=1e-6)
 
 
 @pytest.mark.parametrize(("kind", "component"), [(P.TURN, 0), *((P.AZIMUTH, k) for k in range(3))])

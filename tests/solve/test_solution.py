@@ -203,7 +203,7 @@ def test_an_expression_without_a_value_is_an_infinite_violation():
     body = asm.Body("body", position=(-1, 0, 0))
     scene = asm.Assembly([body])
     q = ca.SX.sym("q", 7)
-    scene.constrain(asm.Expression(ca.Function("root", [q], [ca.sqrt(q[0]) - 1]), [body]))
+    scene.constrain(asm.Expression(ca.Function("root", [q], [ca.sqrt(-1 - q[0] ** 2)]), [body]))
     solution = scene.solve()
     assert not solution.success and solution.feasibility == np.inf
     assert "root body" in solution.message
