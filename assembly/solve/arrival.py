@@ -23,6 +23,8 @@ from assembly.solve.settings import (
 NEAR_SADDLE, OFF_SADDLE = 1e-3, 1e-6
 # What a step must gain of violations that rounding of far coordinates may explain.
 GAIN = 0.5
+# A step of so many roundings of a coordinate at most is no move.
+STEPS_OF_ROUNDING = 8.0
 
 
 @kernel(inner=True)
@@ -43,11 +45,15 @@ def rounding_at(table, pool, settings, here):
 
 
 @kernel(inner=True)
-def slope_rounding(program, here, lagrangian, n, rows, y):
-    """What rounding leaves of the Lagrangian's slope: poses' by the objective's curvature, and that of forces."""
+def is_rounding(program, here, lagrangian, n, rows, y, moved, dual):
+    """Whether a step moved poses by no more than doubles tell apart, and rounding explains the slope that is left.
+
+    Poses' rounding by the objective's curvature, and that of forces.
+    """
     table, pool, shape, _loose, _room = program
     reach = max(1.0, reach_of(table, pool, here[0]))
-    return ROUNDING * (reach * greatest_on_diagonal(lagrangian, n, shape[2]) + strongest(y, rows))
+    most = ROUNDING * (reach * greatest_on_diagonal(lagrangian, n, shape[2]) + strongest(y, rows))
+    return moved <= STEPS_OF_ROUNDING * ROUNDING * reach and dual <= most
 
 
 @kernel(inner=True)

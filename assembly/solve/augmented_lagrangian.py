@@ -45,7 +45,7 @@ from assembly.proximity.watch import (
     SPARING,
     any_crossed,
 )
-from assembly.solve.arrival import GAIN, has_arrived, reach_of, rounding_at, slope_rounding
+from assembly.solve.arrival import GAIN, has_arrived, is_rounding, reach_of, rounding_at
 from assembly.solve.budget import HALF, begin_tick, is_cut, is_spent, may_end, set_deadline
 from assembly.solve.contacts import free_folds, is_of_surfaces
 from assembly.solve.ending import finish, return_to
@@ -110,6 +110,8 @@ EXTRA_TIME = 4
 # Where a solve may stray, and its bodies are so many times farther out, or sizes, after so many steps, it is looked at
 # whether that goes on.
 FAR, STRAYING = 1e3, 60
+# After so many whole steps in a row that gain nothing of the slope, rounding may explain what is left of it.
+STANDS = 20
 # So often at most a solve leaves a saddle of its violations.
 KICKS = 3
 
@@ -183,6 +185,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
     leash = math.inf
     back_at = -1
     longest = 0.0
+    stood = 0
     check_at = PATIENCE
     check_violation = math.inf
     iteration = 0
@@ -299,9 +302,10 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             holds, leash = False, math.inf
         retreats = sunk and holds and ended == RUNNING and iteration < limit
         looks_last = watched and settings[LAST_LOOK] == 1.0
-        # What a whole step gains nothing of may be rounding.
+        # What whole steps gain nothing of, several in a row, may be rounding.
         stands = alpha * cut == 1.0 and dual > max(GAIN * last_dual, settings[STATIONARITY]) and violation <= feasible
-        rounded = stands and dual <= slope_rounding(program, here, lagrangian, n, rows, y)
+        stood = stood + 1 if stands else 0
+        rounded = stood >= STANDS and is_rounding(program, here, lagrangian, n, rows, y, longest, dual)
         unbalanced = 0.0 if rounded else dual
         arrived = has_arrived(program, settings, results, here, violation, last_violation, feasible, unbalanced)
         # Where every last look finds other contacts, the limit ends it.
