@@ -32,9 +32,10 @@ from assembly.constraints.layout import (
     TRACK_AT,
 )
 from assembly.geometry.spline import POLES, SIGN, surface_point
-from assembly.geometry.vec import blend, dot, matvec, sub
+from assembly.geometry.vec import blend, dot, matvec, scale, sub
 from assembly.kinematics.motion import relative_pose, rotation
-from assembly.proximity.extremal import CLOSE, CONVERGED, LEFT_PATCH, SINGULAR, advance, own_frame, solve_pair
+from assembly.proximity.extremal import CLOSE, CONVERGED, LEFT_PATCH, SINGULAR, into_domain, own_frame, solve_pair
+from assembly.proximity.pole import limits, nearest_pole, polar_step
 from assembly.proximity.solid_contact import (
     ALLOWED,
     CONFORMING,
@@ -76,15 +77,19 @@ def facing_of(table, pool, g, relative, frame, x):
 
 @kernel(inline=True)
 def predict_point(table, pool, surface, u, v, du, dv):
-    """Parameters after rates (du, dv), inside the domain; by a pole along the tangent plane.
+    """Parameters after rates (du, dv), inside the domain; along the tangent plane where a pole is nearer than they lead.
 
-    There a point that passes the pole goes around it, in coordinates, in no time: rates of these lead elsewhere.
+    A point that passes a pole goes around it, in coordinates, in no time: rates of these lead elsewhere.
     """
-    step = (0.0, 0.0, 0.0)
     if table[surface + POLES] != 0:
         _p, su, sv, _suu, _suv, _svv = surface_point(table, pool, surface, u, v)
         step = blend(du, su, dv, sv)
-    u, v, _clamped = advance(table, pool, surface, u, v, du, dv, step)
+        edge, part = nearest_pole(table, pool, surface, u, v)
+        low, high, _closed = limits(table, pool, surface, 0 if edge <= 2 else 1)
+        spoke = scale(part * (high - low), su if edge <= 2 else sv)
+        if dot(step, step) > dot(spoke, spoke):
+            return polar_step(table, pool, surface, edge, u, v, step)
+    u, v, _clamped = into_domain(table, pool, surface, u + du, v + dv)
     return u, v
 
 
