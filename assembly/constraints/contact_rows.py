@@ -77,9 +77,10 @@ def facing_of(table, pool, g, relative, frame, x):
 
 @kernel(inline=True)
 def predict_point(table, pool, surface, u, v, du, dv):
-    """Parameters after rates (du, dv), inside the domain; along the tangent plane where a pole is nearer than they lead.
+    """Parameters after rates (du, dv), inside the domain.
 
-    A point that passes a pole goes around it, in coordinates, in no time: rates of these lead elsewhere.
+    Where a pole is nearer than they lead, that is along the tangent plane: a point that passes a pole goes around it, in
+    coordinates, in no time, and rates of these lead elsewhere.
     """
     if table[surface + POLES] != 0:
         _p, su, sv, _suu, _suv, _svv = surface_point(table, pool, surface, u, v)
