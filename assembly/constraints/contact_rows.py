@@ -79,8 +79,8 @@ def facing_of(table, pool, g, relative, frame, x):
 def predict_point(table, pool, surface, u, v, du, dv):
     """Parameters after rates (du, dv), inside the domain.
 
-    Where a pole is nearer than they lead, that is along the tangent plane: a point that passes a pole goes around it, in
-    coordinates, in no time, and rates of these lead elsewhere.
+    Where a pole is nearer than they lead, that is along the tangent plane: a point that passes a pole goes around it,
+    in coordinates, in no time, and rates of these lead elsewhere.
     """
     if table[surface + POLES] != 0:
         _p, su, sv, _suu, _suv, _svv = surface_point(table, pool, surface, u, v)
