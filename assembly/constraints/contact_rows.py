@@ -31,13 +31,16 @@ from assembly.constraints.layout import (
     SURFACE_G,
     TRACK_AT,
 )
-from assembly.geometry.vec import dot, sub
+from assembly.geometry.spline import POLES, SIGN, surface_point
+from assembly.geometry.vec import blend, dot, matvec, scale, sub
 from assembly.kinematics.motion import relative_pose, rotation
-from assembly.proximity.extremal import CLOSE, CONVERGED, LEFT_PATCH, SINGULAR, solve_pair
+from assembly.proximity.extremal import CLOSE, CONVERGED, LEFT_PATCH, SINGULAR, into_domain, own_frame, solve_pair
+from assembly.proximity.pole import limits, nearest_pole, polar_step
 from assembly.proximity.solid_contact import (
     ALLOWED,
     CONFORMING,
     CONTACT_RECORD,
+    FACING,
     FOLD,
     IDLE,
     PAIR_GAP,
@@ -54,22 +57,81 @@ MAY_GO, HARDLY, TOUCHING = -1.0, 1e-3, 1e-9
 # A clearance's row that is open by more than the last needs its pair again after motions of this part of its gap, or of
 # this part of how far bodies may go where contacts may be born: from farther away Newton's method may find another one.
 UNSEEN, ASTRAY, FAR = 0.5, 0.15, 1e-5
+# Beside the statuses of `solve_pair`: the pair that was found does not continue the one that was tracked.
+OTHER_SIDE = 4
+
+
+@kernel(inline=True)
+def facing_of(table, pool, g, relative, frame, x):
+    """1 where the outward normals of the surfaces of a pair oppose each other, -1 where they agree.
+
+    Seen along the normal n of f, with S the surface g, n.(S_u x S_v) = det T, and the frame has T^-1; at a pole it has
+    none.
+    """
+    t = frame[6]
+    along = float(table[g + SIGN]) * (t[0] * t[3] - t[1] * t[2])
+    if along == 0.0:
+        along = dot(frame[0], matvec(relative, own_frame(table, pool, g, x[2], x[3])[1]))
+    return -1.0 if along > 0.0 else 1.0
+
+
+@kernel(inline=True)
+def predict_point(table, pool, surface, u, v, du, dv):
+    """Parameters after rates (du, dv), inside the domain.
+
+    Where a pole is nearer than they lead, that is along the tangent plane: a point that passes a pole goes around it,
+    in coordinates, in no time, and rates of these lead elsewhere.
+    """
+    if table[surface + POLES] != 0:
+        _p, su, sv, _suu, _suv, _svv = surface_point(table, pool, surface, u, v)
+        step = blend(du, su, dv, sv)
+        edge, part = nearest_pole(table, pool, surface, u, v)
+        low, high, _closed = limits(table, pool, surface, 0 if edge <= 2 else 1)
+        spoke = scale(part * (high - low), su if edge <= 2 else sv)
+        if dot(step, step) > dot(spoke, spoke):
+            return polar_step(table, pool, surface, edge, u, v, step)
+    u, v, _clamped = into_domain(table, pool, surface, u + du, v + dv)
+    return u, v
+
+
+@kernel(inner=True)
+def predict_pair(table, pool, row, r, tracked, guess):
+    """Make of guess[r], coordinates that run on from tracked[r] by their rates, where the pair is expected.
+
+    A prediction may run over the end of a patch; Newton starts inside. What becomes of edges is up to switching.
+    """
+    if table[row + SHELL_F] >= 0:
+        return
+    for side in range(2):
+        i = 2 * side
+        u, v = tracked[r, i], tracked[r, i + 1]
+        guess[r, i], guess[r, i + 1] = predict_point(
+            table, pool, table[row + SURFACE_F + side], u, v, guess[r, i] - u, guess[r, i + 1] - v
+        )
 
 
 @kernel(inner=True)
 def track_contact(table, pool, row, q, start, patience, records, k):
-    """Newton on the pair of one row; fills its record. Returns status, parameters, the points' signed distance."""
+    """Newton on the pair of one row from start[k]; fills its record.
+
+    A pair that is followed keeps what its outward normals are to each other: no way leads from opposed ones to equal
+    ones, as from the near side of a ball to the far side. Newton's method may come to either.
+    Returns status, parameters, how they face each other (`FACING`), the points' signed distance.
+    """
     i = table[row + BODY_F]
     j = table[row + BODY_G]
     turn = rotation(q, i)
     relative, shift = relative_pose(q, i, turn, j, rotation(q, j))
     f, g = table[row + SURFACE_F], table[row + SURFACE_G]
-    status, x, _count, frame, curvature = solve_pair(
-        table, pool, f, g, relative, shift, start, 1.0, patience, CLOSE, False
-    )
+    x = (start[k, 0], start[k, 1], start[k, 2], start[k, 3])
+    status, x, _count, frame, curvature = solve_pair(table, pool, f, g, relative, shift, x, 1.0, patience, CLOSE, False)
     apart = sub(frame[4], frame[3])
     distance = math.sqrt(dot(apart, apart))
+    facing = start[k, FACING]
     if status == CONVERGED or status == SINGULAR:
+        facing = facing_of(table, pool, g, relative, frame, x)
+        if facing * start[k, FACING] < 0.0:
+            return OTHER_SIDE, x, start[k, FACING], distance
         store_record(turn, shift, frame, curvature, records, k)
         # Relative curvature -H (I + beta A)^-1: indefinite means the surfaces cross beside the point.
         h = curvature[1]
@@ -78,7 +140,7 @@ def track_contact(table, pool, row, q, start, patience, records, k):
         proper = 1.0 if det > -1e-9 * norm2 and h[0] + h[3] <= 0.0 else 0.0
         records[k, PROPER] = CONFORMING if norm2 <= 1e-18 else proper
         records[k, FOLD] = det / norm2 if norm2 > 1e-18 else 0.0
-    return status, x, distance if frame[10] > 0.0 else -distance
+    return status, x, facing, distance if frame[10] > 0.0 else -distance
 
 
 @kernel(inner=True)
@@ -90,14 +152,15 @@ def start_row(table, pool, row, q, tracked, r):
 
 @kernel(inner=True)
 def restart_contact(table, pool, row, q, tracked, records, k):
-    """As `track_contact`, from a global start; tracked[k] is written meanwhile."""
+    """As `track_contact`, from a global start, without the distance; tracked[k] is written meanwhile."""
     was = (tracked[k, 0], tracked[k, 1], tracked[k, 2], tracked[k, 3])
     status = start_row(table, pool, row, q, tracked, k)
     x = (tracked[k, 0], tracked[k, 1], tracked[k, 2], tracked[k, 3])
-    tracked[k, 0], tracked[k, 1], tracked[k, 2], tracked[k, 3] = was
+    facing = tracked[k, FACING]
     if status == CONVERGED or status == SINGULAR:
-        status, x, _distance = track_contact(table, pool, row, q, x, math.inf, records, k)
-    return status, x
+        status, x, facing, _distance = track_contact(table, pool, row, q, tracked, math.inf, records, k)
+    tracked[k, 0], tracked[k, 1], tracked[k, 2], tracked[k, 3] = was
+    return status, was if status == OTHER_SIDE else x, facing
 
 
 @kernel(inner=True)
@@ -253,22 +316,23 @@ def row_of_pair(table, pool, r, start, patience, point):
     """Row r, of contact r, by its pair. Returns whether it was found.
 
     A contact is carried from `start` to its extremal pair, by steps that turn no normal by more than `patience`. A
-    one-sided row that loses its pair takes the nearest one there is.
+    one-sided row that loses its pair takes the nearest one there is, and so does any whose bodies may stand anywhere by
+    now, if what is found from the pair before is on another side of a body.
     """
     q, tracked, records, _residual, _jacobian = point
     row = table[ROW_TABLE] + ROW * r
     if table[row + SHELL_F] >= 0:
         return solids_row(table, pool, r, start, patience, point)
-    x = (start[r, 0], start[r, 1], start[r, 2], start[r, 3])
-    status, x, distance = track_contact(table, pool, row, q, x, patience, records, r)
+    status, x, facing, distance = track_contact(table, pool, row, q, start, patience, records, r)
     if status != CONVERGED and status != SINGULAR:
-        if table[row + ONE_SIDED] == 0:
+        anywhere = status == OTHER_SIDE and patience == math.inf
+        if table[row + ONE_SIDED] == 0 and not anywhere:
             return False
         if is_guard(table, r):
             return lost_guard(table, pool, r, start, point, False, False)
         # A one-sided contact is of the nearest pair, whichever that is now.
         held = status == LEFT_PATCH and distance > 0.0
-        status, x = restart_contact(table, pool, row, q, tracked, records, r)
+        status, x, facing = restart_contact(table, pool, row, q, tracked, records, r)
         if status != CONVERGED and status != SINGULAR:
             if not held:
                 return False
@@ -277,10 +341,11 @@ def row_of_pair(table, pool, r, start, patience, point):
             records[r, GAP] = distance
             records[r, PROPER] = 1.0
             records[r, FOLD] = 1.0
-        elif not records[r, GAP] > 0.0:
+        elif not (records[r, GAP] > 0.0 or anywhere):
             return False
     write_gap_row(table, pool, r, point)
     tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3] = x
+    tracked[r, FACING] = facing
     return True
 
 

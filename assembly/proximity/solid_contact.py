@@ -3,8 +3,9 @@
 Of every contact a solve keeps `TRACK` numbers: the coordinates of the pair (4), the two features, the normal in the
 axes of body f, which tells on which side of each other two edges are where they touch, the gap, what the pair
 stays with: a corner over a face, which need not be the closest one (`corners.py`), has its features for good; of the
-end of a step, whether its row stays open there for certain (`solve/carry.py`); and, of a clearance's contact, by how
-much its gap may be less than the least one, because it was where the solve began.
+end of a step, whether its row stays open there for certain (`solve/carry.py`); of a clearance's contact, by how much
+its gap may be less than the least one, because it was where the solve began; and, of a pair of surfaces, `FACING`:
+1 where their outward normals oppose each other, -1 where they agree, 0 as long as that is not known.
 
 The kernels here are large, and few scenes need them: loops call them by address (`_address.call_address`).
 """
@@ -25,7 +26,7 @@ from assembly.proximity.nearest_query import NORMAL, PAIR
 from assembly.proximity.switching import track_features
 from assembly.proximity.velocity import RECORD
 
-FEATURE_F, FEATURE_G, PAIR_NORMAL, PAIR_GAP, STAYS, IDLE, ALLOWED, TRACK = 4, 5, 6, 9, 10, 11, 12, 13
+FEATURE_F, FEATURE_G, PAIR_NORMAL, PAIR_GAP, STAYS, IDLE, ALLOWED, FACING, TRACK = 4, 5, 6, 9, 10, 11, 12, 13, 14
 # Behind a record: whether surfaces do not cross at the pair, how far it is from a fold, and how far the bodies may move
 # until a row that is open needs its pair again.
 PROPER, FOLD, SLACK, CONTACT_RECORD = RECORD, RECORD + 1, RECORD + 2, RECORD + 3

@@ -39,7 +39,7 @@ from assembly.proximity.roots import (
     add_given,
     add_root,
 )
-from assembly.proximity.solid_contact import ALLOWED, FEATURE_F, FEATURE_G, IDLE, PAIR_GAP, PAIR_NORMAL, STAYS
+from assembly.proximity.solid_contact import ALLOWED, FACING, FEATURE_F, FEATURE_G, IDLE, PAIR_GAP, PAIR_NORMAL, STAYS
 from assembly.proximity.spine_curve import both_radii
 
 # The record of a watch: counts; where pairs begin; the row of `tracked` that is the first place; address of
@@ -170,6 +170,7 @@ def write_root(roots, i, tracked, r):
     tracked[r, PAIR_GAP] = roots[i, GAP]
     tracked[r, STAYS] = roots[i, CORNER]
     tracked[r, IDLE] = 0.0
+    tracked[r, FACING] = 0.0
 
 
 @kernel(inner=True)

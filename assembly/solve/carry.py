@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly.constraints.contact_rows import copy_tracked, is_guard
+from assembly.constraints.contact_rows import copy_tracked, is_guard, predict_pair
 from assembly.constraints.layout import (
     BODY_F,
     CONTACTS,
@@ -13,7 +13,6 @@ from assembly.constraints.layout import (
     MINIMUM,
     ROW,
     ROW_TABLE,
-    SHELL_F,
     SURFACE_F,
     TRACKED,
 )
@@ -79,6 +78,7 @@ def carry(table, pool, bases, loose, here, trial, d, alpha):
         if u >= 0:
             for i in range(4):
                 out[k, i] += alpha * d[u + i] / lengths[k, i]
+            keep_inside(table, pool, row, k, out)
         else:
             for j in range(4):
                 s = 0.0
@@ -90,7 +90,7 @@ def carry(table, pool, bases, loose, here, trial, d, alpha):
                 s *= alpha
                 for i in range(4):
                     out[k, i] += records[k, RATES + 4 * i + j] * s
-        keep_inside(table, pool, row, k, out)
+            predict_pair(table, pool, row, k, tracked, out)
         if is_guard(table, k) and stays_open(table, pool, bases, k, here, trial, d, alpha):
             out[k, IDLE] = 1.0
             out[k, PAIR_GAP] = max(out[k, PAIR_GAP], pool[table[row + MINIMUM]] + trial[2][k, SLACK])
@@ -98,9 +98,7 @@ def carry(table, pool, bases, loose, here, trial, d, alpha):
 
 @kernel(inner=True)
 def keep_inside(table, pool, row, k, out):
-    """A prediction may run over the end of a patch; Newton starts inside. What becomes of edges is up to switching."""
-    if table[row + SHELL_F] >= 0:
-        return
+    """Coordinates that are unknowns may run over the end of a patch."""
     for side in range(2):
         i = 2 * side
         out[k, i], out[k, i + 1], _clamped = into_domain(

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly.constraints.contact_rows import track_contact, track_row
+from assembly.constraints.contact_rows import predict_pair, track_contact, track_row
 from assembly.constraints.layout import (
     BODIES,
     BODY_F,
@@ -32,8 +32,8 @@ from assembly.constraints.layout import (
 )
 from assembly.geometry.spline import BREAKS_U, BREAKS_V, CLOSED_U, CLOSED_V, SPANS_U, SPANS_V
 from assembly.geometry.vec import quaternion_product
-from assembly.proximity.extremal import BEND, CONVERGED, SINGULAR, into_domain
-from assembly.proximity.solid_contact import FOLD, PAIR_GAP, PROPER, TRACK
+from assembly.proximity.extremal import BEND, CONVERGED, SINGULAR
+from assembly.proximity.solid_contact import FACING, FOLD, PAIR_GAP, PROPER, TRACK
 from assembly.proximity.velocity import ARM_F, GAP, RATES, ZED
 from assembly.proximity.watch import IN_TURNS
 from assembly.proximity.watch_memory import (
@@ -106,12 +106,7 @@ def predict(table, pool, row, r, tracked, records, twists, guess):
             s += records[r, ZED + 12 * j + i] * twists[f, i] + records[r, ZED + 12 * j + 6 + i] * twists[g, i]
         for i in range(4):
             guess[r, i] += records[r, RATES + 4 * i + j] * s
-    if table[row + SHELL_F] < 0:
-        for side in range(2):
-            i = 2 * side
-            guess[r, i], guess[r, i + 1], _clamped = into_domain(
-                table, pool, table[row + SURFACE_F + side], guess[r, i], guess[r, i + 1]
-            )
+    predict_pair(table, pool, row, r, tracked, guess)
 
 
 @kernel(inline=True)
@@ -148,10 +143,10 @@ def correct(table, pool, row, r, q, guess, tracked, records):
         status = track_row(table, pool, row, q, guess, BEND, records, tracked, r)
         found = status == CONVERGED or status == SINGULAR
     else:
-        start = (guess[r, 0], guess[r, 1], guess[r, 2], guess[r, 3])
-        status, x, _distance = track_contact(table, pool, row, q, start, BEND, records, r)
+        status, x, facing, _distance = track_contact(table, pool, row, q, guess, BEND, records, r)
         found = status == CONVERGED or status == SINGULAR
         tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3] = x
+        tracked[r, FACING] = facing
     if found:
         tracked[r, PAIR_GAP] = records[r, GAP]
     if not found or records[r, PROPER] == 0.0:
