@@ -90,11 +90,8 @@ from assembly.solve.settings import (
     TICK,
     VIOLATION,
 )
-from assembly.solve.settings import (
-    TOUCHING as TOUCHING_AT,
-)
 from assembly.solve.standstill import bound_nearby, contradicts, drags, is_stuck, next_floor, stands_still, stays_off
-from assembly.solve.start import let_touch, read_state, rearrange, set_out
+from assembly.solve.start import let_touch, overlap_allowed, read_state, rearrange, set_out
 from assembly.solve.step import CLOSE, aim, cut_step, leave_saddle, propose, short_share
 from assembly.solve.tangency import off_rows
 
@@ -252,7 +249,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             changed = False
             rows, n, system, lost = rearrange(program, count, rows, here, y, better_y, active)
             if iteration == 0 and lost < 0:
-                let_touch(table, here, settings[TOUCHING_AT])
+                let_touch(table, here, overlap_allowed(settings))
             gradient, lines, lagrangian, _factor = system
             kept = False
             # What was hard for other rows need not be for these.

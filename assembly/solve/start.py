@@ -40,6 +40,8 @@ from assembly.solve.settings import (
     GATHER,
     GATHERED,
     HELD,
+    PENALTY,
+    PENALTY_FLOOR,
     RECALL,
     RUNNING,
     SCATTER,
@@ -88,27 +90,38 @@ def let_touch(table, here, touching):
 
 
 @kernel(inline=True)
-def find_contacts(program, state, recalled, here, by_row, n, free_trims, sparing, touching):
-    """Find the contacts of the start and evaluate its rows, unless the last tick left them at `recalled`.
+def overlap_allowed(settings):
+    """How far bodies of contacts may be in each other at the start of this solve and stay so.
 
-    Bodies of a contact or a clearance that are in each other by no more than `touching` there may stay so.
+    A solve or a tick that goes on from the last one has its allowance with its pairs, and gets none on top.
+    """
+    begins = settings[TICK] == 0.0 and settings[PENALTY] > settings[PENALTY_FLOOR]
+    return settings[TOUCHING] if begins else 0.0
+
+
+@kernel(inline=True)
+def find_contacts(program, settings, state, here, by_row, n):
+    """Find the contacts of the start and evaluate its rows, unless the last tick left them in its state.
+
+    Bodies of a contact or a clearance that are in each other by no more than touching there may stay so.
     Returns the contact that has no pair, or -1, and whether that was told by evaluating the rows: which are not
     evaluated yet where a contact has no pair to begin with, or is at a fold.
     """
     table, pool, shape, loose, room = program
     free, lengths, memory = loose[0], loose[1], loose[5]
     y, better_y, active = by_row[2], by_row[3], by_row[4]
+    recalled, tick = int(settings[RECALL]), settings[TICK] == 1.0
     watched = table[WATCH] >= 0
     came = False
     if watched:
         place_guards(table, memory, here, y, better_y, free, True)
     lost = start_contacts(table, pool, here[0], here[1], free, lengths)
     if watched and lost < 0:
-        memory[OVERLAP] = touching
-        came = look_around(table, pool, memory, here, SPARING if sparing else AS_NEEDED)
+        memory[OVERLAP] = settings[TOUCHING]
+        came = look_around(table, pool, memory, here, SPARING if tick else AS_NEEDED)
         memory[OVERLAP] = 0.0
         place_guards(table, memory, here, y, better_y, free, False)
-    count = free_folds(table, pool, here[2], here[1], active, free, lengths, -1.0, -1, free_trims)
+    count = free_folds(table, pool, here[2], here[1], active, free, lengths, -1.0, -1, settings[FREE_TRIMS] == 1.0)
     if lost >= 0 or count > 0:
         return lost, False
     if watched:
@@ -116,7 +129,7 @@ def find_contacts(program, state, recalled, here, by_row, n, free_trims, sparing
     if recalled == 0 or came or not recall(table, state, recalled, here):
         lost = evaluate(table, pool, here[1], math.inf, loose, room, here)
         if lost < 0:
-            let_touch(table, here, touching)
+            let_touch(table, here, overlap_allowed(settings))
     return lost, True
 
 
@@ -157,11 +170,8 @@ def set_out(program, settings, state, here, by_row, n):
     results[CULPRIT] = -1.0
     results[HELD] = 0.0
     results[CURVED] = 0.0
-    free_trims = settings[FREE_TRIMS] == 1.0
     tick = settings[TICK] == 1.0
-    lost, evaluated = find_contacts(
-        program, state, int(settings[RECALL]), here, by_row, n, free_trims, tick, settings[TOUCHING]
-    )
+    lost, evaluated = find_contacts(program, settings, state, here, by_row, n)
     # A tick begins where the last one ended: there a pair that Newton's method loses is at a fold.
     folded = lost >= 0 and evaluated and tick and is_of_surfaces(table, lost)
     status = CONTACT_LOST if lost >= 0 and not folded else RUNNING
