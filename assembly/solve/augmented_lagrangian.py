@@ -54,7 +54,7 @@ from assembly.solve.inertia import note_factor
 from assembly.solve.multipliers import choose_multipliers, forget_objective, least_multipliers, strongest, weigh_rows
 from assembly.solve.pauses import SHORT, pause
 from assembly.solve.report import is_clear, keep, log
-from assembly.solve.restoration import LEAST_SHARE, SHARE, SOFTNESS, begin_way, step_back
+from assembly.solve.restoration import ENDLESS, LEAST_SHARE, SHARE, SOFTNESS, begin_way, step_back
 from assembly.solve.retreat import BEGINNINGS, LEFT, LONGER, SHORTER, begin_again, has_sunk
 from assembly.solve.room import carve_all, results_of, room_needed
 from assembly.solve.rows import violation_of
@@ -93,7 +93,16 @@ from assembly.solve.settings import (
 from assembly.solve.settings import (
     TOUCHING as TOUCHING_AT,
 )
-from assembly.solve.standstill import bound_nearby, contradicts, drags, is_stuck, next_floor, stands_still, stays_off
+from assembly.solve.standstill import (
+    bound_nearby,
+    contradicts,
+    drags,
+    is_stuck,
+    next_floor,
+    raise_multipliers,
+    stands_still,
+    stays_off,
+)
 from assembly.solve.start import let_touch, read_state, rearrange, set_out
 from assembly.solve.step import CLOSE, aim, cut_step, leave_saddle, propose, short_share
 from assembly.solve.tangency import off_rows
@@ -405,6 +414,10 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         if restoring:
             mu = 1.0
             forget_objective(order, rows, y, gradient, lagrangian)
+        if way[ENDLESS] == 1.0 and feasible < violation <= CLOSE:
+            raise_multipliers(way, y, rows, violation, feasible)
+            floor = mu = settings[PENALTY_FLOOR]
+            kept = False
         # Where the last step gained so much that a second one by its factor will do, that is cheaper.
         gain = 2.0 * max(violation / max(last_violation, feasible), dual / max(last_dual, settings[STATIONARITY]))
         is_fresh = not (kept and gain * violation <= feasible and gain * dual <= settings[STATIONARITY])
