@@ -54,7 +54,7 @@ from assembly.solve.inertia import note_factor
 from assembly.solve.multipliers import choose_multipliers, forget_objective, least_multipliers, strongest, weigh_rows
 from assembly.solve.pauses import SHORT, pause
 from assembly.solve.report import is_clear, keep, log
-from assembly.solve.restoration import ENDLESS, LEAST_SHARE, SHARE, SOFTNESS, begin_way, step_back
+from assembly.solve.restoration import LEAST_SHARE, SHARE, SOFTNESS, begin_way, step_back
 from assembly.solve.retreat import BEGINNINGS, LEFT, LONGER, SHORTER, begin_again, has_sunk
 from assembly.solve.room import carve_all, results_of, room_needed
 from assembly.solve.rows import violation_of
@@ -97,6 +97,7 @@ from assembly.solve.standstill import (
     bound_nearby,
     contradicts,
     drags,
+    grows_endlessly,
     is_stuck,
     next_floor,
     raise_multipliers,
@@ -414,7 +415,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         if restoring:
             mu = 1.0
             forget_objective(order, rows, y, gradient, lagrangian)
-        if way[ENDLESS] == 1.0 and feasible < violation <= CLOSE:
+        if grows_endlessly(way, strongest(y, rows), strongest(gradient, n), violation, feasible):
             raise_multipliers(way, y, rows, violation, feasible)
             floor = mu = settings[PENALTY_FLOOR]
             kept = False
