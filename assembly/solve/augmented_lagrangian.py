@@ -416,8 +416,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             mu = 1.0
             forget_objective(order, rows, y, gradient, lagrangian)
         if grows_endlessly(way, strongest(y, rows), strongest(gradient, n), violation, feasible):
-            raise_multipliers(way, y, rows, violation, feasible)
-            floor = mu = settings[PENALTY_FLOOR]
+            floor = mu = min(raise_multipliers(way, y, rows, violation, feasible), settings[PENALTY_FLOOR])
             kept = False
         # Where the last step gained so much that a second one by its factor will do, that is cheaper.
         gain = 2.0 * max(violation / max(last_violation, feasible), dual / max(last_dual, settings[STATIONARITY]))

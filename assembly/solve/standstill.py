@@ -6,6 +6,7 @@ import math
 
 from assembly._kernel import kernel
 from assembly.constraints.contact_rows import TOUCHING
+from assembly.solve.multipliers import strongest
 from assembly.solve.restoration import DRAGS, ENDLESS, NEARBY, SLOW_STEPS, STILLS
 from assembly.solve.settings import NEIGHBORHOOD, STATIONARITY
 from assembly.solve.step import CLOSE
@@ -26,6 +27,8 @@ SLOW, HARDEST = 3.0, 1e-10
 # What is to be left of what counts as held where multipliers that grow without end are raised at once; those that are
 # so many times stronger than the objective's slope do.
 AIMED, ENDLESSLY = 0.25, 100.0
+# The penalty, times such a multiplier: rows are to be stiffer across than what it bends them by.
+SOFT = 0.01
 
 
 @kernel(inline=True)
@@ -127,10 +130,12 @@ def raise_multipliers(way, y, rows, violation, feasible):
 
     Where rows depend on each other and hold by their curvature alone, as of an arm stretched to the only place where it
     touches, no multipliers balance a force across them. Poses off by e along that way are balanced by multipliers in
-    proportion to 1 / e, and violate rows by e^2: by steps of c / mu that takes e^-3 mu of them.
+    proportion to 1 / e, and violate rows by e^2: by steps of c / mu that takes e^-3 mu of them. Returns a penalty for
+    rows with such multipliers.
     """
     factor = math.sqrt(violation / (AIMED * feasible))
     for r in range(rows):
         y[r] *= factor
     way[ENDLESS] = 0.0
     way[SLOW_STEPS] = 0.0
+    return SOFT / strongest(y, rows)
