@@ -19,7 +19,7 @@ def stretched(rng, closing):
     ground = asm.Body("ground", fixed=True)
     bodies, joints = [ground], []
     before = ground.frame()
-    for k, length in enumerate(lengths):
+    for k in range(count):
         link = asm.Body(f"link {k}", position=(lengths[:k].sum(), 0.0, 0.0))
         z = (0.0, 1.0, 0.0) if is_spatial and k % 2 else (0.0, 0.0, 1.0)
         before = bodies[-1].frame(at=(lengths[k - 1] if k else 0.0, 0.0, 0.0), z=z)
