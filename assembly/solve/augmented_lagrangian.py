@@ -90,17 +90,7 @@ from assembly.solve.settings import (
     TICK,
     VIOLATION,
 )
-from assembly.solve.standstill import (
-    bound_nearby,
-    contradicts,
-    drags,
-    grows_endlessly,
-    is_stuck,
-    next_floor,
-    raise_multipliers,
-    stands_still,
-    stays_off,
-)
+from assembly.solve.standstill import bound_nearby, contradicts, drags, is_stuck, next_floor, stands_still, stays_off
 from assembly.solve.start import let_touch, overlap_allowed, read_state, rearrange, set_out
 from assembly.solve.step import CLOSE, aim, cut_step, leave_saddle, propose, short_share
 from assembly.solve.tangency import off_rows
@@ -416,9 +406,6 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         if restoring:
             mu = 1.0
             forget_objective(order, rows, y, gradient, lagrangian)
-        if grows_endlessly(way, strongest(y, rows), strongest(gradient, n), violation, feasible):
-            floor = mu = min(raise_multipliers(way, y, rows, violation, feasible), settings[PENALTY_FLOOR])
-            kept = False
         # Where the last step gained so much that a second one by its factor will do, that is cheaper.
         gain = 2.0 * max(violation / max(last_violation, feasible), dual / max(last_dual, settings[STATIONARITY]))
         is_fresh = not (kept and gain * violation <= feasible and gain * dual <= settings[STATIONARITY])

@@ -19,9 +19,8 @@ from assembly.solve.tangency import off_rows
 SHORTENED, ASTRAY, LEAST_SHARE = 0.25, 10.0, 1e-4
 # What is known of the way: the softness of the last step, the share to take of the next one, the least violation so
 # far, whether the last step led off. Of the loop: whole steps in a row that changed nothing, and that gained little;
-# steps of any length that left what rows are off, and whether only what is near is looked at for that; whether
-# multipliers would grow without end.
-SOFTNESS, SHARE, LOWEST, LED_OFF, STILLS, SLOW_STEPS, DRAGS, NEARBY, ENDLESS, WAY = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9
+# steps of any length that left what rows are off, and whether only what is near is looked at for that.
+SOFTNESS, SHARE, LOWEST, LED_OFF, STILLS, SLOW_STEPS, DRAGS, NEARBY, WAY = 0, 1, 2, 3, 4, 5, 6, 7, 8
 
 
 @kernel(inline=True)
@@ -58,7 +57,6 @@ def begin_way(way):
     way[SLOW_STEPS] = 0.0
     way[DRAGS] = 0.0
     way[NEARBY] = 0.0
-    way[ENDLESS] = 0.0
 
 
 @kernel(inline=True)

@@ -6,10 +6,8 @@ import math
 
 from assembly._kernel import kernel
 from assembly.constraints.contact_rows import TOUCHING
-from assembly.solve.multipliers import strongest
-from assembly.solve.restoration import DRAGS, ENDLESS, NEARBY, SLOW_STEPS, STILLS
+from assembly.solve.restoration import DRAGS, NEARBY, SLOW_STEPS, STILLS
 from assembly.solve.settings import NEIGHBORHOOD, STATIONARITY
-from assembly.solve.step import CLOSE
 
 # So many whole steps in a row that leave this part of the largest violation tell that rows contradict each other; one
 # may be by an old factor.
@@ -24,11 +22,6 @@ DRAGGED, SETTLED = 4.0, 2.0
 # Where so many whole steps in a row do not halve the violation, the floor of the penalty gives way, down to here:
 # rounding, times its inverse, must stay small against the objective's curvature.
 SLOW, HARDEST = 3.0, 1e-10
-# What is to be left of what counts as held where multipliers that grow without end are raised at once; those that are
-# so many times stronger than the objective's slope do.
-AIMED, ENDLESSLY = 0.25, 100.0
-# The penalty, times such a multiplier: rows are to be stiffer across than what it bends them by.
-SOFT = 0.01
 
 
 @kernel(inline=True)
@@ -114,28 +107,4 @@ def next_floor(way, floor, is_slow):
     Rows whose slopes all but vanish, at a dead center say: only a harder penalty holds them.
     """
     way[SLOW_STEPS] = way[SLOW_STEPS] + 1.0 if is_slow else 0.0
-    way[ENDLESS] = 1.0 if way[SLOW_STEPS] >= SLOW and floor <= HARDEST else 0.0
     return max(0.1 * floor, HARDEST) if way[SLOW_STEPS] >= SLOW else floor
-
-
-@kernel(inline=True)
-def grows_endlessly(way, force, steepest, violation, feasible):
-    """Whether only multipliers without end would hold the rows, of which the strongest is `force` by now."""
-    return way[ENDLESS] == 1.0 and feasible < violation <= CLOSE and force > ENDLESSLY * steepest
-
-
-@kernel(inline=True)
-def raise_multipliers(way, y, rows, violation, feasible):
-    """Raise multipliers that would grow without end to where what rows are off counts as held.
-
-    Where rows depend on each other and hold by their curvature alone, as of an arm stretched to the only place where it
-    touches, no multipliers balance a force across them. Poses off by e along that way are balanced by multipliers in
-    proportion to 1 / e, and violate rows by e^2: by steps of c / mu that takes e^-3 mu of them. Returns a penalty for
-    rows with such multipliers.
-    """
-    factor = math.sqrt(violation / (AIMED * feasible))
-    for r in range(rows):
-        y[r] *= factor
-    way[ENDLESS] = 0.0
-    way[SLOW_STEPS] = 0.0
-    return SOFT / strongest(y, rows)
