@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import assembly as asm
-from assembly.constraints import layout
-from assembly.proximity import watch, watch_memory
-from assembly.proximity.facing import CROWDED_PART
-from assembly.proximity.solid_contact import PAIR_GAP, TRACK
+from assembly.constraints.program import records as layout
+from assembly.proximity.features.solid_contact import PAIR_GAP, TRACK
+from assembly.proximity.manager import state as watch_memory
+from assembly.proximity.manager import update as watch
+from assembly.proximity.manager.candidates import CROWDED_PART
 
 __all__ = ["Listed", "Watch"]
 

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly.proximity.facet_tree import FacetTree
-from assembly.proximity.topology import topology_of
+from assembly.proximity.brep.topology import topology_of
+from assembly.proximity.bvh.facet_tree import FacetTree
 
 STILL = (1.0, 0.0, 0.0, 0.0)
 

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 import assembly as asm
 from assembly import scene_file
-from assembly.constraints.joint import Joint
+from assembly.constraints.model.joint import Joint
 from assembly.errors import InputError
 from assembly.kinematics.body import Frame
 from assembly.scene_file.kinds import CONSTRAINTS, OBJECTIVES

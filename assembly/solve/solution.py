@@ -9,25 +9,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly._read_only import ReadOnlyArrays, read_only
-from assembly.constraints.joint import Joint
-from assembly.constraints.layout import IMPLICIT
-from assembly.constraints.packing import Packed
+from assembly.constraints.model.joint import Joint
+from assembly.constraints.packing.scene import Packed
+from assembly.constraints.program.records import IMPLICIT
 from assembly.errors import InputError
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import Pose
-from assembly.proximity.pairs import ContactPair
-from assembly.proximity.solid_contact import TRACK
+from assembly.proximity.extrema.pairs import ContactPair
+from assembly.proximity.features.solid_contact import TRACK
+from assembly.solve.loop.settings import COUNT, DUAL, OBJECTIVE, VIOLATION
 from assembly.solve.measure import measure, standing
 from assembly.solve.options import Options
 from assembly.solve.scene import Scene, Status
-from assembly.solve.settings import COUNT, DUAL, OBJECTIVE, VIOLATION
 
 if TYPE_CHECKING:
     from assembly.solve.crossings import Crossings
-    from assembly.solve.leave import Fit
-    from assembly.solve.mobility import Mobility
-    from assembly.solve.second_order import SecondOrder
-    from assembly.solve.statics import Wrench
+    from assembly.solve.diagnosis.mobility import Mobility
+    from assembly.solve.forces.statics import Wrench
+    from assembly.solve.second_order.classification import SecondOrder
+    from assembly.solve.second_order.leave import Fit
 
 __all__ = ["Iteration", "Solution"]
 
@@ -151,7 +151,7 @@ class Solution(ReadOnlyArrays):
         value = self._result(OBJECTIVE)
         if np.isfinite(value) or not self._is_lost:
             return value * self._packed.unit
-        from assembly.solve.lost import goal
+        from assembly.solve.diagnosis.lost import goal
 
         return goal(self)[0]
 
@@ -166,7 +166,7 @@ class Solution(ReadOnlyArrays):
         value = self._result(DUAL)
         if np.isfinite(value) or not self._is_lost:
             return value
-        from assembly.solve.lost import goal
+        from assembly.solve.diagnosis.lost import goal
 
         return goal(self)[1]
 
@@ -189,7 +189,7 @@ class Solution(ReadOnlyArrays):
     def second_order(self) -> SecondOrder | None:
         """What the end of a solve is; looked at when it is read, unless the solve had to."""
         if self._order is None and self.success:
-            from assembly.solve.second_order import SecondOrder, judge
+            from assembly.solve.second_order.classification import SecondOrder, judge
 
             self._order = SecondOrder.NO_OBJECTIVE
             if self._packed.table[IMPLICIT] == 0:
@@ -203,7 +203,7 @@ class Solution(ReadOnlyArrays):
     def violations(self) -> dict[str, float]:
         """Violation of every constraint, by name: its largest; lengths in the user's unit, angles in radians."""
         if self._is_lost:
-            from assembly.solve.lost import violations
+            from assembly.solve.diagnosis.lost import violations
 
             return violations(self)
         return self._largest(1.0)
@@ -252,7 +252,7 @@ class Solution(ReadOnlyArrays):
     @cached_property
     def wrenches(self) -> dict[str, dict[str, Wrench]]:
         """What every constraint exerts on each of its bodies, by their names."""
-        from assembly.solve.statics import wrenches
+        from assembly.solve.forces.statics import wrenches
 
         return wrenches(self)
 
@@ -277,7 +277,7 @@ class Solution(ReadOnlyArrays):
     @cached_property
     def mobility(self) -> Mobility:
         """Degrees of freedom at `q`, free motions, redundant constraints; `Assembly.mobility` has options."""
-        from assembly.solve.mobility import Mobility
+        from assembly.solve.diagnosis.mobility import Mobility
 
         return Mobility.at(self._scene, self._packed, self._state, solved=True, fit=self._allowed)
 
@@ -289,7 +289,7 @@ class Solution(ReadOnlyArrays):
         """
         if self.status is not Status.INFEASIBLE:
             return []
-        from assembly.solve.conflicts import conflicts_at
+        from assembly.solve.diagnosis.conflicts import conflicts_at
 
         return conflicts_at(self._scene, self._packed, self._state, self._allowed)
 
@@ -357,7 +357,7 @@ class Solution(ReadOnlyArrays):
         root of twice the residual over the rows' curvature: 1e-13 there is 4e-7. Free motions do not count, nor does
         how far an objective is from its best; infinite where rows do not hold to 1e-6.
         """
-        from assembly.solve.pose_error import pose_error
+        from assembly.solve.diagnosis.pose_error import pose_error
 
         return pose_error(self._scene, self._packed, self._state)
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from assembly.errors import InputError
+from assembly.solve.loop.settings import CULPRIT, IMPROPER
 from assembly.solve.scene import Status
-from assembly.solve.settings import CULPRIT, IMPROPER
 from assembly.solve.solution import Iteration, Solution
 
 __all__ = ["iteration_table", "message", "table"]

@@ -2,11 +2,11 @@
 
 A contact is carried along the move by the contact velocity formulation,
 
-    du = RATES z,     z = ZED (d_f, d_g)                                   (proximity/velocity.py)
+    du = RATES z,     z = ZED (d_f, d_g)                                   (proximity/extrema/rates.py)
 
 with the twists d that lead from the last poses to these, and corrected there by Newton's method. One that is not found,
 is a minimum no longer, or was corrected by so much that it may be another root now, is left to the watch
-(`proximity/watch.py`), whose look at the pair of bodies finds all there are.
+(`proximity/manager/update.py`), whose look at the pair of bodies finds all there are.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly.constraints.contact_rows import track_contact, track_row
-from assembly.constraints.layout import (
+from assembly.constraints.program.contact import track_contact, track_row
+from assembly.constraints.program.records import (
     BODIES,
     BODY_F,
     BODY_G,
@@ -30,13 +30,12 @@ from assembly.constraints.layout import (
     SURFACE_F,
     WATCH,
 )
-from assembly.geometry.spline import BREAKS_U, BREAKS_V, CLOSED_U, CLOSED_V, SPANS_U, SPANS_V
+from assembly.geometry.splines.evaluate import BREAKS_U, BREAKS_V, CLOSED_U, CLOSED_V, SPANS_U, SPANS_V
 from assembly.geometry.vec import quaternion_product
-from assembly.proximity.extremal import BEND, CONVERGED, SINGULAR, into_domain
-from assembly.proximity.solid_contact import FOLD, PAIR_GAP, PROPER, TRACK
-from assembly.proximity.velocity import ARM_F, GAP, RATES, ZED
-from assembly.proximity.watch import IN_TURNS
-from assembly.proximity.watch_memory import (
+from assembly.proximity.extrema.face_face import BEND, CONVERGED, SINGULAR, into_domain
+from assembly.proximity.extrema.rates import ARM_F, GAP, RATES, ZED
+from assembly.proximity.features.solid_contact import FOLD, PAIR_GAP, PROPER, TRACK
+from assembly.proximity.manager.state import (
     ALLOWANCE,
     EVENT_COUNT,
     LENGTHS,
@@ -45,7 +44,8 @@ from assembly.proximity.watch_memory import (
     PLACE_MEMORY,
     memory_places,
 )
-from assembly.solve.guards import look_around, place_guards
+from assembly.proximity.manager.update import IN_TURNS
+from assembly.solve.loop.clearances import look_around, place_guards
 
 # A correction by more than this part of the prediction and of the surface's domain puts the root in doubt; so does a
 # root as near as this to a fold (det H over |H|^2), where others are born.

@@ -12,15 +12,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly._copies import OwnState
 from assembly._read_only import ReadOnlyArrays
-from assembly.constraints.clearance import Clearance
-from assembly.constraints.packing import Packed
+from assembly.constraints.model.clearance import Clearance
+from assembly.constraints.packing.scene import Packed
 from assembly.errors import InputError, number
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import pose_rows
-from assembly.proximity import watch_memory
-from assembly.proximity.events import Event, PairState, events_of
-from assembly.proximity.solid_contact import CONTACT_RECORD, TRACK
-from assembly.proximity.velocity import ARM_F, GAP, NORMAL
+from assembly.proximity.extrema.rates import ARM_F, GAP, NORMAL
+from assembly.proximity.features.solid_contact import CONTACT_RECORD, TRACK
+from assembly.proximity.manager import state as watch_memory
+from assembly.proximity.manager.events import Event, PairState, events_of
 from assembly.solve.crossings import PosedBodies, find_crossings
 from assembly.solve.interruption import CTRL_C
 from assembly.solve.options import Options, touching_part

@@ -7,13 +7,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from assembly.constraints import layout, program, row_terms
-from assembly.constraints.blocks import BLOCKS, COLUMN, COUNT, FIRST, PLACE, is_blocked
-from assembly.proximity.free_pair import VARIABLES, VECTORS
-from assembly.proximity.solid_contact import CONTACT_RECORD, TRACK
-from assembly.solve.contacts import start_contacts
-from assembly.solve.rows import arrange, record_of_blocks, shape_of, size_of_shape
-from assembly.solve.search import goal
+from assembly.constraints.program import evaluate as program
+from assembly.constraints.program import records as layout
+from assembly.constraints.program import row_terms
+from assembly.constraints.program.hessian_blocks import BLOCKS, COLUMN, COUNT, FIRST, PLACE, is_blocked
+from assembly.proximity.extrema.lifted_pair import VARIABLES, VECTORS
+from assembly.proximity.features.solid_contact import CONTACT_RECORD, TRACK
+from assembly.solve.loop.contacts import start_contacts
+from assembly.solve.loop.line_search import goal
+from assembly.solve.loop.residuals import arrange, record_of_blocks, shape_of, size_of_shape
 
 
 def room_of_shape(table, rows, n, blocks):

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from assembly.geometry import shapes
-from assembly.geometry.face import Face
-from assembly.geometry.surface import NurbsSurface
+from assembly.geometry.faces.face import Face
+from assembly.geometry.splines.surface import NurbsSurface
 from tests.laws.witness import Pairs, Stack, rotated
 
 

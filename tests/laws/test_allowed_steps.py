@@ -7,17 +7,17 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import assembly as asm
-from assembly.constraints.layout import MOVING, WATCH
-from assembly.proximity import watch
-from assembly.proximity.allowances import part_used, went
-from assembly.proximity.borders import feature_kind
-from assembly.proximity.bounding_tree import ELEMENT, ELEMENT_FEATURE, ELEMENT_POOL
-from assembly.proximity.holding import FEATURES, NOTHING, POINT
-from assembly.proximity.near_root import is_known
-from assembly.proximity.roots import CORNER, ROOT, ROOT_BEYOND, ROOT_FOLD
-from assembly.proximity.shell import EDGE, FACE
-from assembly.proximity.solid_contact import TRACK
-from assembly.proximity.watch_memory import (
+from assembly.constraints.program.records import MOVING, WATCH
+from assembly.proximity.brep.borders import feature_kind
+from assembly.proximity.brep.records import EDGE, FACE
+from assembly.proximity.bvh.tree import ELEMENT, ELEMENT_FEATURE, ELEMENT_POOL
+from assembly.proximity.features.holding import FEATURES, NOTHING, POINT
+from assembly.proximity.features.solid_contact import TRACK
+from assembly.proximity.manager import update as watch
+from assembly.proximity.manager.extrema import CORNER, ROOT, ROOT_BEYOND, ROOT_FOLD
+from assembly.proximity.manager.motion_bounds import part_used, went
+from assembly.proximity.manager.newton_regions import is_known
+from assembly.proximity.manager.state import (
     ALLOWANCE,
     BALL_ALLOWANCE,
     CUT_SHORT,
@@ -37,8 +37,8 @@ from assembly.proximity.watch_memory import (
     TREE_G,
     memory_places,
 )
-from assembly.solve.guards import allowed_share
-from assembly.solve.rows import move
+from assembly.solve.loop.clearances import allowed_share
+from assembly.solve.loop.residuals import move
 
 RINGS = 4
 

@@ -8,18 +8,21 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly.constraints.layout import FREE_COLUMN, ROWS, WATCH
-from assembly.geometry.spline import SURFACE_RECORD
+from assembly.constraints.program.records import FREE_COLUMN, ROWS, WATCH
+from assembly.geometry.splines.evaluate import SURFACE_RECORD
 from assembly.kinematics.motion import relative_pose, rotation
-from assembly.proximity import allowances, roots, watch, watch_memory
-from assembly.proximity.allowances import allow_ball, mover
-from assembly.proximity.extremal import SINGULAR, solve_pair
-from assembly.proximity.folds import fold_beyond
-from assembly.proximity.free_pair import VARIABLES, VECTORS, free_rows
-from assembly.proximity.pairs import _key, _packed, as_face, extremal_pair
-from assembly.proximity.solid_contact import CONTACT_RECORD, PAIR_GAP, TRACK
-from assembly.solve.guards import look_again, look_around, place_guards
-from assembly.solve.tangency import untouched
+from assembly.proximity.extrema.face_face import SINGULAR, solve_pair
+from assembly.proximity.extrema.lifted_pair import VARIABLES, VECTORS, free_rows
+from assembly.proximity.extrema.pairs import _key, _packed, as_face, extremal_pair
+from assembly.proximity.extrema.singular import fold_beyond
+from assembly.proximity.features.solid_contact import CONTACT_RECORD, PAIR_GAP, TRACK
+from assembly.proximity.manager import extrema as roots
+from assembly.proximity.manager import motion_bounds as allowances
+from assembly.proximity.manager import state as watch_memory
+from assembly.proximity.manager import update as watch
+from assembly.proximity.manager.motion_bounds import allow_ball, mover
+from assembly.solve.loop.clearances import look_again, look_around, place_guards
+from assembly.solve.loop.violation import untouched
 from benchmarks.center_lines import torus_wire
 from benchmarks.running import example
 from benchmarks.scenes import MAJOR, MINOR

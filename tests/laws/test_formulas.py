@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from assembly.geometry import shapes
-from assembly.geometry.face import Face
-from assembly.geometry.spline import POLES
+from assembly.geometry.faces.face import Face
+from assembly.geometry.splines.evaluate import POLES
+from assembly.geometry.splines.pole import pole_frame
 from assembly.kinematics.pose import angular_velocity_map, multiply, rotation_matrix, skew
 from assembly.proximity import gap_hessian
-from assembly.proximity.pair_matrix import RANK, pair_matrix
-from assembly.proximity.pole import pole_frame
+from assembly.proximity.extrema.pair_matrix import RANK, pair_matrix
 from tests.laws.witness import STEP, moved
 
 EYE = np.eye(2)

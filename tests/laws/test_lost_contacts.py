@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from assembly.constraints.contact_rows import HARDLY, MAY_GO, hold_all, lost_guard, may_go
-from assembly.constraints.layout import (
+from assembly.constraints.program.contact import HARDLY, MAY_GO, hold_all, lost_guard, may_go
+from assembly.constraints.program.records import (
     CONTACTS,
     FIRST_GUARD,
     FREE_COLUMN,
@@ -17,8 +17,8 @@ from assembly.constraints.layout import (
     ROW_TABLE,
     SHELL_F,
 )
-from assembly.proximity.solid_contact import ALLOWED, CONTACT_RECORD, PAIR_GAP, STAYS, TRACK
-from assembly.solve.contacts import start_contacts
+from assembly.proximity.features.solid_contact import ALLOWED, CONTACT_RECORD, PAIR_GAP, STAYS, TRACK
+from assembly.solve.loop.contacts import start_contacts
 
 LEAST = 0.25
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 
-from assembly.solve.multipliers import EXCHANGES, NEAR, ROUNDS, foresee, leave_out, pushing_multipliers
+from assembly.solve.loop.multipliers import EXCHANGES, NEAR, ROUNDS, foresee, leave_out, pushing_multipliers
 
 
 def pushing(jacobian, one_sided, residual, active, gradient, exchanges=EXCHANGES):

@@ -7,15 +7,15 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import assembly as asm
-from assembly.constraints import layout
-from assembly.constraints.program import evaluate
-from assembly.proximity import watch
-from assembly.proximity.free_pair import VARIABLES, VECTORS
-from assembly.proximity.solid_contact import CONTACT_RECORD, IDLE, PAIR_GAP, SLACK, TRACK
-from assembly.proximity.watch_memory import PAIR_MEMORY, REACH, memory_places
-from assembly.solve.carry import carry
-from assembly.solve.guards import place_guards
-from assembly.solve.rows import arrange, move, record_of_blocks
+from assembly.constraints.program import records as layout
+from assembly.constraints.program.evaluate import evaluate
+from assembly.proximity.extrema.lifted_pair import VARIABLES, VECTORS
+from assembly.proximity.features.solid_contact import CONTACT_RECORD, IDLE, PAIR_GAP, SLACK, TRACK
+from assembly.proximity.manager import update as watch
+from assembly.proximity.manager.state import PAIR_MEMORY, REACH, memory_places
+from assembly.solve.loop.clearances import place_guards
+from assembly.solve.loop.predict import carry
+from assembly.solve.loop.residuals import arrange, move, record_of_blocks
 from tests.laws.loop_point import room_of_shape
 
 SHAPES = {

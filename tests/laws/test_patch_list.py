@@ -7,8 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from assembly.geometry.vec import quaternion_matrix
-from assembly.proximity.bounding_tree import CENTER, NODE_POOL, RADIUS, pairs_within
-from assembly.proximity.patch_list import COUNT, LIST_INTS, OWNER, listed_pairs
+from assembly.proximity.bvh.neighbor_list import COUNT, LIST_INTS, OWNER, listed_pairs
+from assembly.proximity.bvh.tree import CENTER, NODE_POOL, RADIUS, pairs_within
 from tests.laws.test_facet_enclosure import BODIES, Descent, placed, sample
 
 REACH, RING = 0.1, 0.15

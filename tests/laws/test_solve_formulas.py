@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly.constraints.terms import objective
-from assembly.geometry.spline import SURFACE_RECORD
+from assembly.constraints.program.objective_terms import objective
+from assembly.geometry.splines.evaluate import SURFACE_RECORD
 from assembly.kinematics.pose import multiply, retract, rotation_matrix, skew
 from assembly.proximity import gap_hessian
-from assembly.proximity.free_pair import VARIABLES, VECTORS, coordinate_lengths, free_hessian, free_rows
-from assembly.proximity.pairs import _packed
-from assembly.solve.rows import merit
+from assembly.proximity.extrema.lifted_pair import VARIABLES, VECTORS, coordinate_lengths, free_hessian, free_rows
+from assembly.proximity.extrema.pairs import _packed
+from assembly.solve.loop.residuals import merit
 from tests.laws.test_formulas import Local
 from tests.laws.witness import OFFSETS, SLOPE
 

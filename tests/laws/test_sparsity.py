@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly.constraints import layout
-from assembly.constraints.sparsity import clear_upper, place_folds
-from assembly.solve.linear import factorize_shifted, forward_step, solve_step
-from assembly.solve.multipliers import curve_rows, toward_rows
-from assembly.solve.rows import arrange
+from assembly.constraints.program import records as layout
+from assembly.constraints.program.envelope import clear_upper, place_folds
+from assembly.solve.linear_algebra.factorize import factorize_shifted, forward_step, solve_step
+from assembly.solve.loop.multipliers import curve_rows, toward_rows
+from assembly.solve.loop.residuals import arrange
 from tests.laws.loop_point import room_of_shape
 
 

@@ -1,4 +1,6 @@
-"""Minima of the distance of two spines over a thin box, by feet (`spine_minima.py`), against samples."""
+"""Minima of the distance of two spines over a thin box, by feet (`proximity/manager/centerlines/minima.py`), against
+samples.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +9,10 @@ import pytest
 from scipy.optimize import brentq
 
 from assembly.geometry.vec import dot
-from assembly.proximity.spine_box import apart
-from assembly.proximity.spine_curve import HALF, PART_BEND
-from assembly.proximity.spine_minima import MINIMA, valley_minima
-from assembly.proximity.spine_search import THIN
+from assembly.proximity.manager.centerlines.box import apart
+from assembly.proximity.manager.centerlines.curve import HALF, PART_BEND
+from assembly.proximity.manager.centerlines.minima import MINIMA, valley_minima
+from assembly.proximity.manager.centerlines.search import THIN
 from benchmarks.motions import SHAPES
 from benchmarks.watching import Watch
 from tests.laws.test_spines import Two

@@ -9,14 +9,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import assembly as asm
-from assembly.geometry.face import Face
-from assembly.geometry.path import Path
-from assembly.geometry.spine import spine_of
+from assembly.geometry.faces.face import Face
+from assembly.geometry.shapes.centerline import spine_of
+from assembly.geometry.shapes.path import Path
 from assembly.geometry.vec import dot
-from assembly.proximity import watch_memory
-from assembly.proximity.allowances import part_used
-from assembly.proximity.spine_box import BARREN, CONVEX, EMPTY, apart, box_of
-from assembly.proximity.spine_curve import (
+from assembly.proximity.manager import state as watch_memory
+from assembly.proximity.manager.centerlines.box import BARREN, CONVEX, EMPTY, apart, box_of
+from assembly.proximity.manager.centerlines.curve import (
     HALF,
     PART,
     PART_POOL,
@@ -26,7 +25,8 @@ from assembly.proximity.spine_curve import (
     point_of,
     spine_point,
 )
-from assembly.proximity.spine_packing import pack_spine
+from assembly.proximity.manager.centerlines.packing import pack_spine
+from assembly.proximity.manager.motion_bounds import part_used
 from benchmarks.center_lines import path_wire
 from benchmarks.motions import HOOK, SHAPES
 from benchmarks.watching import Watch

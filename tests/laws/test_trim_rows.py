@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly.constraints import layout
-from assembly.constraints.trim_contact import FORMS
+from assembly.constraints.model.trim_contact import FORMS
+from assembly.constraints.program import records as layout
 from tests.laws.curve_witness import CurveStack, SurfaceCurve
 from tests.laws.loop_point import LoopPoint, moved
 from tests.laws.trim_scenes import LOOPS, SURFACES, FreePoint, TrimScene, circle, polygon, spline, trim_scene

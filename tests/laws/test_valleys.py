@@ -7,15 +7,15 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import assembly as asm
-from assembly.constraints.layout import WATCH
-from assembly.geometry.spline import BREAKS_U, BREAKS_V, SPANS_U, SPANS_V, surface_point
-from assembly.proximity.borders import feature_at
-from assembly.proximity.held_valleys import hold_continua, is_next_in_valley, sunk
-from assembly.proximity.holding import HELD_F, HELD_G
-from assembly.proximity.roots import CODE_F, CODE_G, CORNER, LISTED, NEW, ORIGIN, ROOT, ROOT_FOLD, USELESS
-from assembly.proximity.shell import FACES
-from assembly.proximity.valleys import ARRIVED, across_valley, into_valley
-from assembly.proximity.watch_memory import PAIR_SHELL_F, PAIR_SHELL_G, PAIR_TABLE
+from assembly.constraints.program.records import WATCH
+from assembly.geometry.splines.evaluate import BREAKS_U, BREAKS_V, SPANS_U, SPANS_V, surface_point
+from assembly.proximity.brep.borders import feature_at
+from assembly.proximity.brep.records import FACES
+from assembly.proximity.features.holding import HELD_F, HELD_G
+from assembly.proximity.manager.extrema import CODE_F, CODE_G, CORNER, LISTED, NEW, ORIGIN, ROOT, ROOT_FOLD, USELESS
+from assembly.proximity.manager.near_singular import ARRIVED, across_valley, into_valley
+from assembly.proximity.manager.near_singular_points import hold_continua, is_next_in_valley, sunk
+from assembly.proximity.manager.state import PAIR_SHELL_F, PAIR_SHELL_G, PAIR_TABLE
 
 MAJOR, MINOR = 0.7, 0.1
 WIDE = (np.inf, np.inf, np.inf, np.inf)

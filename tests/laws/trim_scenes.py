@@ -7,12 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 import assembly as asm
-from assembly.constraints import layout, program, row_terms
-from assembly.geometry.curve import NurbsCurve
-from assembly.geometry.face import Face
-from assembly.proximity.free_pair import coordinate_lengths
-from assembly.proximity.solid_contact import TRACK
-from assembly.solve.rows import arrange
+from assembly.constraints.program import evaluate as program
+from assembly.constraints.program import records as layout
+from assembly.constraints.program import row_terms
+from assembly.geometry.faces.face import Face
+from assembly.geometry.splines.curve import NurbsCurve
+from assembly.proximity.extrema.lifted_pair import coordinate_lengths
+from assembly.proximity.features.solid_contact import TRACK
+from assembly.solve.loop.residuals import arrange
 from tests.laws.loop_point import LoopPoint, room_of_shape
 from tests.laws.scenes import dome, placed
 

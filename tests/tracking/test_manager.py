@@ -11,7 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import assembly as asm
-from assembly.proximity.events import EventKind, EventReason, PairState
+from assembly.proximity.manager.events import EventKind, EventReason, PairState
 from benchmarks.center_lines import ball_wire, paper_clip_wire, torus_wire
 from benchmarks.wire_oracle import WireOracle
 

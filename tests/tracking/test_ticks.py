@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import assembly as asm
-from assembly.proximity.events import EventKind, EventReason
+from assembly.proximity.manager.events import EventKind, EventReason
 from assembly.tracking.tick import TrackStatus
 from benchmarks.hands import paper_clips
 from benchmarks.running import example

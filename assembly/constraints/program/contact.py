@@ -1,0 +1,325 @@
+"""Rows of contacts: the pair of each is carried to the poses, its gap is the row. `constraints/program/records.py` says
+what stands where.
+
+A contact of two surfaces is a pair of points with a common normal, one of solids the closest features of both
+(`proximity/features/solid_contact.py`). Rows of a clearance are contacts as well, of what its watch has listed.
+"""
+
+from __future__ import annotations
+
+import math
+
+from assembly._address import call_address
+from assembly._kernel import kernel
+from assembly.constraints.program.records import (
+    BODY_F,
+    BODY_G,
+    CONTACTS,
+    DEEPEST_AT,
+    FIRST_GUARD,
+    FREE_COLUMN,
+    GUARDS,
+    MINIMUM,
+    NEAREST_AT,
+    ONE_SIDED,
+    ROW,
+    ROW_TABLE,
+    SEARCH_AT,
+    SHELL_F,
+    SHELL_G,
+    START_AT,
+    SURFACE_F,
+    SURFACE_G,
+    TRACK_AT,
+)
+from assembly.geometry.vec import dot, sub
+from assembly.kinematics.motion import relative_pose, rotation
+from assembly.proximity.extrema.face_face import CLOSE, CONVERGED, LEFT_PATCH, SINGULAR, solve_pair
+from assembly.proximity.extrema.rates import GAP, RATES, RECORD, gradient_row, store_record
+from assembly.proximity.features.solid_contact import (
+    ALLOWED,
+    CONFORMING,
+    CONTACT_RECORD,
+    FOLD,
+    IDLE,
+    PAIR_GAP,
+    PROPER,
+    SLACK,
+    STAYS,
+    TRACK,
+)
+
+# A clearance's contact of solids that are hardly in each other may be given up where its pair ends: then MAY_GO - k
+# stands for what it holds on to, k. One that ends where they touch, which rounding decides, is as good as open.
+MAY_GO, HARDLY, TOUCHING = -1.0, 1e-3, 1e-9
+# A clearance's row that is open by more than the last needs its pair again after motions of this part of its gap, or of
+# this part of how far bodies may go where contacts may be born: from farther away Newton's method may find another one.
+UNSEEN, ASTRAY, FAR = 0.5, 0.15, 1e-5
+
+
+@kernel(inner=True)
+def track_contact(table, pool, row, q, start, patience, records, k):
+    """Newton on the pair of one row; fills its record. Returns status, parameters, the points' signed distance."""
+    i = table[row + BODY_F]
+    j = table[row + BODY_G]
+    turn = rotation(q, i)
+    relative, shift = relative_pose(q, i, turn, j, rotation(q, j))
+    f, g = table[row + SURFACE_F], table[row + SURFACE_G]
+    status, x, _count, frame, curvature = solve_pair(
+        table, pool, f, g, relative, shift, start, 1.0, patience, CLOSE, False
+    )
+    apart = sub(frame[4], frame[3])
+    distance = math.sqrt(dot(apart, apart))
+    if status == CONVERGED or status == SINGULAR:
+        store_record(turn, shift, frame, curvature, records, k)
+        # Relative curvature -H (I + beta A)^-1: indefinite means the surfaces cross beside the point.
+        h = curvature[1]
+        det = h[0] * h[3] - h[1] * h[2]
+        norm2 = h[0] * h[0] + h[1] * h[1] + h[2] * h[2] + h[3] * h[3]
+        proper = 1.0 if det > -1e-9 * norm2 and h[0] + h[3] <= 0.0 else 0.0
+        records[k, PROPER] = CONFORMING if norm2 <= 1e-18 else proper
+        records[k, FOLD] = det / norm2 if norm2 > 1e-18 else 0.0
+    return status, x, distance if frame[10] > 0.0 else -distance
+
+
+@kernel(inner=True)
+def start_row(table, pool, row, q, tracked, r):
+    """The pair of the surfaces of a row wherever it is, into tracked[r]. A status."""
+    f, g = table[row + SURFACE_F], table[row + SURFACE_G]
+    return call_address(table[START_AT], (table, pool, f, g, table[row + BODY_F], table[row + BODY_G], q, tracked, r))
+
+
+@kernel(inner=True)
+def restart_contact(table, pool, row, q, tracked, records, k):
+    """As `track_contact`, from a global start; tracked[k] is written meanwhile."""
+    was = (tracked[k, 0], tracked[k, 1], tracked[k, 2], tracked[k, 3])
+    status = start_row(table, pool, row, q, tracked, k)
+    x = (tracked[k, 0], tracked[k, 1], tracked[k, 2], tracked[k, 3])
+    tracked[k, 0], tracked[k, 1], tracked[k, 2], tracked[k, 3] = was
+    if status == CONVERGED or status == SINGULAR:
+        status, x, _distance = track_contact(table, pool, row, q, x, math.inf, records, k)
+    return status, x
+
+
+@kernel(inner=True)
+def search_row(table, pool, row, q, tracked, r, crossing):
+    """The closest features of the solids of a row wherever they are, into tracked[r]. Whether there are any.
+
+    Solids that are in each other have some if `crossing`, which takes a thousand times as long.
+    """
+    shell_f = table[row + SHELL_F]
+    shell_g = table[row + SHELL_G]
+    i = table[row + BODY_F]
+    j = table[row + BODY_G]
+    nearest = table[NEAREST_AT]
+    deepest = table[DEEPEST_AT] if crossing else 0
+    found = call_address(table[SEARCH_AT], (table, pool, shell_f, shell_g, i, j, q, nearest, deepest, tracked, r))
+    return found == 1
+
+
+@kernel(inner=True)
+def track_row(table, pool, row, q, start, patience, records, tracked, r):
+    """The features of the solids of a row from start[r] on, into tracked[r] and record r. A status."""
+    shell_f = table[row + SHELL_F]
+    shell_g = table[row + SHELL_G]
+    i = table[row + BODY_F]
+    j = table[row + BODY_G]
+    return call_address(table[TRACK_AT], (table, pool, shell_f, shell_g, i, j, q, start, patience, records, tracked, r))
+
+
+@kernel(inline=True)
+def is_guard(table, r):
+    """Whether row r is a clearance's."""
+    return table[FIRST_GUARD] <= r < table[FIRST_GUARD] + table[GUARDS]
+
+
+@kernel(inline=True)
+def least_gap(table, pool, r, tracked):
+    """The least gap of row r, less by what the bodies were in each other where the solve began and still touched."""
+    return pool[table[table[ROW_TABLE] + ROW * r + MINIMUM]] - tracked[r, ALLOWED]
+
+
+@kernel(inline=True)
+def is_of_solids(table, r):
+    """Whether row r is a contact of solids, or has no contact."""
+    return table[table[ROW_TABLE] + ROW * r + SHELL_F] >= 0
+
+
+@kernel(inline=True)
+def may_go(table, r, residual):
+    """Whether row r is a clearance's of solids that are hardly in each other: there, its pair may end."""
+    return is_guard(table, r) and is_of_solids(table, r) and residual[r] > -HARDLY
+
+
+@kernel(inner=True)
+def hold_all(table, tracked):
+    """No contact may be given up any more."""
+    for r in range(table[FIRST_GUARD], table[FIRST_GUARD] + table[GUARDS]):
+        if tracked[r, STAYS] <= MAY_GO:
+            tracked[r, STAYS] = MAY_GO - tracked[r, STAYS]
+
+
+@kernel(inline=True)
+def copy_tracked(start, r, tracked):
+    """All that is tracked of a row, also what its kind has no use for: nothing is to depend on what was in memory."""
+    for i in range(TRACK):
+        tracked[r, i] = start[r, i]
+
+
+@kernel(inline=True)
+def idle_row(r, gap, point):
+    """A row that is open by `gap`."""
+    records = point[2]
+    records[r, GAP] = gap
+    records[r, PROPER] = 1.0
+    records[r, FOLD] = 1.0
+    point[3][r] = gap
+
+
+@kernel(inner=True)
+def lost_guard(table, pool, r, start, point, past, goes):
+    """Row r of a clearance whose pair was lost: idle, if its gap would be open, or it is a corner `past` its face.
+
+    Solids need only touch. Or if it `goes`, though it is not open: one that ends where bodies are in each other would
+    hold every step. One that is lost already stays as it is. What the neighborhood holds now is for the next look to
+    find.
+    """
+    row = table[ROW_TABLE] + ROW * r
+    least = least_gap(table, pool, r, start)
+    gap = start[r, PAIR_GAP] - least
+    if past:
+        gap = max(gap, 0.0)
+    elif not gap > (-TOUCHING if table[row + SHELL_F] >= 0 else 0.0) and not goes and not math.isnan(start[r, 0]):
+        return False
+    idle_row(r, gap, point)
+    point[1][r, PAIR_GAP] = gap + least
+    # Nothing moves it: its pair is not known.
+    for i in range(RATES, RECORD):
+        point[2][r, i] = 0.0
+    for i in range(FREE_COLUMN):
+        point[4][r, i] = 0.0
+    point[1][r, 0] = math.nan
+    return True
+
+
+@kernel(inline=True)
+def write_gap_row(table, pool, r, point):
+    """Row r, of contact r, from its record: the gap less the least one, and its gradient over the twists."""
+    _q, tracked, records, residual, jacobian = point
+    residual[r] = records[r, GAP] - least_gap(table, pool, r, tracked)
+    gradient_row(records, r, jacobian, r)
+    # A pair that follows the bodies has no unknowns of its own.
+    for i in range(4):
+        jacobian[r, FREE_COLUMN + i] = 0.0
+    tracked[r, PAIR_GAP] = records[r, GAP]
+
+
+@kernel(inner=True)
+def solids_row(table, pool, r, start, patience, point):
+    """Row r, of a contact of solids. Returns whether its pair was found.
+
+    Where the pair that is tracked is lost, or an edge is farthest there, the closest one there is takes over, if the
+    row is one-sided or a step may end anywhere: the loop shortens steps as long as it can. A clearance has a watch for
+    that.
+    """
+    q, tracked, records, _residual, _jacobian = point
+    row = table[ROW_TABLE] + ROW * r
+    goes = start[r, STAYS] <= MAY_GO
+    if goes:
+        start[r, STAYS] = MAY_GO - start[r, STAYS]
+        tracked[r, STAYS] = start[r, STAYS]
+    status = track_row(table, pool, row, q, start, patience, records, tracked, r)
+    found = (status == CONVERGED or status == SINGULAR) and (records[r, PROPER] != 0.0 or is_guard(table, r))
+    if not found:
+        if is_guard(table, r):
+            past = start[r, STAYS] > 0.0 and status == LEFT_PATCH
+            return lost_guard(table, pool, r, start, point, past, goes)
+        # Near touching a search takes long, and steps are short.
+        far = abs(start[r, PAIR_GAP]) > HARDLY
+        if not (far or table[row + ONE_SIDED] == 1 or patience == math.inf):
+            return False
+        # Where an edge is farthest, solids may be deep in each other: a step that leads there is too long.
+        lost = status != CONVERGED and status != SINGULAR
+        if not search_row(table, pool, row, q, tracked, r, lost or patience == math.inf):
+            return False
+        status = track_row(table, pool, row, q, tracked, math.inf, records, tracked, r)
+        if status != CONVERGED and status != SINGULAR:
+            return False
+    write_gap_row(table, pool, r, point)
+    return True
+
+
+@kernel(inner=True)
+def row_of_pair(table, pool, r, start, patience, point):
+    """Row r, of contact r, by its pair. Returns whether it was found.
+
+    A contact is carried from `start` to its extremal pair, by steps that turn no normal by more than `patience`. A
+    one-sided row that loses its pair takes the nearest one there is.
+    """
+    q, tracked, records, _residual, _jacobian = point
+    row = table[ROW_TABLE] + ROW * r
+    if table[row + SHELL_F] >= 0:
+        return solids_row(table, pool, r, start, patience, point)
+    x = (start[r, 0], start[r, 1], start[r, 2], start[r, 3])
+    status, x, distance = track_contact(table, pool, row, q, x, patience, records, r)
+    if status != CONVERGED and status != SINGULAR:
+        if table[row + ONE_SIDED] == 0:
+            return False
+        if is_guard(table, r):
+            return lost_guard(table, pool, r, start, point, False, False)
+        # A one-sided contact is of the nearest pair, whichever that is now.
+        held = status == LEFT_PATCH and distance > 0.0
+        status, x = restart_contact(table, pool, row, q, tracked, records, r)
+        if status != CONVERGED and status != SINGULAR:
+            if not held:
+                return False
+            for i in range(CONTACT_RECORD):
+                records[r, i] = 0.0
+            records[r, GAP] = distance
+            records[r, PROPER] = 1.0
+            records[r, FOLD] = 1.0
+        elif not records[r, GAP] > 0.0:
+            return False
+    write_gap_row(table, pool, r, point)
+    tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3] = x
+    return True
+
+
+@kernel(inline=True)
+def contact_row(table, pool, r, start, patience, point):
+    """Row r, of contact r, from `start` on. Returns whether its pair was found, or need not be.
+
+    A row of a clearance that stays open is as `solve/loop/predict.py` left it.
+    """
+    _q, tracked, records, residual, _jacobian = point
+    row = table[ROW_TABLE] + ROW * r
+    copy_tracked(start, r, tracked)
+    if table[row + BODY_F] < 0:
+        idle_row(r, 1.0, point)
+        return True
+    if start[r, IDLE] == 1.0:
+        tracked[r, IDLE] = 0.0
+        residual[r] = start[r, PAIR_GAP] - least_gap(table, pool, r, start)
+        return True
+    if not row_of_pair(table, pool, r, start, patience, point):
+        return False
+    tracks = not math.isnan(tracked[r, 0])
+    # Features of solids switch as they move: their rows are followed.
+    open_far = is_guard(table, r) and table[row + SHELL_F] < 0 and residual[r] > FAR
+    records[r, SLACK] = 0.0
+    if tracks and open_far:
+        # How far they may go is behind the least gap.
+        records[r, SLACK] = min(UNSEEN * residual[r], ASTRAY * pool[table[row + MINIMUM] + 1])
+    return True
+
+
+@kernel(
+    signatures=("(i8[::1], f8[::1], f8[:, ::1], f8, i8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1])"),
+)
+def contact_rows(table, pool, start, patience, free, q, tracked, records, residual, jacobian):
+    """All rows of contacts but those of free pairs, and their gradients. Returns one whose pair was lost, or -1."""
+    point = (q, tracked, records, residual, jacobian)
+    for r in range(table[CONTACTS]):
+        if free[r] < 0 and not contact_row(table, pool, r, start, patience, point):
+            return r
+    return -1

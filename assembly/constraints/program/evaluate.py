@@ -1,0 +1,113 @@
+"""The rows of a packed scene evaluated, with their first derivatives; `constraints/program/records.py` says what stands
+where.
+
+A row of a joint is c_1 coordinate_1 + c_2 coordinate_2 - value (`constraints/program/primitives.py`), a row of a trim
+the signed distance
+of a contact to a loop (`proximity/features/trim_distance.py`); rows of a tape are the values of a user's expression
+(`geometry/expression/tape.py`).
+Rows of contacts are in `constraints/program/contact.py`, second derivatives in `row_terms.py`.
+"""
+
+from __future__ import annotations
+
+from assembly._address import call_address
+from assembly._kernel import kernel
+from assembly.constraints.program.contact import copy_tracked
+from assembly.constraints.program.primitives import coordinate, place_frames, write_gradient
+from assembly.constraints.program.records import (
+    CONTACT_ROWS_AT,
+    CONTACTS,
+    COORDINATE,
+    EXTRA_COLUMN,
+    FREE_ROW_AT,
+    JOINT_RECORD,
+    JOINT_ROW,
+    JOINT_TABLE,
+    JOINTS,
+    KIND,
+    PARAMETERS,
+    ROW,
+    ROW_TABLE,
+    ROWS,
+    SECOND,
+    TAPE_RECORD,
+    TAPE_TABLE,
+    TAPES,
+    TRACKED,
+    TRIM_ROWS_AT,
+    TRIMS,
+)
+from assembly.constraints.program.tapes import tape_rows
+
+
+@kernel(inner=True)
+def coordinate_row(pool, kind, component, k, angle, factor, start, tracked, records, jacobian, r, column):
+    """Factor times a coordinate, its gradient into row r from `column` on; its angle is tracked."""
+    near = start[angle, 0] if angle >= 0 else 0.0
+    value, n, arm_f, arm_g, h = coordinate(kind, component, records, k, near)
+    if angle >= 0:
+        tracked[angle, 0] = value
+    write_gradient(n, arm_f, arm_g, h, factor, jacobian, r, column)
+    return factor * value
+
+
+@kernel(inner=True)
+def joint_row(table, pool, r, start, tracked, records, residual, jacobian):
+    """Row r, of a joint."""
+    row = table[ROW_TABLE] + ROW * r
+    o = table[row + PARAMETERS]
+    pairs = table[CONTACTS]
+    second = table[row + SECOND]
+    value = -pool[o + 2]
+    for part in range(1 if second < 0 else 2):
+        at = row + COORDINATE if part == 0 else second
+        value += coordinate_row(
+            pool,
+            table[at],
+            table[at + 1],
+            pairs + table[at + 2],
+            table[at + 3],
+            pool[o + part],
+            start,
+            tracked,
+            records,
+            jacobian,
+            r,
+            0 if part == 0 else EXTRA_COLUMN,
+        )
+    residual[r] = value
+
+
+@kernel(inner=True)
+def evaluate(table, pool, start, patience, loose, room, point):
+    """Evaluate all rows at the point's poses. Returns the contact whose pair was lost, or -1.
+
+    `start` are the tracked values to begin from. `point` is (poses, tracked values, records, residual, Jacobian); all
+    but the poses are written. `loose` is what pairs need: (places of the free ones, lengths, room, ...).
+    """
+    q, tracked, records, residual, jacobian = point
+    pairs = table[CONTACTS]
+    free = loose[0]
+    for r in range(pairs):
+        if free[r] >= 0:
+            one = (table, pool, r, start, free, loose[1], loose[2], q, tracked, records, residual, jacobian)
+            call_address(table[FREE_ROW_AT], one)
+    if pairs > 0:
+        others = (table, pool, start, patience, free, q, tracked, records, residual, jacobian)
+        lost = call_address(table[CONTACT_ROWS_AT], others)
+        if lost >= 0:
+            return lost
+    if table[TRIMS] > 0:
+        call_address(table[TRIM_ROWS_AT], (table, pool, free, loose[1], q, tracked, records, residual, jacobian))
+    for k in range(pairs, table[TRACKED]):
+        # Of an angle that no row has, only an input of a dexterity, this is all that is known.
+        copy_tracked(start, k, tracked)
+    for k in range(table[JOINTS]):
+        joint = table[JOINT_TABLE] + JOINT_RECORD * k
+        place_frames(pool, table[joint + 2], q, table[joint], table[joint + 1], records, pairs + k)
+    for r in range(pairs, table[ROWS]):
+        if table[table[ROW_TABLE] + ROW * r + KIND] == JOINT_ROW:
+            joint_row(table, pool, r, start, tracked, records, residual, jacobian)
+    for t in range(table[TAPES]):
+        tape_rows(table, pool, table[TAPE_TABLE] + TAPE_RECORD * t, q, room, residual, jacobian)
+    return -1

@@ -1,0 +1,100 @@
+"""The Hessian of the Lagrangian of a large scene, kept by blocks of six by six: a body, or two that meet in a row.
+
+An n x n matrix of thousands of unknowns is almost all zeros, and memory that is touched for the first time in every
+solve costs more than the arithmetic. So scenes of many bodies have a record of blocks
+(`constraints/packing/elimination_order.py`), whose rows stand in the order of the factor:
+
+    N, blocks of the Hessian, blocks of the factor, and where these begin, counted from the record:
+    place (N)           row of the body whose twist is number k among the unknowns
+    first (N + 1)       of every row its first block of the Hessian; that is the one on the diagonal
+    column (.)          of a block; not before its row
+    seat (.)            where it stands in its row of the factor, twice, plus one where it goes there transposed
+    panel (N + 1), across (.)                     rows of the factor and their columns, ascending
+    meeting (N + 1), meeting_row (.), meeting_at (.)   of every column the rows above that have it, and at which place
+
+and, as numbers in its header, the addresses of the two kernels that make the factor and solve by it.
+
+A block is turned as the upper triangle of the unknowns has it, block e in rows 6 e.. of an array of six columns.
+Where a pair at a fold has unknowns of its own, everything is dense in an envelope as in a small scene
+(`constraints/program/envelope.py`).
+"""
+
+from __future__ import annotations
+
+from assembly._kernel import kernel
+
+COUNT, BLOCKS, FACTORED, PLACE, FIRST, COLUMN, SEAT, PANEL, ACROSS = 0, 1, 2, 3, 4, 5, 6, 7, 8
+MEETING, MEETING_ROW, MEETING_AT, FACTORIZE_AT, SOLVE_AT, BLOCK_HEADER = 9, 10, 11, 12, 13, 14
+
+
+@kernel(inline=True)
+def is_blocked(order):
+    """Whether the Hessian is kept by blocks now."""
+    folds = order[1]
+    return folds[folds.shape[0] - 1, 1] == 1
+
+
+@kernel(inline=True)
+def choose_storage(order, n):
+    """By blocks, if the scene has a record of them and all n unknowns are bodies'."""
+    folds, blocks = order[1], order[3]
+    by_blocks = blocks.size > 0 and n == 6 * blocks[COUNT]
+    folds[folds.shape[0] - 1, 1] = 1 if by_blocks else 0
+
+
+@kernel(inner=True)
+def block_row(blocks, at, other):
+    """Row of the array of blocks where that of the unknowns at.. and other.. begins."""
+    p = blocks[blocks[PLACE] + at // 6]
+    q = blocks[blocks[PLACE] + other // 6]
+    column = max(p, q)
+    e = blocks[blocks[FIRST] + min(p, q)]
+    while blocks[blocks[COLUMN] + e] != column:
+        e += 1
+    return 6 * e
+
+
+@kernel(inline=True)
+def spot(order, at, other):
+    """Row and column of the Hessian's array where the block of the unknowns at.. and other.., at <= other, begins."""
+    if is_blocked(order):
+        return block_row(order[3], at, other), 0
+    return at, other
+
+
+@kernel(inner=True)
+def clear_patch(order, f, g):
+    """Zeros for the terms of two bodies; where their twists, at f.. and g.. (negative: fixed), stand in the patch."""
+    patch = order[2][1:]
+    for i in range(12):
+        for j in range(12):
+            patch[i, j] = 0.0
+    if f >= 0 and g >= 0:
+        return (0, 6) if f < g else (6, 0)
+    return (0 if f >= 0 else -1), (0 if g >= 0 else -1)
+
+
+@kernel(inner=True)
+def add_patch(order, f, g, hessian):
+    """Hessian += the patch, of the bodies whose twists are at f.. and g.."""
+    blocks, patch = order[3], order[2][1:]
+    low = min(f, g)
+    high = max(f, g)
+    if low < 0:
+        low = high
+    if low < 0:
+        return
+    at = block_row(blocks, low, low)
+    for i in range(6):
+        for j in range(i, 6):
+            hessian[at + i, j] += patch[i, j]
+    if high == low:
+        return
+    at = block_row(blocks, low, high)
+    for i in range(6):
+        for j in range(6):
+            hessian[at + i, j] += patch[i, 6 + j]
+    at = block_row(blocks, high, high)
+    for i in range(6):
+        for j in range(i, 6):
+            hessian[at + i, j] += patch[6 + i, 6 + j]

@@ -1,0 +1,174 @@
+"""The terms of an objective: values, gradients and Hessians in twists.
+
+point distance   weight |p - target|^2
+posture          weight |x - x0|^2 + lever 4 sin^2(angle / 2), from a pose (x0, e0)
+tape             weight times a user's expression
+"""
+
+from __future__ import annotations
+
+import math
+
+from assembly._address import call_address
+from assembly._kernel import kernel
+from assembly.constraints.program.envelope import clear_upper
+from assembly.constraints.program.hessian_blocks import block_row, is_blocked, spot
+from assembly.constraints.program.records import RUN_TAPE_AT, SCALE, SLOTS, TERM_TABLE, TERMS
+from assembly.constraints.program.tapes import place_tape
+from assembly.geometry.vec import add, cross, dot, matvec, quaternion_product, sub
+from assembly.kinematics.motion import position, rotation
+
+# A term: kind, body, offset of its parameters, its tape, and whether a posture is that of the start of each solve.
+TERM = 8
+TERM_KIND, TERM_BODY, TERM_PARAMETERS, TERM_TAPE, TERM_FOLLOWS = 0, 1, 2, 3, 4
+POINT_DISTANCE, POSTURE, TAPE_TERM, DEXTERITY = 0, 1, 2, 3
+# Parameters of a posture.
+POSTURE_LENGTH, POSTURE_POSITION, POSTURE_QUATERNION, POSTURE_TURN, POSTURE_PARAMETERS = 0, 1, 4, 8, 9
+
+
+@kernel(inline=True)
+def load(array, o):
+    return (array[o], array[o + 1], array[o + 2])
+
+
+@kernel(inner=True)
+def point_distance(pool, o, q, body, s, order, gradient, hessian):
+    """Value of weight |p - target|^2; from order 1 on its derivatives are added at s, the place of the body's twist."""
+    weight = pool[o]
+    p = matvec(rotation(q, body), load(pool, o + 1))
+    e = add(sub(position(q, body), load(pool, o + 4)), p)
+    value = weight * dot(e, e)
+    if s < 0 or order == 0:
+        return value
+    turn = cross(p, e)
+    for k in range(3):
+        gradient[s + k] += 2.0 * weight * e[k]
+        gradient[s + 3 + k] += 2.0 * weight * turn[k]
+    pp = dot(p, p) - dot(e, p)
+    for k in range(3):
+        hessian[s + k, s + k] += 2.0 * weight
+        hessian[s + 3 + k, s + 3 + k] += 2.0 * weight * pp
+        i = (k + 1) % 3
+        j = (k + 2) % 3
+        # d(turn)/dx = [p]x: -p_j at (k, i), +p_i at (k, j).
+        hessian[s + i, s + 3 + k] -= 2.0 * weight * p[j]
+        hessian[s + j, s + 3 + k] += 2.0 * weight * p[i]
+        for l in range(k, 3):
+            hessian[s + 3 + k, s + 3 + l] += weight * (p[k] * e[l] + e[k] * p[l] - 2.0 * p[k] * p[l])
+    return value
+
+
+@kernel(inner=True)
+def posture(pool, o, q, body, s, order, gradient, hessian):
+    """|x - x0|^2 and 4 sin^2(angle / 2), with c and u the scalar and vector part of e0 e^*."""
+    weight = pool[o + POSTURE_LENGTH]
+    lever = pool[o + POSTURE_TURN]
+    d = sub(position(q, body), load(pool, o + POSTURE_POSITION))
+    at = o + POSTURE_QUATERNION
+    c, ux, uy, uz = quaternion_product(
+        (pool[at], pool[at + 1], pool[at + 2], pool[at + 3]), (q[body, 3], -q[body, 4], -q[body, 5], -q[body, 6])
+    )
+    u = (ux, uy, uz)
+    value = weight * dot(d, d) + 4.0 * lever * dot(u, u)
+    if s < 0 or order == 0:
+        return value
+    for k in range(3):
+        gradient[s + k] += 2.0 * weight * d[k]
+        gradient[s + 3 + k] -= 4.0 * lever * c * u[k]
+    for k in range(3):
+        hessian[s + k, s + k] += 2.0 * weight
+        hessian[s + 3 + k, s + 3 + k] += 2.0 * lever * c * c
+        for l in range(k, 3):
+            hessian[s + 3 + k, s + 3 + l] -= 2.0 * lever * u[k] * u[l]
+    return value
+
+
+@kernel(inner=True)
+def tape_term(table, pool, term, q, order, room, entries, gradient, hessian):
+    """Weight times the one value of a tape."""
+    inputs, outputs, work = room
+    weight = pool[table[term + TERM_PARAMETERS]]
+    size = pool[SCALE]
+    # A term's tape has the record of a row's tape, one value.
+    tape = table[term + TERM_TAPE]
+    end = place_tape(table, pool, tape, q, inputs)
+    call_address(table[RUN_TAPE_AT], (table, pool, table[tape], inputs, work, outputs))
+    value = weight * outputs[0]
+    count = table[tape + 3]
+    bodies = table[tape + 4]
+    if order == 0 or not math.isfinite(value):
+        return value if math.isfinite(value) else math.inf
+    for b in range(count):
+        s = 6 * table[table[SLOTS] + table[bodies + b]]
+        if s >= 0:
+            for i in range(3):
+                gradient[s + i] += weight * size * outputs[1 + 6 * b + i]
+                gradient[s + 3 + i] += weight * outputs[4 + 6 * b + i]
+    inputs[end] = weight
+    call_address(table[RUN_TAPE_AT], (table, pool, table[tape + 1], inputs, work, outputs))
+    for b in range(count):
+        at = 6 * table[table[SLOTS] + table[bodies + b]]
+        for c in range(count):
+            other = 6 * table[table[SLOTS] + table[bodies + c]]
+            if at < 0 or other < at:
+                continue
+            row, column = spot(entries, at, other)
+            for i in range(6):
+                for j in range(6):
+                    factor = (size if i < 3 else 1.0) * (size if j < 3 else 1.0)
+                    hessian[row + i, column + j] += factor * outputs[6 * count * (6 * b + i) + 6 * c + j]
+    return value
+
+
+@kernel(inner=True)
+def term_by_blocks(pool, o, kind, q, body, s, entries, gradient, hessian):
+    """A term of one body with its derivatives, for a Hessian by blocks."""
+    if s < 0:
+        slope, block, order = gradient[:0], hessian[:0], 0
+    else:
+        at = block_row(entries[3], s, s)
+        slope, block, order = gradient[s : s + 6], hessian[at : at + 6], 1
+    if kind == POINT_DISTANCE:
+        return point_distance(pool, o, q, body, 0, order, slope, block)
+    return posture(pool, o, q, body, 0, order, slope, block)
+
+
+@kernel(inner=True)
+def recenter(table, pool, q):
+    """Postures that have no reference of their own from where their bodies are now."""
+    for t in range(table[TERMS]):
+        term = table[TERM_TABLE] + TERM * t
+        if table[term + TERM_KIND] == POSTURE and table[term + TERM_FOLLOWS] == 1:
+            o = table[term + TERM_PARAMETERS] + POSTURE_POSITION
+            for k in range(7):
+                pool[o + k] = q[table[term + TERM_BODY], k]
+
+
+@kernel(inner=True)
+def objective(table, pool, q, order, room, entries, gradient, hessian):
+    """Value of the objective. From order 1 on the gradient and the upper triangle of the Hessian are overwritten.
+
+    `entries` says where the Hessian has any (`constraints/program/envelope.py`).
+    """
+    if order > 0:
+        for i in range(gradient.size):
+            gradient[i] = 0.0
+        clear_upper(entries, gradient.size, hessian)
+    blocked = order > 0 and is_blocked(entries)
+    value = 0.0
+    for t in range(table[TERMS]):
+        term = table[TERM_TABLE] + TERM * t
+        kind = table[term + TERM_KIND]
+        body = table[term + TERM_BODY]
+        if blocked and (kind == POINT_DISTANCE or kind == POSTURE):
+            s = 6 * table[table[SLOTS] + body]
+            value += term_by_blocks(pool, table[term + TERM_PARAMETERS], kind, q, body, s, entries, gradient, hessian)
+        elif kind == POINT_DISTANCE:
+            s = 6 * table[table[SLOTS] + body]
+            value += point_distance(pool, table[term + TERM_PARAMETERS], q, body, s, order, gradient, hessian)
+        elif kind == POSTURE:
+            s = 6 * table[table[SLOTS] + body]
+            value += posture(pool, table[term + TERM_PARAMETERS], q, body, s, order, gradient, hessian)
+        elif kind == TAPE_TERM:
+            value += tape_term(table, pool, term, q, order, room, entries, gradient, hessian)
+    return value

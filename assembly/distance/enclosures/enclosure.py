@@ -1,0 +1,288 @@
+"""Convex sets that hold a piece of a curve, each by its support, and the records of pieces.
+
+    h(n) = max n.C(t),  t in [t0, t1],  |n| = 1        chi = C(t1) - C(t0),  L = t1 - t0,  f0, f1 = n.C at the ends
+
+    ellipsoid   h <= (f0 + f1) / 2 + sqrt(w + (n.chi)^2) / 2      (Lakshmanan et al., theorem 1, of any dimension)
+    capsule     h <= max(f0, f1) + L^2 max|C''| / 8
+    taylor      h <= max over s of (1 - s) f0 + s f1 + q s (1 - s) / 2,   q = L^2 max(0, max -n.C'')
+    box         h <= the support of the box of C
+
+with the width w = L int |C' - chi / L|^2 dt, which is what u^2 - |chi|^2 of lemma 1 is without its cancellation. Of a
+formula it is bounded by the least of L^4 max|C''|^2 / 12, (L^2 (|C''(m)| / sqrt 12 + L max|C'''| / sqrt 320))^2 (C' is
+C'(m) + C''(m) (t - m) and a rest, in the norm of the variance), (L max|C'|)^2 - |chi|^2 and the user's bound of the
+length squared less |chi|^2. For sets A and B and any unit n
+
+    distance >= -h_A(n) - h_B(-n)
+
+which is the certificate; a good n only makes it large. Supports are taken from a reference point near A, so that they
+are as exact as differences; sums of three products err by 4 units of 2^-52 of their absolute sum, which is added.
+"""
+
+from __future__ import annotations
+
+import math
+
+from assembly._kernel import kernel
+from assembly.geometry.expression import formula
+from assembly.geometry.expression.formula import arc_bound, point_bounds, range_bounds, refine
+from assembly.geometry.interval import UNIT, down, magnitude, up
+from assembly.geometry.splines import bezier_ranges
+from assembly.geometry.splines.bezier_ranges import bezier_point_bounds, bezier_range_bounds
+
+# Kinds of operands.
+HULL, FORMULA, BEZIER = 0, 1, 2
+# Kinds of bounds; AUTO takes the least of all.
+AUTO, ELLIPSOID, CAPSULE, TAYLOR = 0, 1, 2, 3
+# Record of a piece: its interval, ends and middle point and how far these may be off, the width, the length of the
+# ellipsoid, the radius of the capsule, the Bezier piece, ranges (twelve pairs), values in the middle (nine pairs), and
+# whether its ends are ends of a smooth part of the curve.
+T0, T1, P0, P1, PM, OFF, WIDE, LENGTH, RADIUS, SPAN, BOX = 0, 1, 2, 5, 8, 11, 12, 13, 14, 15, 16
+SPEED, BEND, JERK, MID, MID_SPEED, MID_BEND, FIRST_END, LAST_END = 22, 28, 34, 40, 46, 52, 58, 59
+# How far the first end, the last and the middle may be off, each by itself; OFF is the largest.
+OFF_0, OFF_1, OFF_MID, PIECE = 60, 61, 62, 63
+_GROW = 1.0 + 16.0 * UNIT
+
+
+@kernel(inner=True, exact=True)
+def point_values(kind, table, pool, span, t, room, out, o):
+    """Intervals of C, C', C'' at t to out[o:], nine pairs."""
+    if kind == FORMULA:
+        point_bounds(table, pool, t, room)
+        for k in range(18):
+            out[o + k] = room[formula.RESULTS + k]
+    else:
+        at = bezier_ranges.BEZIER_AT
+        bezier_point_bounds(table, pool, span, t, room, at)
+        for k in range(18):
+            out[o + k] = room[at + k]
+
+
+@kernel(inline=True)
+def middle_of(x, o, k):
+    """A double in the k-th of the pairs at x[o:]."""
+    return 0.5 * (x[o + 2 * k] + x[o + 2 * k + 1])
+
+
+@kernel(inner=True, exact=True)
+def off_of(x, o):
+    """How far the middle of three pairs may be from what they enclose."""
+    a = x[o + 1] - x[o]
+    b = x[o + 3] - x[o + 2]
+    c = x[o + 5] - x[o + 4]
+    # Half the width, and the rounding of the middle itself.
+    size = abs(x[o]) + abs(x[o + 2]) + abs(x[o + 4])
+    return _GROW * (0.5 * math.sqrt(a * a + b * b + c * c) + UNIT * size)
+
+
+@kernel(inner=True, exact=True)
+def most(x, o):
+    """Largest norm of what three pairs enclose."""
+    a = magnitude((x[o], x[o + 1]))
+    b = magnitude((x[o + 2], x[o + 3]))
+    c = magnitude((x[o + 4], x[o + 5]))
+    return _GROW * math.sqrt(a * a + b * b + c * c)
+
+
+@kernel(inner=True, exact=True)
+def fill_piece(kind, table, pool, room, x, o):
+    """All of the record at x[o:] from its interval, its ends with how far these may be off, and its Bezier piece."""
+    t0 = x[o + T0]
+    t1 = x[o + T1]
+    middle = 0.5 * (t0 + t1)
+    span = int(x[o + SPAN])
+    point_values(kind, table, pool, span, middle, room, x, o + MID)
+    for k in range(3):
+        x[o + PM + k] = middle_of(x, o + MID, k)
+    x[o + OFF_MID] = off_of(x, o + MID)
+    x[o + OFF] = max(x[o + OFF_0], max(x[o + OFF_1], x[o + OFF_MID]))
+    width = math.inf
+    arc = math.inf
+    if kind == FORMULA:
+        range_bounds(table, pool, t0, t1, room)
+        for k in range(24):
+            x[o + BOX + k] = room[formula.RESULTS + k]
+        if table[formula.ARC_TAPE] != 0:
+            arc = arc_bound(table, pool, t0, t1, room)
+    else:
+        bezier_range_bounds(table, pool, span, t0, t1, room)
+        for k in range(24):
+            x[o + BOX + k] = room[bezier_ranges.RANGES + k]
+        width = room[bezier_ranges.WIDTH]
+    refine(x, o + BOX, up(max(middle - t0, t1 - middle)), o + MID)
+    step = up(t1 - t0)
+    bend = most(x, o + BEND)
+    x[o + RADIUS] = _GROW * 0.125 * step * step * bend
+    a = x[o + P1] - x[o + P0]
+    b = x[o + P1 + 1] - x[o + P0 + 1]
+    c = x[o + P1 + 2] - x[o + P0 + 2]
+    chord = math.sqrt(a * a + b * b + c * c)
+    if width == math.inf:
+        # 1 / sqrt 12 and 1 / sqrt 320, rounded up.
+        root = 0.288675134594813 * bend
+        root = min(root, 0.288675134594813 * most(x, o + MID_BEND) + 0.0559016994374948 * step * most(x, o + JERK))
+        root = _GROW * step * step * root
+        width = _GROW * root * root
+        arc = min(arc, _GROW * step * most(x, o + SPEED))
+        least = max(0.0, chord * (1.0 - 8.0 * UNIT) - 2.0 * x[o + OFF])
+        across = arc - least if arc > least else 0.0
+        # u^2 - |chi|^2 as a product: sums of squares would cancel once more.
+        other = _GROW * across * (arc + least) if arc < math.inf else math.inf
+        width = min(width, other)
+    if not (width < math.inf):
+        width = math.inf
+    x[o + WIDE] = width
+    x[o + LENGTH] = math.sqrt(width + chord * chord)
+
+
+@kernel(inner=True, exact=True)
+def split_piece(kind, table, pool, room, x, o, p):
+    """Both halves of the piece at x[o:] to x[p:] and behind it. Returns whether doubles can tell the halves apart."""
+    t0 = x[o + T0]
+    t1 = x[o + T1]
+    middle = 0.5 * (t0 + t1)
+    if not (t0 < middle < t1):
+        return False
+    for side in range(2):
+        q = p + PIECE * side
+        x[q + T0] = t0 if side == 0 else middle
+        x[q + T1] = middle if side == 0 else t1
+        for k in range(3):
+            x[q + P0 + k] = x[o + P0 + k] if side == 0 else x[o + PM + k]
+            x[q + P1 + k] = x[o + PM + k] if side == 0 else x[o + P1 + k]
+        x[q + OFF_0] = x[o + OFF_0] if side == 0 else x[o + OFF_MID]
+        x[q + OFF_1] = x[o + OFF_MID] if side == 0 else x[o + OFF_1]
+        x[q + SPAN] = x[o + SPAN]
+        x[q + FIRST_END] = x[o + FIRST_END] if side == 0 else 0.0
+        x[q + LAST_END] = 0.0 if side == 0 else x[o + LAST_END]
+        fill_piece(kind, table, pool, room, x, q)
+    return True
+
+
+@kernel(inner=True, exact=True)
+def first_pieces(kind, table, pool, room, x):
+    """Records of the smooth parts of a curve to x. Returns how many."""
+    count = 1 if kind == FORMULA else table[bezier_ranges.PIECES]
+    for i in range(count):
+        o = PIECE * i
+        x[o + T0] = pool[formula.DOMAIN] if kind == FORMULA else 0.0
+        x[o + T1] = pool[formula.DOMAIN + 1] if kind == FORMULA else 1.0
+        x[o + SPAN] = i
+        x[o + FIRST_END] = 1.0
+        x[o + LAST_END] = 1.0
+        for side in range(2):
+            point_values(kind, table, pool, i, x[o + T0 + side], room, x, o + MID)
+            for k in range(3):
+                x[o + P0 + 3 * side + k] = middle_of(x, o + MID, k)
+            x[o + OFF_0 + side] = off_of(x, o + MID)
+        fill_piece(kind, table, pool, room, x, o)
+    return count
+
+
+@kernel(inline=True)
+def along(x, o, n, c):
+    """n.(p - c) of the point at x[o:], and what its rounding may be."""
+    a = n[0] * (x[o] - c[0])
+    b = n[1] * (x[o + 1] - c[1])
+    d = n[2] * (x[o + 2] - c[2])
+    return a + b + d, 4.0 * UNIT * (abs(a) + abs(b) + abs(d))
+
+
+@kernel(inner=True, exact=True)
+def hull_support(x, o, count, n, c):
+    """Upper bound of n.(p - c) over `count` points from x[o]."""
+    best = -math.inf
+    for k in range(count):
+        f, slack = along(x, o + 3 * k, n, c)
+        best = max(best, f + slack)
+    return up(best)
+
+
+@kernel(inner=True, exact=True)
+def piece_support(x, o, n, c, bound):
+    """Upper bound of n.(C - c) over a piece, |n| at most 1 up to 2 units, by a kind of enclosure."""
+    f0, e0 = along(x, o + P0, n, c)
+    f1, e1 = along(x, o + P1, n, c)
+    slack = x[o + OFF] * _GROW + e0 + e1
+    d = f1 - f0
+    best = math.inf
+    # That of the box alone, which does not rest on points.
+    boxed = math.inf
+    if bound == AUTO or bound == ELLIPSOID:
+        # Ends that are off by OFF change both the center and the chord; each by less than OFF in the sum below.
+        best = 0.5 * (f0 + f1) + _GROW * 0.5 * math.sqrt(x[o + WIDE] * _GROW + d * d) + slack
+    if bound == CAPSULE:
+        best = max(f0, f1) + x[o + RADIUS] * _GROW
+    if bound == AUTO or bound == TAYLOR:
+        least = 0.0
+        for k in range(3):
+            if n[k] == 0.0:  # times infinity it would be no number
+                continue
+            p = n[k] * x[o + BEND + 2 * k]
+            q = n[k] * x[o + BEND + 2 * k + 1]
+            least += min(p, q) - UNIT * 4.0 * max(abs(p), abs(q)) - 1e-300
+        step = up(x[o + T1] - x[o + T0])
+        # q / 2 of the heading.
+        bulge = _GROW * 0.5 * step * step * max(0.0, -least)
+        if not (bulge < math.inf):
+            high = math.inf
+        elif abs(d) >= bulge:
+            high = max(f0, f1)
+        else:
+            high = 0.5 * (f0 + f1) + _GROW * (0.25 * bulge + d * d / (4.0 * bulge))
+        best = min(best, high)
+        high = 0.0
+        for k in range(3):
+            if n[k] == 0.0:
+                continue
+            p = n[k] * (x[o + BOX + 2 * k] - c[k])
+            q = n[k] * (x[o + BOX + 2 * k + 1] - c[k])
+            high += max(p, q) + UNIT * 4.0 * max(abs(p), abs(q))
+        if high == high:
+            boxed = high
+    best = min(best + slack, boxed)
+    if not (best < math.inf):
+        return math.inf
+    return up(best + 4.0 * UNIT * abs(best))
+
+
+@kernel(inner=True, exact=True)
+def separation_along(xa, oa, xb, ob, count_b, n, bound):
+    """Lower bound of the distance of two pieces, or of a piece and `count_b` points, from a direction of a to b."""
+    size = math.sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2])
+    if not (0.0 < size < math.inf):
+        return 0.0
+    n = (n[0] / size, n[1] / size, n[2] / size)
+    back = (-n[0], -n[1], -n[2])
+    c = (xa[oa + PM], xa[oa + PM + 1], xa[oa + PM + 2])
+    high_a = piece_support(xa, oa, n, c, bound)
+    if count_b > 0:
+        high_b = hull_support(xb, ob, count_b, back, c)
+    else:
+        high_b = piece_support(xb, ob, back, c, bound)
+    # The direction is a unit one up to two units.
+    lower = down(-high_a - high_b) * (1.0 - 8.0 * UNIT)
+    return lower if lower > 0.0 else 0.0
+
+
+@kernel(signatures="(i8, i8[::1], f8[::1], f8[::1], i8, f8, f8, f8[::1])")
+def enclose(kind, table, pool, room, span, t0, t1, x):
+    """The record of the piece over [t0, t1], to x; of a smooth part `span` of the curve."""
+    x[T0], x[T1], x[SPAN] = t0, t1, span
+    x[FIRST_END], x[LAST_END] = 1.0, 1.0
+    for side in range(2):
+        point_values(kind, table, pool, span, x[T0 + side], room, x, MID)
+        for k in range(3):
+            x[P0 + 3 * side + k] = middle_of(x, MID, k)
+        x[OFF_0 + side] = off_of(x, MID)
+    fill_piece(kind, table, pool, room, x, 0)
+
+
+@kernel(signatures="(f8[::1], f8[:, ::1], i8, f8[::1])")
+def supports(x, directions, bound, out):
+    """Upper bounds of n.C over the piece of a record for unit directions (k, 3)."""
+    for i in range(directions.shape[0]):
+        n = (directions[i, 0], directions[i, 1], directions[i, 2])
+        c = (x[PM], x[PM + 1], x[PM + 2])
+        shift = n[0] * c[0] + n[1] * c[1] + n[2] * c[2]
+        size = abs(n[0] * c[0]) + abs(n[1] * c[1]) + abs(n[2] * c[2])
+        out[i] = up(piece_support(x, 0, n, c, bound) + shift + 8.0 * UNIT * size)

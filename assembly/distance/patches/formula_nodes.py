@@ -1,0 +1,240 @@
+"""Pieces of a curve given by a formula as patches of degrees 2 and 0, for the search of `distance/patches/search.py`.
+
+What a patch search knows of a patch is its box and its quadratic model with a proven remainder
+(`distance/patches/nodes.py`). Of a
+formula both come from intervals: with the middle m of [t0, t1], h the width, t = m + h z and z in [-1/2, 1/2],
+
+    |C(t) - (A0 + J z + K z^2 / 2)| <= E0,    |h C' - (J + K z)| <= E1,    |h^2 C'' - K| <= E2
+
+hold with A0, J, K about C(m), h C'(m), h^2 C''(m) and, beside what these may be off by, for each the least of
+
+    third derivatives     E0 = s / 48,  E1 = s / 8,  E2 = s / 2,    s = h^3 sup |C'''|
+    second derivatives    E0 = v / 8,   E1 = v / 2,  E2 = v,        v = h^2 sup |C'' - C''(m)|
+    a kink, K = 0         E0 = r / 2,   E1 = r,                     r = h sup |C' - C'(m)|
+    a vertical, J = 0     E0 = sup |C - C(m)|
+
+A remainder that is not known is NONE, a number that is too large for any proof and whose products do not overflow.
+The rows are the model's Bezier points. A curve is (table, pool, room) of `geometry/expression/formula.py`, about its
+center.
+
+About a kink or a vertical bounds narrow with h alone, while as many patches as 1 / h come into question. So a piece
+without second derivatives is halved before any patch is, and one that is short against the tolerance, or has no double
+in its middle, is a dot: J = K = 0, its parameter none of the pair's, and what is proven of one of its points holds for
+all but for 2 E0.
+"""
+
+from __future__ import annotations
+
+import math
+
+from assembly._kernel import kernel
+from assembly.distance.enclosures.enclosure import middle_of, most, off_of
+from assembly.distance.patches.nodes import (
+    A0,
+    AWAY,
+    BOX_CENTER,
+    BOX_HALF,
+    DEEPEST,
+    DEPTH,
+    E0,
+    E1,
+    E2,
+    HALVES,
+    HIGH_U,
+    HIGH_V,
+    JU,
+    KUU,
+    LOW_U,
+    LOW_V,
+    NODE_INTS,
+    PATCH,
+    ROWS,
+    SPEED_U,
+    SPEED_V,
+    patch_stride,
+)
+from assembly.distance.patches.pair import OFF, PATCH_J, PATCH_K
+from assembly.geometry.expression import formula
+from assembly.geometry.expression.formula import point_bounds, range_bounds, refine
+from assembly.geometry.interval import UNIT, idifference, magnitude, up
+
+NONE = 1e100
+# Pairs of a record for work: C, C', C'', C''' over the interval, then C, C', C'' in its middle.
+_SPEED, _BEND, _JERK, _MIDDLE = 6, 12, 18, 24
+
+
+@kernel(inline=True)
+def half_width(t0, t1):
+    """Half the width of an interval about its middle as a double, rounded up."""
+    middle = 0.5 * (t0 + t1)
+    return up(max(middle - t0, t1 - middle))
+
+
+@kernel(inner=True)
+def set_interval(record, ints, nodes, k, t0, t1):
+    """Node k for [t0, t1], not described yet."""
+    o = patch_stride(record) * k
+    nodes[o + AWAY] = 0.0
+    nodes[o + LOW_U], nodes[o + HIGH_U] = t0, t1
+    nodes[o + LOW_V], nodes[o + HIGH_V] = 0.0, 1.0
+    ints[NODE_INTS * k + HALVES] = -1
+    ints[NODE_INTS * k + PATCH] = 0
+    # Where doubles have no middle there is nothing to halve.
+    ints[NODE_INTS * k + DEPTH] = 0 if t0 < 0.5 * (t0 + t1) < t1 else DEEPEST
+
+
+@kernel(inner=True)
+def start_formula(curve, record, ints, nodes):
+    """All of the curve as node 0."""
+    pool = curve[1]
+    set_interval(record, ints, nodes, 0, pool[formula.DOMAIN], pool[formula.DOMAIN + 1])
+
+
+@kernel(inner=True)
+def split_formula(record, ints, nodes, k, low):
+    """Make the halves of node k as nodes low and low + 1, not described yet."""
+    o = patch_stride(record) * k
+    t0 = nodes[o + LOW_U]
+    t1 = nodes[o + HIGH_U]
+    middle = 0.5 * (t0 + t1)
+    ints[NODE_INTS * k + HALVES] = low
+    set_interval(record, ints, nodes, low, t0, middle)
+    set_interval(record, ints, nodes, low + 1, middle, t1)
+
+
+@kernel(inline=True)
+def known_middle(x, o, k):
+    """The middle of the k-th of the pairs at x[o:], zero where that is not known."""
+    value = middle_of(x, o, k)
+    return value if abs(value) < NONE else 0.0
+
+
+@kernel(inner=True, exact=True)
+def spread(x, o, m):
+    """Largest norm of what three pairs at x[o:] enclose less the middles of those at x[m:], rounded up."""
+    total = 0.0
+    for k in range(3):
+        c = known_middle(x, m, k)
+        d = magnitude(idifference((x[o + 2 * k], x[o + 2 * k + 1]), (c, c)))
+        total += d * d
+    return math.sqrt(total) * (1.0 + 8.0 * UNIT)
+
+
+@kernel(inline=True)
+def bounded(x):
+    """A bound, or NONE for one that is none."""
+    return x if x < NONE else NONE
+
+
+@kernel(inline=True)
+def is_dot(nodes, o):
+    """Whether a piece counts as a point."""
+    return nodes[o + SPEED_V] < 0.0
+
+
+@kernel(inner=True, exact=True)
+def describe_formula(curve, short, nodes, o, x):
+    """Box and model of a piece from its interval; x (42) is for work, `short` the radius of a dot."""
+    table, pool, room = curve
+    t0 = nodes[o + LOW_U]
+    t1 = nodes[o + HIGH_U]
+    half = half_width(t0, t1)
+    h = 2.0 * half
+    range_bounds(table, pool, t0, t1, room)
+    for k in range(_MIDDLE):
+        x[k] = room[formula.RESULTS + k]
+    point_bounds(table, pool, 0.5 * (t0 + t1), room)
+    for k in range(18):
+        x[_MIDDLE + k] = room[formula.RESULTS + k]
+    refine(x, 0, half, _MIDDLE)
+    for k in range(3):
+        c = known_middle(x, 0, k)
+        r = bounded(up(max(x[2 * k + 1] - c, c - x[2 * k])))
+        nodes[o + BOX_CENTER + k] = c
+        nodes[o + BOX_HALF + k] = r
+    speed = h * most(x, _SPEED)
+    grow = 1.0 + 64.0 * UNIT
+    off = off_of(x, _MIDDLE)
+    off_j = h * off_of(x, _MIDDLE + _SPEED)
+    off_k = h * h * off_of(x, _MIDDLE + _BEND)
+    third = h * h * h * most(x, _JERK)
+    second = h * h * spread(x, _BEND, _MIDDLE + _BEND)
+    first = h * spread(x, _SPEED, _MIDDLE + _SPEED)
+    j = h
+    k2 = h * h
+    e0 = min(third / 48.0 + 0.125 * off_k, 0.125 * second) + off + 0.5 * off_j
+    e1 = min(0.125 * third + 0.5 * off_k, 0.5 * second) + off_j
+    e2 = min(0.5 * third + off_k, second)
+    dot = 0.0
+    if not (e0 < NONE and off_k < NONE):
+        # Halved first, until it is a dot.
+        speed = NONE
+        k2 = 0.0
+        e0 = 0.5 * first + off
+        e1 = first
+        e2 = NONE
+        radius = spread(x, 0, _MIDDLE)
+        if radius <= short or not t0 < 0.5 * (t0 + t1) < t1:
+            dot = -1.0
+            speed = 0.0
+        if dot < 0.0 or not e0 < NONE:
+            j = 0.0
+            e0 = radius
+            e1 = NONE
+    nodes[o + SPEED_U] = bounded(speed)
+    nodes[o + SPEED_V] = dot
+    # Products of h and the sums with rows are rounded, too.
+    size = 0.0
+    for k in range(3):
+        a = known_middle(x, _MIDDLE, k)
+        slope = j * known_middle(x, _MIDDLE + _SPEED, k)
+        bend = k2 * known_middle(x, _MIDDLE + _BEND, k)
+        nodes[o + A0 + k] = a
+        nodes[o + JU + k] = slope
+        nodes[o + JU + 3 + k] = 0.0
+        nodes[o + KUU + k] = bend
+        nodes[o + KUU + 3 + k] = 0.0
+        nodes[o + KUU + 6 + k] = 0.0
+        nodes[o + ROWS + k] = a - 0.5 * slope + 0.125 * bend
+        nodes[o + ROWS + 4 + k] = a - 0.125 * bend
+        nodes[o + ROWS + 8 + k] = a + 0.5 * slope + 0.125 * bend
+        size += abs(a) + abs(slope) + abs(bend)
+    for k in range(3):
+        nodes[o + ROWS + 4 * k + 3] = 1.0
+    nodes[o + E0] = bounded(e0 * grow + 8.0 * UNIT * size)
+    nodes[o + E1] = bounded(e1 * grow + 8.0 * UNIT * size)
+    nodes[o + E2] = bounded(e2 * grow + 8.0 * UNIT * size)
+
+
+@kernel(inner=True, exact=True)
+def formula_derivatives(curve, nodes, o, x, w):
+    """Point of a piece at m + h (x - 1/2); derivatives by z at PATCH_J and PATCH_K.
+
+    To OFF how far the point and the first derivative may be off, and how far z can go back and ahead within the piece.
+    """
+    table, pool, room = curve
+    t0 = nodes[o + LOW_U]
+    t1 = nodes[o + HIGH_U]
+    h = 2.0 * half_width(t0, t1)
+    t = formula_parameter(nodes, o, x)
+    point_bounds(table, pool, t, room)
+    at = formula.RESULTS
+    size = 0.0
+    for k in range(3):
+        w[PATCH_J + k] = h * known_middle(room, at + _SPEED, k)
+        w[PATCH_K + k] = h * h * known_middle(room, at + _BEND, k)
+        size += abs(w[PATCH_J + k])
+    w[OFF] = bounded(off_of(room, at))
+    w[OFF + 1] = bounded(h * off_of(room, at + _SPEED) + 2.0 * UNIT * size)
+    w[OFF + 2] = up(up(t - t0) / h)
+    w[OFF + 3] = up(up(t1 - t) / h)
+    return known_middle(room, at, 0), known_middle(room, at, 1), known_middle(room, at, 2)
+
+
+@kernel(inline=True)
+def formula_parameter(nodes, o, x):
+    """The curve's parameter of a place on a piece, as `formula_derivatives` takes it."""
+    t0 = nodes[o + LOW_U]
+    t1 = nodes[o + HIGH_U]
+    t = 0.5 * (t0 + t1) + 2.0 * half_width(t0, t1) * (x - 0.5)
+    return min(max(t, t0), t1)

@@ -1,0 +1,258 @@
+"""Bezier patches that a certified search halves: their boxes, and a quadratic model with a proven remainder.
+
+As `distance/curves/nodes.py`, in two parameters: with x, y in [-1/2, 1/2] on a patch,
+
+    |S - (A0 + Ju x + Jv y + Kuu x^2 / 2 + Kuv x y + Kvv y^2 / 2)| <= E0 = (m30 + 3 m21 + 3 m12 + m03) / 48,
+
+m_kl >= sup |S_kl|, and likewise E1 for the first and E2 for the second derivatives. The bounds m follow from
+differences of the net about the center of its box; for S = X / w from Leibniz' rule solved for the highest derivative,
+
+    m_kl w = |X_kl| + sum over (i, j) < (k, l) of C(k, i) C(l, j) |w_(k-i)(l-j)| m_ij.
+
+A curve is a patch of degree 0 in v, a point one of degree 0 in both; what is said of rounding there holds here with
+the sum of both degrees.
+"""
+
+from __future__ import annotations
+
+import math
+
+from assembly._kernel import kernel
+from assembly.distance.curves.nodes import length
+from assembly.geometry.splines.bezier_pieces import ERROR, REACH, UNIT
+
+# Integers of a record: degrees, patches along u and v, 1 where weights differ, and where in the pool its tables are:
+# breaks, weights of the middles, binomials (as for curves, each direction), nets.
+DEGREE_U, DEGREE_V, PATCHES_U, PATCHES_V, RATIONAL, BREAKS_U, BREAKS_V, MIDDLE_U, MIDDLE_V, NETS, PATCH_RECORD = (
+    0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10
+)  # fmt: skip
+# Doubles of a node.
+BOX_CENTER, BOX_HALF, A0, JU, KUU, E0, E1, E2, SPEED_U, SPEED_V, AWAY, LOW_U, HIGH_U, LOW_V, HIGH_V, ROWS = (
+    0, 3, 6, 9, 15, 24, 25, 26, 27, 28, 29, 30, 31, 32, 33, 34
+)  # fmt: skip
+# Integers: the halves (-1: not made yet), the patch, halvings.
+HALVES, PATCH, DEPTH, NODE_INTS = 0, 1, 2, 3
+# Halvings after which a node is let go.
+DEEPEST = 60
+
+
+@kernel(inline=True)
+def patch_stride(record):
+    """Doubles of a node."""
+    return ROWS + 4 * (record[DEGREE_U] + 1) * (record[DEGREE_V] + 1) * (1 + record[RATIONAL])
+
+
+@kernel(inline=True)
+def patch_positions(record, o):
+    """Where the positions of a node's control points begin."""
+    return o + ROWS + 4 * (record[DEGREE_U] + 1) * (record[DEGREE_V] + 1) * record[RATIONAL]
+
+
+@kernel(inner=True, exact=True)
+def fill_patch(record, pool, ints, nodes, k):
+    """Node k for the patch k."""
+    count = 4 * (record[DEGREE_U] + 1) * (record[DEGREE_V] + 1)
+    o = patch_stride(record) * k
+    for j in range(count):
+        nodes[o + ROWS + j] = pool[record[NETS] + count * k + j]
+    nodes[o + AWAY] = pool[ERROR]
+    nodes[o + LOW_U] = 0.0
+    nodes[o + HIGH_U] = 1.0
+    nodes[o + LOW_V] = 0.0
+    nodes[o + HIGH_V] = 1.0
+    ints[NODE_INTS * k + HALVES] = -1
+    ints[NODE_INTS * k + PATCH] = k
+    ints[NODE_INTS * k + DEPTH] = 0
+
+
+@kernel(inner=True, exact=True)
+def split_patch(record, pool, ints, nodes, k, low):
+    """Make the halves of node k, across its longer direction, as nodes low and low + 1, not described yet."""
+    p = record[DEGREE_U]
+    q = record[DEGREE_V]
+    stride = patch_stride(record)
+    o = stride * k
+    a = stride * low
+    b = a + stride
+    ints[NODE_INTS * k + HALVES] = low
+    for j in range(low, low + 2):
+        ints[NODE_INTS * j + HALVES] = -1
+        ints[NODE_INTS * j + PATCH] = ints[NODE_INTS * k + PATCH]
+        ints[NODE_INTS * j + DEPTH] = ints[NODE_INTS * k + DEPTH] + 1
+    for j in range(A0, ROWS):
+        nodes[a + j] = nodes[o + j]
+        nodes[b + j] = nodes[o + j]
+    for j in range(4 * (p + 1) * (q + 1)):
+        nodes[b + ROWS + j] = nodes[o + ROWS + j]
+    along_u = nodes[o + SPEED_U] >= nodes[o + SPEED_V]
+    n = p if along_u else q
+    step = 4 * (q + 1) if along_u else 4
+    lines = q + 1 if along_u else p + 1
+    across = 4 if along_u else 4 * (q + 1)
+    for line in range(lines):
+        s = b + ROWS + across * line
+        t = a + ROWS + across * line
+        for r in range(n + 1):
+            for j in range(4):
+                nodes[t + step * r + j] = nodes[s + j]
+            for i in range(n - r):
+                for j in range(4):
+                    nodes[s + step * i + j] = 0.5 * (nodes[s + step * i + j] + nodes[s + step * (i + 1) + j])
+    side = LOW_U if along_u else LOW_V
+    middle = 0.5 * (nodes[o + side] + nodes[o + side + 1])
+    nodes[a + side + 1] = middle
+    nodes[b + side] = middle
+    away = nodes[o + AWAY] + (2.0 + 2.0 * record[RATIONAL]) * n * UNIT * pool[REACH]
+    nodes[a + AWAY] = away
+    nodes[b + AWAY] = away
+
+
+@kernel(inner=True, exact=True)
+def largest_difference(nodes, at, p, q, k, l, center):
+    """Largest difference of orders k and l of the net, of X = w (P - center) and of w."""
+    most = 0.0
+    heaviest = 0.0
+    for i in range(p + 1 - k):
+        for j in range(q + 1 - l):
+            x = y = z = w = 0.0
+            sign_u = 1.0
+            for a in range(k + 1):
+                factor = sign_u
+                for b in range(l + 1):
+                    o = at + 4 * ((q + 1) * (i + a) + j + b)
+                    v = factor * nodes[o + 3]
+                    x += v * (nodes[o] - center[0])
+                    y += v * (nodes[o + 1] - center[1])
+                    z += v * (nodes[o + 2] - center[2])
+                    w += v
+                    factor *= -float(l - b) / (b + 1.0)
+                sign_u *= -float(k - a) / (a + 1.0)
+            most = max(most, x * x + y * y + z * z)
+            heaviest = max(heaviest, abs(w))
+    return math.sqrt(most), heaviest
+
+
+@kernel(inline=True)
+def falling(n, k):
+    """n (n - 1) ... of k factors."""
+    value = 1.0
+    for i in range(k):
+        value *= n - i
+    return value
+
+
+@kernel(inner=True, exact=True)
+def describe_patch(record, pool, nodes, o, m):
+    """Box and model of a patch from its rows; m (32) is for work."""
+    p = record[DEGREE_U]
+    q = record[DEGREE_V]
+    rational = record[RATIONAL] == 1
+    at = patch_positions(record, o)
+    count = (p + 1) * (q + 1)
+    least = math.inf
+    heaviest = 0.0
+    for i in range(count):
+        s = o + ROWS + 4 * i
+        w = nodes[s + 3]
+        least = min(least, w)
+        heaviest = max(heaviest, w)
+        if rational:
+            for j in range(3):
+                nodes[at + 4 * i + j] = nodes[s + j] / w
+            nodes[at + 4 * i + 3] = w
+    for j in range(3):
+        low = math.inf
+        high = -math.inf
+        for i in range(count):
+            low = min(low, nodes[at + 4 * i + j])
+            high = max(high, nodes[at + 4 * i + j])
+        nodes[o + BOX_CENTER + j] = 0.5 * (low + high)
+        nodes[o + BOX_HALF + j] = 0.5 * (high - low) + 8.0 * UNIT * pool[REACH]
+    center = (nodes[o], nodes[o + 1], nodes[o + 2])
+    r = length((nodes[o + 3], nodes[o + 4], nodes[o + 5]))
+    ratio = heaviest / least
+    grow = 1.0 + 1e-12
+    # Bounds of derivatives: m[4 k + l], those of w behind.
+    m[0] = r
+    for k in range(4):
+        for l in range(4 - k):
+            if k + l == 0 or (not rational and k + l == 2):
+                continue
+            i = 4 * k + l
+            m[i] = 0.0
+            m[16 + i] = 0.0
+            scale = falling(p, k) * falling(q, l)
+            if k <= p and l <= q:
+                x, w = largest_difference(nodes, at, p, q, k, l, center)
+                m[i] = scale * (x / least + 64.0 * UNIT * ratio * r)
+                m[16 + i] = scale * (w / least + 64.0 * UNIT * ratio) if rational else 0.0
+            if rational:
+                for a in range(k + 1):
+                    for b in range(l + 1):
+                        if a < k or b < l:
+                            m[i] += binomial(k, a) * binomial(l, b) * m[16 + 4 * (k - a) + l - b] * m[4 * a + b]
+            m[i] *= grow
+    # The middle: value and derivatives of X and w.
+    v = (0.0, 0.0, 0.0, 0.0)
+    du = v
+    dv = v
+    uu = v
+    uv = v
+    vv = v
+    mu = record[MIDDLE_U]
+    mv = record[MIDDLE_V]
+    for i in range(p + 1):
+        for j in range(q + 1):
+            s = at + 4 * ((q + 1) * i + j)
+            w = nodes[s + 3]
+            row = (w * (nodes[s] - center[0]), w * (nodes[s + 1] - center[1]), w * (nodes[s + 2] - center[2]), w)
+            a0 = pool[mu + i]
+            a1 = pool[mu + p + 1 + i]
+            a2 = pool[mu + 2 * p + 2 + i]
+            b0 = pool[mv + j]
+            b1 = pool[mv + q + 1 + j]
+            b2 = pool[mv + 2 * q + 2 + j]
+            v = plus(v, a0 * b0, row)
+            du = plus(du, a1 * b0, row)
+            dv = plus(dv, a0 * b1, row)
+            uu = plus(uu, a2 * b0, row)
+            uv = plus(uv, a1 * b1, row)
+            vv = plus(vv, a0 * b2, row)
+    w = 1.0 / v[3]
+    for j in range(3):
+        c = w * v[j]
+        cu = w * (du[j] - du[3] * c)
+        cv = w * (dv[j] - dv[3] * c)
+        nodes[o + A0 + j] = center[j] + c
+        nodes[o + JU + j] = cu
+        nodes[o + JU + 3 + j] = cv
+        nodes[o + KUU + j] = w * (uu[j] - 2.0 * du[3] * cu - uu[3] * c)
+        nodes[o + KUU + 3 + j] = w * (uv[j] - du[3] * cv - dv[3] * cu - uv[3] * c)
+        nodes[o + KUU + 6 + j] = w * (vv[j] - 2.0 * dv[3] * cv - vv[3] * c)
+    n = p + q + 1.0
+    u = 8.0 * (n + 8.0) * UNIT * r * ratio
+    e0 = u + 4.0 * UNIT * pool[REACH]
+    e1 = 8.0 * n * u * ratio
+    e2 = 64.0 * n * n * u * ratio * ratio
+    m30 = m[12]
+    m21 = m[9]
+    m12 = m[6]
+    m03 = m[3]
+    nodes[o + E0] = (m30 + 3.0 * m21 + 3.0 * m12 + m03) / 48.0 * grow + e0 + e1 + 0.5 * e2
+    nodes[o + E1] = 0.125 * max(m30 + 2.0 * m21 + m12, m21 + 2.0 * m12 + m03) * grow + e1 + e2
+    nodes[o + E2] = 0.5 * max(m30 + m21, m21 + m12, m12 + m03) * grow + e2
+    nodes[o + SPEED_U] = m[4]
+    nodes[o + SPEED_V] = m[1]
+
+
+@kernel(inline=True)
+def plus(a, s, b):
+    return (a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2], a[3] + s * b[3])
+
+
+@kernel(inline=True)
+def binomial(n, k):
+    """C(n, k) for n at most 3."""
+    if k == 0 or k == n:
+        return 1.0
+    return float(n)

@@ -1,0 +1,307 @@
+"""Certified distance of a surface and a point, a curve or a surface: the search of `distance/curves/search.py` over
+patches.
+
+The curve may be given by a formula: its pieces are `distance/patches/formula_nodes.py`'s.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from assembly._kernel import kernel
+from assembly.distance.curves.nodes import length
+from assembly.distance.curves.search import CONVERGED, bound_to_beat, ended, in_span, longer, pop, push
+from assembly.distance.patches.formula_nodes import (
+    describe_formula,
+    formula_parameter,
+    is_dot,
+    split_formula,
+    start_formula,
+)
+from assembly.distance.patches.newton import load_points, nearest_in_patches, proven_in_patches
+from assembly.distance.patches.nodes import (
+    AWAY,
+    BREAKS_U,
+    BREAKS_V,
+    DEEPEST,
+    DEGREE_U,
+    DEGREE_V,
+    DEPTH,
+    E0,
+    HALVES,
+    HIGH_U,
+    HIGH_V,
+    LOW_U,
+    LOW_V,
+    NODE_INTS,
+    PATCH,
+    PATCHES_U,
+    PATCHES_V,
+    RATIONAL,
+    SPEED_U,
+    SPEED_V,
+    describe_patch,
+    fill_patch,
+    patch_stride,
+    split_patch,
+)
+from assembly.distance.patches.pair import (
+    BASIS,
+    PLACE,
+    D,
+    H,
+    Z,
+    clear_bends,
+    free_count,
+    load_hessian,
+    load_models,
+    patch_box_bound,
+    patch_convexity,
+    patch_hull_bound,
+    patch_model_bound,
+    size_at,
+)
+from assembly.geometry.splines.bezier_pieces import CENTER, ERROR, REACH, UNIT, WEIGHT_RATIO
+
+# What it writes: bounds, parameters of a and of b, the two points, pairs bounded.
+LOWER, UPPER, PARAMETERS, POINTS, COUNT, PATCH_ANSWER = 0, 1, 2, 6, 12, 13
+_ROOM = 512
+
+
+@kernel(inline=True)
+def patch_size(nodes, o):
+    """The longer side of a patch."""
+    return max(nodes[o + SPEED_U], nodes[o + SPEED_V])
+
+
+@kernel(inline=True)
+def point_error(record, pool):
+    """How far an evaluated point may be from the packed patch: sums of positive terms in triangles of 3 n roundings."""
+    n = record[DEGREE_U] + record[DEGREE_V]
+    return (1.0 + record[RATIONAL]) * (8.0 * n + 24.0) * UNIT * pool[REACH]
+
+
+@kernel(inline=True)
+def derivative_error(record, pool):
+    """The same of a derivative: n differences of such sums, in a quotient also of the weights."""
+    n = record[DEGREE_U] + record[DEGREE_V] + 1.0
+    return 8.0 * n * (4.0 * n + 16.0) * UNIT * pool[REACH] * pool[WEIGHT_RATIO] ** (2 * record[RATIONAL])
+
+
+@kernel(inner=True)
+def keep_patch_points(ra, qa, ia, a, ka, rb, qb, ib, b, kb, na, nb, curve, w, u, v, upper, out):
+    """Write nearest points that are known: u and v at PLACE of two nodes."""
+    o = patch_stride(ra) * ka
+    p = patch_stride(rb) * kb
+    patch = ia[NODE_INTS * ka + PATCH]
+    out[PARAMETERS] = between(qa, ra[BREAKS_U] + patch // ra[PATCHES_V], a[o + LOW_U], a[o + HIGH_U], w[PLACE])
+    out[PARAMETERS + 1] = between(
+        qa, ra[BREAKS_V] + patch % ra[PATCHES_V], a[o + LOW_V], a[o + HIGH_V], w[PLACE + 1] if na > 1 else 0.0
+    )
+    patch = ib[NODE_INTS * kb + PATCH]
+    x = w[PLACE + na] if nb > 0 else 0.0
+    y = w[PLACE + na + 1] if nb > 1 else 0.0
+    if curve is None:
+        out[PARAMETERS + 2] = between(qb, rb[BREAKS_U] + patch // rb[PATCHES_V], b[p + LOW_U], b[p + HIGH_U], x)
+        out[PARAMETERS + 3] = between(qb, rb[BREAKS_V] + patch % rb[PATCHES_V], b[p + LOW_V], b[p + HIGH_V], y)
+    else:
+        out[PARAMETERS + 2] = formula_parameter(b, p, x)
+    out[UPPER] = upper
+    for j in range(3):
+        out[POINTS + j] = u[j] + qa[CENTER + j]
+        out[POINTS + 3 + j] = v[j] + qb[CENTER + j]
+
+
+@kernel(inline=True)
+def between(pool, at, low, high, x):
+    """The parameter of a place on a node of one direction."""
+    return in_span(pool, at, low + x * (high - low))
+
+
+@kernel(
+    signatures=(
+        "(i8[::1], f8[::1], i8[::1], f8[::1], Tuple((i8[::1], f8[::1], f8[::1])), f8, f8, i8, b1, f8[::1])",
+        "(i8[::1], f8[::1], i8[::1], f8[::1], none, f8, f8, i8, b1, f8[::1])",
+    ),
+    allocates=True,
+)
+def patch_distance(ra, qa, rb, qb, curve, tolerance, clearance, budget, polish, out):
+    """Bounds of the distance of two packed shapes, the first no point; a clearance below zero asks for the distance.
+
+    The second may stand for a curve given by a formula, which is None else.
+    """
+    shift = (qb[CENTER] - qa[CENTER], qb[CENTER + 1] - qa[CENTER + 1], qb[CENTER + 2] - qa[CENTER + 2])
+    slack = 8.0 * UNIT * (qa[REACH] + qb[REACH] + length(shift)) + 1e-150
+    error = slack + point_error(ra, qa) + point_error(rb, qb)
+    rough = max(derivative_error(ra, qa), derivative_error(rb, qb))
+    step = max(0.999 * tolerance, 8.0 * (error + qa[ERROR] + qb[ERROR]))
+    na = free_count(ra)
+    nb = free_count(rb)
+    n = na + nb
+    sa = patch_stride(ra)
+    sb = patch_stride(rb)
+    used_a = ra[PATCHES_U] * ra[PATCHES_V]
+    used_b = rb[PATCHES_U] * rb[PATCHES_V]
+    room_a = used_a + _ROOM
+    room_b = used_b + _ROOM
+    room = used_a * used_b + _ROOM
+    a = np.empty(room_a * sa)
+    b = np.empty(room_b * sb)
+    ia = np.empty(room_a * NODE_INTS, np.int64)
+    ib = np.empty(room_b * NODE_INTS, np.int64)
+    keys = np.empty(room)
+    first = np.empty(room, np.int64)
+    second = np.empty(room, np.int64)
+    degree = max(max(ra[DEGREE_U], ra[DEGREE_V]), max(rb[DEGREE_U], rb[DEGREE_V]))
+    w = np.empty(BASIS + 6 * (degree + 1))
+    m = np.empty(42)
+    clear_bends(w)
+    for k in range(used_a):
+        fill_patch(ra, qa, ia, a, k)
+    if curve is None:
+        for k in range(used_b):
+            fill_patch(rb, qb, ib, b, k)
+    else:
+        start_formula(curve, rb, ib, b)
+    count = 0
+    # The first corners, which are on both shapes.
+    for i in range(4):
+        w[PLACE + i] = 0.0
+    _low, upper, u, v = proven_in_patches(ra, a, 0, na, rb, b, 0, nb, curve, shift, error, rough, False, w)
+    keep_patch_points(ra, qa, ia, a, 0, rb, qb, ib, b, 0, na, nb, curve, w, u, v, upper, out)
+    at_start = True
+    let_go = math.inf
+    bounded = 0
+    status = CONVERGED
+    key = 0.0
+    # Nodes from new_a and new_b on are to be described; then pairs first_a..last_a with first_b..last_b bounded.
+    new_a = 0
+    new_b = 0
+    first_a = 0
+    last_a = used_a
+    first_b = 0
+    last_b = used_b
+    while True:
+        for k in range(new_a, used_a):
+            describe_patch(ra, qa, a, sa * k, m)
+        for k in range(new_b, used_b):
+            if curve is None:
+                describe_patch(rb, qb, b, sb * k, m)
+            else:
+                describe_formula(curve, 0.125 * step, b, sb * k, m)
+        new_a = used_a
+        new_b = used_b
+        limit = bound_to_beat(upper, step, clearance)
+        for ja in range(first_a, last_a):
+            for jb in range(first_b, last_b):
+                bounded += 1
+                oa = sa * ja
+                ob = sb * jb
+                if curve is not None:
+                    nb = 0 if is_dot(b, ob) else 1
+                    n = na + nb
+                bound = max(key, patch_box_bound(a, oa, b, ob, shift, slack))
+                # At the start, where there are many, boxes must do.
+                if bound < limit and not at_start:
+                    load_models(a, oa, na, b, ob, nb, shift, w)
+                    load_hessian(w, n)
+                    bound = max(bound, patch_model_bound(a, oa, b, ob, slack, n, w))
+                    if bound < limit:
+                        # The rows of a formula are its model's, which is not the curve.
+                        rest = 0.0 if curve is None else b[ob + E0]
+                        bound = max(bound, patch_hull_bound(ra, a, oa, rb, b, ob, shift, slack, n, w) - rest)
+                if bound < limit:
+                    push(keys, first, second, count, bound, ja, jb)
+                    count += 1
+                else:
+                    let_go = min(let_go, bound)
+        first_a = last_a
+        at_start = False
+        top = min(keys[0], let_go) if count > 0 else let_go
+        status = ended(top, upper, step, clearance, count, bounded, budget)
+        if status >= 0:
+            break
+        key = keys[0]
+        ka = first[0]
+        kb = second[0]
+        pop(keys, first, second, count)
+        count -= 1
+        oa = sa * ka
+        ob = sb * kb
+        if curve is not None:
+            nb = 0 if is_dot(b, ob) else 1
+            n = na + nb
+        away = a[oa + AWAY] + b[ob + AWAY]
+        load_models(a, oa, na, b, ob, nb, shift, w)
+        load_hessian(w, n)
+        key = max(key, patch_model_bound(a, oa, b, ob, slack, n, w))
+        for i in range(n):
+            w[PLACE + i] = w[Z + i] + 0.5
+        proven = polish and patch_convexity(a, oa, na, b, ob, n, w)
+        for i in range(n):
+            w[Z + i] = w[H + 5 * i]
+        descend = proven
+        if polish and not proven:
+            load_points(ra, a, oa, na, rb, b, ob, nb, curve, shift, w)
+            descend = size_at(w, D) + error + away < upper
+        if descend:
+            nearest_in_patches(ra, a, oa, na, rb, b, ob, nb, curve, shift, w)
+        low, far, u, v = proven_in_patches(ra, a, oa, na, rb, b, ob, nb, curve, shift, error, rough, proven, w)
+        if far < upper:
+            upper = far
+            keep_patch_points(ra, qa, ia, a, ka, rb, qb, ib, b, kb, na, nb, curve, w, u, v, upper, out)
+        if proven:
+            # A dot's point stands for others: no patch, however small, comes nearer to the truth than that.
+            doubt = 2.0 * b[ob + E0] if curve is not None and nb == 0 else 0.0
+            key = max(key, low - doubt)
+            if far - low <= max(step, 16.0 * (error + away)) + doubt:
+                let_go = min(let_go, key)
+                continue
+        if key >= upper - step or (key > clearance >= 0.0):
+            let_go = min(let_go, key)
+            continue
+        # Halve the longer one.
+        long_a = patch_size(a, oa)
+        long_b = patch_size(b, ob)
+        ends_a = ia[NODE_INTS * ka + DEPTH] >= DEEPEST
+        ends_b = ib[NODE_INTS * kb + DEPTH] >= DEEPEST
+        if max(long_a, long_b) <= step or (ends_a and ends_b):
+            let_go = min(let_go, key)
+            continue
+        first_a = ka
+        last_a = ka + 1
+        first_b = kb
+        last_b = kb + 1
+        if ends_b or (long_a >= long_b and not ends_a):
+            if ia[NODE_INTS * ka + HALVES] < 0:
+                if used_a + 2 > room_a:
+                    room_a *= 4
+                    a = longer(a, room_a * sa)
+                    ia = longer(ia, room_a * NODE_INTS)
+                split_patch(ra, qa, ia, a, ka, used_a)
+                used_a += 2
+            first_a = ia[NODE_INTS * ka + HALVES]
+            last_a = first_a + 2
+        else:
+            if ib[NODE_INTS * kb + HALVES] < 0:
+                if used_b + 2 > room_b:
+                    room_b *= 4
+                    b = longer(b, room_b * sb)
+                    ib = longer(ib, room_b * NODE_INTS)
+                if curve is None:
+                    split_patch(rb, qb, ib, b, kb, used_b)
+                else:
+                    split_formula(rb, ib, b, kb, used_b)
+                used_b += 2
+            first_b = ib[NODE_INTS * kb + HALVES]
+            last_b = first_b + 2
+        if count + 2 > room:
+            room *= 4
+            keys = longer(keys, room)
+            first = longer(first, room)
+            second = longer(second, room)
+    out[LOWER] = max(min(top, upper), 0.0)
+    out[COUNT] = bounded
+    return status

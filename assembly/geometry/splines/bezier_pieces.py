@@ -1,0 +1,123 @@
+"""A curve as Bezier pieces in homogeneous coordinates, as kernels of certified queries read it.
+
+    C(x) = sum_i B_i^n(x) w_i P_i / sum_i B_i^n(x) w_i,    0 <= x <= 1 on every span,
+
+with B_i^n(x) = C(n, i) x^i (1 - x)^(n - i), about a center of the curve's own, so that an offset costs no digits.
+"""
+
+from __future__ import annotations
+
+from assembly._kernel import kernel
+from assembly._lanes import lane, load_lanes, store_xyz
+from assembly.geometry.splines.evaluate import find_span, into_domain
+
+# Integers of a record: degree, spans, 1 where weights differ, and where in the pool its tables are.
+DEGREE, SPANS, RATIONAL, BREAKS, BINOMIALS, MIDDLE, PIECES, TREE, SQUARES, SQUARE_BINOMIALS, RECORD = (
+    0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10
+)  # fmt: skip
+# Doubles at the head of a pool: the largest distance of a control point from the center, how far the packed curve may
+# be from the one that was given, the center, the largest quotient of two weights.
+REACH, ERROR, CENTER, WEIGHT_RATIO, HEAD = 0, 1, 2, 5, 6
+# A box of the tree over the spans: center and half extents; first the root, then its left subtree, then its right one.
+BOX = 6
+# Half a unit in the last place of one.
+UNIT = 1.1102230246251565e-16
+
+
+@kernel(inner=True)
+def bezier_value(rows, o, pool, binomials, n, x):
+    """Homogeneous point of the piece whose rows of four begin at o, by Horner's rule from the nearer end."""
+    if x <= 0.5:
+        rest = 1.0 - x
+        y = x / rest
+        v = load_lanes(rows, o + 4 * n)
+        for i in range(n - 1, -1, -1):
+            v = pool[binomials + i] * load_lanes(rows, o + 4 * i) + y * v
+    else:
+        rest = x
+        y = (1.0 - x) / rest
+        v = load_lanes(rows, o)
+        for i in range(1, n + 1):
+            v = pool[binomials + i] * load_lanes(rows, o + 4 * i) + y * v
+    scale = 1.0
+    for _ in range(n):
+        scale *= rest
+    return scale * v
+
+
+@kernel(inner=True)
+def bezier_derivatives(rows, o, pool, binomials, n, x):
+    """The same with the first and second derivative; n >= 1."""
+    b = binomials + n + 1
+    c = b + n + 1
+    p = load_lanes(rows, o + 4 * n)
+    q = load_lanes(rows, o + 4 * (n - 1))
+    zero = 0.0 * p
+    if x <= 0.5:
+        rest = 1.0 - x
+        y = x / rest
+        v = p
+        d = zero
+        h = zero
+        after = p
+        second = zero
+        for i in range(n - 1, -1, -1):
+            q = load_lanes(rows, o + 4 * i)
+            v = pool[binomials + i] * q + y * v
+            first = after - q
+            d = pool[b + i] * first + y * d
+            if i < n - 1:
+                h = pool[c + i] * (second - first) + y * h
+            second = first
+            after = q
+    else:
+        rest = x
+        y = (1.0 - x) / rest
+        before = load_lanes(rows, o)
+        v = before
+        d = zero
+        h = zero
+        second = zero
+        for i in range(1, n + 1):
+            q = load_lanes(rows, o + 4 * i)
+            v = pool[binomials + i] * q + y * v
+            first = q - before
+            d = pool[b + i - 1] * first + y * d
+            if i > 1:
+                h = pool[c + i - 2] * (first - second) + y * h
+            second = first
+            before = q
+    scale = 1.0
+    for _ in range(n - 2):
+        scale *= rest
+    if n == 1:
+        return rest * v, d, zero
+    return (scale * rest * rest) * v, (n * scale * rest) * d, (n * (n - 1.0) * scale) * h
+
+
+@kernel(signatures="(i8[::1], f8[::1], f8[::1], b1, i8, f8[::1])")
+def evaluate_pieces(record, pool, t, closed, order, out):
+    """`spline.evaluate_curve` from Bezier pieces: as accurate at any degree."""
+    count = t.size
+    n = record[DEGREE]
+    for i in range(count):
+        x, fits = into_domain(pool, record[BREAKS], record[SPANS], int(closed), t[i])
+        if not fits:
+            return i
+        span = find_span(pool, record[BREAKS], record[SPANS], x)
+        low = pool[record[BREAKS] + span]
+        width = pool[record[BREAKS] + span + 1] - low
+        rows = record[PIECES] + 4 * (n + 1) * span
+        v, d, h = bezier_derivatives(pool, rows, pool, record[BINOMIALS], n, min(max((x - low) / width, 0.0), 1.0))
+        w = 1.0 / lane(v, 3)
+        p = w * v
+        q = w * (d - lane(d, 3) * p)
+        store_xyz(p, out, 3 * i)
+        for j in range(3):
+            out[3 * i + j] += pool[CENTER + j]
+        if order >= 1:
+            store_xyz((1.0 / width) * q, out, 3 * (count + i))
+        if order >= 2:
+            bend = w * (h - (2.0 * lane(d, 3)) * q - lane(h, 3) * p)
+            store_xyz((1.0 / (width * width)) * bend, out, 3 * (2 * count + i))
+    return -1

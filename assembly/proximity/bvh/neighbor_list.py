@@ -1,0 +1,111 @@
+"""Pairs of patches that may face each other, or of parts of spines, kept from look to look of a pair of bodies.
+
+A descent of two trees (`proximity/bvh/tree.py`, `proximity/manager/centerlines/parts.py`) finds pairs for one pose. One
+that allows for a ring of
+poses finds all that any of them has, and not many more: what a look at one of these poses finds is sifted from the
+list. A list is a function of shapes and of the pose that it was made for, whoever asks; there are a few of them in the
+table, and pairs of bodies take turns.
+
+In the table: the pair it is for (-1: none), how many (-1: more than there is room for), the pose it is for (the turn's
+quaternion, the middle of the tree of the body that moves), how far that may go from there, the reach, elements (k, 2).
+Lengths are multiples of GRAIN there: the pool is shared by all who solve a scene at the same time, and a table is one's
+own.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from assembly._kernel import kernel
+from assembly.geometry.vec import add, dot, matvec, sub
+from assembly.proximity.bvh.tree import CENTER, NODE_POOL, RADIUS, pairs_about, still_within, three
+
+OWNER, COUNT, TURN, PLACE, RING, REACH, ENTRIES, ROOM = 0, 1, 2, 6, 9, 10, 11, 512
+LIST_INTS = ENTRIES + 2 * ROOM
+# Multiples of this are within it of what they stand for; a list is not made for what is farther away than FAR.
+GRAIN, FAR = 2.0**-48, 1000.0
+
+
+@kernel(inner=True)
+def moved_since(table, pool, at, p, moving):
+    """How far the body that moves is at most from where it was when the list at `at` was made; infinite for another's.
+
+    `moving` is the body whose motion is measured (`allowances.mover`).
+    """
+    _side, tree, e, rotation, place = moving
+    if table[at + OWNER] != p:
+        return math.inf
+    root = table[tree + NODE_POOL]
+    middle = add(matvec(rotation, three(pool, root + CENTER)), place)
+    square = 0.0
+    other = 0.0
+    for k in range(4):
+        was = GRAIN * table[at + TURN + k]
+        square += (e[k] - was) * (e[k] - was)
+        other += (e[k] + was) * (e[k] + was)
+    way = sub(middle, (GRAIN * table[at + PLACE], GRAIN * table[at + PLACE + 1], GRAIN * table[at + PLACE + 2]))
+    return math.sqrt(dot(way, way)) + 2.0 * pool[root + RADIUS] * math.sqrt(min(square, other))
+
+
+@kernel(inner=True)
+def reaches(table, at, moved, reach):
+    """Whether the list at `at` has what is within a reach after so far a motion: 1; 0 if not; -1 if it had no room."""
+    if moved > GRAIN * table[at + RING]:
+        return 0
+    if table[at + COUNT] < 0:
+        return -1
+    return 1 if reach + moved <= GRAIN * (table[at + REACH] + table[at + RING]) else 0
+
+
+@kernel(inner=True)
+def can_be_listed(table, pool, moving, reach):
+    """Whether lengths of a list are in its range."""
+    _side, tree, _e, rotation, place = moving
+    root = table[tree + NODE_POOL]
+    middle = add(matvec(rotation, three(pool, root + CENTER)), place)
+    return dot(middle, middle) < FAR * FAR and reach < FAR and pool[root + RADIUS] < FAR
+
+
+@kernel(inner=True)
+def write_list(table, pool, at, p, moving, reach, ring, found, count):
+    """Keep `count` pairs (k, 2), made for motions up to `ring`; none where there is no room. Whether there was."""
+    _side, tree, e, rotation, place = moving
+    middle = add(matvec(rotation, three(pool, table[tree + NODE_POOL] + CENTER)), place)
+    table[at + OWNER] = p
+    for k in range(4):
+        table[at + TURN + k] = np.int64(e[k] / GRAIN)
+    for k in range(3):
+        table[at + PLACE + k] = np.int64(middle[k] / GRAIN)
+    # Less by more than what the pose is rounded by, at a radius of FAR.
+    table[at + RING] = np.int64((ring - 1e-10) / GRAIN)
+    table[at + REACH] = np.int64(reach / GRAIN)
+    if count < 0 or count > ROOM or count > found.shape[0]:
+        table[at + COUNT] = -1
+        return False
+    table[at + COUNT] = count
+    for k in range(count):
+        table[at + ENTRIES + 2 * k] = found[k, 0]
+        table[at + ENTRIES + 2 * k + 1] = found[k, 1]
+    return True
+
+
+@kernel(inner=True)
+def listed_pairs(table, pool, at, p, trees, turn, shift, moving, reach, ring, stack, candidates):
+    """What `pairs_within` finds, from the list at `at`, which is made anew where it does not reach.
+
+    The pose is that of g seen from f; `moving` is the body whose motion is measured (`allowances.mover`), and a new
+    list is for motions of it up to `ring`. -1 where there is no room for a list.
+    """
+    fits = reaches(table, at, moved_since(table, pool, at, p, moving), reach)
+    if fits < 0 or (fits == 0 and not can_be_listed(table, pool, moving, ring + reach)):
+        return -1
+    if fits == 0:
+        tilt = ring / pool[table[moving[1] + NODE_POOL] + RADIUS]
+        count = pairs_about(table, pool, trees[0], trees[1], turn, shift, reach, ring, tilt, stack, candidates)
+        if not write_list(table, pool, at, p, moving, reach, ring, candidates, count):
+            return -1
+    return still_within(
+        table, pool, trees[0], trees[1], turn, shift, reach, at + ENTRIES, table[at + COUNT], candidates
+    )

@@ -1,0 +1,379 @@
+"""The extremal pair of two surfaces: where they are closest, or deepest in each other.
+
+With n the outward unit normal of f, d = g - f and m the normal of g scaled so that m.n = 1, the pair solves
+
+    P^T d = 0   (d is normal to f)      and      r2 = P^T (m - n) = 0   (the normals are parallel),
+
+P = [x y] an orthonormal tangent frame of f. Unlike "d orthogonal to all four tangents" this stays
+regular through touching and interpenetration. Newton's step is taken in tangent lengths
+a = E u_f', b = T u_g' with E = P^T [f_u f_v], T = P^T [g_u g_v]; A and C are the shape operators of f and g
+with respect to n (dn = P A a), and
+
+    H a = C r1 - r2,   b = (I + beta A) a - r1,   H = C (I + beta A) - A,   beta = n.d
+
+(the two 2x2 solves of paper 001, appendix A, in one common frame, so that no angle between the
+parameterizations and no sign of the second normal appears).
+"""
+
+from __future__ import annotations
+
+import math
+
+from assembly._kernel import kernel
+from assembly.geometry.splines.evaluate import (
+    BREAKS_U,
+    BREAKS_V,
+    CLOSED_U,
+    CLOSED_V,
+    POLES,
+    SIGN,
+    SPANS_U,
+    SPANS_V,
+    surface_point,
+)
+from assembly.geometry.splines.pole import CHART, limits, nearest_pole, polar_step, pole_frame
+from assembly.geometry.vec import add, blend, cross, dot, matvec, matvec_t, scale, sub
+from assembly.proximity.extrema.pair_matrix import across_first, curvature_bound, null_ways, pair_matrix, right_side
+
+# A step that turns about a pole by more than this part of the domain is taken in the pole's plane.
+TURN = 0.08
+# What became of a pair.
+CONVERGED, SINGULAR, LEFT_PATCH, NOT_CONVERGED = 0, 1, 2, 3
+# A parameterization counts as regular where |Su x Sv| is above this times |Su| |Sv|.
+POLE = 1e-9
+# Newton's steps: four or five near a solution, more while steps are cut; around a ring whose wire turns a normal by as
+# much as a step may, some 60 lead halfway.
+LIMIT, AROUND = 40, 120
+# After so many steps a singular pair whose residual vanishes is one; for who searches it is where normals are as
+# parallel as this, in radians, above each other to as much of the size.
+PATIENCE, SETTLED = 12, 1e-12
+# The most, in radians, that a step may turn a normal.
+BEND = 0.5
+# Steps below this many radians that do not shrink any more are rounding; where the end of a patch held the last one,
+# below the second, and some roundings of coordinates.
+STAGNANT, HELD_STILL, HELD_ROUNDING = 1e-7, 1e-12, 4e-15
+# A step that turns the normals by less leaves an error below rounding when a solve carries the frame along it.
+CLOSE = 2e-7
+
+
+@kernel(inline=True)
+def shape_operator(p, q, r, s, luu, luv, lvv):
+    """-J^T L J, J = [[p, q], [r, s]] the inverse of tangent coordinates, L_ij = S_ij.n; symmetric, +1/r on a ball."""
+    a = luu * p + luv * r
+    b = luv * p + lvv * r
+    return (
+        -(p * a + r * b),
+        -(q * a + s * b),
+        -(q * (luu * q + luv * s) + s * (luv * q + lvv * s)),
+    )
+
+
+@kernel(inline=True)
+def own_frame(table, pool, r, u, v):
+    """Point, outward normal n, tangents x and y, E^-1 (11, 12, 22), shape operator, and whether regular.
+
+    [S_u S_v] = [x y] E.
+
+    At a pole E^-1 is zero: the point moves, its polar coordinates have no rates.
+    """
+    zero = (0.0, 0.0, 0.0)
+    if table[r + POLES] != 0:
+        edge, distance = nearest_pole(table, pool, r, u, v)
+        if distance < CHART:
+            p, n, x, y, a, smooth = pole_frame(table, pool, r, edge, u, v)
+            return p, n, x, y, zero, a, smooth
+    p, su, sv, suu, suv, svv = surface_point(table, pool, r, u, v)
+    sign = float(table[r + SIGN])
+    normal = cross(su, sv)
+    uu = dot(su, su)
+    nn = dot(normal, normal)
+    if not (nn > POLE * POLE * uu * dot(sv, sv) and nn > 1e-290):
+        return p, zero, zero, zero, zero, zero, False
+    length = math.sqrt(nn)
+    n = scale(sign / length, normal)
+    i11 = 1.0 / math.sqrt(uu)
+    x = scale(i11, su)
+    # |Su x Sv| = e11 e22.
+    i22 = sign * uu * i11 / length
+    i12 = -dot(x, sv) * i11 * i22
+    a = shape_operator(i11, i12, 0.0, i22, dot(suu, n), dot(suv, n), dot(svv, n))
+    return p, n, x, cross(n, x), (i11, i12, i22), a, True
+
+
+@kernel(inline=True)
+def other_frame(table, pool, r, u, v, n, x, y):
+    """Seen with another surface's n, x, y: point, T^-1 (11, 12, 21, 22), shape operator, tilt r2, whether regular.
+
+    m = n + [x y] r2 is orthogonal to S_u and S_v: T^T r2 = -(n.S_u, n.S_v), with T = [x y]^T [S_u S_v].
+    """
+    zero = (0.0, 0.0, 0.0)
+    none = (0.0, 0.0, 0.0, 0.0)
+    if table[r + POLES] != 0:
+        edge, distance = nearest_pole(table, pool, r, u, v)
+        if distance < CHART:
+            p, m, gx, gy, b, smooth = pole_frame(table, pool, r, edge, u, v)
+            s = dot(m, n)
+            if not smooth or abs(s) < 1e-3:
+                return p, none, zero, (0.0, 0.0), False
+            side = 1.0 if s > 0.0 else -1.0
+            xx = dot(x, gx)
+            xy = dot(x, gy)
+            yx = dot(y, gx)
+            yy = dot(y, gy)
+            c = (
+                side * (xx * (b[0] * xx + b[1] * xy) + xy * (b[1] * xx + b[2] * xy)),
+                side * (xx * (b[0] * yx + b[1] * yy) + xy * (b[1] * yx + b[2] * yy)),
+                side * (yx * (b[0] * yx + b[1] * yy) + yy * (b[1] * yx + b[2] * yy)),
+            )
+            return p, none, c, (dot(x, m) / s, dot(y, m) / s), True
+    p, su, sv, suu, suv, svv = surface_point(table, pool, r, u, v)
+    t11 = dot(x, su)
+    t12 = dot(x, sv)
+    t21 = dot(y, su)
+    t22 = dot(y, sv)
+    det = t11 * t22 - t12 * t21
+    if not (det * det > POLE * POLE * dot(su, su) * dot(sv, sv) and abs(det) > 1e-145):
+        return p, none, zero, (0.0, 0.0), False
+    i = 1.0 / det
+    t = (i * t22, -i * t12, -i * t21, i * t11)
+    c = shape_operator(t[0], t[1], t[2], t[3], dot(suu, n), dot(suv, n), dot(svv, n))
+    nu = dot(n, su)
+    nv = dot(n, sv)
+    return p, t, c, (-(t[0] * nu + t[2] * nv), -(t[1] * nu + t[3] * nv)), True
+
+
+@kernel(inline=True)
+def pair_frame(table, pool, f, g, rotation, shift, x):
+    """Everything about a pair at parameters x = (u_f, v_f, u_g, v_g), in the axes of body f.
+
+    Returns
+    -------
+    n, tx, ty : normal of f and its tangent frame, [f_u f_v] = [tx ty] E
+    pf, pg : the two points
+    e : (11, 12, 22) of E^-1, which is upper triangular; zero at a pole
+    t : (11, 12, 21, 22) of T^-1; zero at a pole
+    a, c : shape operators (11, 12, 22) of f and g with respect to n
+    r : (r1x, r1y, r2x, r2y), residual
+    beta : n.(pg - pf)
+    regular : whether both surfaces have a tangent plane here, and those are not orthogonal
+    """
+    pf, n, tx, ty, e, a, regular_f = own_frame(table, pool, f, x[0], x[1])
+    # The normal and the frame go to the axes of g, rather than six derivatives to those of f.
+    ng = matvec_t(rotation, n)
+    xg = matvec_t(rotation, tx)
+    yg = matvec_t(rotation, ty)
+    qg, t, c, tilt, regular_g = other_frame(table, pool, g, x[2], x[3], ng, xg, yg)
+    pg = add(matvec(rotation, qg), shift)
+    d = sub(pg, pf)
+    return n, tx, ty, pf, pg, e, t, a, c, (dot(tx, d), dot(ty, d), tilt[0], tilt[1]), dot(n, d), regular_f and regular_g
+
+
+@kernel(inline=True)
+def into_domain(table, pool, r, u, v):
+    """Parameters wrapped where the surface is closed, clamped where it ends; whether it was clamped."""
+    clamped = False
+    ou = table[r + BREAKS_U]
+    lo = pool[ou]
+    hi = pool[ou + table[r + SPANS_U]]
+    if u < lo or u > hi:
+        if table[r + CLOSED_U] == 1:
+            u -= (hi - lo) * math.floor((u - lo) / (hi - lo))
+            u = min(max(u, lo), hi)
+        else:
+            u = lo if u < lo else hi
+            clamped = True
+    ov = table[r + BREAKS_V]
+    lo = pool[ov]
+    hi = pool[ov + table[r + SPANS_V]]
+    if v < lo or v > hi:
+        if table[r + CLOSED_V] == 1:
+            v -= (hi - lo) * math.floor((v - lo) / (hi - lo))
+            v = min(max(v, lo), hi)
+        else:
+            v = lo if v < lo else hi
+            clamped = True
+    return u, v, clamped
+
+
+@kernel(inline=True)
+def advance(table, pool, r, u, v, du, dv, step):
+    """Parameters moved by (du, dv), or over a pole by the tangential step (body axes); whether an end held them."""
+    if table[r + POLES] != 0:
+        edge, distance = nearest_pole(table, pool, r, u, v)
+        ulo, uhi, _ = limits(table, pool, r, 0)
+        vlo, vhi, _ = limits(table, pool, r, 1)
+        turn = abs(dv) / (vhi - vlo) if edge <= 2 else abs(du) / (uhi - ulo)
+        if edge <= 2:
+            beyond = u + du < ulo if edge == 1 else u + du > uhi
+        else:
+            beyond = v + dv < vlo if edge == 4 else v + dv > vhi
+        if distance < CHART or turn > TURN or beyond:
+            u, v = polar_step(table, pool, r, edge, u, v, step)
+            return u, v, False
+    return into_domain(table, pool, r, u + du, v + dv)
+
+
+@kernel(inline=True)
+def pair_step(a, c, r, k, inverse, size):
+    """Newton's step along the tangents of f and of g, and by how much either turns its surface's normal."""
+    s0, s1 = right_side(c, r)
+    ax = inverse[0] * s0 + inverse[1] * s1
+    ay = inverse[2] * s0 + inverse[3] * s1
+    bx = k[0] * ax + k[1] * ay - r[0]
+    by = k[1] * ax + k[2] * ay - r[1]
+    bend_f = (abs(ax) + abs(ay)) * max(curvature_bound(a), 2.0 / size)
+    bend_g = (abs(bx) + abs(by)) * max(curvature_bound(c), 2.0 / size)
+    return ax, ay, bx, by, bend_f, bend_g
+
+
+@kernel(inline=True)
+def step_of_other(a, c, k, h, step, size):
+    """A step of a pair of a continuum, without its part along the continuum on g: f makes that one, backwards.
+
+    Where an end of g is in the way the pair may go on along the continuum, to where both surfaces are. Along it H = 0,
+    so that f moved by s and g by K s, K = I + beta A, leave what the step solves as it is. Returns as `pair_step`.
+    """
+    ax, ay, bx, by = step
+    if abs(h[0]) + abs(h[1]) + abs(h[2]) + abs(h[3]) <= 1e-9 / size:
+        # Two planes: all ways are along it.
+        ax, ay, bx, by = ax - bx, ay - by, 0.0, 0.0
+    else:
+        _v, w = null_ways(h)
+        kx = k[0] * w[0] + k[1] * w[1]
+        ky = k[1] * w[0] + k[2] * w[1]
+        stretch = w[0] * kx + w[1] * ky
+        s = -(bx * w[0] + by * w[1]) / stretch if abs(stretch) > 1e-9 else 0.0
+        ax, ay, bx, by = ax + s * w[0], ay + s * w[1], bx + s * kx, by + s * ky
+    bend_f = (abs(ax) + abs(ay)) * max(curvature_bound(a), 2.0 / size)
+    bend_g = (abs(bx) + abs(by)) * max(curvature_bound(c), 2.0 / size)
+    return ax, ay, bx, by, bend_f, bend_g
+
+
+@kernel(inline=True)
+def bent_at_most(bend):
+    """The part of a step that turns a normal by `BEND` at most."""
+    return 1.0 if bend <= BEND else BEND / bend
+
+
+@kernel(inline=True)
+def move_pair(table, pool, f, g, rotation, x, e, t, tx, ty, step_f, step_g):
+    """Parameters after steps along the tangents of either surface; whether either was clamped; how far they were to go.
+
+    The steps are in the tangent frame of f, (tx, ty), for both.
+    """
+    ax, ay = step_f
+    bx, by = step_g
+    du = e[0] * ax + e[1] * ay
+    dv = e[2] * ay
+    ds = t[0] * bx + t[1] * by
+    dt = t[2] * bx + t[3] * by
+    uf, vf, clamped_f = advance(table, pool, f, x[0], x[1], du, dv, blend(ax, tx, ay, ty))
+    move = matvec_t(rotation, blend(bx, tx, by, ty))
+    ug, vg, clamped_g = advance(table, pool, g, x[2], x[3], ds, dt, move)
+    return (uf, vf, ug, vg), clamped_f or clamped_g, abs(du) + abs(dv) + abs(ds) + abs(dt)
+
+
+@kernel(inline=True)
+def vanishes(r, size):
+    """Whether a residual is as good as zero."""
+    return abs(r[2]) + abs(r[3]) < 1e-9 and abs(r[0]) + abs(r[1]) < 1e-9 * size
+
+
+@kernel(inline=True)
+def settled(c, r, size):
+    """Whether a pair is one as far as anything tells that is not rounding."""
+    s0, s1 = right_side(c, r)
+    return abs(s0) + abs(s1) <= SETTLED and abs(r[0]) + abs(r[1]) <= SETTLED * size
+
+
+@kernel(inline=True)
+def stagnates(step, bend, previous, status, p, q, size):
+    """Whether a step that does not shrink any more is rounding: one that an end held does not shrink either."""
+    least = STAGNANT
+    if status == LEFT_PATCH:
+        least = min(HELD_STILL + HELD_ROUNDING * math.sqrt(dot(p, p) + dot(q, q)) / size, least)
+    return bend < least and step > 0.25 * previous
+
+
+@kernel(inner=True)
+def solve_pair(table, pool, f, g, rotation, shift, x, size, turn, close, downhill):
+    """Newton from x to the extremal pair: status, parameters, iterations, frame, and H as `pair_matrix` gives it.
+
+    `size` is the length against which steps are measured. A step that would turn a normal by more than `BEND` is
+    shortened, so that the iteration follows the surface; one that would turn it by more than `turn` says that x was not
+    near a pair at all. After a step that turns it by less than `close` the frame is carried along, not evaluated again:
+    what is left is of the order of close^2, and of close^3 in the gap. With `downhill` a start along a level valley is
+    led to its least, as a search asks; without, a pair that is followed stays where it is in a continuum.
+    """
+    tolerance = 4e-14 * size
+    flat = 1e-9 / size
+    previous = 1e300
+    status = NOT_CONVERGED
+    level = False
+    # Whether it is f that goes along a continuum, because an end of g is in the way; steps in a row that ends undid.
+    by_other = False
+    stills = 0
+    iteration = 0
+    while True:
+        n, tx, ty, pf, pg, e, t, a, c, r, beta, regular = pair_frame(table, pool, f, g, rotation, shift, x)
+        k, h, inverse, isolated = pair_matrix(a, c, beta, flat)
+        if not regular:
+            # An apex or a crease: there is no tangent plane to go on.
+            break
+        if downhill:
+            inverse, levels = across_first(a, c, r, k, h, inverse, flat)
+            level = level or levels
+        ax, ay, bx, by, bend_f, bend_g = pair_step(a, c, r, k, inverse, size)
+        if by_other and not isolated:
+            ax, ay, bx, by, bend_f, bend_g = step_of_other(a, c, k, h, (ax, ay, bx, by), size)
+        step = max(abs(ax) + abs(ay), abs(bx) + abs(by))
+        bend = max(bend_f, bend_g)
+        small = bend < close and isolated
+        # Small against the scene and against the bodies' own curvature; or as small as rounding lets it become.
+        if (step <= tolerance and bend < 1e-9) or stagnates(step, bend, previous, status, pf, pg, size):
+            # In a singular system a vanishing step is a solution only if the residual vanishes too.
+            status = CONVERGED if isolated else (SINGULAR if vanishes(r, size) else NOT_CONVERGED)
+            break
+        ends = iteration >= (AROUND if level and status != LEFT_PATCH else LIMIT) or not step < 1e300 or bend > turn
+        if not isolated and vanishes(r, size):
+            # Along the valley of a fold there is nothing to tell places apart; steps need not shrink.
+            if (ends or settled(c, r, size)) if downhill else iteration >= PATIENCE:
+                status = SINGULAR
+                break
+        if ends:
+            break
+        previous = step
+        # Each surface by its own measure: a pebble turns while the hill beside it is crossed.
+        factor_f = bent_at_most(bend_f)
+        factor_g = bent_at_most(bend_g)
+        step_f = (factor_f * ax, factor_f * ay)
+        step_g = (factor_g * bx, factor_g * by)
+        y, clamped, way = move_pair(table, pool, f, g, rotation, x, e, t, tx, ty, step_f, step_g)
+        status = NOT_CONVERGED
+        if clamped:
+            status = LEFT_PATCH
+            still = abs(y[0] - x[0]) + abs(y[1] - x[1]) + abs(y[2] - x[2]) + abs(y[3] - x[3]) <= 1e-12 * way
+            stills = stills + 1 if still else 0
+            # Held at the end of the patch and nothing else moves, nor the other surface's point: the pair has left.
+            if stills == 2 or (still and isolated):
+                break
+            if not isolated:
+                by_other = not by_other
+                previous = 1e300
+        elif small:
+            wx = a[0] * ax + a[1] * ay
+            wy = a[1] * ax + a[2] * ay
+            beta += 0.5 * (r[0] * wx + r[1] * wy - r[2] * bx - r[3] * by)
+            pf = add(pf, blend(ax, tx, ay, ty))
+            pg = add(pg, blend(bx, tx, by, ty))
+            lean = blend(wx, tx, wy, ty)
+            tx = sub(tx, scale(wx, n))
+            ty = sub(ty, scale(wy, n))
+            n = add(n, lean)
+            x = y
+            status = CONVERGED
+            iteration += 1
+            break
+        x = y
+        iteration += 1
+    return status, x, iteration, (n, tx, ty, pf, pg, e, t, a, c, r, beta, regular), (k, h, inverse, isolated)

@@ -1,0 +1,95 @@
+"""One pair of features for Python: where it is, and how it and its gap move with the two poses."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from assembly._kernel import kernel
+from assembly.geometry.vec import add, matvec, matvec_t
+from assembly.kinematics.motion import position, relative_pose, rotation
+from assembly.proximity.brep.records import FACE
+from assembly.proximity.extrema.feature_pair import feature_record, features_at, solve_features
+from assembly.proximity.extrema.rates import RATES, RECORD, ZED, add_gap_terms, gradient_row, into_quaternions
+
+# What is written of a pair: parameters (4), point of f, point of g, normal, gap, whether it is isolated, whether two
+# surfaces do not cross there, how far it is from a fold, residual (4).
+PARAMETERS, POINT_F, POINT_G, NORMAL, GAP, ISOLATED, PROPER, FOLD, RESIDUAL, PAIR = 0, 4, 7, 10, 13, 14, 15, 16, 17, 21
+
+
+@kernel(
+    signatures="(i8[::1], f8[::1], i8, i8, i8, i8, f8[:, ::1], UniTuple(f8, 4), UniTuple(f8, 3), f8, f8, f8[::1])",
+)
+def find_features(table, pool, kind_f, f, kind_g, g, q, x, n, size, turn, out):
+    """`solve_features` at the poses q (2, 7); n and what is written to `out` (PAIR,) are in world axes.
+
+    Returns the status.
+    """
+    turn_f = rotation(q, 0)
+    relative, shift = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
+    known = matvec_t(turn_f, (n[0], n[1], n[2]))
+    status, y, frame = solve_features(table, pool, kind_f, f, kind_g, g, relative, shift, x, known, size, turn)
+    origin = position(q, 0)
+    pf = add(matvec(turn_f, frame[3]), origin)
+    pg = add(matvec(turn_f, frame[4]), origin)
+    normal = matvec(turn_f, frame[0])
+    for k in range(3):
+        out[POINT_F + k] = pf[k]
+        out[POINT_G + k] = pg[k]
+        out[NORMAL + k] = normal[k]
+    r = frame[11]
+    for k in range(4):
+        out[PARAMETERS + k] = y[k]
+        out[RESIDUAL + k] = r[k]
+    out[GAP] = frame[5]
+    out[ISOLATED] = 1.0 if frame[13] else 0.0
+    out[PROPER] = 1.0 if frame[14] else 0.0
+    out[FOLD] = frame[15]
+    return status
+
+
+@kernel(
+    signatures=(
+        "(i8[::1], f8[::1], i8, i8, i8, i8, f8[:, ::1], UniTuple(f8, 4), UniTuple(f8, 3), f8, f8[:, ::1], f8[:, ::1])"
+    ),
+)
+def feature_derivatives(table, pool, kind_f, f, kind_g, g, q, x, n, size, first, hessian):
+    """d(parameters)/dq and d(gap)/dq in `first` (5, 14), the gap's Hessian over the twists in `hessian` (12, 12).
+
+    Rates of what a feature has no parameter for are zero, of polar coordinates at a pole NaN. Returns the pair's
+    residual (lengths over `size`, and tilts), infinite where a feature has no tangent, and whether it is isolated.
+    """
+    turn_f = rotation(q, 0)
+    relative, shift = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
+    known = matvec_t(turn_f, (n[0], n[1], n[2]))
+    frame = features_at(table, pool, kind_f, f, kind_g, g, relative, shift, x, known, size)
+    if not frame[12]:
+        return math.inf, False
+    r = frame[11]
+    error = max(abs(r[0]), abs(r[1])) / size + max(abs(r[2]), abs(r[3]))
+    records = np.empty((1, RECORD))
+    gradient = np.empty((1, 12))
+    row = np.empty(12)
+    feature_record(turn_f, shift, frame, records, 0)
+    gradient_row(records, 0, gradient, 0)
+    for j in range(12):
+        row[j] = gradient[0, j]
+    into_quaternions(row, q, first, 4)
+    for i in range(4):
+        rates = frame[8] if i < 2 else frame[9]
+        kind = kind_f if i < 2 else kind_g
+        at_pole = kind == FACE and rates[0] == 0.0 and rates[1] == 0.0
+        for j in range(12):
+            row[j] = math.nan if at_pole else 0.0
+            for l in range(4):
+                row[j] += records[0, RATES + 4 * i + l] * records[0, ZED + 12 * l + j]
+        into_quaternions(row, q, first, i)
+    for i in range(12):
+        for j in range(12):
+            hessian[i, j] = 0.0
+    add_gap_terms(records, 0, gradient, 0, 1.0, 0.0, hessian, 0, 6)
+    for i in range(12):
+        for j in range(i):
+            hessian[i, j] = hessian[j, i]
+    return error, frame[13]

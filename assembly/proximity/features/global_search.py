@@ -1,0 +1,376 @@
+"""The nearest points of two shells over all their faces, edges and vertices, by branch and bound.
+
+Nearest points are an extremum of some pair of features inside both. Two trees of balls
+(`proximity/features/ball_tree.py`) are descended
+together, the pair of nodes with the least bound of its distance first. A pair of cells is given up when
+
+- its bound (`proximity/features/quadratic_model.py`) is not below the least distance known,
+- no normal of one is parallel to one of the other, or the distance changes monotonically over one of them: then
+  no extremum of these two features is in it,
+- it is small, and an extremum found is its own: relative curvature cannot change its sign as far as from there,
+
+else Newton's method looks for an extremum from its middle, and the larger cell is cut. What is known to be feasible,
+an extremum or a sample inside the trims, lowers the least distance. Shells that cross are at distance zero; their
+crossing points are found by Newton's method for d = 0, and the search ends.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from assembly._kernel import kernel
+from assembly.geometry.vec import dot, sub
+from assembly.proximity.brep.records import FACE, FACE_SURFACE, VERTEX
+from assembly.proximity.extrema.crossing import crossing_point
+from assembly.proximity.extrema.face_face import CONVERGED, SINGULAR, solve_pair
+from assembly.proximity.extrema.feature_pair import solve_features
+from assembly.proximity.features.ball_tree import (
+    CELL,
+    CHILD,
+    CHILDREN,
+    FEATURE,
+    INFO,
+    KIND,
+    LEVEL,
+    OUTSIDE,
+    RECORD,
+    give_model,
+    grow,
+    plant,
+    room,
+)
+from assembly.proximity.features.quadratic_model import (
+    BEND,
+    CENTER,
+    NODE,
+    POINT,
+    RADIUS,
+    REST,
+    U0,
+    V0,
+    get,
+    pair_bound,
+)
+from assembly.proximity.features.region_tests import FAR, excluded, is_feasible, is_known, relative_curvature, side_of
+
+# What became of a search: apart, all other pairs excluded; shells cross; out of room, the best pair known.
+APART, CROSSING, UNPROVEN = 0, 1, 2
+# Pairs of nodes that may wait at a time, and pairs that may be cut.
+WAITING = 65536
+# Extrema kept.
+EXTREMA = 256
+# Pairs of cells that are smaller, in parts of the size, are not cut: what they bound is the proof's end.
+TINY = 2.5e-10
+# Newton's method is tried where normals turn by less.
+SMOOTH = 1.2
+
+
+@kernel(inner=True)
+def push(keys, slots, count, key, slot):
+    """Put into the heap."""
+    i = count
+    while i > 0:
+        parent = (i - 1) >> 1
+        if keys[parent] <= key:
+            break
+        keys[i] = keys[parent]
+        slots[i] = slots[parent]
+        i = parent
+    keys[i] = key
+    slots[i] = slot
+
+
+@kernel(inner=True)
+def drop_first(keys, slots, count):
+    """Take the least out of the heap of `count`, which has one less then."""
+    last = count - 1
+    key = keys[last]
+    slot = slots[last]
+    i = 0
+    while True:
+        child = 2 * i + 1
+        if child >= last:
+            break
+        if child + 1 < last and keys[child + 1] < keys[child]:
+            child += 1
+        if keys[child] >= key:
+            break
+        keys[i] = keys[child]
+        slots[i] = slots[child]
+        i = child
+    keys[i] = key
+    slots[i] = slot
+
+
+@kernel(inner=True)
+def extremum_near(table, pool, kind_f, f, kind_g, g, turn, shift, x, n, size):
+    """Newton from x: whether it led to an extremum, its coordinates, gap, least relative curvature, stretch of f's."""
+    if kind_f == FACE and kind_g == FACE:
+        status, y, _count, frame, curvature = solve_pair(
+            table, pool, table[f + FACE_SURFACE], table[g + FACE_SURFACE], turn, shift, x, size, 1.5, 0.0, False
+        )
+        least, stretch = relative_curvature(curvature[0], curvature[1], frame[10])
+        return status, y, frame[10], least, stretch
+    af = table[f + FACE_SURFACE] if kind_f == FACE else f
+    ag = table[g + FACE_SURFACE] if kind_g == FACE else g
+    status, y, frame = solve_features(table, pool, kind_f, af, kind_g, ag, turn, shift, x, n, size, 1.5)
+    return status, y, frame[5], 0.0, 1.0
+
+
+@kernel(inner=True)
+def larger_first(a, ai, i, b, bi, j):
+    """Whether to go down on the side of f: what is not a cell first, then what is larger."""
+    if ai[i, LEVEL] == CELL and bi[j, LEVEL] != CELL:
+        return False
+    if bi[j, LEVEL] == CELL and ai[i, LEVEL] != CELL:
+        return True
+    if ai[i, KIND] == VERTEX or bi[j, KIND] == VERTEX:
+        return bi[j, KIND] == VERTEX
+    if ai[i, LEVEL] == CELL:
+        # What keeps the bound from the distance, or else the extent.
+        return a[i, REST] + 0.02 * a[i, RADIUS] >= b[j, REST] + 0.02 * b[j, RADIUS]
+    return a[i, RADIUS] >= b[j, RADIUS]
+
+
+@kernel(inner=True)
+def ball_bound(a, i, b, j):
+    d = sub(get(b, j, CENTER), get(a, i, CENTER))
+    return math.sqrt(dot(d, d)) - a[i, RADIUS] - b[j, RADIUS]
+
+
+@kernel(inner=True, allocates=True)
+def search(table, pool, shell_f, shell_g, turn, shift, size, rough):
+    """The nearest points of two shells, g seen from f, or any that are farther by a part of that, `rough`, at most.
+
+    Returns
+    -------
+    status
+        APART: all else is excluded. CROSSING: the shells cross at the point returned. UNPROVEN: out of room.
+    code_f, code_g
+        Numbers of the features.
+    x
+        Their coordinates, (u_f, v_f, u_g, v_g).
+    gap
+        n.(g - f), n the outward normal of a face of f, else of g, else from f to g.
+    lower
+        No points are nearer than this.
+    effort
+        Pairs looked at.
+    """
+    same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+    origin = (0.0, 0.0, 0.0)
+    most_f = room(table, pool, shell_f)
+    most_g = room(table, pool, shell_g)
+    a = np.empty((most_f, NODE))
+    ai = np.empty((most_f, INFO), np.int64)
+    b = np.empty((most_g, NODE))
+    bi = np.empty((most_g, INFO), np.int64)
+    work = np.empty((4, 16, 16))
+    count_f = plant(table, pool, shell_f, same, origin, a, ai)
+    count_g = plant(table, pool, shell_g, turn, shift, b, bi)
+    keys = np.empty(WAITING)
+    slots = np.empty(WAITING, np.int64)
+    pairs = np.empty((WAITING, 3), np.int64)
+    normals = np.empty((WAITING, 3))
+    free = np.empty(WAITING, np.int64)
+    released = 0
+    used = 0
+    waiting = 0
+    extrema = np.empty((EXTREMA, 6))
+    owners = np.empty((EXTREMA, 2), np.int64)
+    known = 0
+    tolerance = 1e-13 * size
+    # The least bound of a pair that was too small to be cut.
+    uncut = math.inf
+    status = APART
+    upper = math.inf
+    best = (-1, -1)
+    at = (0.0, 0.0, 0.0, 0.0)
+    gap = upper
+    lower = upper
+    effort = 0
+    # A first guess, by going down where balls are nearest.
+    i = 0
+    j = 0
+    while ai[i, LEVEL] != CELL or bi[j, LEVEL] != CELL:
+        if larger_first(a, ai, i, b, bi, j):
+            count_f = grow(table, pool, shell_f, same, origin, a, ai, i, count_f)
+            nearest = math.inf
+            first = ai[i, CHILD]
+            for k in range(first, first + ai[i, CHILDREN]):
+                d = sub(get(b, j, CENTER), get(a, k, CENTER))
+                if dot(d, d) < nearest:
+                    nearest = dot(d, d)
+                    i = k
+        else:
+            count_g = grow(table, pool, shell_g, turn, shift, b, bi, j, count_g)
+            nearest = math.inf
+            first = bi[j, CHILD]
+            for k in range(first, first + bi[j, CHILDREN]):
+                d = sub(get(b, k, CENTER), get(a, i, CENTER))
+                if dot(d, d) < nearest:
+                    nearest = dot(d, d)
+                    j = k
+    first_f = i
+    first_g = j
+    pairs[0, 0] = i
+    pairs[0, 1] = j
+    pairs[0, 2] = 2
+    pairs[1, 0] = 0
+    pairs[1, 1] = 0
+    pairs[1, 2] = 0
+    for k in range(2):
+        normals[k, 0], normals[k, 1], normals[k, 2] = origin
+    used = 2
+    push(keys, slots, 0, -math.inf, 0)
+    push(keys, slots, 1, ball_bound(a, 0, b, 0), 1)
+    waiting = 2
+    while waiting > 0:
+        key = keys[0]
+        slot = slots[0]
+        if key >= (1.0 - rough) * upper - tolerance:
+            break
+        drop_first(keys, slots, waiting)
+        waiting -= 1
+        i = pairs[slot, 0]
+        j = pairs[slot, 1]
+        ready = pairs[slot, 2]
+        n = (normals[slot, 0], normals[slot, 1], normals[slot, 2])
+        free[released] = slot
+        released += 1
+        effort += 1
+        lower = max(key, 0.0)
+        if count_f + 160 > most_f or count_g + 160 > most_g or waiting + 160 > WAITING:
+            status = UNPROVEN
+            break
+        are_cells = ai[i, LEVEL] == CELL and bi[j, LEVEL] == CELL
+        if are_cells:
+            give_model(table, pool, same, origin, a, ai, i, work)
+            give_model(table, pool, turn, shift, b, bi, j, work)
+            kind_f = ai[i, KIND]
+            kind_g = bi[j, KIND]
+            f = ai[i, RECORD]
+            g = bi[j, RECORD]
+            if ready == 0:
+                key, n = pair_bound(a, i, b, j, n, upper)
+                if key >= (1.0 - rough) * upper - tolerance:
+                    continue
+                if waiting > 0 and key > keys[0]:
+                    released -= 1
+                    slot = free[released]
+                    pairs[slot, 0] = i
+                    pairs[slot, 1] = j
+                    pairs[slot, 2] = 1
+                    normals[slot, 0], normals[slot, 1], normals[slot, 2] = n
+                    push(keys, slots, waiting, key, slot)
+                    waiting += 1
+                    continue
+            d = sub(get(b, j, POINT), get(a, i, POINT))
+            apart = math.sqrt(dot(d, d))
+            start = (a[i, U0], a[i, V0], b[j, U0], b[j, V0])
+            if (
+                apart < upper
+                and is_feasible(table, pool, kind_f, f, start[0], start[1])
+                and is_feasible(table, pool, kind_g, g, start[2], start[3])
+            ):
+                upper = apart
+                best = (ai[i, FEATURE], bi[j, FEATURE])
+                at = start
+                gap = apart
+            if ready != 2 and excluded(a, i, kind_f, b, j, kind_g, key > 0.0):
+                continue
+            settled, beside = is_known(table, pool, a, ai, i, b, bi, j, extrema, owners, known)
+            if settled:
+                continue
+            # Beside an extremum Newton's method would find that one again.
+            if ready == 2 or (max(a[i, BEND], b[j, BEND]) < SMOOTH and beside > FAR):
+                found, x, beta, least, stretch = extremum_near(
+                    table, pool, kind_f, f, kind_g, g, turn, shift, start, n, size
+                )
+                if found == CONVERGED or found == SINGULAR:
+                    if (
+                        abs(beta) < upper
+                        and is_feasible(table, pool, kind_f, f, x[0], x[1])
+                        and is_feasible(table, pool, kind_g, g, x[2], x[3])
+                    ):
+                        upper = abs(beta)
+                        best = (ai[i, FEATURE], bi[j, FEATURE])
+                        at = x
+                        gap = beta
+                    if known < EXTREMA:
+                        extrema[known, 0], extrema[known, 1], extrema[known, 2], extrema[known, 3] = x
+                        extrema[known, 4] = least
+                        extrema[known, 5] = stretch
+                        owners[known, 0] = ai[i, FEATURE]
+                        owners[known, 1] = bi[j, FEATURE]
+                        known += 1
+                        if is_known(table, pool, a, ai, i, b, bi, j, extrema[known - 1 :], owners[known - 1 :], 1)[0]:
+                            continue
+            if key <= 0.0 and a[i, BEND] + b[j, BEND] < SMOOTH:
+                x, crosses = crossing_point(table, pool, kind_f, f, kind_g, g, turn, shift, start, size)
+                if (
+                    crosses
+                    and is_feasible(table, pool, kind_f, f, x[0], x[1])
+                    and is_feasible(table, pool, kind_g, g, x[2], x[3])
+                ):
+                    status = CROSSING
+                    best = (ai[i, FEATURE], bi[j, FEATURE])
+                    at = x
+                    gap = 0.0
+                    lower = 0.0
+                    upper = 0.0
+                    break
+            if ready == 2:
+                continue
+            if side_of(table, pool, a, ai, i) == OUTSIDE or side_of(table, pool, b, bi, j) == OUTSIDE:
+                continue
+            if max(a[i, RADIUS], b[j, RADIUS]) < TINY * size:
+                uncut = min(uncut, key)
+                continue
+        if larger_first(a, ai, i, b, bi, j):
+            count_f = grow(table, pool, shell_f, same, origin, a, ai, i, count_f)
+            first = ai[i, CHILD]
+            last = first + ai[i, CHILDREN]
+            down_f = True
+        else:
+            count_g = grow(table, pool, shell_g, turn, shift, b, bi, j, count_g)
+            first = bi[j, CHILD]
+            last = first + bi[j, CHILDREN]
+            down_f = False
+        for k in range(first, last):
+            p = k if down_f else i
+            q = j if down_f else k
+            if are_cells:
+                if down_f:
+                    give_model(table, pool, same, origin, a, ai, p, work)
+                else:
+                    give_model(table, pool, turn, shift, b, bi, q, work)
+                key, m = pair_bound(a, p, b, q, n, upper)
+            else:
+                key = ball_bound(a, p, b, q)
+                m = n
+            if key >= (1.0 - rough) * upper - tolerance:
+                continue
+            if released > 0:
+                released -= 1
+                slot = free[released]
+            elif used < WAITING:
+                slot = used
+                used += 1
+            else:
+                continue
+            pairs[slot, 0] = p
+            pairs[slot, 1] = q
+            pairs[slot, 2] = 1 if are_cells else 0
+            normals[slot, 0], normals[slot, 1], normals[slot, 2] = m
+            push(keys, slots, waiting, key, slot)
+            waiting += 1
+    if status == APART:
+        lower = (1.0 - rough) * upper - tolerance
+    elif best[0] < 0 and upper == math.inf:
+        # Out of room before any point inside the trims: where the search began.
+        best = (ai[first_f, FEATURE], bi[first_g, FEATURE])
+        at = (a[first_f, U0], a[first_f, V0], b[first_g, U0], b[first_g, V0])
+    return status, best[0], best[1], at, gap, max(min(lower, uncut), 0.0), effort

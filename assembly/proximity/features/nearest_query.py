@@ -1,0 +1,138 @@
+"""The nearest features of two shells for Python, and tracking of them, one call each."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from assembly._kernel import kernel
+from assembly.geometry.vec import add, dot, matvec, matvec_t, scale, sub
+from assembly.kinematics.motion import position, relative_pose, rotation
+from assembly.proximity.brep.borders import feature_at, feature_kind
+from assembly.proximity.extrema.crossing import tangents
+from assembly.proximity.extrema.face_face import CONVERGED, SINGULAR
+from assembly.proximity.extrema.feature_pair import solve_features
+from assembly.proximity.features.ball_tree import feature_cells
+from assembly.proximity.features.conforming import NEARLY, conforming_pair
+from assembly.proximity.features.global_search import APART, CROSSING, UNPROVEN, search
+from assembly.proximity.features.penetration import PENETRATING, TOUCHING, deepest
+from assembly.proximity.features.separating_normals import WAYS, overlap_at
+from assembly.proximity.features.switching import track_features
+
+# What is written of a pair: parameters (4), point of f, point of g, normal, gap, lower bound, pairs of cells looked
+# at, switches.
+PARAMETERS, POINT_F, POINT_G, NORMAL, GAP, LOWER, EFFORT, SWITCHES, PAIR = 0, 4, 7, 10, 13, 14, 15, 16, 17
+# Where no pair is nearer than the one found by more than this part of the size, it counts as the nearest one: in a
+# continuum, or beside a tip, a search has no room to prove more.
+PROVEN = 1e-9
+# Statuses of a tracked pair, beside those of a search.
+TRACKED, LOST = 4, 5
+
+
+@kernel(inner=True)
+def write_pair(q, turn_f, x, pf, pg, n, gap, out):
+    """A pair in the axes of body f into `out`, in world axes."""
+    origin = position(q, 0)
+    a = add(matvec(turn_f, pf), origin)
+    b = add(matvec(turn_f, pg), origin)
+    normal = matvec(turn_f, n)
+    for k in range(4):
+        out[PARAMETERS + k] = x[k]
+    for k in range(3):
+        out[POINT_F + k] = a[k]
+        out[POINT_G + k] = b[k]
+        out[NORMAL + k] = normal[k]
+    out[GAP] = gap
+
+
+@kernel(inner=True)
+def write_features(table, pool, shell_f, shell_g, q, turn_f, turn, shift, f, g, x, n, gap, size, codes, out):
+    """The pair of features f and g at x into codes (2,) and out (PAIR,); n a normal near its own, or zero."""
+    kind_f = feature_kind(table, shell_f, f)
+    kind_g = feature_kind(table, shell_g, g)
+    a = feature_at(table, shell_f, f)
+    b = feature_at(table, shell_g, g)
+    status, y, frame = solve_features(table, pool, kind_f, a, kind_g, b, turn, shift, x, n, size, math.inf)
+    codes[0] = f
+    codes[1] = g
+    if (status == CONVERGED or status == SINGULAR) and abs(abs(frame[5]) - abs(gap)) <= 1e-12 * size:
+        write_pair(q, turn_f, y, frame[3], frame[4], frame[0], frame[5], out)
+        return
+    # A crossing, or an apex where Newton's method has no tangent to go on: the points themselves.
+    same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+    none = (0.0, 0.0, 0.0)
+    pf = tangents(table, pool, kind_f, feature_cells(table, shell_f, f)[1], same, none, x[0], x[1])[0]
+    pg = tangents(table, pool, kind_g, feature_cells(table, shell_g, g)[1], turn, shift, x[2], x[3])[0]
+    d = sub(pg, pf)
+    length = math.sqrt(dot(d, d))
+    write_pair(q, turn_f, x, pf, pg, scale(1.0 / length, d) if length > 1e-9 * size else frame[0], length, out)
+
+
+@kernel(signatures="(i8[::1], f8[::1], i8, i8, f8[:, ::1], f8, i8[::1], f8[::1])")
+def find_nearest(table, pool, shell_f, shell_g, q, size, codes, out):
+    """The nearest pair at the poses q (2, 7); its features into codes (2,), the pair into out. Returns the status."""
+    turn_f = rotation(q, 0)
+    turn, shift = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
+    status, f, g, x, gap, lower, effort = search(table, pool, shell_f, shell_g, turn, shift, size, 0.0)
+    none = (0.0, 0.0, 0.0)
+    if status == UNPROVEN:
+        # The search was over before it came to the nearest one; beside what it found there may be nearer ones.
+        found, near_f, near_g, y, frame, _switches = track_features(
+            table, pool, shell_f, shell_g, turn, shift, f, g, x, none, size, math.inf
+        )
+        if (found == CONVERGED or found == SINGULAR) and lower <= abs(frame[5]) < abs(gap):
+            f, g, x, gap = near_f, near_g, y, frame[5]
+        if abs(gap) - lower <= PROVEN * size:
+            status = APART
+    if status == APART and abs(gap) <= TOUCHING * size:
+        # Solids whose faces are flush have points in common before a search comes to where they cross.
+        if overlap_at(table, pool, shell_f, shell_g, turn, f, g, x, size, np.empty((WAYS, 3))):
+            status = CROSSING
+    write_features(table, pool, shell_f, shell_g, q, turn_f, turn, shift, f, g, x, none, gap, size, codes, out)
+    out[LOWER] = lower
+    out[EFFORT] = effort
+    return status
+
+
+@kernel(signatures="(i8[::1], f8[::1], i8, i8, f8[:, ::1], f8, i8[::1], f8[::1])")
+def find_deepest(table, pool, shell_f, shell_g, q, size, codes, out):
+    """The pair of two shells that cross at the features and coordinates in codes and out. Returns the status.
+
+    APART where they turn out to touch, and rounding said that they cross. Where what leads out is long it is seen
+    whether only conforming faces have points in common.
+    """
+    turn_f = rotation(q, 0)
+    turn, shift = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
+    x = (out[0], out[1], out[2], out[3])
+    found, f, g, y, n, gap = deepest(table, pool, shell_f, shell_g, turn, shift, codes[0], codes[1], x, size)
+    if not found or gap < -NEARLY * size:
+        touches, near_f, near_g, z, m, off = conforming_pair(table, pool, shell_f, shell_g, turn, shift, size)
+        if touches:
+            found, f, g, y, n, gap = True, near_f, near_g, z, m, off
+    if not found:
+        return CROSSING
+    write_features(table, pool, shell_f, shell_g, q, turn_f, turn, shift, f, g, y, n, gap, size, codes, out)
+    return PENETRATING if gap < 0.0 else APART
+
+
+@kernel(signatures="(i8[::1], f8[::1], i8, i8, f8[:, ::1], f8, i8[::1], f8[::1])")
+def follow_nearest(table, pool, shell_f, shell_g, q, size, codes, out):
+    """The pair in codes and out carried to the poses q. Returns TRACKED, or LOST and leaves the pair."""
+    turn_f = rotation(q, 0)
+    turn, shift = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
+    n = matvec_t(turn_f, (out[NORMAL], out[NORMAL + 1], out[NORMAL + 2]))
+    x = (out[0], out[1], out[2], out[3])
+    status, f, g, y, frame, switches = track_features(
+        table, pool, shell_f, shell_g, turn, shift, codes[0], codes[1], x, n, size, 1.0
+    )
+    # An edge may have become the farthest one of its neighborhood, surfaces may cross beside their points. In a
+    # continuum, of flush faces say, nothing tells.
+    if not (status == SINGULAR or (status == CONVERGED and frame[14])):
+        return LOST
+    codes[0] = f
+    codes[1] = g
+    write_pair(q, turn_f, y, frame[3], frame[4], frame[0], frame[5], out)
+    out[LOWER] = math.nan
+    out[SWITCHES] += switches
+    return TRACKED

@@ -1,0 +1,208 @@
+"""What may be in a pair of cells: whether they are inside their trims, hold an extremum, or only one that is known.
+
+Where features are nearest, d = g - f is normal to both, so that d.S_u = d.S_v = 0 on a face and d.C_t = 0 on an edge.
+An extremum of two faces with relative curvature of least eigenvalue l > 0 is the only one as far as the curvatures of
+both change by less than l.
+"""
+
+from __future__ import annotations
+
+import math
+
+from assembly._kernel import kernel
+from assembly.geometry.faces.trim import trim_side
+from assembly.geometry.faces.trim_nearest import trim_nearest
+from assembly.geometry.faces.trim_pieces import TRIM_CURVES
+from assembly.geometry.splines.evaluate import (
+    BREAKS_U,
+    BREAKS_V,
+    CLOSED_U,
+    CLOSED_V,
+    CURVE_BREAKS,
+    CURVE_SPANS,
+    SPANS_U,
+    SPANS_V,
+)
+from assembly.geometry.vec import cross, dot, sub
+from assembly.proximity.brep.records import EDGE, EDGE_CURVE, EDGE_START, FACE, FACE_SURFACE, FACE_TRIM, VERTEX
+from assembly.proximity.features.ball_tree import (
+    FEATURE,
+    INSIDE,
+    KIND,
+    MIXED_SIDE,
+    OUTSIDE,
+    RECORD,
+    SIDE,
+    UNKNOWN,
+)
+from assembly.proximity.features.quadratic_model import (
+    BEND,
+    CHANGE,
+    CURVED,
+    HALF_U,
+    HALF_V,
+    LINEAR_U,
+    LINEAR_V,
+    MIXED,
+    NORMAL,
+    POINT,
+    RADIUS,
+    REST,
+    SQUARE_U,
+    SQUARE_V,
+    U0,
+    V0,
+    get,
+)
+
+# Boxes whose normals turn by less hold at most one extremum.
+TRUSTED = 0.05
+# Boxes that hold an extremum this many half widths from their middles still take it for their own.
+BESIDE = 1.5
+FAR = 6.0
+
+
+@kernel(inner=True)
+def is_feasible(table, pool, kind, record, u, v):
+    """Whether a point of a feature is one of the shell."""
+    if kind != FACE or table[record + FACE_TRIM] < 0:
+        return True
+    return trim_side(table, pool, table[record + FACE_TRIM], u, v) >= 0
+
+
+@kernel(inner=True)
+def side_of(table, pool, nodes, info, i):
+    """Where a cell is from the trim of its face."""
+    if info[i, KIND] != FACE or info[i, SIDE] != UNKNOWN:
+        return info[i, SIDE]
+    trim = table[info[i, RECORD] + FACE_TRIM]
+    s = trim_nearest(table, pool, trim, 0, table[trim + TRIM_CURVES], nodes[i, U0], nodes[i, V0])[0]
+    reach = math.sqrt(nodes[i, HALF_U] ** 2 + nodes[i, HALF_V] ** 2)
+    side = INSIDE if s >= reach else (OUTSIDE if s < -1.000001 * reach else MIXED_SIDE)
+    info[i, SIDE] = side
+    return side
+
+
+@kernel(inner=True)
+def grows(a, i, p, q, first, second, b, j, d, length):
+    """Whether d.S_u, p = S_u over half a box and q = S_v so, cannot vanish over a node a[i] and another b[j].
+
+    `first` and `second` are half the derivatives of p along both directions.
+    """
+    pp = dot(p, p)
+    if pp == 0.0:
+        return False
+    long = math.sqrt(pp)
+    moves = pp + abs(dot(p, q)) + abs(dot(p, get(b, j, LINEAR_U))) + abs(dot(p, get(b, j, LINEAR_V)))
+    turn = 2.0 * math.sqrt(dot(first, first)) + math.sqrt(dot(second, second)) + 6.0 * a[i, REST]
+    return abs(dot(d, p)) > moves + long * (a[i, CURVED] + b[j, CURVED]) + (length + a[i, RADIUS] + b[j, RADIUS]) * turn
+
+
+@kernel(inner=True)
+def monotone(a, i, kind, b, j, d, length):
+    """Whether d.S_u or d.S_v cannot vanish over a node of one feature, and any point of one of another."""
+    if kind == VERTEX:
+        return False
+    p = get(a, i, LINEAR_U)
+    q = get(a, i, LINEAR_V)
+    m = get(a, i, MIXED)
+    if grows(a, i, p, q, get(a, i, SQUARE_U), m, b, j, d, length):
+        return True
+    return kind == FACE and grows(a, i, q, p, get(a, i, SQUARE_V), m, b, j, d, length)
+
+
+@kernel(inner=True)
+def excluded(a, i, kind_f, b, j, kind_g, are_apart):
+    """Whether no extremum of two features, and no crossing, is in a pair of their cells."""
+    d = sub(get(b, j, POINT), get(a, i, POINT))
+    length = math.sqrt(dot(d, d))
+    if monotone(a, i, kind_f, b, j, d, length) or monotone(b, j, kind_g, a, i, d, length):
+        return True
+    bend = a[i, BEND] + b[j, BEND]
+    # Where features cross, their normals need not be parallel.
+    if not (are_apart and bend < 1.5):
+        return False
+    if kind_f == FACE and kind_g == FACE:
+        s = cross(get(a, i, NORMAL), get(b, j, NORMAL))
+        return dot(s, s) > math.sin(bend) ** 2
+    if kind_f == FACE and kind_g == EDGE:
+        t = get(b, j, LINEAR_U)
+        return abs(dot(t, get(a, i, NORMAL))) > math.sin(bend) * math.sqrt(dot(t, t))
+    if kind_f == EDGE and kind_g == FACE:
+        t = get(a, i, LINEAR_U)
+        return abs(dot(t, get(b, j, NORMAL))) > math.sin(bend) * math.sqrt(dot(t, t))
+    return False
+
+
+@kernel(inner=True)
+def relative_curvature(k, h, beta):
+    """Least eigenvalue of the curvature of g relative to f moved to it, towards each other; and 1 / the least of K."""
+    det = k[0] * k[2] - k[1] * k[1]
+    if not (k[0] > 0.0 and det > 0.0):
+        return -math.inf, 1.0
+    s = -1.0 / det if beta >= 0.0 else 1.0 / det
+    # -H K^-1, symmetric but for rounding.
+    a = s * (h[0] * k[2] - h[1] * k[1])
+    b = s * 0.5 * (h[1] * k[0] - h[0] * k[1] + h[2] * k[2] - h[3] * k[1])
+    c = s * (h[3] * k[0] - h[2] * k[1])
+    least = 0.5 * (a + c) - math.sqrt(0.25 * (a - c) ** 2 + b * b)
+    low = 0.5 * (k[0] + k[2]) - math.sqrt(0.25 * (k[0] - k[2]) ** 2 + k[1] * k[1])
+    return least, 1.0 / max(low, 1e-12)
+
+
+@kernel(inline=True)
+def off_middle(x, middle, half, period):
+    """How many half widths x is from the middle of an interval."""
+    d = abs(x - middle)
+    if period > 0.0:
+        d = min(d, abs(period - d))
+    if half > 0.0:
+        return d / half
+    return 0.0
+
+
+@kernel(inner=True)
+def periods(table, pool, kind, record):
+    """Periods of a feature's coordinates; 0 where there is none."""
+    if kind == FACE:
+        r = table[record + FACE_SURFACE]
+        bu = table[r + BREAKS_U]
+        bv = table[r + BREAKS_V]
+        u = pool[bu + table[r + SPANS_U]] - pool[bu] if table[r + CLOSED_U] == 1 else 0.0
+        v = pool[bv + table[r + SPANS_V]] - pool[bv] if table[r + CLOSED_V] == 1 else 0.0
+        return u, v
+    if kind == EDGE and table[record + EDGE_START] < 0:
+        c = table[record + EDGE_CURVE]
+        o = table[c + CURVE_BREAKS]
+        return pool[o + table[c + CURVE_SPANS]] - pool[o], 0.0
+    return 0.0, 0.0
+
+
+@kernel(inner=True)
+def from_middles(table, pool, a, ai, i, b, bi, j, x):
+    """The most half widths that coordinates x are from the middles of two cells."""
+    pu, pv = periods(table, pool, ai[i, KIND], ai[i, RECORD])
+    s = off_middle(x[0], a[i, U0], a[i, HALF_U], pu)
+    s = max(s, off_middle(x[1], a[i, V0], a[i, HALF_V], pv))
+    pu, pv = periods(table, pool, bi[j, KIND], bi[j, RECORD])
+    s = max(s, off_middle(x[2], b[j, U0], b[j, HALF_U], pu))
+    return max(s, off_middle(x[3], b[j, V0], b[j, HALF_V], pv))
+
+
+@kernel(inner=True)
+def is_known(table, pool, a, ai, i, b, bi, j, extrema, owners, count):
+    """Whether the only extremum that two cells may hold is one that is known; half widths from the nearest one."""
+    bend = max(a[i, BEND], b[j, BEND])
+    nearest = math.inf
+    for k in range(count):
+        if owners[k, 0] != ai[i, FEATURE] or owners[k, 1] != bi[j, FEATURE]:
+            continue
+        s = from_middles(table, pool, a, ai, i, b, bi, j, (extrema[k, 0], extrema[k, 1], extrema[k, 2], extrema[k, 3]))
+        nearest = min(nearest, s)
+        if s <= BESIDE and bend <= TRUSTED:
+            return True, s
+        if s <= FAR:
+            change = a[i, CHANGE] * extrema[k, 5] * extrema[k, 5] + b[j, CHANGE]
+            if extrema[k, 4] > 1.5 * max(s, 1.0) * change:
+                return True, s
+    return False, nearest

@@ -1,0 +1,140 @@
+"""Parts of two spines that are near each other: by a descent of their trees, or from a list of an earlier one."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from assembly._kernel import kernel
+from assembly.geometry.vec import add, dot, matvec, sub
+from assembly.proximity.bvh.neighbor_list import COUNT, ENTRIES, can_be_listed, moved_since, reaches, write_list
+from assembly.proximity.manager.centerlines.box import ROUNDING, segment_distance
+from assembly.proximity.manager.centerlines.curve import (
+    BALL,
+    BALL_RADIUS,
+    HALF,
+    NODE_POOL,
+    NODE_TABLE,
+    PART,
+    PART_BEND,
+    PART_POOL,
+    TANGENT,
+    three,
+)
+
+
+@kernel(inline=True)
+def balls_apart(pool, o, p, turn, shift):
+    """How far the balls at o and at p are apart, negative where they meet."""
+    d = sub(add(matvec(turn, three(pool, p)), shift), three(pool, o))
+    return math.sqrt(dot(d, d)) - pool[o + BALL_RADIUS] - pool[p + BALL_RADIUS]
+
+
+@kernel(inline=True)
+def parts_apart(pool, o, p, turn, shift):
+    """A lower bound of the distance of the parts at o of f and at p of g: that of their tangents in the middle."""
+    h = pool[o + HALF]
+    k = pool[p + HALF]
+    d = sub(add(matvec(turn, three(pool, p)), shift), three(pool, o))
+    least = segment_distance(d, three(pool, o + TANGENT), matvec(turn, three(pool, p + TANGENT)), h, k)
+    return least - 0.5 * (pool[o + PART_BEND] * h * h + pool[p + PART_BEND] * k * k) - ROUNDING
+
+
+@kernel(inline=True)
+def whole_box(table, pool, spine, part, boxes, b, at):
+    """A side of box b: a whole part, from and to its ends."""
+    half = pool[table[spine + PART_POOL] + PART * part + HALF]
+    boxes[b, at] = float(part)
+    boxes[b, at + 1] = -half
+    boxes[b, at + 2] = half
+
+
+@kernel(inner=True)
+def descend(table, pool, spines, turn, shift, reach, stack, out):
+    """Parts (k, 2) of two spines that may be within a reach of each other.
+
+    Returns how many, or -1 where there is no room; and how far all others are beyond.
+    """
+    f, g = spines
+    nodes_f = table[f + NODE_POOL]
+    nodes_g = table[g + NODE_POOL]
+    stack[0, 0] = 0
+    stack[0, 1] = 0
+    used = 1
+    count = 0
+    beyond = math.inf
+    while used > 0:
+        used -= 1
+        i = stack[used, 0]
+        j = stack[used, 1]
+        o = nodes_f + BALL * i
+        p = nodes_g + BALL * j
+        apart = balls_apart(pool, o, p, turn, shift)
+        if apart > reach:
+            beyond = min(beyond, apart)
+            continue
+        child_f = table[table[f + NODE_TABLE] + i]
+        child_g = table[table[g + NODE_TABLE] + j]
+        if child_f < 0 and child_g < 0:
+            part_f = np.int64(-1 - child_f)
+            part_g = np.int64(-1 - child_g)
+            apart = parts_apart(
+                pool, table[f + PART_POOL] + PART * part_f, table[g + PART_POOL] + PART * part_g, turn, shift
+            )
+            if apart > reach:
+                beyond = min(beyond, apart)
+                continue
+            if count == out.shape[0]:
+                return -1, 0.0
+            out[count, 0] = part_f
+            out[count, 1] = part_g
+            count += 1
+            continue
+        if used + 2 > stack.shape[0]:
+            return -1, 0.0
+        down_f = child_g < 0 or (child_f >= 0 and pool[o + BALL_RADIUS] >= pool[p + BALL_RADIUS])
+        for k in range(2):
+            stack[used, 0] = child_f + k if down_f else i
+            stack[used, 1] = j if down_f else child_g + k
+            used += 1
+    return count, beyond
+
+
+@kernel(inner=True)
+def parts_beyond(table, pool, scene, reach, stack, out):
+    """How far two spines are apart at least, where no parts of them are within a reach of each other."""
+    return descend(table, pool, scene[5], scene[0], scene[1], reach, stack, out)[1]
+
+
+@kernel(inner=True)
+def near_parts(table, pool, at, p, scene, moving, reach, ring, stack, out, boxes):
+    """Boxes of parts of two spines that are within a reach of each other; how many, or -1 where there is no room.
+
+    From the list at `at`, as `patch_list.listed_pairs` has patches.
+    """
+    turn, shift = scene[0], scene[1]
+    spines = scene[5]
+    f, g = spines
+    fits = reaches(table, at, moved_since(table, pool, at, p, moving), reach)
+    if fits == 0 and can_be_listed(table, pool, moving, ring + reach):
+        count, _beyond = descend(table, pool, spines, turn, shift, reach + ring, stack, out)
+        fits = 1 if write_list(table, pool, at, p, moving, reach, ring, out, count) else -1
+    if fits == 1:
+        many = table[at + COUNT]
+        for k in range(many):
+            out[k, 0] = table[at + ENTRIES + 2 * k]
+            out[k, 1] = table[at + ENTRIES + 2 * k + 1]
+    else:
+        many, _beyond = descend(table, pool, spines, turn, shift, reach, stack, out)
+    count = 0
+    for k in range(many):
+        i, j = out[k, 0], out[k, 1]
+        if parts_apart(pool, table[f + PART_POOL] + PART * i, table[g + PART_POOL] + PART * j, turn, shift) > reach:
+            continue
+        if count == boxes.shape[0]:
+            return -1
+        whole_box(table, pool, f, i, boxes, count, 0)
+        whole_box(table, pool, g, j, boxes, count, 3)
+        count += 1
+    return count if many >= 0 else -1

@@ -1,0 +1,302 @@
+"""The place of a contact on two bodies: what a least gap of the same bodies does not ask for.
+
+Around a contact's pair of points the bodies are nearer than any gap above zero. Its place is all that is reached from
+there between the two bodies without their gap rising to the least one: the corners of a face that lies on another face,
+the two minima into which the contact's minimum parts. What is near elsewhere, beyond a wider gap, is another place. A
+contact that is still open is taken as closed: what it will leave open by less than the least gap is in its place.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from assembly._kernel import kernel
+from assembly.geometry.splines.evaluate import surface_point
+from assembly.geometry.vec import add, dot, matvec, matvec_t, scale, sub
+from assembly.kinematics.motion import relative_pose, rotation
+from assembly.proximity.brep.borders import feature_at, feature_kind
+from assembly.proximity.brep.records import EDGE, VERTEX
+from assembly.proximity.bvh.tree import (
+    CENTER,
+    CHILD,
+    ELEMENT,
+    ELEMENT_FEATURE,
+    ELEMENT_POOL,
+    HALF,
+    NODE,
+    NODE_INTS,
+    NODE_POOL,
+    NODE_TABLE,
+)
+from assembly.proximity.extrema.feature_jets import edge_jet, vertex_point
+from assembly.proximity.features.solid_contact import FEATURE_F, FEATURE_G, PAIR_GAP
+from assembly.proximity.manager.extrema import (
+    BESIDE_CONTACT,
+    ELSEWHERE,
+    GAP,
+    GIVEN_RECORD,
+    GIVEN_ROW,
+    GIVEN_SHELL,
+    GIVEN_SURFACE,
+    LISTED,
+    NEW,
+    OF_CONTACT,
+    OPENS,
+    ORIGIN,
+    POINT_F,
+    POINT_G,
+    ROOT_PLACE,
+    SWAPPED,
+)
+from assembly.proximity.manager.overlap import DEPTH, foot_at, surface_of, with_children
+from assembly.proximity.manager.state import (
+    GIVEN,
+    GIVEN_COUNT,
+    LENGTHS,
+    NEGLECT,
+    PAIR_F,
+    PAIR_G,
+    PAIR_MINIMUM,
+    PAIR_RECORD,
+    PAIR_SHELL_F,
+    PAIR_SHELL_G,
+    PAIR_SURFACE_F,
+    PAIR_SURFACE_G,
+    PAIR_TABLE,
+    TREE_F,
+    TREE_G,
+)
+
+# A way from one pair to another one has so many strides, were it straight; so many it may have at most.
+STRIDES, LONGEST = 32, 96
+# How often a point is put between the bodies anew after a stride, and which part of a stride has to be gained.
+CENTERINGS, GAINED = 3, 0.05
+# Steps of Newton's method to the nearest point of an edge.
+EDGE_STEPS = 8
+
+
+@kernel(inner=True)
+def point_of(table, pool, surface, shell, code, u, v):
+    """The point of a surface, or of a feature of a shell, in the axes of its body."""
+    if surface >= 0:
+        return surface_point(table, pool, surface, u, v)[0]
+    kind = feature_kind(table, shell, code)
+    feature = feature_at(table, shell, code)
+    if kind == VERTEX:
+        return vertex_point(table, pool, feature)
+    return edge_jet(table, pool, feature, u)[0] if kind == EDGE else surface_point(table, pool, feature, u, v)[0]
+
+
+@kernel(inner=True)
+def point_on_edge(table, pool, edge, low, high, y):
+    """The point of a part of an edge that Newton's method takes for the nearest one to y."""
+    t = 0.5 * (low + high)
+    for _ in range(EDGE_STEPS):
+        p, along, bent = edge_jet(table, pool, edge, t)
+        d = sub(p, y)
+        slope = dot(d, along)
+        square = dot(along, along)
+        curvature = square + dot(d, bent)
+        step = -slope / (curvature if curvature > 0.1 * square else max(square, 1e-300))
+        before = t
+        t = min(max(t + step, low), high)
+        if abs(t - before) <= 1e-12 * (high - low):
+            break
+    return edge_jet(table, pool, edge, t)[0]
+
+
+@kernel(inner=True)
+def nearest_point(table, pool, tree, surface, shell, y, reach, stack):
+    """The nearest point of a body to y, in its axes, and whether one is within reach."""
+    stack[0] = 0
+    used = 1
+    least = reach
+    best = y
+    some = False
+    while used > 0:
+        used -= 1
+        i = stack[used]
+        o = table[tree + NODE_POOL] + NODE * i
+        square = 0.0
+        for k in range(3):
+            off = max(abs(y[k] - pool[o + CENTER + k]) - pool[o + HALF + k], 0.0)
+            square += off * off
+        if square > least * least:
+            continue
+        child = table[table[tree + NODE_TABLE] + NODE_INTS * i + CHILD]
+        if child >= 0:
+            used = with_children(stack, used, child)
+            continue
+        e = -1 - child
+        at = table[tree + ELEMENT_POOL] + ELEMENT * e
+        code = np.int64(pool[at + ELEMENT_FEATURE])
+        if surface_of(table, shell, surface, code) >= 0:
+            distance, n, found = foot_at(table, pool, tree, surface, shell, e, y)
+            p = sub(y, scale(distance, n))
+            if not found:
+                continue
+        elif feature_kind(table, shell, code) == EDGE:
+            middle, half = pool[at], pool[at + 2]
+            p = point_on_edge(table, pool, feature_at(table, shell, code), middle - half, middle + half, y)
+        else:
+            p = vertex_point(table, pool, feature_at(table, shell, code))
+        d = sub(p, y)
+        distance = math.sqrt(dot(d, d))
+        if distance <= least:
+            least, best, some = distance, p, True
+    return best, some
+
+
+@kernel(inner=True)
+def between_bodies(table, pool, scene, c, reach, stack):
+    """The middle of the nearest points of both bodies to c, how far these are apart, and whether both are in reach."""
+    turn, shift, surfaces, trees = scene
+    p, found_f = nearest_point(table, pool, trees[0], surfaces[0], surfaces[2], c, reach, stack)
+    at_g = matvec_t(turn, sub(c, shift))
+    q, found_g = nearest_point(table, pool, trees[1], surfaces[1], surfaces[3], at_g, reach, stack)
+    q = add(matvec(turn, q), shift)
+    d = sub(q, p)
+    return scale(0.5, add(p, q)), math.sqrt(dot(d, d)), found_f and found_g
+
+
+@kernel(inner=True)
+def leads_to(table, pool, scene, begin, end, level, stack):
+    """Whether a way between the bodies leads from one point to another one, along which they are nearer than a level.
+
+    It goes straight for the end, and after every stride back to where both bodies are equally far.
+    """
+    d = sub(end, begin)
+    left = math.sqrt(dot(d, d))
+    stride = left / STRIDES
+    c = begin
+    for _ in range(LONGEST):
+        if left <= stride:
+            return True
+        c = add(c, scale(stride / left, sub(end, c)))
+        near = False
+        for _centering in range(CENTERINGS):
+            c, gap, found = between_bodies(table, pool, scene, c, stride + level, stack)
+            if not found:
+                return False
+            near = gap < level
+            if near:
+                break
+        d = sub(end, c)
+        before, left = left, math.sqrt(dot(d, d))
+        if not near or left > before - GAINED * stride:
+            return False
+    return False
+
+
+@kernel(inner=True)
+def contact_points(table, pool, scene, given, tracked):
+    """The pair of points of a given contact, in the axes of body f of its pair of bodies."""
+    r = table[given + GIVEN_ROW]
+    a = point_of(
+        table, pool, table[given + GIVEN_SURFACE], table[given + GIVEN_SHELL], np.int64(tracked[r, FEATURE_F]),
+        tracked[r, 0], tracked[r, 1],
+    )  # fmt: skip
+    b = point_of(
+        table, pool, table[given + GIVEN_SURFACE + 1], table[given + GIVEN_SHELL + 1],
+        np.int64(tracked[r, FEATURE_G]), tracked[r, 2], tracked[r, 3],
+    )  # fmt: skip
+    if table[given + SWAPPED] == 1:
+        a, b = b, a
+    return a, add(matvec(scene[0], b), scene[1])
+
+
+@kernel(inline=True)
+def root_points(roots, k):
+    """The pair of points of a root."""
+    return (
+        (roots[k, POINT_F], roots[k, POINT_F + 1], roots[k, POINT_F + 2]),
+        (roots[k, POINT_G], roots[k, POINT_G + 1], roots[k, POINT_G + 2]),
+    )
+
+
+@kernel(inline=True)
+def apart(a, b):
+    """The distance of two points."""
+    d = sub(a, b)
+    return math.sqrt(dot(d, d))
+
+
+@kernel(inner=True, allocates=True)
+def spread(table, pool, scene, roots, count, begin, limits, stack):
+    """Mark the roots in the place of a contact whose points have their middle at `begin`.
+
+    From root to root, the nearest first: each is tried from the nearest point that is known to be in the place. The
+    `limits` are the level below which gaps are, and the gap below which no root is taken.
+    """
+    level, lowest = limits
+    middles = np.empty((count, 3))
+    # From how near a root was tried last, and from where it is to be tried next.
+    tried = np.full(count, math.inf)
+    nearest = np.full(count, math.inf)
+    source = np.empty((count, 3))
+    eligible = np.zeros(count, np.bool_)
+    for k in range(count):
+        p, q = root_points(roots, k)
+        c = scale(0.5, add(p, q))
+        middles[k, 0], middles[k, 1], middles[k, 2] = c
+        source[k, 0], source[k, 1], source[k, 2] = begin
+        nearest[k] = apart(c, begin)
+        may = roots[k, ORIGIN] == NEW or roots[k, ORIGIN] >= LISTED
+        eligible[k] = may and roots[k, ROOT_PLACE] == ELSEWHERE and lowest <= roots[k, GAP] < level
+    while True:
+        best = -1
+        for k in range(count):
+            if eligible[k] and nearest[k] < tried[k] and (best < 0 or nearest[k] < nearest[best]):
+                best = k
+        if best < 0:
+            return
+        tried[best] = nearest[best]
+        start = (source[best, 0], source[best, 1], source[best, 2])
+        end = (middles[best, 0], middles[best, 1], middles[best, 2])
+        if not leads_to(table, pool, scene, start, end, level, stack):
+            continue
+        roots[best, ROOT_PLACE] = BESIDE_CONTACT
+        eligible[best] = False
+        for k in range(count):
+            away = apart((middles[k, 0], middles[k, 1], middles[k, 2]), end)
+            if away < nearest[k]:
+                nearest[k] = away
+                source[k, 0], source[k, 1], source[k, 2] = end
+
+
+@kernel(signatures="(i8[::1], f8[::1], i8, i8, f8[:, ::1], f8[:, ::1], f8[:, ::1], i8)")
+def mark_places(table, pool, watch, p, q, tracked, roots, count):
+    """Mark the roots of pair p that are a given contact's pair, or in its place; how many contacts have one."""
+    pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
+    i, j = table[pair + PAIR_F], table[pair + PAIR_G]
+    turn, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
+    surfaces = (
+        table[pair + PAIR_SURFACE_F],
+        table[pair + PAIR_SURFACE_G],
+        table[pair + PAIR_SHELL_F],
+        table[pair + PAIR_SHELL_G],
+    )
+    scene = (turn, shift, surfaces, (table[pair + TREE_F], table[pair + TREE_G]))
+    least = pool[table[pair + PAIR_MINIMUM]]
+    neglect = pool[table[watch + LENGTHS] + NEGLECT]
+    stack = np.empty(DEPTH, np.int64)
+    known = 0
+    for c in range(table[pair + GIVEN_COUNT]):
+        given = table[pair + GIVEN] + GIVEN_RECORD * c
+        r = table[given + GIVEN_ROW]
+        if math.isnan(tracked[r, 0]):
+            continue
+        known += 1
+        a, b = contact_points(table, pool, scene, given, tracked)
+        for k in range(count):
+            p_f, p_g = root_points(roots, k)
+            if max(apart(p_f, a), apart(p_g, b)) <= neglect:
+                roots[k, ROOT_PLACE] = OF_CONTACT
+        gap = apart(a, b) if tracked[r, PAIR_GAP] > 0.0 else 0.0
+        # A contact that may stay open, and is by more than the least gap, excuses nothing that is nearer.
+        lowest = least if table[given + OPENS] == 1 and gap >= least else -math.inf
+        limits = (gap + least, lowest)
+        spread(table, pool, scene, roots, count, scale(0.5, add(a, b)), limits, stack)
+    return known

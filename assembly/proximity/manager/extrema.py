@@ -1,0 +1,227 @@
+"""Extremal pairs of two bodies, the roots of a look (`proximity/manager/update.py`): from pairs of patches by Newton's
+method.
+
+A root counts where outward normals oppose each other and the distance has a local minimum, by which solids touch; a
+saddle of the distance is known, but not listed. Two roots are one where their points are near in space and along the
+surfaces as well: the surface point halfway between their parameters is near them, too (paper 001, section 5).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from assembly._address import call_address
+from assembly._kernel import kernel
+from assembly.geometry.splines.evaluate import BREAKS_U, BREAKS_V, CLOSED_U, CLOSED_V, SPANS_U, SPANS_V, surface_point
+from assembly.geometry.vec import add, dot, matvec, matvec_t, scale, sub
+from assembly.kinematics.motion import rotation
+from assembly.proximity.brep.borders import feature_at
+from assembly.proximity.brep.records import FACES
+from assembly.proximity.extrema.face_face import CONVERGED, NOT_CONVERGED, SINGULAR, pair_frame, solve_pair
+from assembly.proximity.extrema.feedback import descend_pair
+from assembly.proximity.extrema.global_start import opposed
+from assembly.proximity.extrema.rates import ARM_F
+from assembly.proximity.extrema.rates import GAP as RECORD_GAP
+from assembly.proximity.extrema.singular import ALONE, fold_of
+from assembly.proximity.features.solid_contact import FEATURE_F, FEATURE_G, FOLD, PAIR_NORMAL, PROPER, STAYS
+
+# A root: parameters, features, normal in the axes of f, gap, where it is from, its points in the axes of f, how far it
+# is from a fold (det H / |H|^2), how far so beyond the knot lines beside it (NaN: not looked at), what it holds on to
+# if it is no root, but a corner (`proximity/manager/vertex_contacts.py`), and whether it is in the place of a contact
+# (`contact_place.py`).
+CODE_F, CODE_G, ROOT_NORMAL, GAP, ORIGIN, POINT_F, POINT_G, ROOT_FOLD, ROOT_BEYOND, CORNER, ROOT_PLACE, ROOT = (
+    4, 5, 6, 9, 10, 11, 14, 17, 18, 19, 20, 21
+)  # fmt: skip
+# Where it is from: of no use, new, from LISTED on the place it has, down from GIVEN_CONTACT which given contact it is.
+USELESS, NEW, LISTED, GIVEN_CONTACT = -2.0, -1.0, 0, -3.0
+# A given contact of two bodies: its row, 1 if the bodies are the other way round there, 1 if its gap may be open, and
+# the surfaces of its sides, or else (-1) their shells.
+GIVEN_ROW, SWAPPED, OPENS, GIVEN_SURFACE, GIVEN_SHELL, GIVEN_RECORD = 0, 1, 2, 3, 5, 7
+# Of a root: in no contact's place, in one beside the contact's own pair, that pair.
+ELSEWHERE, BESIDE_CONTACT, OF_CONTACT = 0.0, 1.0, 2.0
+# What became of a start: nothing there, a root that is known, a saddle, a minimum.
+NOTHING, ALIKE, SADDLE, MINIMUM_FOUND = 0, 1, 2, 3
+# Roots of no use are the same within this radius, in parts of the scene's size.
+SAME = 1e-6
+# Steps of the controller where Newton's method fails.
+DESCENTS = 40
+
+
+@kernel(inline=True)
+def between(table, pool, r, u, v, s, t):
+    """The middle of two pairs of parameters, the shorter way around."""
+    a = 0.5 * (u + s)
+    b = 0.5 * (v + t)
+    if table[r + CLOSED_U] == 1:
+        period = pool[table[r + BREAKS_U] + table[r + SPANS_U]] - pool[table[r + BREAKS_U]]
+        if abs(u - s) > 0.5 * period:
+            a += 0.5 * period if a < pool[table[r + BREAKS_U]] + 0.5 * period else -0.5 * period
+    if table[r + CLOSED_V] == 1:
+        period = pool[table[r + BREAKS_V] + table[r + SPANS_V]] - pool[table[r + BREAKS_V]]
+        if abs(v - t) > 0.5 * period:
+            b += 0.5 * period if b < pool[table[r + BREAKS_V]] + 0.5 * period else -0.5 * period
+    return a, b
+
+
+@kernel(inline=True)
+def square_to(a, b):
+    """The square of the distance of two points."""
+    d = sub(a, b)
+    return dot(d, d)
+
+
+@kernel(inner=True)
+def are_one(table, pool, scene, roots, i, k, neglect):
+    """Whether roots i and k are the same contact."""
+    square = neglect * neglect
+    for side in range(2):
+        o = POINT_F + 3 * side
+        a = (roots[i, o], roots[i, o + 1], roots[i, o + 2])
+        b = (roots[k, o], roots[k, o + 1], roots[k, o + 2])
+        if roots[i, CODE_F + side] != roots[k, CODE_F + side] or square_to(a, b) > square:
+            return False
+        surface = scene[2][side]
+        if surface < 0:
+            shell = scene[2][2 + side]
+            if roots[i, CODE_F + side] >= table[shell + FACES]:
+                continue
+            surface = feature_at(table, shell, np.int64(roots[i, CODE_F + side]))
+        u, v = between(
+            table, pool, surface, roots[i, 2 * side], roots[i, 2 * side + 1], roots[k, 2 * side], roots[k, 2 * side + 1]
+        )
+        p = surface_point(table, pool, surface, u, v)[0]
+        if side == 1:
+            p = add(matvec(scene[0], p), scene[1])
+        if square_to(p, a) > square and square_to(p, b) > square:
+            return False
+    return True
+
+
+@kernel(inner=True)
+def surfaces_root(table, pool, scene, start, roots, k):
+    """Newton on two surfaces from `start`, the controller where it fails; fills root k.
+
+    Returns NOTHING, SADDLE or MINIMUM_FOUND.
+    """
+    turn, shift = scene[0], scene[1]
+    f, g = scene[2][0], scene[2][1]
+    status, x, _count, frame, curvature = solve_pair(table, pool, f, g, turn, shift, start, 1.0, math.inf, 0.0, True)
+    if status == NOT_CONVERGED:
+        # The controller leads down from anywhere, to a minimum of the distance.
+        status, x, _count, frame, curvature = descend_pair(table, pool, f, g, turn, shift, start, 1.0, DESCENTS)
+    if status != CONVERGED and status != SINGULAR:
+        return NOTHING
+    if not opposed(frame, turn, table, pool, g, x):
+        return NOTHING
+    h = curvature[1]
+    det = h[0] * h[3] - h[1] * h[2]
+    norm2 = h[0] * h[0] + h[1] * h[1] + h[2] * h[2] + h[3] * h[3]
+    write(roots, k, x, 0, 0, frame[0], frame[10], frame[3], frame[4], fold_of(h))
+    return MINIMUM_FOUND if det > -1e-9 * norm2 and h[0] + h[3] <= 0.0 else SADDLE
+
+
+@kernel(inner=True)
+def solids_root(table, pool, scene, codes, start, n, roots, k, work, corner):
+    """Switching and Newton on the features of two solids, or Newton alone for a corner; fills root k."""
+    i, j, q, track_at = scene[4]
+    records, tracked = work
+    tracked[0, 0], tracked[0, 1], tracked[0, 2], tracked[0, 3] = start
+    tracked[0, FEATURE_F] = float(codes[0])
+    tracked[0, FEATURE_G] = float(codes[1])
+    tracked[0, STAYS] = corner
+    for l in range(3):
+        tracked[0, PAIR_NORMAL + l] = n[l]
+    status = call_address(
+        track_at, (table, pool, scene[2][2], scene[2][3], i, j, q, tracked, math.inf, records, tracked, 0)
+    )
+    if status != CONVERGED and (status != SINGULAR or corner > 0.0):
+        # An edge along another one, or along a face, is no corner: its ends are.
+        return NOTHING
+    turn = rotation(q, i)
+    m = (tracked[0, PAIR_NORMAL], tracked[0, PAIR_NORMAL + 1], tracked[0, PAIR_NORMAL + 2])
+    pg = matvec_t(turn, (records[0, ARM_F], records[0, ARM_F + 1], records[0, ARM_F + 2]))
+    gap = records[0, RECORD_GAP]
+    x = (tracked[0, 0], tracked[0, 1], tracked[0, 2], tracked[0, 3])
+    write(
+        roots, k, x, tracked[0, FEATURE_F], tracked[0, FEATURE_G], m, gap, sub(pg, scale(gap, m)), pg, records[0, FOLD]
+    )
+    roots[k, CORNER] = corner
+    return MINIMUM_FOUND if records[0, PROPER] == 1.0 else SADDLE
+
+
+@kernel(inline=True)
+def write(roots, k, x, code_f, code_g, n, gap, pf, pg, fold):
+    roots[k, 0], roots[k, 1], roots[k, 2], roots[k, 3] = x
+    roots[k, CODE_F] = float(code_f)
+    roots[k, CODE_G] = float(code_g)
+    roots[k, ROOT_NORMAL], roots[k, ROOT_NORMAL + 1], roots[k, ROOT_NORMAL + 2] = n
+    roots[k, GAP] = gap
+    roots[k, ORIGIN] = USELESS
+    roots[k, POINT_F], roots[k, POINT_F + 1], roots[k, POINT_F + 2] = pf
+    roots[k, POINT_G], roots[k, POINT_G + 1], roots[k, POINT_G + 2] = pg
+    roots[k, ROOT_FOLD] = fold
+    roots[k, ROOT_BEYOND] = math.nan
+    roots[k, CORNER] = 0.0
+    roots[k, ROOT_PLACE] = ELSEWHERE
+
+
+@kernel(inner=True)
+def add_root(table, pool, scene, codes, start, n, neglect, roots, count, work, corner):
+    """Look for a root from a start and add it, as USELESS, if it is none of the known ones; a corner where it holds on
+    to something.
+
+    Returns how many roots there are, and NOTHING, ALIKE, SADDLE or MINIMUM_FOUND.
+    """
+    if scene[2][0] >= 0:
+        found = surfaces_root(table, pool, scene, start, roots, count)
+    else:
+        found = solids_root(table, pool, scene, codes, start, n, roots, count, work, corner)
+    if found == NOTHING:
+        return count, found
+    for k in range(count):
+        # One of far sides, or a saddle, hides no contact beside it.
+        radius = min(neglect, SAME) if roots[k, ORIGIN] == USELESS else neglect
+        if are_one(table, pool, scene, roots, count, k, radius):
+            return count, ALIKE
+    return count + 1, found
+
+
+@kernel(inner=True)
+def add_given(table, pool, scene, tracked, listed, many, neglect, roots, work):
+    """Add the roots at which given contacts of the two bodies are now. Returns how many.
+
+    A contact whose coordinates are unknowns of a solve may be on its way to another root than Newton's method goes to
+    from there: it does not stand for that one.
+    """
+    count = 0
+    for c in range(many):
+        given = listed + GIVEN_RECORD * c
+        r = table[given + GIVEN_ROW]
+        x = (tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3])
+        if math.isnan(x[0]) or count == roots.shape[0]:
+            continue
+        if table[given + SWAPPED] == 1:
+            x = (x[2], x[3], x[0], x[1])
+        before = count
+        count, found = add_root(table, pool, scene, (0, 0), x, (0.0, 0.0, 0.0), 0.0, roots, count, work, 0.0)
+        if scene[2][0] >= 0 and (found == NOTHING or (count > before and count < roots.shape[0])):
+            frame = pair_frame(table, pool, scene[2][0], scene[2][1], scene[0], scene[1], x)
+            if frame[11]:
+                write(roots, count, x, 0, 0, frame[0], frame[10], frame[3], frame[4], 0.0)
+            if found != NOTHING:
+                same = frame[11] and are_one(table, pool, scene, roots, before, count, neglect)
+                count = count if same else before
+            elif frame[11] and opposed(frame, scene[0], table, pool, scene[2][1], x):
+                # At a fold Newton's method may find nothing: there the contact still is.
+                count += 1
+        if count > before:
+            roots[before, ORIGIN] = GIVEN_CONTACT - c
+    return count
+
+
+@kernel(inline=True)
+def is_alone(roots, k):
+    """Whether root k is far from a fold, beyond knot lines too as far as it is known."""
+    return roots[k, ROOT_FOLD] > ALONE and not roots[k, ROOT_BEYOND] <= ALONE

@@ -1,0 +1,108 @@
+"""Pairs of points through which bodies with flush faces seem to be in each other: a head on a plate, beside its hole.
+
+Where a face lies on another one, the pair of an edge of one and of a wall beside it may have normals that oppose each
+other and a negative gap: the rim of a head is behind the wall of the hole that it covers. The segment between its
+points runs between the two faces. The way apart there is off the faces, which is next to nothing, and they have rows of
+their own; that of the pair would lead along them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from assembly._kernel import kernel
+from assembly.geometry.vec import add, dot, matvec, matvec_t, scale, sub
+from assembly.proximity.bvh.tree import CENTER, CHILD, HALF, NODE, NODE_INTS, NODE_POOL, NODE_TABLE
+from assembly.proximity.manager.extrema import GAP, LISTED, NEW, ORIGIN, POINT_F, POINT_G, USELESS
+from assembly.proximity.manager.overlap import DEPTH, foot_at, with_children
+from assembly.proximity.manager.state import (
+    HANDED_OFF,
+    LOST,
+    PLACE_MEMORY,
+    PLACE_NUMBER,
+    memory_places,
+    note,
+    release,
+)
+
+# Faces are flush at a pair where they are nearer to its middle than this part of how deep it is,
+SHORT = 1e-3
+# and their normals oppose each other but for this cosine.
+OPPOSED = 1e-6
+# Depths that are rounding, and room for faces about a point.
+ROUNDING, FACES_ABOUT = 1e-9, 16
+
+
+@kernel(inner=True)
+def faces_about(table, pool, tree, shell, y, reach, stack, normals):
+    """Write the normals of a body's faces that are within reach of a point; how many there are. In its axes."""
+    stack[0] = 0
+    used = 1
+    count = 0
+    while used > 0 and count < normals.shape[0]:
+        used -= 1
+        i = stack[used]
+        o = table[tree + NODE_POOL] + NODE * i
+        square = 0.0
+        for k in range(3):
+            off = max(abs(y[k] - pool[o + CENTER + k]) - pool[o + HALF + k], 0.0)
+            square += off * off
+        if square > reach * reach:
+            continue
+        child = table[table[tree + NODE_TABLE] + NODE_INTS * i + CHILD]
+        if child >= 0:
+            used = with_children(stack, used, child)
+            continue
+        distance, n, some = foot_at(table, pool, tree, -1, shell, -1 - child, y)
+        if some and abs(distance) <= reach:
+            normals[count, 0], normals[count, 1], normals[count, 2] = n
+            count += 1
+    return count
+
+
+@kernel(inner=True)
+def is_between_flush_faces(table, pool, scene, roots, k, stack, normals):
+    """Whether the middle of root k, with a negative gap, is between two faces that all but touch there."""
+    turn, shift = scene[0], scene[1]
+    a = (roots[k, POINT_F], roots[k, POINT_F + 1], roots[k, POINT_F + 2])
+    b = (roots[k, POINT_G], roots[k, POINT_G + 1], roots[k, POINT_G + 2])
+    c = scale(0.5, add(a, b))
+    reach = -SHORT * roots[k, GAP]
+    many = faces_about(table, pool, scene[3][0], scene[2][2], c, reach, stack, normals[0])
+    if many == 0:
+        return False
+    others = faces_about(table, pool, scene[3][1], scene[2][3], matvec_t(turn, sub(c, shift)), reach, stack, normals[1])
+    for i in range(others):
+        n = matvec(turn, (normals[1, i, 0], normals[1, i, 1], normals[1, i, 2]))
+        for l in range(many):
+            if dot(n, (normals[0, l, 0], normals[0, l, 1], normals[0, l, 2])) < OPPOSED - 1.0:
+                return True
+    return False
+
+
+@kernel(inner=True, allocates=True)
+def drop_flush(table, pool, watch, memory, p, scene, roots, count, tracked):
+    """Make those roots of pair p useless that run between flush faces; listed ones give up their places."""
+    stack = np.empty(DEPTH, np.int64)
+    normals = np.empty((2, FACES_ABOUT, 3))
+    places = memory_places(table, watch)[1]
+    for k in range(count):
+        origin = np.int64(roots[k, ORIGIN])
+        if not roots[k, GAP] < -ROUNDING or not (roots[k, ORIGIN] == NEW or origin >= LISTED):
+            continue
+        if not is_between_flush_faces(table, pool, scene, roots, k, stack, normals):
+            continue
+        if origin >= LISTED:
+            number = memory[places + PLACE_MEMORY * (origin - LISTED) + PLACE_NUMBER]
+            note(table, watch, memory, HANDED_OFF, LOST, p, number, roots[k, GAP])
+            release(table, watch, memory, origin - LISTED, tracked)
+        roots[k, ORIGIN] = USELESS
+
+
+@kernel(inner=True)
+def any_deep(roots, count):
+    """Whether any root is deeper than rounding."""
+    for k in range(count):
+        if roots[k, GAP] < -ROUNDING and roots[k, ORIGIN] != USELESS:
+            return True
+    return False

@@ -1,0 +1,130 @@
+"""Whether a pair of patches has a root that is known, or one to which Newton's method stays near where it starts.
+
+The patches of two bodies that face each other are tiles of where they may touch. What is in a tile is found from its
+middle in a few steps; a sequence that leaves it, and those beside it, is on its way to what other tiles have.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from assembly._kernel import kernel
+from assembly.geometry.splines.evaluate import BREAKS_U, BREAKS_V, CLOSED_U, CLOSED_V, SPANS_U, SPANS_V
+from assembly.proximity.bvh.tree import ELEMENT, ELEMENT_FEATURE, ELEMENT_POOL
+from assembly.proximity.extrema.face_face import bent_at_most, move_pair, pair_frame, pair_step
+from assembly.proximity.extrema.pair_matrix import across_first, pair_matrix
+from assembly.proximity.extrema.singular import ALONE, BESIDE, fold_beyond
+from assembly.proximity.features.holding import POINT
+from assembly.proximity.manager.extrema import CODE_F, CODE_G, CORNER, ROOT_BEYOND, ROOT_FOLD, is_alone
+
+# Steps; and below so many radians, that a step turns a normal, it is as good as there.
+STEPS, CLOSE = 6, 0.02
+# Curvatures below this, over the scene's size, are rounding.
+FLAT = 1e-9
+# What became of it.
+LEFT, STAYED = -1, -2
+# Sequences whose first steps lead as close together as this part of a patch go the same way. Of one that was followed:
+# where its first step led, and whether it came to no root of its own.
+TOGETHER, BARREN, PASSED = 0.25, 4, 5
+
+
+@kernel(inline=True)
+def half_widths(table, pool, trees, pair):
+    """Half the widths, in parameters, of the patches of a pair of elements."""
+    o = table[trees[0] + ELEMENT_POOL] + ELEMENT * pair[0]
+    p = table[trees[1] + ELEMENT_POOL] + ELEMENT * pair[1]
+    return (pool[o + 2], pool[o + 3], pool[p + 2], pool[p + 3])
+
+
+@kernel(inline=True)
+def is_within(table, pool, surface, x, y, u, v, half_u, half_v):
+    """Whether parameters (x, y) are in a box around (u, v)."""
+    du = abs(x - u)
+    dv = abs(y - v)
+    if surface >= 0:
+        if table[surface + CLOSED_U] == 1:
+            period = pool[table[surface + BREAKS_U] + table[surface + SPANS_U]] - pool[table[surface + BREAKS_U]]
+            du = min(du, period - du)
+        if table[surface + CLOSED_V] == 1:
+            period = pool[table[surface + BREAKS_V] + table[surface + SPANS_V]] - pool[table[surface + BREAKS_V]]
+            dv = min(dv, period - dv)
+    return du <= half_u and dv <= half_v
+
+
+@kernel(inline=True)
+def is_beside(table, pool, surfaces, x, y, half, part):
+    """Whether parameters x are within a part of half widths from y, on both surfaces."""
+    f, g = surfaces[0], surfaces[1]
+    return is_within(table, pool, f, x[0], x[1], y[0], y[1], part * half[0], part * half[1]) and is_within(
+        table, pool, g, x[2], x[3], y[2], y[3], part * half[2], part * half[3]
+    )
+
+
+@kernel(inner=True)
+def is_known(table, pool, scene, e, d, roots, count):
+    """The features of elements e and d, the parameters of their middles, whether a known root is all there is.
+
+    And whether one is there that is near a fold, on this side of a knot line or beyond: a second root may be beside it.
+    """
+    o = table[scene[3][0] + ELEMENT_POOL] + ELEMENT * e
+    p = table[scene[3][1] + ELEMENT_POOL] + ELEMENT * d
+    codes = (np.int64(pool[o + ELEMENT_FEATURE]), np.int64(pool[p + ELEMENT_FEATURE]))
+    start = (pool[o], pool[o + 1], pool[p], pool[p + 1])
+    half = half_widths(table, pool, scene[3], (e, d))
+    folds = False
+    for k in range(count):
+        if roots[k, CODE_F] != codes[0] or roots[k, CODE_G] != codes[1]:
+            continue
+        if not roots[k, ROOT_FOLD] > ALONE or roots[k, CORNER] >= POINT:
+            # A point that stays where it is is no root: where the edge, or the face, is nearest may be beside it.
+            continue
+        x = (roots[k, 0], roots[k, 1], roots[k, 2], roots[k, 3])
+        if not is_beside(table, pool, scene[2], x, start, half, BESIDE):
+            continue
+        if scene[2][0] >= 0 and math.isnan(roots[k, ROOT_BEYOND]):
+            # Beyond a knot line curvatures may be others.
+            roots[k, ROOT_BEYOND] = fold_beyond(table, pool, scene, x, half)
+        if is_alone(roots, k):
+            return codes, start, True, False
+        folds = True
+    return codes, start, False, folds
+
+
+@kernel(inner=True)
+def stays(table, pool, surfaces, turn, shift, start, half, passed, count):
+    """Whether Newton's method from `start` stays beside it, within BESIDE times half widths in (u, v) and (s, t).
+
+    Returns STAYED or LEFT, or which of the `count` sequences in `passed` (n, PASSED) it goes along with; where it came
+    to; and how many sequences there are now.
+    """
+    f, g = surfaces[0], surfaces[1]
+    x = start
+    for step in range(STEPS):
+        _n, tx, ty, _pf, _pg, e, t, a, c, r, beta, regular = pair_frame(table, pool, f, g, turn, shift, x)
+        if not regular:
+            return STAYED, x, count
+        k, h, inverse, _isolated = pair_matrix(a, c, beta, FLAT)
+        inverse, _level = across_first(a, c, r, k, h, inverse, FLAT)
+        ax, ay, bx, by, bend_f, bend_g = pair_step(a, c, r, k, inverse, 1.0)
+        if not max(bend_f, bend_g) > CLOSE:
+            return STAYED, x, count
+        # Each surface by its own measure, as in `solve_pair`.
+        factor_f = bent_at_most(bend_f)
+        factor_g = bent_at_most(bend_g)
+        step_f = (factor_f * ax, factor_f * ay)
+        step_g = (factor_g * bx, factor_g * by)
+        x, _held, _way = move_pair(table, pool, f, g, turn, x, e, t, tx, ty, step_f, step_g)
+        if not is_beside(table, pool, surfaces, x, start, half, BESIDE):
+            return LEFT, x, count
+        if step == 0:
+            for way in range(count):
+                there = (passed[way, 0], passed[way, 1], passed[way, 2], passed[way, 3])
+                if is_beside(table, pool, surfaces, x, there, half, TOGETHER):
+                    return way, x, count
+            if count < passed.shape[0]:
+                passed[count, 0], passed[count, 1], passed[count, 2], passed[count, 3] = x
+                passed[count, BARREN] = 0.0
+                count += 1
+    return STAYED, x, count

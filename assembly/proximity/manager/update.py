@@ -1,0 +1,412 @@
+"""The global manager's kernel: which pairs of bodies are looked at, which contacts between them are listed.
+
+Every body carries a tree of patches (`proximity/bvh/tree.py`). A look at a pair of bodies descends their trees, finds
+the
+pairs of patches that may hold an extremum of the distance within the pair's reach, and the extrema by Newton's method
+(`proximity/manager/extrema.py`). The near ones are listed: each has a place, from which it is tracked exactly. What is
+left out is farther
+than the pair's allowance: until a point of one body has moved by that much, seen from the other, nothing unlisted can
+touch. Where patches face each other and hold no root, a motion may bring one forth; there, a ball around these patches
+may move by less (`motion_bounds.py`). Which patches a look goes into is in `candidates.py`, how it searches them in
+`search.py`, what it knows in `state.py`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from assembly._address import call_address
+from assembly._kernel import kernel
+from assembly.kinematics.motion import relative_pose, rotation
+from assembly.proximity.bvh.neighbor_list import LIST_INTS
+from assembly.proximity.bvh.tree import NODE_POOL, RADIUS, least_distance
+from assembly.proximity.features.solid_contact import CONTACT_RECORD, PAIR_GAP, STAYS, TRACK
+from assembly.proximity.manager.candidates import facing_pairs, near_enough
+from assembly.proximity.manager.centerlines.curve import both_radii
+from assembly.proximity.manager.centerlines.minima import MINIMA
+from assembly.proximity.manager.centerlines.parts import near_parts, parts_beyond
+from assembly.proximity.manager.centerlines.search import BOX, BOXES, search_spines
+from assembly.proximity.manager.extrema import (
+    CORNER,
+    ELSEWHERE,
+    GAP,
+    GIVEN_CONTACT,
+    LISTED,
+    ORIGIN,
+    ROOT,
+    ROOT_PLACE,
+    USELESS,
+    is_alone,
+)
+from assembly.proximity.manager.flush import any_deep, drop_flush
+from assembly.proximity.manager.motion_bounds import (
+    LEAST_ALLOWANCE,
+    STILL,
+    allow_ball,
+    largest_part,
+    mover,
+    reach_now,
+    used_most,
+)
+from assembly.proximity.manager.newton_regions import PASSED
+from assembly.proximity.manager.overlap import crosses
+from assembly.proximity.manager.search import search_patches
+from assembly.proximity.manager.state import (
+    ABORTED,
+    ALLOWANCE,
+    CALLS,
+    CLOCK,
+    CORNERS,
+    CROSSED,
+    CROWDED,
+    CUT_SHORT,
+    DEADLINE,
+    DOUBT,
+    EVENT_COUNT,
+    FAR,
+    FIRST,
+    FIRST_REACH,
+    GIVEN_COUNT,
+    GO_ON_AT,
+    HIGH,
+    LAST_REACH,
+    LENGTHS,
+    LIST_TABLE,
+    LISTS,
+    LOOKS,
+    LOW,
+    MARK_AT,
+    NEAR,
+    NEGLECT,
+    OVERLAP,
+    PAIR_F,
+    PAIR_G,
+    PAIR_MEMORY,
+    PAIR_MINIMUM,
+    PAIR_RECORD,
+    PAIR_SHELL_F,
+    PAIR_SHELL_G,
+    PAIR_SURFACE_F,
+    PAIR_SURFACE_G,
+    PAIR_TABLE,
+    PAIRS,
+    PART,
+    PLACE_MEMORY,
+    REACH,
+    ROOTS,
+    SLICE,
+    SPINE_F,
+    SPINE_G,
+    STATE,
+    TAKE,
+    TRACK_SOLIDS,
+    TRACKING,
+    TREE_F,
+    TREE_G,
+    TURN,
+    any_listed,
+    any_lost,
+    known_roots,
+    list_roots,
+    memory_places,
+    release_given,
+    seat_given,
+)
+from assembly.proximity.manager.vertex_contacts import add_corners
+
+# Looks: at pairs that used up their allowance, or at all that moved. The first may be careful, at urgent pairs too, and
+# in turns, earlier at one pair at a time, and ask whether bodies cross where a contact lost its root. MEASURED: which
+# parts of allowances are used is known. SPARING: only at those that used up all of it, as no pose does that is allowed.
+AS_NEEDED, EVERYTHING, CAREFUL, IN_TURNS, DOUBTFUL, MEASURED, SPARING = 0, 1, 2, 4, 8, 16, 32
+# A pair is looked at again when so much of its allowance is used: the second, but the first of round wires, whose looks
+# take little; in turns, the one that used most of it at the first, and any that cut a step since its last look at the
+# third: what is left would cut the next one to nothing.
+USED, SPENT, BRIEF = 0.5, 0.85, 0.35
+# Room: pairs of patches of a look.
+CANDIDATES, STACK = 8192, 1024
+# Folds nearer than this part of a first reach are looked at after every move.
+FLAT = 0.2
+# Lists of parts of spines that are near are for motions up to so many first reaches.
+SPINE_RINGS = 4.0
+NO_BALL = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0)
+# Ways of Newton's method that are remembered in a look.
+WAYS = 64
+# Whether a look tells if bodies cross where no contact says so. A contact that lost its root is a reason to ask in a
+# solve; a tick has no time for it.
+NEVER, WHERE_LOST, ALWAYS = 0, 1, 2
+# Bodies cross that are in each other by more than this, or than what is called touching where that is known.
+CROSSING = 1e-6
+
+
+@kernel(inner=True)
+def list_corners(table, pool, watch, scene, reach, least, offsets, stack, candidates, roots, count, work, tracked):
+    """Add corners over faces to the roots of a pair. Returns how many roots there are.
+
+    A listed contact whose root is at one stays there.
+    """
+    lengths = table[watch + LENGTHS]
+    span = (-pool[lengths + FIRST_REACH], reach + least)
+    neglect = pool[lengths + NEGLECT]
+    count = add_corners(table, pool, scene, span, offsets, neglect, stack, candidates, roots, count, work)
+    for k in range(count):
+        place = np.int64(roots[k, ORIGIN])
+        if place >= LISTED:
+            tracked[table[watch + FIRST] + place - LISTED, STAYS] = roots[k, CORNER]
+    return count
+
+
+@kernel(inner=True)
+def nearest_fold(roots, count, least, reach):
+    """How far away what is born at a fold may be: about as far as the nearest root beside one. Corners have none."""
+    low = math.inf
+    for k in range(count):
+        if roots[k, CORNER] == 0.0 and not is_alone(roots, k) and abs(roots[k, GAP] - least) <= reach:
+            low = min(low, max(roots[k, GAP] - least, 0.0))
+    return low
+
+
+@kernel(inner=True)
+def crosses_elsewhere(table, pool, watch, memory, p, scene, roots, count, least, offsets, stack, candidates, tracked):
+    """Whether the bodies of pair p are in each other where no contact says so."""
+    pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
+    places = memory_places(table, watch)[1]
+    margin = max(CROSSING, memory[OVERLAP])
+    deep = False
+    for k in range(count):
+        asked = least if roots[k, ORIGIN] > GIVEN_CONTACT and roots[k, ROOT_PLACE] == ELSEWHERE else 0.0
+        deep = deep or (roots[k, GAP] < asked - margin and roots[k, ORIGIN] != USELESS)
+    for k in range(table[pair + LOW], table[pair + HIGH]):
+        if memory[places + PLACE_MEMORY * k] == p:
+            deep = deep or tracked[table[watch + FIRST] + k, PAIR_GAP] < -margin
+    return not deep and crosses(table, pool, scene, stack, candidates, margin, offsets)
+
+
+@kernel(inner=True)
+def search_by_patches(table, pool, watch, memory, p, scene, moving, reach, offsets, tracked, rooms, roots):
+    """Find the roots of pair p by patches that face each other; what a look knows of the pair then.
+
+    Returns
+    -------
+    How many roots there are; whether a listed one was lost; how far bodies may go for what is not listed;
+    how far what is in a ball may go, and that ball; how far, until a pose that stays is looked at; whether there is
+    anything within reach.
+    """
+    stack, candidates, distances, passed, work, _pairs, _boxes, _marks = rooms
+    lengths = table[watch + LENGTHS]
+    minimum = table[table[watch + PAIR_TABLE] + PAIR_RECORD * p + PAIR_MINIMUM]
+    least, flank = pool[minimum], pool[minimum + 1]
+    at = memory_places(table, watch)[0] + PAIR_MEMORY * p
+    found, reach = facing_pairs(table, pool, watch, memory, p, scene, moving, reach, stack, candidates)
+    memory[at + REACH] = reach
+    count, any_gone = known_roots(table, pool, watch, memory, p, scene, offsets, tracked, roots, work)
+    enough = near_enough(table, pool, scene, least, reach, flank, candidates, found, distances)
+    span = (-pool[lengths + LAST_REACH], reach + least)
+    neglect = pool[lengths + NEGLECT]
+    facing = (candidates, distances)
+    count, free, fertile, ball = search_patches(
+        table, pool, scene, moving, (flank, enough), span, offsets, neglect, facing, found, roots, count, work, passed
+    )
+    free = min(free, reach)
+    if found == 0:
+        # Nothing faces the other body within reach: the boxes tell how far that is so.
+        trees = scene[3]
+        free = max(free, least_distance(table, pool, trees[0], trees[1], scene[0], scene[1], math.inf, stack) - least)
+    return count, any_gone, free, fertile, ball, math.inf, found > 0
+
+
+@kernel(inner=True)
+def search_by_spines(table, pool, watch, memory, p, scene, moving, reach, offsets, tracked, rooms, roots):
+    """The same for two round wires, by their spines."""
+    stack, _candidates, _distances, _passed, work, pairs, boxes, marks = rooms
+    lengths = table[watch + LENGTHS]
+    minimum = table[table[watch + PAIR_TABLE] + PAIR_RECORD * p + PAIR_MINIMUM]
+    least, flank = pool[minimum], pool[minimum + 1]
+    radii = both_radii(table, pool, scene[5]) + least
+    ring = SPINE_RINGS * pool[lengths + FIRST_REACH]
+    at_list = table[watch + LIST_TABLE] + LIST_INTS * (p % table[watch + LISTS])
+    waiting = near_parts(table, pool, at_list, p, scene, moving, radii + reach, ring, stack, pairs, boxes)
+    while waiting < 0 and reach > LEAST_ALLOWANCE:
+        # Out of room: what is nearer is looked at more often.
+        reach *= 0.5
+        waiting = near_parts(table, pool, at_list, p, scene, moving, radii + reach, ring, stack, pairs, boxes)
+    memory[memory_places(table, watch)[0] + PAIR_MEMORY * p + REACH] = reach
+    count, any_gone = known_roots(table, pool, watch, memory, p, scene, offsets, tracked, roots, work)
+    if waiting < 0:
+        # There is no room for what is as near as it should not be.
+        memory[CROWDED] = 1.0
+        return count, any_gone, 0.0, math.inf, NO_BALL, math.inf, True
+    if waiting == 0:
+        beyond = parts_beyond(table, pool, scene, radii + reach, stack, pairs) - radii
+        return count, any_gone, beyond, math.inf, NO_BALL, math.inf, False
+    # No tangent turns by more than a motion over this.
+    rho = min(2.0 * (radii + reach), 0.99 * pool[table[moving[1] + NODE_POOL] + RADIUS])
+    count, free, fertile, ball, sure = search_spines(
+        table, pool, scene, moving, rho, (least, TAKE * reach, reach, flank), pool[lengths + NEGLECT], boxes, waiting,
+        marks, roots, count, work,
+    )  # fmt: skip
+    return count, any_gone, free, fertile, ball, sure, True
+
+
+@kernel(inner=True)
+def look_at_pair(table, pool, watch, memory, p, q, tracked, rooms, roots, asks):
+    """Find and list the roots of pair p; `asks` says whether it tells if the bodies cross elsewhere."""
+    pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
+    at = memory_places(table, watch)[0] + PAIR_MEMORY * p
+    i = table[pair + PAIR_F]
+    j = table[pair + PAIR_G]
+    turn, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
+    scene = (
+        turn,
+        shift,
+        (
+            table[pair + PAIR_SURFACE_F],
+            table[pair + PAIR_SURFACE_G],
+            table[pair + PAIR_SHELL_F],
+            table[pair + PAIR_SHELL_G],
+        ),
+        (table[pair + TREE_F], table[pair + TREE_G]),
+        (i, j, q, table[watch + TRACK_SOLIDS]),
+        (table[pair + SPINE_F], table[pair + SPINE_G]),
+    )
+    memory[LOOKS] += 1.0
+    minimum = table[pair + PAIR_MINIMUM]
+    least = pool[minimum]
+    offsets = (pool[minimum + 2], pool[minimum + 3])
+    moving = mover(table, watch, p, q)
+    reach = reach_now(table, pool, watch, memory, p, moving)
+    wires = scene[5][0] >= 0
+    if wires:
+        count, any_gone, free, fertile, ball, sure, found = search_by_spines(
+            table, pool, watch, memory, p, scene, moving, reach, offsets, tracked, rooms, roots
+        )
+    else:
+        count, any_gone, free, fertile, ball, sure, found = search_by_patches(
+            table, pool, watch, memory, p, scene, moving, reach, offsets, tracked, rooms, roots
+        )
+    if scene[2][0] >= 0:
+        seat_given(table, watch, memory, p, roots, count, tracked)
+    elif table[watch + CORNERS] == 1:
+        count = list_corners(
+            table, pool, watch, scene, memory[at + REACH], least, offsets, rooms[0], rooms[1], roots, count, rooms[4],
+            tracked,
+        )  # fmt: skip
+    if scene[2][0] < 0 and any_deep(roots, count):
+        drop_flush(table, pool, watch, memory, p, scene, roots, count, tracked)
+    if table[watch + MARK_AT] != 0 and least > 0.0 and table[pair + GIVEN_COUNT] > 0:
+        call_address(table[watch + MARK_AT], (table, pool, watch, p, q, tracked, roots, count))
+        release_given(table, watch, memory, p, roots, count, tracked)
+    rest, lowest, wanting = list_roots(table, pool, watch, memory, p, roots, count, tracked)
+    memory[at + CROSSED] = math.nan
+    if wires and asks != NEVER:
+        # All that is as near as this is known, and most of it is listed.
+        memory[at + CROSSED] = 1.0 if lowest < -max(CROSSING, memory[OVERLAP]) else 0.0
+    elif asks == ALWAYS or (asks == WHERE_LOST and any_gone):
+        crossed = crosses_elsewhere(
+            table, pool, watch, memory, p, scene, roots, count, least, offsets, rooms[0], rooms[1], tracked
+        )
+        memory[at + CROSSED] = 1.0 if crossed else 0.0
+    memory[at + ALLOWANCE] = max(min(rest, free), LEAST_ALLOWANCE)
+    memory[at + PART] = 0.0
+    memory[at + DOUBT] = 0.0
+    if wires:
+        sure = max(sure, STILL * memory[at + ALLOWANCE])
+    elif fertile < math.inf:
+        low = nearest_fold(roots, count, least, memory[at + REACH])
+        sure = 0.0 if low <= FLAT * pool[table[watch + LENGTHS] + FIRST_REACH] else math.inf
+        fertile = fertile if sure == 0.0 else min(fertile, low)
+    allow_ball(memory, at, ball, fertile, sure)
+    listed = any_listed(table, watch, memory, p)
+    memory[at + STATE] = float(TRACKING if listed else (NEAR if found else FAR))
+    if wanting:
+        memory[CROWDED] = 1.0
+
+
+@kernel(inner=True)
+def any_crossed(table, watch, memory):
+    """Whether bodies were in each other at their last thorough look, where no contact says so."""
+    at = memory_places(table, watch)[0]
+    for p in range(table[watch + PAIRS]):
+        if memory[at + PAIR_MEMORY * p + CROSSED] == 1.0:
+            return True
+    return False
+
+
+@kernel(inline=True)
+def is_by_patches(table, watch, p):
+    """Whether pair p is looked at by patches, and not by the spines of two round wires."""
+    return table[table[watch + PAIR_TABLE] + PAIR_RECORD * p + SPINE_F] < 0
+
+
+@kernel(inner=True)
+def is_due(table, watch, memory, p, tracked, how, most):
+    """Whether pair p is to be looked at, now that it is known which parts of allowances are used; `most` used most."""
+    o = memory_places(table, watch)[0] + PAIR_MEMORY * p
+    part = memory[o + PART]
+    if how & ~MEASURED == EVERYTHING:
+        due = part > 0.0 or math.isnan(memory[o + CROSSED])
+    else:
+        much = SPENT if is_by_patches(table, watch, p) else USED
+        due = part > (1.0 if how & SPARING != 0 else much)
+        if how & IN_TURNS != 0:
+            due = due or (p == most and part > USED)
+            due = due or (part > BRIEF and memory[o + CUT_SHORT] > memory[o + ALLOWANCE])
+        due = due or (how & CAREFUL != 0 and memory[o + DOUBT] > 1.0)
+    return due or any_lost(table, watch, memory, p, tracked)
+
+
+@kernel(inner=True, allocates=True)
+def look_at_due(table, pool, watch, memory, q, tracked, how, first, most):
+    """Look at the pairs that are due, of which `first` is the first one."""
+    stack = np.empty((STACK, 2), np.int64)
+    roots = np.empty((ROOTS, ROOT))
+    pairs = np.empty((BOXES, 2), np.int64)
+    boxes = np.empty((BOXES, BOX))
+    marks = (np.empty((ROOTS, 4)), np.empty((MINIMA, 2)))
+    work = (np.empty((1, CONTACT_RECORD)), np.empty((1, TRACK)))
+    with_patches = False
+    candidates = stack
+    distances = boxes[0]
+    passed = boxes
+    at = memory_places(table, watch)[0]
+    for p in range(first, table[watch + PAIRS]):
+        if p != first and not is_due(table, watch, memory, p, tracked, how, most):
+            continue
+        if p != first and table[watch + CLOCK] != 0 and call_address(table[watch + CLOCK], ()) > memory[DEADLINE]:
+            if table[watch + GO_ON_AT] == 0 or call_address(table[watch + GO_ON_AT], ()) == ABORTED:
+                # Who set it is told, and goes on in another call.
+                memory[DEADLINE] = -1.0
+                break
+            memory[DEADLINE] = call_address(table[watch + CLOCK], ()) + SLICE
+        if is_by_patches(table, watch, p) and not with_patches:
+            with_patches = True
+            candidates = np.empty((CANDIDATES, 2), np.int64)
+            distances = np.empty(CANDIDATES)
+            passed = np.empty((WAYS, PASSED))
+        asks = WHERE_LOST if how & DOUBTFUL != 0 else NEVER
+        if how & ~MEASURED == EVERYTHING or math.isnan(memory[at + PAIR_MEMORY * p + TURN]):
+            asks = ALWAYS
+        rooms = (stack, candidates, distances, passed, work, pairs, boxes, marks)
+        look_at_pair(table, pool, watch, memory, p, q, tracked, rooms, roots, asks)
+
+
+@kernel(signatures="(i8[::1], f8[::1], i8, f8[::1], f8[:, ::1], f8[:, ::1], i8)")
+def look(table, pool, watch, memory, q, tracked, how):
+    """Look at the pairs of bodies that need it, or at all that moved, and list what is near.
+
+    Returns how many events that made. `tracked` has a row for every place (`proximity/features/solid_contact.py`), at
+    the roots of the poses q or close by.
+    """
+    before = memory[EVENT_COUNT]
+    memory[CALLS] += 1.0
+    most = -1
+    if how & MEASURED == 0:
+        most = largest_part(table, pool, watch, memory, q)[0]
+    else:
+        most = used_most(table, watch, memory)
+    for p in range(table[watch + PAIRS]):
+        if is_due(table, watch, memory, p, tracked, how, most):
+            look_at_due(table, pool, watch, memory, q, tracked, how, p, most)
+            break
+    return np.int64(memory[EVENT_COUNT] - before)

@@ -1,0 +1,211 @@
+"""Rows, their dense Jacobian and the objective's gradient at a state: what diagnosis and statics look at.
+
+Columns are twists of all bodies in the scene's order, fixed ones too, lengths over the scene's size; then four
+coordinates of every contact whose pair is at a fold (`proximity/extrema/lifted_pair.py`). Rows are those of the
+program, then four of tangency for every such contact.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from assembly._kernel import kernel
+from assembly.constraints.program.evaluate import evaluate
+from assembly.constraints.program.objective_terms import objective
+from assembly.constraints.program.records import (
+    BODIES,
+    BODY_F,
+    BODY_G,
+    CONTACTS,
+    EXTRA,
+    EXTRA_COLUMN,
+    FREE_COLUMN,
+    JOINT_ROW,
+    JOINTS,
+    KIND,
+    MOVING,
+    ROW,
+    ROW_TABLE,
+    ROWS,
+    SECOND,
+    SECOND_BODY_F,
+    SECOND_BODY_G,
+    SLOTS,
+    TAPE_BODIES,
+    TAPE_LIST,
+    TAPE_RECORD,
+    TAPE_ROOM,
+    TAPE_ROW_AT,
+    TAPE_TABLE,
+    TAPE_VALUES,
+    TAPES,
+    TRACKED,
+    TRIM_PAIR,
+    TRIMS,
+    VECTOR_TRIMS,
+)
+from assembly.proximity.extrema.lifted_pair import VARIABLES, VECTORS
+from assembly.proximity.features.solid_contact import CONTACT_RECORD, TRACK
+from assembly.solve.loop.contacts import free_folds, start_contacts
+from assembly.solve.loop.line_search import goal
+from assembly.solve.loop.report import scaled_poses
+from assembly.solve.loop.residuals import arrange, shape_of, size_of_shape
+from assembly.solve.loop.settings import FREE_BELOW
+
+
+@kernel(inner=True)
+def spread_block(packed, r, column, body, out):
+    """The six entries of row r from `column` on, to the twist of a body; -1 is none."""
+    if body >= 0:
+        for k in range(6):
+            out[r, 6 * body + k] += packed[r, column + k]
+
+
+@kernel(inner=True)
+def spread_rows(table, free, count, packed, out):
+    """All rows of the program's Jacobian, from the twists of their own bodies to all columns."""
+    m = table[ROWS]
+    for r in range(m + 4 * count):
+        for j in range(out.shape[1]):
+            out[r, j] = 0.0
+    for r in range(m):
+        row = table[ROW_TABLE] + ROW * r
+        spread_block(packed, r, 0, table[row + BODY_F], out)
+        spread_block(packed, r, 6, table[row + BODY_G], out)
+        second = table[row + SECOND]
+        if table[row + KIND] == JOINT_ROW and second >= 0:
+            spread_block(packed, r, EXTRA_COLUMN, table[second + SECOND_BODY_F], out)
+            spread_block(packed, r, EXTRA_COLUMN + 6, table[second + SECOND_BODY_G], out)
+    for k in range(table[CONTACTS]):
+        if free[k] >= 0:
+            row = table[ROW_TABLE] + ROW * k
+            e = m + 4 * free[k]
+            at = 6 * table[BODIES] + 4 * free[k]
+            for i in range(4):
+                spread_block(packed, e + i, 0, table[row + BODY_F], out)
+                spread_block(packed, e + i, 6, table[row + BODY_G], out)
+                out[k, at + i] = packed[k, FREE_COLUMN + i]
+                for j in range(4):
+                    out[e + i, at + j] = packed[e + i, FREE_COLUMN + j]
+    for r in range(table[CONTACTS], table[CONTACTS] + table[TRIMS]):
+        k = table[table[ROW_TABLE] + ROW * r + TRIM_PAIR]
+        if free[k] >= 0:
+            for j in range(4):
+                out[r, 6 * table[BODIES] + 4 * free[k] + j] = packed[r, FREE_COLUMN + j]
+    for t in range(table[TAPES]):
+        tape = table[TAPE_TABLE] + TAPE_RECORD * t
+        for v in range(table[tape + TAPE_VALUES]):
+            for b in range(2, table[tape + TAPE_BODIES]):
+                body = table[table[tape + TAPE_LIST] + b]
+                spread_block(packed, table[tape + TAPE_ROW_AT] + v, EXTRA_COLUMN + 6 * (b - 2), body, out)
+
+
+@kernel(inner=True, allocates=True)
+def new_point(table):
+    """Room for a point of the loop, with as many rows as there can be."""
+    pairs = table[CONTACTS]
+    most = table[ROWS] + 4 * pairs
+    records = np.ones((pairs + table[JOINTS] + table[VECTOR_TRIMS], CONTACT_RECORD))
+    packed = np.zeros((most, EXTRA_COLUMN + 6 * table[EXTRA]))
+    return np.empty((table[BODIES], 7)), np.empty((table[TRACKED], TRACK)), records, np.zeros(most), packed
+
+
+@kernel(inner=True, allocates=True)
+def point_at(table, pool, state, free):
+    """A point of the loop at a state: whether all its rows are evaluated (-1, or the contact that is lost), how many
+    contacts are at folds, the point, and what pairs and tapes need.
+
+    Parameters of contacts that are NaN are found by a global start, pairs at folds are freed, as the loop does.
+    """
+    pairs = table[CONTACTS]
+    tracks = table[TRACKED]
+    start = np.empty((tracks, TRACK))
+    point = new_point(table)
+    q, tracked, records, residual, _packed = point
+    o = table[TAPE_ROOM]
+    room = (np.empty(table[o]), np.empty(table[o + 1]), np.empty(table[o + 2]))
+    loose = (
+        free,
+        np.empty((pairs, 4)),
+        np.empty((VECTORS if pairs > 0 else 0, 3, VARIABLES)),
+        np.empty((VARIABLES if pairs > 0 else 0, VARIABLES)),
+        np.empty((tracks, TRACK)),
+        np.empty(0),
+    )
+    scaled_poses(table, pool, state, q)
+    for k in range(tracks):
+        for i in range(TRACK):
+            tracked[k, i] = state[7 * table[BODIES] + TRACK * k + i]
+    for k in range(pairs):
+        free[k] = -1
+    count = 0
+    lost = start_contacts(table, pool, q, tracked, free, loose[1])
+    if lost < 0:
+        # Every contact counts here, also one that pushes nothing.
+        active = np.ones(residual.size)
+        count = free_folds(table, pool, records, tracked, active, free, loose[1], -1.0, -1, False)
+        before = -1
+        while count != before:
+            for k in range(tracks):
+                for i in range(TRACK):
+                    start[k, i] = tracked[k, i]
+            lost = evaluate(table, pool, start, math.inf, loose, room, point)
+            before = count
+            count = free_folds(table, pool, records, tracked, active, free, loose[1], FREE_BELOW, lost, False)
+    return lost, count, point, loose, room
+
+
+@kernel(signatures="(i8[::1], f8[::1], f8[::1], i8[::1], f8[::1], f8[:, ::1])")
+def rows_at(table, pool, state, free, residual, jacobian):
+    """Evaluate all rows at a state. Returns a contact that has no pair there, or -1.
+
+    state : tracked values are overwritten by those found; NaN parameters of a contact are found by a global start
+    free (contacts) : place among the contacts at folds, or -1
+    residual (m + 4 contacts), jacobian (m + 4 contacts, 6 bodies + 4 contacts) : as many rows and columns are written
+    as there are folds
+    """
+    lost, count, point, _loose, _room = point_at(table, pool, state, free)
+    _q, tracked, _records, values, packed = point
+    for k in range(table[TRACKED]):
+        for i in range(TRACK):
+            state[7 * table[BODIES] + TRACK * k + i] = tracked[k, i]
+    for r in range(table[ROWS] + 4 * count):
+        residual[r] = values[r]
+    if lost < 0:
+        spread_rows(table, free, count, packed, jacobian)
+    return lost
+
+
+@kernel(signatures="(i8[::1], f8[::1], f8[::1], i8[::1], f8[::1], none)")
+def gradient_at(table, pool, state, free, gradient, tips):
+    """The objective's gradient in the twists of all bodies (6 bodies), zero for fixed ones. Returns its value.
+
+    `tips` is None where no term is a dexterity. Dexterities are left out where a contact has no pair.
+    """
+    found = point_at(table, pool, state, free)
+    integers, doubles = size_of_shape(table, table[ROWS] + 4 * found[1], 6 * table[MOVING] + 4 * found[1])
+    # The blocks outlive what is carved from them: they are arguments of the kernel that carves.
+    return slopes_at(table, pool, free, found, tips, gradient, np.empty(integers, np.int64), np.empty(doubles))
+
+
+@kernel(inner=True, allocates=True)
+def slopes_at(table, pool, free, found, tips, gradient, integers, doubles):
+    """The same at a point that `point_at` found, with what it works in."""
+    lost, count, point, loose, room = found
+    rows = table[ROWS] + 4 * count
+    n = 6 * table[MOVING] + 4 * count
+    shape = shape_of(table, rows, n, table[:0], integers, doubles)
+    arrange(table, free, shape, rows, n)
+    slopes = np.empty(n)
+    curves = np.empty((n, n))
+    if lost < 0:
+        value = goal(table, pool, shape, rows, loose, room, tips, point, 1, slopes, curves)
+    else:
+        value = objective(table, pool, point[0], 1, room, shape[2], slopes, curves)
+    for b in range(table[BODIES]):
+        s = table[table[SLOTS] + b]
+        for k in range(6):
+            gradient[6 * b + k] = slopes[6 * s + k] if s >= 0 else 0.0
+    return value

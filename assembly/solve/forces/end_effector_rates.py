@@ -1,0 +1,34 @@
+"""The tip's Jacobian at a state, outside the loop: what `solve/forces/end_effector.py` calls."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from assembly._kernel import kernel
+from assembly.constraints.program.objective_terms import TERM_PARAMETERS, TERM_TAPE
+from assembly.constraints.program.records import EXTRA, MOVING, ROWS
+from assembly.solve.dense.row_table import point_at
+from assembly.solve.linear_algebra.singular_values import measure_jacobian
+from assembly.solve.loop.dexterity import DEPENDENT, DIRECTION, MEASURE, tip_map
+from assembly.solve.loop.residuals import place_rows
+
+
+@kernel(signatures="(i8[::1], f8[::1], i8, f8[::1], i8[::1], f8[:, ::1])")
+def tip_at(table, pool, term, state, free, jacobian):
+    """The Jacobian of a term of dexterity at a state, in the user's units.
+
+    Returns a contact that has no pair there or -1, an outcome of `dexterity.tip_map`, and the measure.
+    """
+    lost, count, point, _loose, _room = point_at(table, pool, state, free)
+    if lost >= 0:
+        return lost, DEPENDENT, 0.0
+    rows = table[ROWS] + 4 * count
+    bases = np.empty((rows, 3 + table[EXTRA]), np.int64)
+    place_rows(table, free, bases, np.empty(rows, np.int64))
+    outcome, found, _used, _inputs, _adjoint = tip_map(
+        table, pool, term, bases, rows, 6 * table[MOVING] + 4 * count, point, 1
+    )
+    jacobian[:] = found
+    measure = table[table[term + TERM_TAPE] + MEASURE]
+    value = measure_jacobian(measure, pool, table[term + TERM_PARAMETERS] + DIRECTION, found, np.empty(found.shape))
+    return lost, outcome, value

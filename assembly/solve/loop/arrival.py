@@ -1,0 +1,74 @@
+"""Whether a solve has arrived: rows hold where bodies are now, and the Lagrangian is stationary."""
+
+from __future__ import annotations
+
+from assembly._kernel import kernel
+from assembly.constraints.program.records import BODIES, IMPLICIT, REFERENCE, SCALE
+from assembly.solve.linear_algebra.factorize import greatest_on_diagonal
+from assembly.solve.loop.inertia import DOWNWARD
+from assembly.solve.loop.multipliers import strongest
+from assembly.solve.loop.residuals import turned
+from assembly.solve.loop.settings import (
+    CURVED,
+    FEASIBILITY,
+    MOST_ROUNDING,
+    ROUNDING,
+    SECOND_ORDER,
+    STATIONARITY,
+    TESTED,
+    TICK,
+)
+
+# A saddle is left from where the dual residual and the violation are no more.
+NEAR_SADDLE, OFF_SADDLE = 1e-3, 1e-6
+# What a step must gain of violations that rounding of far coordinates may explain.
+GAIN = 0.5
+
+
+@kernel(inner=True)
+def reach_of(table, pool, q):
+    """How far out the user's coordinates are, over the size."""
+    reach = 0.0
+    for b in range(table[BODIES]):
+        for k in range(3):
+            reach = max(reach, abs(q[b, k] + pool[REFERENCE + k] / pool[SCALE]))
+    return reach
+
+
+@kernel(inner=True)
+def rounding_at(table, pool, settings, here):
+    """The violation that is none: what is asked for, or what rounding of coordinates and of whole turns violates."""
+    reach = max(reach_of(table, pool, here[0]), turned(table, pool, here[1]))
+    return max(settings[FEASIBILITY], min(ROUNDING * reach, MOST_ROUNDING))
+
+
+@kernel(inner=True)
+def slope_rounding(program, here, lagrangian, n, rows, y):
+    """What rounding leaves of the Lagrangian's slope: poses' by the objective's curvature, and that of forces."""
+    table, pool, shape, _loose, _room = program
+    reach = max(1.0, reach_of(table, pool, here[0]))
+    return ROUNDING * (reach * greatest_on_diagonal(lagrangian, n, shape[2]) + strongest(y, rows))
+
+
+@kernel(inner=True)
+def is_near_saddle(table, settings, results, violation, dual):
+    """Whether a solve is near a saddle that is to be left: steps toward one gain little, and are of no use."""
+    if settings[SECOND_ORDER] != TESTED or settings[TICK] == 1.0 or table[IMPLICIT] == 1:
+        return False
+    return results[CURVED] == DOWNWARD and violation <= OFF_SADDLE and dual <= NEAR_SADDLE
+
+
+@kernel(inner=True)
+def has_arrived(program, settings, results, here, violation, last_violation, feasible, dual):
+    """Whether rows hold and the Lagrangian is stationary, or all but so at a saddle that is to be left.
+
+    Of a start that was far out rows held to its rounding. They are to hold to that of where bodies are now, unless
+    steps gain nothing more.
+    """
+    table, pool = program[0], program[1]
+    if is_near_saddle(table, settings, results, violation, dual):
+        return True
+    if not (violation <= feasible and dual <= settings[STATIONARITY]):
+        return False
+    gains = violation > settings[FEASIBILITY] and not violation > GAIN * last_violation
+    return not gains or violation <= rounding_at(table, pool, settings, here)

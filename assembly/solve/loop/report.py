@@ -1,0 +1,140 @@
+"""What a solve leaves in its state: the pose judged afresh, rows in the user's units."""
+
+from __future__ import annotations
+
+import math
+
+from assembly._kernel import kernel
+from assembly.constraints.program.contact import TOUCHING
+from assembly.constraints.program.evaluate import evaluate
+from assembly.constraints.program.records import (
+    BODIES,
+    CONTACTS,
+    IS_LENGTH,
+    REFERENCE,
+    ROW,
+    ROW_TABLE,
+    ROWS,
+    SCALE,
+    SLOTS,
+    TRACKED,
+)
+from assembly.proximity.extrema.face_face import BEND
+from assembly.proximity.features.solid_contact import PROPER, TRACK
+from assembly.solve.loop.contacts import free_pairs_hold
+from assembly.solve.loop.settings import HISTORY
+from assembly.solve.loop.violation import off_rows, off_tangency
+
+
+@kernel(inner=True)
+def log(history, iteration, figures):
+    """Write the figures of an iteration, if there is room for them."""
+    if iteration < history.shape[0]:
+        for k in range(HISTORY):
+            history[iteration, k] = figures[k]
+
+
+@kernel(inner=True)
+def scaled_poses(table, pool, state, q):
+    """Poses of a state as the program has them."""
+    for b in range(table[BODIES]):
+        for k in range(3):
+            q[b, k] = (state[7 * b + k] - pool[REFERENCE + k]) / pool[SCALE]
+        for k in range(3, 7):
+            q[b, k] = state[7 * b + k]
+
+
+@kernel(inner=True)
+def write_pose(table, pool, q, state):
+    """Poses of the moving bodies into the state, in the user's coordinates; what did not move keeps its bits."""
+    for b in range(table[BODIES]):
+        if table[table[SLOTS] + b] >= 0:
+            for k in range(3):
+                if q[b, k] != (state[7 * b + k] - pool[REFERENCE + k]) / pool[SCALE]:
+                    state[7 * b + k] = q[b, k] * pool[SCALE] + pool[REFERENCE + k]
+            for k in range(3, 7):
+                state[7 * b + k] = q[b, k]
+
+
+@kernel(inner=True)
+def is_clear(table, residual):
+    """Whether no contact, given or of a clearance, is one of bodies in each other."""
+    for r in range(table[CONTACTS]):
+        if residual[r] < -TOUCHING:
+            return False
+    return True
+
+
+@kernel(inner=True)
+def keep(here, y, rows, held):
+    """Copy poses, tracked values and multipliers of a point."""
+    for b in range(held[0].shape[0]):
+        for k in range(7):
+            held[0][b, k] = here[0][b, k]
+    for r in range(held[1].shape[0]):
+        for k in range(TRACK):
+            held[1][r, k] = here[1][r, k]
+    for r in range(rows):
+        held[2][r] = y[r]
+
+
+@kernel(inner=True)
+def bring_back(held, rows, here, y):
+    """The point that `keep` copied."""
+    for b in range(held[0].shape[0]):
+        for k in range(7):
+            here[0][b, k] = held[0][b, k]
+    for r in range(held[1].shape[0]):
+        for k in range(TRACK):
+            here[1][r, k] = held[1][r, k]
+    for r in range(rows):
+        y[r] = held[2][r]
+
+
+@kernel(inner=True)
+def judge(table, pool, state, loose, room, shape, rows, here, trial, bound, lax):
+    """The pose as it is returned, rounded to the user's coordinates, evaluated afresh into `trial`.
+
+    Residuals and pairs found are copied to `here`. Returns whether every row holds within the bound, and the largest
+    violation, tangency counted by gaps if `lax`.
+    """
+    q = trial[0]
+    scaled_poses(table, pool, state, q)
+    lost = evaluate(table, pool, here[1], BEND, loose, room, trial)
+    if lost >= 0:
+        return False, math.inf
+    for r in range(rows):
+        here[3][r] = trial[3][r]
+    for k in range(table[CONTACTS]):
+        for i in range(TRACK):
+            here[1][k, i] = trial[1][k, i]
+    violation = off_rows(table, loose, shape[1], trial, lax)
+    holds = free_pairs_hold(table, pool, q, here[1], loose[0], 1e-9)
+    return holds and violation <= bound, violation
+
+
+@kernel(inner=True)
+def write_rows(table, here, y, loose, lax, size, state):
+    """Tracked values, multipliers and residuals into the state; returns at how many contacts surfaces cross."""
+    _q, tracked, records, residual, jacobian = here
+    free = loose[0]
+    m = table[ROWS]
+    o = 7 * table[BODIES]
+    for k in range(table[TRACKED]):
+        for i in range(TRACK):
+            state[o + TRACK * k + i] = tracked[k, i]
+    o += TRACK * table[TRACKED]
+    crossing = 0.0
+    for r in range(m):
+        state[o + r] = y[r]
+        worst = residual[r]
+        if r < table[CONTACTS]:
+            if free[r] >= 0:
+                # What a free pair lacks to be extremal is a violation of its contact, too.
+                off = off_tangency(residual, jacobian, r, m + 4 * free[r], lax, loose[3])
+                if off > abs(worst):
+                    worst = -off
+            elif records[r, PROPER] == 0.0 and abs(worst) <= TOUCHING:
+                crossing += 1.0
+        state[o + m + r] = worst * size if table[table[ROW_TABLE] + ROW * r + IS_LENGTH] == 1 else worst
+    return crossing

@@ -1,0 +1,339 @@
+"""What the loop does with rows: their places among the unknowns, products with the Jacobian, the merit.
+
+`bases` says where the variables of each row stand, negative for none: twist of f, twist of g, a free pair's
+coordinates, then twists of further bodies.
+"""
+
+from __future__ import annotations
+
+from assembly._carve import carve
+from assembly._kernel import kernel
+from assembly.constraints.program.envelope import close_envelope, place_folds
+from assembly.constraints.program.hessian_blocks import choose_storage
+from assembly.constraints.program.objective_terms import TAPE_TERM, TERM, TERM_KIND, TERM_TABLE, TERM_TAPE
+from assembly.constraints.program.records import (
+    ANGLE,
+    BLOCK_LENGTH,
+    BLOCK_RECORD,
+    BODIES,
+    BODY_F,
+    BODY_G,
+    CONTACTS,
+    DEXTERITIES,
+    EXTRA,
+    EXTRA_COLUMN,
+    FREE_COLUMN,
+    JOINT_ROW,
+    KIND,
+    MOVING,
+    ONE_SIDED,
+    PARAMETERS,
+    ROW,
+    ROW_TABLE,
+    ROWS,
+    SECOND,
+    SECOND_BODY_F,
+    SECOND_BODY_G,
+    SLOTS,
+    TAPE_BODIES,
+    TAPE_LIST,
+    TAPE_RECORD,
+    TAPE_ROW_AT,
+    TAPE_TABLE,
+    TAPE_VALUES,
+    TAPES,
+    TERMS,
+    TRIM_PAIR,
+    TRIMS,
+)
+from assembly.kinematics.motion import retract
+
+
+@kernel(inline=True)
+def slot(table, body):
+    """Where a body's twist stands among the unknowns; negative for a fixed one, and for none."""
+    return 6 * table[table[SLOTS] + body] if body >= 0 else -1
+
+
+@kernel(inner=True)
+def place_rows(table, free, bases, one_sided):
+    """Where each row's variables stand, and its side."""
+    for r in range(table[ROWS]):
+        row = table[ROW_TABLE] + ROW * r
+        one_sided[r] = table[row + ONE_SIDED]
+        for b in range(bases.shape[1]):
+            bases[r, b] = -1
+        bases[r, 0] = slot(table, table[row + BODY_F])
+        bases[r, 1] = slot(table, table[row + BODY_G])
+        second = table[row + SECOND]
+        if table[row + KIND] == JOINT_ROW and second >= 0:
+            bases[r, 3] = slot(table, table[second + SECOND_BODY_F])
+            bases[r, 4] = slot(table, table[second + SECOND_BODY_G])
+    for r in range(table[CONTACTS]):
+        if free[r] >= 0:
+            bases[r, 2] = 6 * table[MOVING] + 4 * free[r]
+            for i in range(4):
+                e = table[ROWS] + 4 * free[r] + i
+                one_sided[e] = 0
+                for j in range(bases.shape[1]):
+                    bases[e, j] = bases[r, j]
+    for r in range(table[CONTACTS], table[CONTACTS] + table[TRIMS]):
+        bases[r, 2] = bases[table[table[ROW_TABLE] + ROW * r + TRIM_PAIR], 2]
+    for t in range(table[TAPES]):
+        tape = table[TAPE_TABLE] + TAPE_RECORD * t
+        for v in range(table[tape + TAPE_VALUES]):
+            for b in range(2, table[tape + TAPE_BODIES]):
+                bases[table[tape + TAPE_ROW_AT] + v, b + 1] = slot(table, table[table[tape + TAPE_LIST] + b])
+
+
+@kernel(inline=True, allocates=True)
+def record_of_blocks(table):
+    """The part of the table that has it; empty where the scene has none."""
+    return table[table[BLOCK_RECORD] : table[BLOCK_RECORD] + table[BLOCK_LENGTH]]
+
+
+@kernel(inline=True)
+def width(block):
+    return 4 if block == 2 else 6
+
+
+@kernel(inner=True)
+def body_span(bases, r, n):
+    """First unknown and last one of the bodies of row r; n and -1 where it has none."""
+    low = n
+    high = -1
+    for b in range(bases.shape[1]):
+        at = bases[r, b]
+        if at >= 0 and b != 2:
+            low = min(low, at)
+            high = max(high, at + 5)
+    return low, high
+
+
+@kernel(inner=True)
+def place_unknowns(table, bases, rows, n, order):
+    """Where the Hessian of the Lagrangian has entries, and its factor (see `constraints/program/envelope.py`)."""
+    places, folds = order[0], order[1]
+    last, ends = places[0], places[2]
+    choose_storage(order, n)
+    first = 6 * table[MOVING]
+    for i in range(n):
+        last[i] = first + (i - first) // 4 * 4 + 3 if i >= first else i // 6 * 6 + 5
+    for r in range(rows):
+        low, high = body_span(bases, r, n)
+        if high >= 0:
+            last[low] = max(last[low], high)
+    for t in range(table[TERMS]):
+        term = table[TERM_TABLE] + TERM * t
+        if table[term + TERM_KIND] == TAPE_TERM:
+            tape = table[term + TERM_TAPE]
+            low = n
+            high = -1
+            for b in range(table[tape + TAPE_BODIES]):
+                at = slot(table, table[table[tape + TAPE_LIST] + b])
+                if at >= 0:
+                    low = min(low, at)
+                    high = max(high, at + 5)
+            if high >= 0:
+                last[low] = max(last[low], high)
+    close_envelope(last, first)
+    count = (n - first) // 4
+    folds[folds.shape[0] - 1, 0] = 0
+    if count == 0 or table[DEXTERITIES] > 0:
+        for i in range(n):
+            if table[DEXTERITIES] > 0:
+                last[i] = n - 1
+            ends[i] = last[i]
+        return
+    for r in range(table[CONTACTS]):
+        if bases[r, 2] >= 0:
+            k = (bases[r, 2] - first) // 4
+            folds[k, 0] = bases[r, 0]
+            folds[k, 1] = bases[r, 1]
+    folds[folds.shape[0] - 1, 0] = count
+    place_folds(n, order)
+
+
+@kernel(inner=True)
+def order_rows(bases, rows, n, sequence, last_row, latest):
+    """Rows in the order of their first bodies, and how far those of J J^T reach then (see `linear.factorize`).
+
+    `latest` is room for n + 1 numbers.
+    """
+    # Rows meet in J J^T where they share a variable. First how many begin at each, then where the next one goes.
+    for i in range(n + 1):
+        latest[i] = 0
+    for r in range(rows):
+        latest[body_span(bases, r, n)[0]] += 1
+    total = 0
+    for i in range(n + 1):
+        total, latest[i] = total + latest[i], total
+    for r in range(rows):
+        low = body_span(bases, r, n)[0]
+        sequence[latest[low]] = r
+        latest[low] += 1
+    for at in range(rows):
+        for b in range(bases.shape[1]):
+            if bases[sequence[at], b] >= 0:
+                latest[bases[sequence[at], b]] = at
+    for at in range(rows):
+        last_row[at] = at
+        for b in range(bases.shape[1]):
+            if bases[sequence[at], b] >= 0:
+                last_row[at] = max(last_row[at], latest[bases[sequence[at], b]])
+    close_envelope(last_row, rows)
+
+
+@kernel(inner=True)
+def arrange(table, free, shape, rows, n):
+    """Where rows and unknowns stand, now that the pairs in `free` are at folds."""
+    bases, one_sided, order, (sequence, last_row) = shape
+    place_rows(table, free, bases, one_sided)
+    place_unknowns(table, bases, rows, n, order)
+    order_rows(bases, rows, n, sequence, last_row, order[0][3])
+
+
+@kernel(inline=True)
+def size_of_shape(table, most, n):
+    """How many integers and doubles `shape_of` carves at most."""
+    integers = (6 + table[EXTRA]) * most + 2 * (table[CONTACTS] + 1) + 4 * (n + 1)
+    return integers, 13 * max(n, 36)
+
+
+@kernel(inline=True, allocates=True)
+def shape_of(table, most, n, blocks, integers, doubles):
+    """Room for what `arrange` finds, for so many rows and unknowns: (bases, one_sided, order, order of rows).
+
+    `blocks` is the scene's record of them, `record_of_blocks`, or an empty one for a dense Hessian. The room is that of
+    the ends of two blocks of memory.
+    """
+    end, tail = size_of_shape(table, most, n)
+    at = integers.size - end
+    of_rows = carve(integers, at, (3, most))
+    folds = carve(integers, at + 3 * most, (table[CONTACTS] + 1, 2))
+    places = carve(integers, at + 3 * most + 2 * (table[CONTACTS] + 1), (4, n + 1))
+    bases = carve(integers, integers.size - (3 + table[EXTRA]) * most, (most, 3 + table[EXTRA]))
+    scratch = carve(doubles, doubles.size - tail, (13 if blocks.size > 0 else 1, max(n, 36)))
+    return bases, of_rows[0], (places, folds, scratch, blocks), (of_rows[1], of_rows[2])
+
+
+@kernel(inner=True)
+def times(bases, jacobian, r, d):
+    """Row r of J d."""
+    s = 0.0
+    f = bases[r, 0]
+    if f >= 0:
+        for k in range(6):
+            s += jacobian[r, k] * d[f + k]
+    g = bases[r, 1]
+    if g >= 0:
+        for k in range(6):
+            s += jacobian[r, 6 + k] * d[g + k]
+    u = bases[r, 2]
+    if u >= 0:
+        for k in range(4):
+            s += jacobian[r, FREE_COLUMN + k] * d[u + k]
+    for b in range(3, bases.shape[1]):
+        at = bases[r, b]
+        if at >= 0:
+            for k in range(6):
+                s += jacobian[r, EXTRA_COLUMN + 6 * (b - 3) + k] * d[at + k]
+    return s
+
+
+@kernel(inner=True)
+def add_row(bases, jacobian, r, factor, out):
+    """out += factor times row r of J."""
+    f = bases[r, 0]
+    if f >= 0:
+        for k in range(6):
+            out[f + k] += factor * jacobian[r, k]
+    g = bases[r, 1]
+    if g >= 0:
+        for k in range(6):
+            out[g + k] += factor * jacobian[r, 6 + k]
+    u = bases[r, 2]
+    if u >= 0:
+        for k in range(4):
+            out[u + k] += factor * jacobian[r, FREE_COLUMN + k]
+    for b in range(3, bases.shape[1]):
+        at = bases[r, b]
+        if at >= 0:
+            for k in range(6):
+                out[at + k] += factor * jacobian[r, EXTRA_COLUMN + 6 * (b - 3) + k]
+
+
+@kernel(inner=True)
+def add_transposed(bases, jacobian, rows, weights, out):
+    """out += J^T weights."""
+    for r in range(rows):
+        if weights[r] != 0.0:
+            add_row(bases, jacobian, r, weights[r], out)
+
+
+@kernel(inner=True)
+def violation_of(residual, one_sided, rows):
+    """Largest violation."""
+    worst = 0.0
+    for r in range(rows):
+        c = residual[r]
+        if one_sided[r] == 1:
+            c = min(c, 0.0)
+        if not abs(c) <= worst:
+            worst = abs(c)
+    return worst
+
+
+@kernel(inner=True)
+def merit(residual, one_sided, rows, y, mu):
+    """What the rows add to the augmented Lagrangian; a one-sided row counts only while y + c / mu is negative."""
+    value = 0.0
+    for r in range(rows):
+        c = residual[r]
+        if one_sided[r] == 1 and y[r] + c / mu >= 0.0:
+            value -= 0.5 * mu * y[r] * y[r]
+        else:
+            value += y[r] * c + 0.5 * c * c / mu
+    return value
+
+
+@kernel(inner=True)
+def move(table, q, d, alpha, out):
+    """Every moving body retracted by alpha d."""
+    for b in range(table[BODIES]):
+        s = 6 * table[table[SLOTS] + b]
+        if s >= 0:
+            retract(
+                q,
+                b,
+                (alpha * d[s], alpha * d[s + 1], alpha * d[s + 2]),
+                (alpha * d[s + 3], alpha * d[s + 4], alpha * d[s + 5]),
+                out,
+            )
+
+
+@kernel(inner=True)
+def turned(table, pool, tracked):
+    """The largest product of a factor and an angle in a row."""
+    most = 0.0
+    for r in range(table[CONTACTS], table[ROWS]):
+        row = table[ROW_TABLE] + ROW * r
+        if table[row + KIND] != JOINT_ROW:
+            continue
+        o = table[row + PARAMETERS]
+        if table[row + ANGLE] >= 0:
+            most = max(most, max(abs(pool[o + 2]), abs(pool[o] * tracked[table[row + ANGLE], 0])))
+        second = table[row + SECOND]
+        if second >= 0 and table[second + 3] >= 0:
+            most = max(most, abs(pool[o + 1] * tracked[table[second + 3], 0]))
+    return most
+
+
+@kernel(inner=True)
+def clear_row(bases, r, out):
+    """Zeros where row r has variables."""
+    for b in range(bases.shape[1]):
+        at = bases[r, b]
+        if at >= 0:
+            for k in range(width(b)):
+                out[at + k] = 0.0

@@ -1,0 +1,77 @@
+"""The shortest way back onto the rows, where the time of a solve or a tick is over and they do not hold yet."""
+
+from __future__ import annotations
+
+import math
+
+from assembly._kernel import kernel
+from assembly.constraints.program.evaluate import evaluate
+from assembly.constraints.program.records import ROWS, WATCH
+from assembly.proximity.extrema.face_face import BEND
+from assembly.solve.loop.clearances import is_too_far
+from assembly.solve.loop.multipliers import toward_rows
+from assembly.solve.loop.predict import carry
+from assembly.solve.loop.residuals import move
+from assembly.solve.loop.violation import off_rows
+
+# A step is shortened by this where it leads farther off; a tick's may lead off by this once, if the next one leads
+# back.
+SHORTENED, ASTRAY, LEAST_SHARE = 0.25, 10.0, 1e-4
+# What is known of the way: the softness of the last step, the share to take of the next one, the least violation so
+# far, whether the last step led off. Of the loop: whole steps in a row that changed nothing, and that gained little;
+# steps of any length that left what rows are off, and whether only what is near is looked at for that.
+SOFTNESS, SHARE, LOWEST, LED_OFF, STILLS, SLOW_STEPS, DRAGS, NEARBY, WAY = 0, 1, 2, 3, 4, 5, 6, 7, 8
+
+
+@kernel(inline=True)
+def way_back(program, here, trial, rows, weights, mu, softness, share, enough, system, tick):
+    """A share of the least step that leaves little of the gaps, into the trial point.
+
+    `weights` is room for which rows count, and for forces. Returns the softness that the step took, and how far off the
+    rows it leads: infinitely where bodies may not go so far, or a pair is lost.
+    """
+    table, pool, shape, loose, room = program
+    active, forces, _foreseen = weights
+    _gradient, (_descent, step, _straight), lagrangian, matrix = system
+    bases, one_sided, _order, _of_rows = shape
+    n = step.size
+    softness = toward_rows(
+        shape, table[ROWS], rows, here[3], here[4], mu, active, softness, enough, lagrangian, matrix, n, forces, step
+    )
+    move(table, here[0], step, share, trial[0])
+    carry(table, pool, bases, loose, here, trial, step, share)
+    if table[WATCH] >= 0 and is_too_far(table, pool, loose[5], trial):
+        return softness, math.inf
+    if evaluate(table, pool, loose[4], BEND, loose, room, trial) >= 0:
+        return softness, math.inf
+    return softness, off_rows(table, loose, one_sided, trial, tick)
+
+
+@kernel(inner=True)
+def begin_way(way):
+    """Rows have changed: what was found of steps and violations counts no more."""
+    way[SHARE] = 1.0
+    way[LOWEST] = math.inf
+    way[LED_OFF] = 0.0
+    way[STILLS] = 0.0
+    way[SLOW_STEPS] = 0.0
+    way[DRAGS] = 0.0
+    way[NEARBY] = 0.0
+
+
+@kernel(inline=True)
+def step_back(program, here, trial, rows, weights, mu, violation, enough, system, tick, way):
+    """A step on the way back, into the trial point; whether it is to be taken. If not, the next one is shorter."""
+    if violation < way[LOWEST]:
+        way[LOWEST] = violation
+        way[LED_OFF] = 0.0
+    way[SOFTNESS], there = way_back(
+        program, here, trial, rows, weights, mu, way[SOFTNESS], way[SHARE], enough, system, tick
+    )
+    nearer = there < way[LOWEST]
+    if not nearer and not (tick and there < ASTRAY * way[LOWEST] and way[LED_OFF] == 0.0):
+        way[SHARE] *= SHORTENED
+        return False
+    way[LED_OFF] = 0.0 if nearer else 1.0
+    way[SHARE] = min(way[SHARE] / SHORTENED, 1.0)
+    return True

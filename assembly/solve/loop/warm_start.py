@@ -1,0 +1,85 @@
+"""What a tick leaves for the next one, which begins at the same poses: its rows with their first derivatives.
+
+whether there is something | poses, as in the state | of every contact: number, residual, record, gradient
+"""
+
+from __future__ import annotations
+
+from assembly._kernel import kernel
+from assembly.constraints.program.contact import idle_row
+from assembly.constraints.program.records import (
+    BODIES,
+    BODY_F,
+    CONTACTS,
+    FREE_COLUMN,
+    GUARD_NUMBER,
+    JOINTS,
+    ROW,
+    ROW_TABLE,
+    ROWS,
+    TRACKED,
+)
+from assembly.proximity.features.solid_contact import CONTACT_RECORD
+
+# Of a contact: its number, its residual, then its record and its gradient.
+RECALLED = 2 + CONTACT_RECORD + FREE_COLUMN
+
+
+@kernel(inline=True)
+def recall_size(bodies, pairs):
+    """Doubles of what is left."""
+    return 1 + 7 * bodies + RECALLED * pairs
+
+
+@kernel(inline=True)
+def is_simple(table):
+    """Whether all rows are contacts; others have values that change between ticks."""
+    return table[ROWS] == table[CONTACTS] and table[TRACKED] == table[CONTACTS] and table[JOINTS] == 0
+
+
+@kernel(inline=True)
+def recall(table, state, at, point):
+    """Take over the rows that were left at these poses, with these contacts. Whether there were."""
+    if state[at] != 1.0 or not is_simple(table):
+        return False
+    for k in range(7 * table[BODIES]):
+        if state[at + 1 + k] != state[k]:
+            return False
+    o = at + 1 + 7 * table[BODIES]
+    for r in range(table[CONTACTS]):
+        if state[o + RECALLED * r] != float(table[table[ROW_TABLE] + ROW * r + GUARD_NUMBER]):
+            return False
+    for r in range(table[CONTACTS]):
+        if table[table[ROW_TABLE] + ROW * r + BODY_F] < 0:
+            idle_row(r, 1.0, point)
+            continue
+        a = o + RECALLED * r
+        point[3][r] = state[a + 1]
+        for i in range(CONTACT_RECORD):
+            point[2][r, i] = state[a + 2 + i]
+        for i in range(FREE_COLUMN):
+            point[4][r, i] = state[a + 2 + CONTACT_RECORD + i]
+    return True
+
+
+@kernel(inline=True)
+def leave(table, state, at, point, good):
+    """Leave the rows of a point whose poses are in the state, if they are `good`."""
+    state[at] = 0.0
+    if not good or not is_simple(table):
+        return
+    state[at] = 1.0
+    for k in range(7 * table[BODIES]):
+        state[at + 1 + k] = state[k]
+    o = at + 1 + 7 * table[BODIES]
+    for r in range(table[CONTACTS]):
+        a = o + RECALLED * r
+        row = table[ROW_TABLE] + ROW * r
+        state[a] = float(table[row + GUARD_NUMBER])
+        if table[row + BODY_F] < 0:
+            continue
+        state[a + 1] = point[3][r]
+        for i in range(CONTACT_RECORD):
+            state[a + 2 + i] = point[2][r, i]
+        for i in range(FREE_COLUMN):
+            state[a + 2 + CONTACT_RECORD + i] = point[4][r, i]

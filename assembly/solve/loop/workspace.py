@@ -1,0 +1,163 @@
+"""Room that a solve works in: arrays in two blocks of memory, of doubles and of integers (`_carve.py`)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from assembly._carve import carve
+from assembly._kernel import kernel
+from assembly.constraints.program.hessian_blocks import BLOCKS, FACTORED, is_blocked
+from assembly.constraints.program.records import (
+    BLOCK_RECORD,
+    BODIES,
+    CONTACTS,
+    EXTRA,
+    EXTRA_COLUMN,
+    GUARDS,
+    JOINTS,
+    MOVING,
+    ROWS,
+    TAPE_ROOM,
+    TRACKED,
+    VECTOR_TRIMS,
+)
+from assembly.proximity.extrema.lifted_pair import VARIABLES, VECTORS
+from assembly.proximity.features.solid_contact import CONTACT_RECORD, TRACK
+from assembly.solve.loop.residuals import arrange, record_of_blocks, shape_of, size_of_shape
+from assembly.solve.loop.restoration import WAY
+
+# What a row has a number of, behind its residuals here and at the trial point: its multiplier, a better one, whether it
+# counts, what it pushes with, whether a step would break it.
+BY_ROW = 7
+
+
+@kernel(inline=True, allocates=True)
+def results_of(table, state):
+    """The end of a state, behind poses, tracked values, multipliers and residuals."""
+    return state[7 * table[BODIES] + TRACK * table[TRACKED] + 2 * table[ROWS] :]
+
+
+@kernel(inline=True)
+def room_needed(table):
+    """How many doubles and integers a solve works in: what is carved below, and by `shape_of`."""
+    pairs, bodies, tracks, tapes = table[CONTACTS], table[BODIES], table[TRACKED], table[TAPE_ROOM]
+    most, n = table[ROWS] + 4 * pairs, 6 * table[MOVING]
+    integers, doubles = size_of_shape(table, most, n + 4 * pairs)
+    # Poses, tracked values, records, Jacobians, what a row has one of.
+    doubles += 21 * bodies + 4 * TRACK * tracks + 2 * record_count(table) * CONTACT_RECORD
+    doubles += 2 * most * (EXTRA_COLUMN + 6 * table[EXTRA]) + (BY_ROW + 1) * most
+    # Of pairs; of tapes; multipliers of least squares; the way back.
+    doubles += 4 * pairs + (3 * VECTORS + VARIABLES) * VARIABLES
+    doubles += table[tapes] + table[tapes + 1] + table[tapes + 2] + (most + 1) * most + WAY
+    # Of unknowns, while no pair is at a fold.
+    blocks = table[BLOCK_RECORD]
+    doubles += 4 * n + (36 * (table[blocks + BLOCKS] + table[blocks + FACTORED]) if blocks > 0 else 2 * n * n)
+    return doubles, integers + pairs + table[GUARDS]
+
+
+@kernel(inline=True)
+def record_count(table):
+    """How many records a point has."""
+    return table[CONTACTS] + table[JOINTS] + table[VECTOR_TRIMS]
+
+
+@kernel(inline=True, allocates=True)
+def carve_points(table, most, doubles, at):
+    """Two points of the search, room by row, tracked values more, for a guess, a third point to keep; where it ends.
+
+    A point: poses, tracked values, records, residual, Jacobian. `most` rows at most. The third one is a pose, its
+    tracked values and its multipliers.
+    """
+    bodies, tracks, columns = table[BODIES], table[TRACKED], EXTRA_COLUMN + 6 * table[EXTRA]
+    poses = carve(doubles, at, (3, bodies, 7))
+    at += 21 * bodies
+    tracked = carve(doubles, at, (4, tracks, TRACK))
+    at += 4 * tracks * TRACK
+    records = carve(doubles, at, (2, record_count(table), CONTACT_RECORD))
+    at += 2 * record_count(table) * CONTACT_RECORD
+    jacobians = carve(doubles, at, (2, most, columns))
+    at += 2 * most * columns
+    by_row = carve(doubles, at, (BY_ROW + 1, most))
+    at += (BY_ROW + 1) * most
+    for k in range(BY_ROW):
+        for r in range(most):
+            by_row[k, r] = 0.0
+    here = (poses[0], tracked[0], records[0], by_row[0], jacobians[0])
+    trial = (poses[1], tracked[1], records[1], by_row[1], jacobians[1])
+    return here, trial, by_row, tracked[2], (poses[2], tracked[3], by_row[BY_ROW]), at
+
+
+@kernel(inline=True, allocates=True)
+def carve_pairs(table, guess, memory, doubles, at, integers):
+    """What pairs need: which are free, the lengths of their coordinates, room for their derivatives; a guess of all.
+
+    With what a watch of clearances remembers. No pair is free yet. And where it ends.
+    """
+    pairs = table[CONTACTS]
+    free = carve(integers, 0, (pairs,))
+    for k in range(pairs):
+        free[k] = -1
+    lengths = carve(doubles, at, (pairs, 4))
+    at += 4 * pairs
+    vectors = carve(doubles, at, (VECTORS, 3, VARIABLES))
+    at += 3 * VECTORS * VARIABLES
+    values = carve(doubles, at, (VARIABLES, VARIABLES))
+    return (free, lengths, vectors, values, guess, memory), at + VARIABLES * VARIABLES
+
+
+@kernel(inline=True, allocates=True)
+def carve_tapes(table, doubles, at):
+    """What the instructions of expressions work in, and where it ends."""
+    o = table[TAPE_ROOM]
+    inputs = carve(doubles, at, (table[o],))
+    outputs = carve(doubles, at + table[o], (table[o + 1],))
+    work = carve(doubles, at + table[o] + table[o + 1], (table[o + 2],))
+    return (inputs, outputs, work), at + table[o] + table[o + 1] + table[o + 2]
+
+
+@kernel(inline=True)
+def sides_of(n, order):
+    """Rows and columns of the Hessian's array and of its factor's, for n unknowns."""
+    if is_blocked(order):
+        return (6 * order[3][BLOCKS], 6), (1, 36 * order[3][FACTORED])
+    return (n, n), (n, n)
+
+
+@kernel(inline=True, allocates=True)
+def carve_unknowns(n, order, doubles, at):
+    """Room for n unknowns: gradient, (right side or scratch, step, step before it was bent), Hessian, its factor."""
+    hessian, factor = sides_of(n, order)
+    vectors = carve(doubles, at, (4, n))
+    end = at + 4 * n + hessian[0] * hessian[1]
+    matrices = carve(doubles, at + 4 * n, hessian), carve(doubles, end, factor)
+    return vectors[0], (vectors[1], vectors[2], vectors[3]), matrices[0], matrices[1]
+
+
+@kernel(inline=True, allocates=True)
+def carve_all(table, memory, doubles, integers):
+    """All that a solve works in, as `room_needed` counts it; rows and unknowns are those without free pairs.
+
+    Points (here, trial, held), room by row, the shape of what is sparse, what pairs need, numbers of contacts, tapes,
+    room for least squares, what is known of a way back, room for unknowns.
+    """
+    pairs = table[CONTACTS]
+    most, n = table[ROWS] + 4 * pairs, 6 * table[MOVING]
+    here, trial, by_row, guess, held, at = carve_points(table, most, doubles, 0)
+    shape = shape_of(table, most, n + 4 * pairs, record_of_blocks(table), integers, doubles)
+    loose, at = carve_pairs(table, guess, memory, doubles, at, integers)
+    numbers = carve(integers, pairs, (table[GUARDS],))
+    arrange(table, loose[0], shape, table[ROWS], n)
+    tapes, at = carve_tapes(table, doubles, at)
+    gram = carve(doubles, at, (most + 1, most))
+    at += (most + 1) * most
+    way = carve(doubles, at, (WAY,))
+    system = carve_unknowns(n, shape[2], doubles, at + WAY)
+    return (here, trial, held), by_row, shape, loose, numbers, tapes, gram, way, system
+
+
+@kernel(inline=True, allocates=True)
+def unknowns(n, order):
+    """The same of its own: where pairs at folds bring more unknowns."""
+    hessian, factor = sides_of(n, order)
+    vectors = np.empty((4, n))
+    return vectors[0], (vectors[1], vectors[2], vectors[3]), np.empty(hessian), np.empty(factor)
