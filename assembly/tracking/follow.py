@@ -30,9 +30,10 @@ from assembly.constraints.program.records import (
     SURFACE_F,
     WATCH,
 )
+from assembly.geometry.splines.domain import into_domain
 from assembly.geometry.splines.evaluate import BREAKS_U, BREAKS_V, CLOSED_U, CLOSED_V, SPANS_U, SPANS_V
 from assembly.geometry.vec import quaternion_product
-from assembly.proximity.extrema.face_face import BEND, CONVERGED, SINGULAR, into_domain
+from assembly.proximity.extrema.face_face import BEND, CONVERGED, SINGULAR
 from assembly.proximity.extrema.rates import ARM_F, GAP, RATES, ZED
 from assembly.proximity.features.solid_contact import FOLD, PAIR_GAP, PROPER, TRACK
 from assembly.proximity.manager.state import (

@@ -9,9 +9,8 @@ import pytest
 
 from assembly.geometry import shapes
 from assembly.geometry.faces.face import Face
-from assembly.geometry.splines.evaluate import SURFACE_RECORD
+from assembly.geometry.splines.evaluate import OFFSETS, SURFACE_RECORD
 from assembly.proximity import PairStatus, contact_jacobian, extremal_pair
-from assembly.proximity.extrema.pairs import OFFSETS
 from assembly.proximity.extrema.rates import pair_derivatives
 from tests.laws.scenes import placed
 from tests.laws.witness import Pairs, Stack, moved

@@ -8,7 +8,7 @@ import pytest
 import assembly as asm
 from assembly.errors import InputError
 from assembly.solve import solution as solution_module
-from assembly.solve.solution import Iteration
+from assembly.solve.result import Iteration
 from tests.solve.dense.test_jacobian import everything
 from tests.solve.mechanisms import bricard, planar_four_bar
 

@@ -96,13 +96,13 @@ def pack_watch(
     lengths = np.zeros(watch_memory.LENGTH_COUNT)
     lengths[watch_memory.NEGLECT] = min(clearance.neglect for clearance in clearances)
     lengths[watch_memory.FIRST_REACH], lengths[watch_memory.LAST_REACH] = FIRST_REACH, LAST_REACH
-    _, lengths_at = writer.add(pool=lengths)
+    _, lengths_place = writer.add(pool=lengths)
     lists = min(count, MOST_LISTS)
     list_table, _ = writer.add([-1] * (LIST_INTS * lists))
     record = np.zeros(watch_memory.WATCH_RECORD, dtype=np.int64)
     record[watch_memory.PAIRS], record[watch_memory.PLACES] = count, first
     record[watch_memory.PAIR_TABLE], record[watch_memory.FIRST] = pair_table, len(contacts)
-    record[watch_memory.LENGTHS] = lengths_at
+    record[watch_memory.LENGTHS] = lengths_place
     record[watch_memory.LISTS], record[watch_memory.LIST_TABLE] = lists, list_table
     record[watch_memory.CORNERS] = any(clearance.corners for clearance in clearances)
     # Where one is asked for, its address is written when the scene is ready.
@@ -212,7 +212,7 @@ class _PairPacking:
 
     def write(self) -> tuple[int, int]:
         """How many pairs there are, and where their records begin."""
-        given_at, _ = self._writer.add(self._given)
+        given_place, _ = self._writer.add(self._given)
         table = np.array(self._records, dtype=np.int64).reshape(-1, watch_memory.PAIR_RECORD)
-        table[:, watch_memory.GIVEN] += given_at
+        table[:, watch_memory.GIVEN] += given_place
         return len(table), self._writer.add(table)[0]

@@ -15,12 +15,11 @@ from assembly.constraints.program import records as layout
 from assembly.constraints.program.primitives import AZIMUTH, TURN
 from assembly.geometry.expression import tape
 from assembly.geometry.faces.face import Face
-from assembly.geometry.splines.evaluate import SURFACE_RECORD
+from assembly.geometry.splines.evaluate import OFFSETS, SURFACE_RECORD
 from assembly.kinematics.body import Body
 from assembly.proximity.brep.packing import pack_shell
 from assembly.proximity.brep.solid import solid_of
 from assembly.proximity.brep.writer import Writer
-from assembly.proximity.extrema.pairs import OFFSETS
 
 __all__ = ["SceneWriter"]
 

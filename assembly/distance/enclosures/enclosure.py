@@ -25,7 +25,7 @@ import math
 from assembly._kernel import kernel
 from assembly.geometry.expression import formula
 from assembly.geometry.expression.formula import arc_bound, point_bounds, range_bounds, refine
-from assembly.geometry.interval import UNIT, down, magnitude, up
+from assembly.geometry.interval import _GROW, UNIT, down, middle_of, most, off_of, up
 from assembly.geometry.splines import bezier_ranges
 from assembly.geometry.splines.bezier_ranges import bezier_point_bounds, bezier_range_bounds
 
@@ -40,7 +40,6 @@ T0, T1, P0, P1, PM, OFF, WIDE, LENGTH, RADIUS, SPAN, BOX = 0, 1, 2, 5, 8, 11, 12
 SPEED, BEND, JERK, MID, MID_SPEED, MID_BEND, FIRST_END, LAST_END = 22, 28, 34, 40, 46, 52, 58, 59
 # How far the first end, the last and the middle may be off, each by itself; OFF is the largest.
 OFF_0, OFF_1, OFF_MID, PIECE = 60, 61, 62, 63
-_GROW = 1.0 + 16.0 * UNIT
 
 
 @kernel(inner=True, exact=True)
@@ -55,32 +54,6 @@ def point_values(kind, table, pool, span, t, room, out, o):
         bezier_point_bounds(table, pool, span, t, room, at)
         for k in range(18):
             out[o + k] = room[at + k]
-
-
-@kernel(inline=True)
-def middle_of(x, o, k):
-    """A double in the k-th of the pairs at x[o:]."""
-    return 0.5 * (x[o + 2 * k] + x[o + 2 * k + 1])
-
-
-@kernel(inner=True, exact=True)
-def off_of(x, o):
-    """How far the middle of three pairs may be from what they enclose."""
-    a = x[o + 1] - x[o]
-    b = x[o + 3] - x[o + 2]
-    c = x[o + 5] - x[o + 4]
-    # Half the width, and the rounding of the middle itself.
-    size = abs(x[o]) + abs(x[o + 2]) + abs(x[o + 4])
-    return _GROW * (0.5 * math.sqrt(a * a + b * b + c * c) + UNIT * size)
-
-
-@kernel(inner=True, exact=True)
-def most(x, o):
-    """Largest norm of what three pairs enclose."""
-    a = magnitude((x[o], x[o + 1]))
-    b = magnitude((x[o + 2], x[o + 3]))
-    c = magnitude((x[o + 4], x[o + 5]))
-    return _GROW * math.sqrt(a * a + b * b + c * c)
 
 
 @kernel(inner=True, exact=True)

@@ -22,8 +22,6 @@ from assembly.distance.enclosures.enclosure import (
     T0,
     T1,
     WIDE,
-    middle_of,
-    off_of,
     point_values,
     separation_along,
 )
@@ -37,7 +35,7 @@ from assembly.distance.enclosures.taylor import (
     turn_values,
 )
 from assembly.geometry.expression import formula
-from assembly.geometry.interval import UNIT, up
+from assembly.geometry.interval import UNIT, middle_of, off_of, up
 from assembly.geometry.vec import add, cross, dot, scale, sub
 
 # What the best points are: their distance rounded up, parameters and pieces, points, whether a meeting is proven, the

@@ -28,7 +28,6 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly.distance.enclosures.enclosure import middle_of, most, off_of
 from assembly.distance.patches.nodes import (
     A0,
     AWAY,
@@ -56,7 +55,7 @@ from assembly.distance.patches.nodes import (
 from assembly.distance.patches.pair import OFF, PATCH_J, PATCH_K
 from assembly.geometry.expression import formula
 from assembly.geometry.expression.formula import point_bounds, range_bounds, refine
-from assembly.geometry.interval import UNIT, idifference, magnitude, up
+from assembly.geometry.interval import UNIT, idifference, magnitude, middle_of, most, off_of, up
 
 NONE = 1e100
 # Pairs of a record for work: C, C', C'', C''' over the interval, then C, C', C'' in its middle.

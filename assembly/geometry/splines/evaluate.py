@@ -316,3 +316,10 @@ def third_derivatives(table, pool, r, u, v):
     xuvv = i * (c1 - wv * xuv - wu * xvv - wvv * xu - wuv * xv - lane(c1, 3) * x)
     xvvv = i * (d - wv * xvv - wvv * xv - lane(d, 3) * x)
     return xyz(6.0 * xuuu), xyz(2.0 * xuuv), xyz(2.0 * xuvv), xyz(6.0 * xvvv)
+
+
+CELL_SIZE = 11  # doubles a cell: u, v, point, sphere's center, radius, half widths in u and v
+
+
+# Fields of a surface record that are offsets into the pool.
+OFFSETS = (BREAKS_U, BREAKS_V, COEFFICIENTS, CELLS)

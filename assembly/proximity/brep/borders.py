@@ -5,6 +5,7 @@ from __future__ import annotations
 from assembly._kernel import kernel
 from assembly.geometry.faces.trim_nearest import trim_nearest
 from assembly.geometry.faces.trim_pieces import TRIM_CURVES, TRIM_FIRST
+from assembly.geometry.splines.domain import into_domain
 from assembly.geometry.splines.evaluate import (
     CURVE_BREAKS,
     CURVE_CLOSED,
@@ -36,7 +37,6 @@ from assembly.proximity.brep.records import (
     VERTEX_RECORD,
     VERTEX_TABLE,
 )
-from assembly.proximity.extrema.face_face import into_domain
 
 
 @kernel(inline=True)

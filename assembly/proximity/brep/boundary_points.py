@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
+from assembly.geometry.splines.domain import into_domain
 from assembly.geometry.splines.evaluate import curve_lanes, surface_point, xyz
 from assembly.geometry.vec import blend, cross, dot, sub
-from assembly.proximity.extrema.face_face import into_domain
 
 _NEWTON_STEPS = 12
 

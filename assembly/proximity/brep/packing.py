@@ -12,13 +12,11 @@ from numpy.typing import NDArray
 from assembly.errors import positive
 from assembly.geometry.faces.face import Face
 from assembly.geometry.faces.trim_pieces import TRIM_FIRST
-from assembly.geometry.splines.evaluate import CELLS, COEFFICIENTS, CURVE_RECORD
+from assembly.geometry.splines.evaluate import CELL_SIZE, CELLS, COEFFICIENTS, CURVE_RECORD, OFFSETS
 from assembly.proximity.brep import records as shell
 from assembly.proximity.brep.edge_cells import edge_cells, outside_cells
 from assembly.proximity.brep.topology import Topology
 from assembly.proximity.brep.writer import Writer
-from assembly.proximity.extrema.global_start import CELL_SIZE
-from assembly.proximity.extrema.pairs import OFFSETS
 
 __all__ = ["pack_shell"]
 
@@ -99,15 +97,15 @@ def _face(
     pool[coefficients:cells].reshape(-1, 4)[:, :3] *= factor
     pool[cells:].reshape(-1, CELL_SIZE)[:, 2:9] *= factor
     record[list(OFFSETS)] += writer.pool_at
-    surface_at, _ = writer.add(record, pool)
-    trim_at = curves = -1
+    surface_place, _ = writer.add(record, pool)
+    trim_place = curves = -1
     if face.boundary:
         table, pool = face.packed_trim(writer.table_at, writer.pool_at)
         curves = int(table[TRIM_FIRST])
-        trim_at, _ = writer.add(table, pool)
+        trim_place, _ = writer.add(table, pool)
     listed, _ = writer.add([-1 if edge is None else edge for edge in edges])
     _, flags_at = writer.add(pool=flags)
-    return [surface_at, trim_at, listed, flags_at], curves
+    return [surface_place, trim_place, listed, flags_at], curves
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,10 +17,10 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
+from assembly.geometry.splines.domain import into_domain
 from assembly.geometry.splines.evaluate import BREAKS_U, BREAKS_V, CLOSED_U, CLOSED_V, SPANS_U, SPANS_V, surface_point
 from assembly.geometry.vec import add, dot, matvec, matvec_t, sub
 from assembly.kinematics.motion import relative_pose, rotation
-from assembly.proximity.extrema.face_face import into_domain
 from assembly.proximity.extrema.feedback import descent_step, end_of
 
 # Forms of the projections.

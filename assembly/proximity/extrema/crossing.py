@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
+from assembly.geometry.splines.domain import into_domain
 from assembly.geometry.splines.evaluate import (
     CURVE_BREAKS,
     CURVE_SPANS,
@@ -12,7 +13,6 @@ from assembly.geometry.splines.evaluate import (
 )
 from assembly.geometry.vec import add, blend, cross, dot, matvec, scale, sub
 from assembly.proximity.brep.records import EDGE, EDGE_CURVE, EDGE_START, FACE, FACE_SURFACE
-from assembly.proximity.extrema.face_face import into_domain
 from assembly.proximity.extrema.feature_jets import edge_jet, vertex_point
 
 

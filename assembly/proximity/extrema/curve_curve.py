@@ -20,12 +20,12 @@ from assembly._read_only import ReadOnlyArrays
 from assembly.errors import InputError, vector
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.curve import NurbsCurve
-from assembly.geometry.splines.evaluate import CURVE_BREAKS, CURVE_COEFFICIENTS, SURFACE_RECORD
+from assembly.geometry.splines.evaluate import CURVE_BREAKS, CURVE_COEFFICIENTS, OFFSETS, SURFACE_RECORD
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.kinematics.pose import pose_row
 from assembly.proximity.brep.records import EDGE, EDGE_CURVE, EDGE_END, EDGE_RECORD, EDGE_START, EDGE_SURFACE, FACE
 from assembly.proximity.extrema.feature_query import GAP, NORMAL, PAIR, POINT_F, feature_derivatives, find_features
-from assembly.proximity.extrema.pairs import EXTREMAL, OFFSETS, PairStatus, Side, as_face
+from assembly.proximity.extrema.pairs import EXTREMAL, PairStatus, Side, as_face
 
 __all__ = ["CurvePair", "curve_contact_jacobian", "curve_gap_gradient", "curve_gap_hessian", "extremal_curve_pair"]
 

@@ -20,15 +20,10 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
+from assembly.geometry.splines.domain import into_domain
 from assembly.geometry.splines.evaluate import (
-    BREAKS_U,
-    BREAKS_V,
-    CLOSED_U,
-    CLOSED_V,
     POLES,
     SIGN,
-    SPANS_U,
-    SPANS_V,
     surface_point,
 )
 from assembly.geometry.splines.pole import CHART, limits, nearest_pole, polar_step, pole_frame
@@ -166,33 +161,6 @@ def pair_frame(table, pool, f, g, rotation, shift, x):
     pg = add(matvec(rotation, qg), shift)
     d = sub(pg, pf)
     return n, tx, ty, pf, pg, e, t, a, c, (dot(tx, d), dot(ty, d), tilt[0], tilt[1]), dot(n, d), regular_f and regular_g
-
-
-@kernel(inline=True)
-def into_domain(table, pool, r, u, v):
-    """Parameters wrapped where the surface is closed, clamped where it ends; whether it was clamped."""
-    clamped = False
-    ou = table[r + BREAKS_U]
-    lo = pool[ou]
-    hi = pool[ou + table[r + SPANS_U]]
-    if u < lo or u > hi:
-        if table[r + CLOSED_U] == 1:
-            u -= (hi - lo) * math.floor((u - lo) / (hi - lo))
-            u = min(max(u, lo), hi)
-        else:
-            u = lo if u < lo else hi
-            clamped = True
-    ov = table[r + BREAKS_V]
-    lo = pool[ov]
-    hi = pool[ov + table[r + SPANS_V]]
-    if v < lo or v > hi:
-        if table[r + CLOSED_V] == 1:
-            v -= (hi - lo) * math.floor((v - lo) / (hi - lo))
-            v = min(max(v, lo), hi)
-        else:
-            v = lo if v < lo else hi
-            clamped = True
-    return u, v, clamped
 
 
 @kernel(inline=True)

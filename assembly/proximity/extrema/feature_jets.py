@@ -26,6 +26,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
+from assembly.geometry.splines.domain import into_domain
 from assembly.geometry.splines.evaluate import CURVE_BREAKS, CURVE_SPANS, curve_lanes, surface_point, xyz
 from assembly.geometry.vec import add, blend, cross, dot, matvec, scale, sub
 from assembly.proximity.brep.records import (
@@ -37,7 +38,6 @@ from assembly.proximity.brep.records import (
     VERTEX,
     VERTEX_POINT,
 )
-from assembly.proximity.extrema.face_face import into_domain
 from assembly.proximity.extrema.pair_matrix import RANK
 
 # Newton's own matrix is damped below this ratio: its residuals are right to rounding, unlike the rates it stands for.

@@ -21,10 +21,12 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly.geometry.splines.domain import into_domain
 from assembly.geometry.splines.evaluate import (
     BREAKS_U,
     BREAKS_V,
     CELL_COUNT,
+    CELL_SIZE,
     CELLS,
     SIGN,
     SPANS_U,
@@ -38,13 +40,11 @@ from assembly.proximity.extrema.face_face import (
     LEFT_PATCH,
     NOT_CONVERGED,
     SINGULAR,
-    into_domain,
     own_frame,
     pair_frame,
     solve_pair,
 )
 
-CELL_SIZE = 11  # doubles a cell: u, v, point, sphere's center, radius, half widths in u and v
 # How many of the nearest and of the best aligned samples are tried.
 NEAREST = 16
 ALIGNED = 8

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from assembly._read_only import ReadOnlyArrays
 from assembly.errors import InputError, integer, real_array, vector
 from assembly.geometry.faces.face import Face
-from assembly.geometry.splines.evaluate import BREAKS_U, BREAKS_V, CELLS, COEFFICIENTS, SURFACE_RECORD
+from assembly.geometry.splines.evaluate import OFFSETS, SURFACE_RECORD
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.kinematics.body import BodyFace
 from assembly.kinematics.pose import pose_row
@@ -29,8 +29,6 @@ __all__ = ["ContactPair", "PairStatus", "contact_jacobian", "descend", "extremal
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
 Side = NurbsSurface | Face | BodyFace
-# Fields of a surface record that are offsets into the pool.
-OFFSETS = (BREAKS_U, BREAKS_V, COEFFICIENTS, CELLS)
 # How far from extremal a pair may be where its derivatives are asked for.
 EXTREMAL = 1e-6
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
+from assembly.geometry.splines.domain import into_domain, is_within
 from assembly.geometry.splines.evaluate import SIGN, surface_point
 from assembly.geometry.vec import cross, dot, matvec, matvec_t, scale, sub
-from assembly.proximity.extrema.face_face import into_domain
 from assembly.proximity.extrema.singular import BESIDE
-from assembly.proximity.manager.newton_regions import is_within
 
 # Steps down the slope of a gap.
 SLIDES = 24

@@ -13,6 +13,7 @@ from assembly.geometry.splines.evaluate import (
     BREAKS_U,
     BREAKS_V,
     CELL_COUNT,
+    CELL_SIZE,
     CELLS,
     CURVE_BREAKS,
     CURVE_SPANS,
@@ -42,7 +43,6 @@ from assembly.proximity.brep.records import (
     VERTEX_TABLE,
     VERTICES,
 )
-from assembly.proximity.extrema.global_start import CELL_SIZE
 from assembly.proximity.features.edge_model import edge_model
 from assembly.proximity.features.quadratic_model import (
     CENTER,

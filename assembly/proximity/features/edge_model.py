@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
+from assembly.geometry.splines.domain import into_domain
 from assembly.geometry.splines.evaluate import (
     BREAKS_U,
     BREAKS_V,
@@ -26,7 +27,6 @@ from assembly.geometry.splines.evaluate import (
 )
 from assembly.geometry.vec import add, blend, dot, scale
 from assembly.proximity.brep.records import EDGE_CURVE, EDGE_SURFACE
-from assembly.proximity.extrema.face_face import into_domain
 from assembly.proximity.features.quadratic_model import HALF_U, LEAST_WEIGHT, ROUNDING, U0, place_model, remainder
 
 

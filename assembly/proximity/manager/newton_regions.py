@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
-from assembly.geometry.splines.evaluate import BREAKS_U, BREAKS_V, CLOSED_U, CLOSED_V, SPANS_U, SPANS_V
+from assembly.geometry.splines.domain import is_within
 from assembly.proximity.bvh.tree import ELEMENT, ELEMENT_FEATURE, ELEMENT_POOL
 from assembly.proximity.extrema.face_face import bent_at_most, move_pair, pair_frame, pair_step
 from assembly.proximity.extrema.pair_matrix import across_first, pair_matrix
@@ -36,21 +36,6 @@ def half_widths(table, pool, trees, pair):
     o = table[trees[0] + ELEMENT_POOL] + ELEMENT * pair[0]
     p = table[trees[1] + ELEMENT_POOL] + ELEMENT * pair[1]
     return (pool[o + 2], pool[o + 3], pool[p + 2], pool[p + 3])
-
-
-@kernel(inline=True)
-def is_within(table, pool, surface, x, y, u, v, half_u, half_v):
-    """Whether parameters (x, y) are in a box around (u, v)."""
-    du = abs(x - u)
-    dv = abs(y - v)
-    if surface >= 0:
-        if table[surface + CLOSED_U] == 1:
-            period = pool[table[surface + BREAKS_U] + table[surface + SPANS_U]] - pool[table[surface + BREAKS_U]]
-            du = min(du, period - du)
-        if table[surface + CLOSED_V] == 1:
-            period = pool[table[surface + BREAKS_V] + table[surface + SPANS_V]] - pool[table[surface + BREAKS_V]]
-            dv = min(dv, period - dv)
-    return du <= half_u and dv <= half_v
 
 
 @kernel(inline=True)

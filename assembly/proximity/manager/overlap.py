@@ -13,6 +13,7 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly.geometry.faces.trim import trim_side
+from assembly.geometry.splines.domain import is_within
 from assembly.geometry.splines.evaluate import SIGN, surface_point
 from assembly.geometry.vec import add, cross, matvec, matvec_t, scale, sub
 from assembly.proximity.brep.apexes import unit
@@ -38,7 +39,6 @@ from assembly.proximity.extrema.projection import foot_of
 from assembly.proximity.extrema.singular import BESIDE
 from assembly.proximity.manager.edge_piercing import cut_at, patch_corners, pierces
 from assembly.proximity.manager.extrema import GAP, POINT_F, POINT_G
-from assembly.proximity.manager.newton_regions import is_within
 
 # Room for the descent of a segment.
 DEPTH = 256

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from assembly.solve.dense.jacobian import NoPairError, rows_of
 from assembly.solve.dense.row_table import gradient_at
 from assembly.solve.diagnosis.subset import Snapshot
-from assembly.solve.solution import Solution
+
+if TYPE_CHECKING:
+    from assembly.solve.solution import Solution
 
 __all__ = ["goal", "violations"]
 

@@ -15,7 +15,7 @@ from assembly.solve.dense.groups import Group, groups_of
 from assembly.solve.dense.jacobian import rows_of
 from assembly.solve.diagnosis.subset import Problem
 from assembly.solve.interruption import Interruption
-from assembly.solve.solution import Solution
+from assembly.solve.result import Result
 
 __all__ = ["finite_dof", "path"]
 
@@ -52,7 +52,7 @@ def moves(q: Array, other: Array, size: float) -> Array:
     return twists
 
 
-def _at(problem: Problem, solution: Solution, interruption: Interruption) -> list[Group]:
+def _at(problem: Problem, solution: Result, interruption: Interruption) -> list[Group]:
     """The groups at a solution of a problem of two-sided rows."""
     rows = rows_of(problem.packed, solution._state)
     counted = np.ones(len(rows.owners), dtype=bool)
@@ -171,7 +171,7 @@ def path(problem: Problem, q: Array, motion: Array, size: float, levels: Array, 
         TimeoutError where its time is over before.
     """
     poses = np.empty((len(levels), *q.shape))
-    solution: Solution | None = None
+    solution: Result | None = None
     length = float(np.linalg.norm(motion))
     widest = float(np.linalg.norm(motion, axis=1).max()) / length
     gone = 0.0
@@ -193,7 +193,7 @@ def path(problem: Problem, q: Array, motion: Array, size: float, levels: Array, 
     return poses
 
 
-def _onward(problem: Problem, solution: Solution, motion: Array, interruption: Interruption) -> Array:
+def _onward(problem: Problem, solution: Result, motion: Array, interruption: Interruption) -> Array:
     """What of a motion is free at the next pose."""
     onward = np.zeros_like(motion)
     for group in _at(problem, solution, interruption):

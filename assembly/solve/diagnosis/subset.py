@@ -28,8 +28,8 @@ from assembly.solve.dense.rank import HELD
 from assembly.solve.interruption import Interruption
 from assembly.solve.loop.settings import ANY_POSE, GATHER
 from assembly.solve.options import Options
+from assembly.solve.result import Result
 from assembly.solve.scene import Scene, Status
-from assembly.solve.solution import Solution
 
 __all__ = ["Problem", "Snapshot"]
 
@@ -88,7 +88,7 @@ class Problem:
         """The constraints of the problem."""
         return self._scene.constraints
 
-    def start(self, q: Array, after: Solution | None = None) -> Array:
+    def start(self, q: Array, after: Result | None = None) -> Array:
         """The state of a solve from poses (n, 7); tracked values go on from a solution's."""
         packed = self.packed
         state = packed.new_state()
@@ -106,9 +106,7 @@ class Problem:
             packed.start_angles(q, state, warm=False)
         return state
 
-    def solve(
-        self, q: Array, interruption: Interruption, after: Solution | None = None, gathers: bool = False
-    ) -> Solution:
+    def solve(self, q: Array, interruption: Interruption, after: Result | None = None, gathers: bool = False) -> Result:
         """The nearest poses that hold the constraints, from poses (n, 7); tracked values go on from a solution's.
 
         Or any poses that hold them, from where scattered bodies were gathered. TimeoutError where the interruption's
@@ -122,14 +120,14 @@ class Problem:
         outcome = begin(packed, interruption, packed.table, settings, self.start(q, after), turns)
         outcome = balanced(packed, settings, outcome, partial(go_on_once, interruption))
         interruption.check("what constraints allow")
-        return Solution(self._scene, packed, outcome.state, _STATUSES[outcome.code], 0.0, outcome.history)
+        return Result(self._scene, packed, outcome.state, _STATUSES[outcome.code], 0.0, outcome.history)
 
-    def violations(self, solution: Solution) -> Array:
+    def violations(self, solution: Result) -> Array:
         """Violations of the constraints, in their order: lengths over the size of the whole scene."""
         each = self._off(solution)
         return np.array([each[rows].max(initial=0.0) for rows in self.packed.spans])
 
-    def holds(self, solution: Solution) -> bool:
+    def holds(self, solution: Result) -> bool:
         """Whether all constraints hold at a solution: contacts, limits and expressions to rounding."""
         packed = self.packed
         allowed = np.full(packed.rows, min(self.held, HELD))
@@ -137,7 +135,7 @@ class Problem:
         allowed[values[~packed.one_sided[values]]] = self.held
         return solution.status is not Status.CONTACT_LOST and bool((self._off(solution) <= allowed).all())
 
-    def _off(self, solution: Solution) -> Array:
+    def _off(self, solution: Result) -> Array:
         """Violations of the rows, lengths over the size of the whole scene; infinite where there is no value."""
         packed = self.packed
         values = solution._residuals

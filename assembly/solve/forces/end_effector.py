@@ -26,10 +26,11 @@ from assembly.proximity.features.solid_contact import TRACK
 from assembly.solve.diagnosis.undetermined import complaint
 from assembly.solve.forces.end_effector_rates import tip_at
 from assembly.solve.loop.dexterity import DETERMINED
-from assembly.solve.solution import Solution
+from assembly.solve.result import Result
 
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
+    from assembly.solve.solution import Solution
 
 __all__ = ["dexterity_ellipsoid", "dexterity_value", "tip_jacobian"]
 
@@ -174,7 +175,7 @@ def _evaluated(scene: Assembly, objective: Dexterity, q: ArrayLike | Solution | 
 
 def _state(scene: Assembly, packed: Packed, q: ArrayLike | Solution | None) -> Array:
     """Where the bodies are, and where the pairs of contacts are looked for."""
-    if not isinstance(q, Solution):
+    if not isinstance(q, Result):
         return scene._start(packed, None if q is None else pose_rows("q", q, len(scene.bodies)), None)
     if q._packed is packed:
         return q._state

@@ -33,10 +33,11 @@ from assembly.kinematics.body import Body, Frame, Point
 from assembly.kinematics.pose import angular_velocity_map, pose_rows, quaternion_rate_map, rotation_matrix
 from assembly.solve.dense.jacobian import rows_of
 from assembly.solve.dense.row_table import gradient_at
-from assembly.solve.solution import Solution
+from assembly.solve.result import Result
 
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
+    from assembly.solve.solution import Solution
 
 __all__ = ["Wrench", "geometric_jacobian", "joint_torques", "tool_wrench", "wrenches"]
 
@@ -240,7 +241,7 @@ def _chain(
     at: Solution | Assembly, inputs: Sequence[Joint | Freedom], tip: Point | Frame | Body
 ) -> tuple[Array, Array]:
     """The Jacobian of a tip and where it is."""
-    scene = at._scene if isinstance(at, Solution) else at
+    scene = at._scene if isinstance(at, Result) else at
     bodies = scene.bodies
     rows = {id(body): row for body, row in zip(bodies, at.q, strict=True)}
     if not isinstance(tip, (Point, Frame, Body)):

@@ -17,7 +17,7 @@ from assembly.constraints.program.records import (
     SURFACE_F,
     TRACKED,
 )
-from assembly.proximity.extrema.face_face import into_domain
+from assembly.geometry.splines.domain import into_domain
 from assembly.proximity.extrema.rates import RATES, ZED
 from assembly.proximity.features.solid_contact import CONTACT_RECORD, IDLE, PAIR_GAP, SLACK
 from assembly.solve.loop.residuals import times

@@ -10,7 +10,7 @@ from assembly._carve import carve
 from assembly._kernel import kernel
 from assembly.constraints.program.envelope import close_envelope, place_folds
 from assembly.constraints.program.hessian_blocks import choose_storage
-from assembly.constraints.program.objective_terms import TAPE_TERM, TERM, TERM_KIND, TERM_TABLE, TERM_TAPE
+from assembly.constraints.program.objective_terms import TAPE_TERM, TERM, TERM_KIND, TERM_TAPE
 from assembly.constraints.program.records import (
     ANGLE,
     BLOCK_LENGTH,
@@ -42,6 +42,7 @@ from assembly.constraints.program.records import (
     TAPE_TABLE,
     TAPE_VALUES,
     TAPES,
+    TERM_TABLE,
     TERMS,
     TRIM_PAIR,
     TRIMS,

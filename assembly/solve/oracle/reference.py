@@ -36,8 +36,9 @@ from assembly.solve.measure import Near
 from assembly.solve.oracle.rows import Poses, Rows
 from assembly.solve.oracle.surfaces import Pair, Patch
 from assembly.solve.oracle.terms import Terms
+from assembly.solve.result import Iteration
 from assembly.solve.scene import Status
-from assembly.solve.solution import Iteration, Solution
+from assembly.solve.solution import Solution
 
 if TYPE_CHECKING:
     from assembly.assembly import Assembly

@@ -5,8 +5,8 @@ import pytest
 
 from assembly.geometry import shapes
 from assembly.geometry.splines.cells import COUNT, GROUP, split, surface_cells
+from assembly.geometry.splines.evaluate import CELL_SIZE
 from assembly.geometry.splines.surface import NurbsSurface
-from assembly.proximity.extrema.global_start import CELL_SIZE
 from tests.geometry.splines.test_surface import random_surface
 
 SURFACES = {

@@ -13,6 +13,7 @@ from assembly.geometry.faces.trim_pieces import TRIM_CURVES, TRIM_FIRST
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.evaluate import (
     CELL_COUNT,
+    CELL_SIZE,
     CELLS,
     CURVE_BREAKS,
     CURVE_RECORD,
@@ -25,7 +26,6 @@ from assembly.proximity.brep import records as shell
 from assembly.proximity.brep.edge_cells import curve_boxes, edge_cells, first_cells
 from assembly.proximity.brep.packing import pack_shell
 from assembly.proximity.brep.topology import topology_of
-from assembly.proximity.extrema.global_start import CELL_SIZE
 from tests.geometry.splines.test_surface import random_surface
 from tests.proximity.brep.test_topology import RINGS, SOLIDS, arc, cut_octant, disc, line, octant, tee_box
 

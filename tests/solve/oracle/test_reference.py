@@ -8,8 +8,8 @@ import assembly as asm
 from assembly.geometry import shapes
 from assembly.solve.oracle.reference import ReferenceSolver
 from assembly.solve.oracle.surfaces import spline_function
+from assembly.solve.result import Iteration
 from assembly.solve.scene import Status
-from assembly.solve.solution import Iteration
 from tests.geometry.reference import knot_vector
 
 
