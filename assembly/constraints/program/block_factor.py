@@ -16,24 +16,17 @@ import math
 from assembly._kernel import kernel
 from assembly._lanes import load_lanes, store_lanes
 from assembly.constraints.program.hessian_blocks import (
-    ACROSS,
-    COUNT,
-    FIRST,
-    MEETING,
-    MEETING_AT,
-    MEETING_ROW,
-    PANEL,
-    PLACE,
-    SEAT,
+    blocks_at,
 )
 
 
 @kernel(inner=True)
 def greatest_diagonal(lagrangian, blocks):
     """The largest entry on the diagonal, without its sign; not finite if one is not."""
+    layout = blocks_at(blocks, 0)
     most = 1.0
-    for p in range(blocks[COUNT]):
-        at = 6 * blocks[blocks[FIRST] + p]
+    for p in range(layout.count):
+        at = 6 * blocks[layout.first + p]
         for i in range(6):
             value = abs(lagrangian[at + i, i])
             if not value < math.inf:
@@ -45,13 +38,14 @@ def greatest_diagonal(lagrangian, blocks):
 @kernel(inner=True)
 def place_panel(lagrangian, blocks, i, shift, panels, o, count, seats):
     """Row i of the Hessian + shift I into the panel of so many blocks at o; where its columns stand, into seats."""
-    first = blocks[blocks[PANEL] + i]
+    layout = blocks_at(blocks, 0)
+    first = blocks[layout.panel + i]
     for p in range(count):
-        seats[blocks[blocks[ACROSS] + first + p]] = o + 36 * p
+        seats[blocks[layout.across + first + p]] = o + 36 * p
     for l in range(o, o + 36 * count):
         panels[l] = 0.0
-    for e in range(blocks[blocks[FIRST] + i], blocks[blocks[FIRST] + i + 1]):
-        seat = blocks[blocks[SEAT] + e]
+    for e in range(blocks[layout.first + i], blocks[layout.first + i + 1]):
+        seat = blocks[layout.seat + e]
         at = o + 36 * (seat // 2)
         if seat % 2 == 1:
             for r in range(6):
@@ -145,21 +139,22 @@ def factorize_blocks(lagrangian, blocks, shift, panels, seats, turned):
 
     Called by its address, as few scenes are large.
     """
-    for i in range(blocks[COUNT]):
-        first = blocks[blocks[PANEL] + i]
-        count = blocks[blocks[PANEL] + i + 1] - first
+    layout = blocks_at(blocks, 0)
+    for i in range(layout.count):
+        first = blocks[layout.panel + i]
+        count = blocks[layout.panel + i + 1] - first
         o = 36 * first
         place_panel(lagrangian, blocks, i, shift, panels, o, count, seats)
-        for e in range(blocks[blocks[MEETING] + i], blocks[blocks[MEETING] + i + 1]):
-            k = blocks[blocks[MEETING_ROW] + e]
-            p = blocks[blocks[PANEL] + k] + blocks[blocks[MEETING_AT] + e]
-            end = blocks[blocks[PANEL] + k + 1]
+        for e in range(blocks[layout.meeting + i], blocks[layout.meeting + i + 1]):
+            k = blocks[layout.meeting_row + e]
+            p = blocks[layout.panel + k] + blocks[layout.meeting_at + e]
+            end = blocks[layout.panel + k + 1]
             turn_block(panels, 36 * p, turned)
             while p < end:
                 # As many blocks at once as are neighbors in both.
-                at = seats[blocks[blocks[ACROSS] + p]]
+                at = seats[blocks[layout.across + p]]
                 run = 1
-                while p + run < end and seats[blocks[blocks[ACROSS] + p + run]] == at + 36 * run:
+                while p + run < end and seats[blocks[layout.across + p + run]] == at + 36 * run:
                     run += 1
                 subtract_blocks(panels, at, turned, 36 * p, run)
                 p += run
@@ -171,12 +166,13 @@ def factorize_blocks(lagrangian, blocks, shift, panels, seats, turned):
 @kernel(inner=True)
 def forward_blocks(blocks, panels, b, x):
     """Solve U^T x = b, b in the order of the unknowns, x in that of the factor."""
-    for k in range(blocks[COUNT]):
-        p = 6 * blocks[blocks[PLACE] + k]
+    layout = blocks_at(blocks, 0)
+    for k in range(layout.count):
+        p = 6 * blocks[layout.place + k]
         for i in range(6):
             x[p + i] = b[6 * k + i]
-    for k in range(blocks[COUNT]):
-        first = blocks[blocks[PANEL] + k]
+    for k in range(layout.count):
+        first = blocks[layout.panel + k]
         o = 36 * first
         at = 6 * k
         for r in range(6):
@@ -184,8 +180,8 @@ def forward_blocks(blocks, panels, b, x):
             for l in range(r):
                 s -= panels[o + 6 * r + l] * x[at + l]
             x[at + r] = s * panels[o + 7 * r]
-        for p in range(first + 1, blocks[blocks[PANEL] + k + 1]):
-            to = 6 * blocks[blocks[ACROSS] + p]
+        for p in range(first + 1, blocks[layout.panel + k + 1]):
+            to = 6 * blocks[layout.across + p]
             for c in range(6):
                 f = 36 * p + 6 * c
                 for r in range(6):
@@ -195,13 +191,14 @@ def forward_blocks(blocks, panels, b, x):
 @kernel(inner=True)
 def substitute_blocks(blocks, panels, b, x):
     """Solve U^T U x = b in place of b; x is scratch."""
+    layout = blocks_at(blocks, 0)
     forward_blocks(blocks, panels, b, x)
-    for k in range(blocks[COUNT] - 1, -1, -1):
-        first = blocks[blocks[PANEL] + k]
+    for k in range(layout.count - 1, -1, -1):
+        first = blocks[layout.panel + k]
         o = 36 * first
         at = 6 * k
-        for p in range(first + 1, blocks[blocks[PANEL] + k + 1]):
-            to = 6 * blocks[blocks[ACROSS] + p]
+        for p in range(first + 1, blocks[layout.panel + k + 1]):
+            to = 6 * blocks[layout.across + p]
             for c in range(6):
                 s = x[to + c]
                 f = 36 * p + 6 * c
@@ -212,8 +209,8 @@ def substitute_blocks(blocks, panels, b, x):
             x[at + c] = s
             for r in range(c):
                 x[at + r] -= panels[o + 6 * c + r] * s
-    for k in range(blocks[COUNT]):
-        p = 6 * blocks[blocks[PLACE] + k]
+    for k in range(layout.count):
+        p = 6 * blocks[layout.place + k]
         for i in range(6):
             b[6 * k + i] = x[p + i]
 

@@ -12,41 +12,22 @@ import math
 from assembly._address import call_address
 from assembly._kernel import kernel
 from assembly.constraints.program.records import (
-    BODY_F,
-    BODY_G,
-    CONTACTS,
-    DEEPEST_AT,
-    FIRST_GUARD,
     FREE_COLUMN,
-    GUARDS,
-    MINIMUM,
-    NEAREST_AT,
-    ONE_SIDED,
     ROW,
-    ROW_TABLE,
-    SEARCH_AT,
-    SHELL_F,
-    SHELL_G,
-    START_AT,
-    SURFACE_F,
-    SURFACE_G,
-    TRACK_AT,
+    contact_row_at,
+    header_at,
+    row_at,
 )
 from assembly.geometry.vec import dot, sub
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.extrema.face_face import CLOSE, CONVERGED, LEFT_PATCH, SINGULAR, solve_pair
-from assembly.proximity.extrema.rates import GAP, RATES, RECORD, gradient_row, store_record
+from assembly.proximity.extrema.rates import RATES, RECORD, derivatives_at, gradient_row, store_record
 from assembly.proximity.features.solid_contact import (
-    ALLOWED,
     CONFORMING,
     CONTACT_RECORD,
-    FOLD,
-    IDLE,
-    PAIR_GAP,
-    PROPER,
-    SLACK,
-    STAYS,
     TRACK,
+    contact_record_at,
+    tracked_at,
 )
 
 # A clearance's contact of solids that are hardly in each other may be given up where its pair ends: then MAY_GO - k
@@ -60,11 +41,14 @@ UNSEEN, ASTRAY, FAR = 0.5, 0.15, 1e-5
 @kernel(inner=True)
 def track_contact(table, pool, row, q, start, patience, records, k):
     """Newton on the pair of one row; fills its record. Returns status, parameters, the points' signed distance."""
-    i = table[row + BODY_F]
-    j = table[row + BODY_G]
+    fields = row_at(table, row)
+    contact = contact_row_at(table, row)
+    contact_record = contact_record_at(records, k)
+    i = fields.body_f
+    j = fields.body_g
     turn = rotation(q, i)
     relative, shift = relative_pose(q, i, turn, j, rotation(q, j))
-    f, g = table[row + SURFACE_F], table[row + SURFACE_G]
+    f, g = contact.surface_f, contact.surface_g
     status, x, _count, frame, curvature = solve_pair(
         table, pool, f, g, relative, shift, start, 1.0, patience, CLOSE, False
     )
@@ -77,16 +61,20 @@ def track_contact(table, pool, row, q, start, patience, records, k):
         det = h[0] * h[3] - h[1] * h[2]
         norm2 = h[0] * h[0] + h[1] * h[1] + h[2] * h[2] + h[3] * h[3]
         proper = 1.0 if det > -1e-9 * norm2 and h[0] + h[3] <= 0.0 else 0.0
-        records[k, PROPER] = CONFORMING if norm2 <= 1e-18 else proper
-        records[k, FOLD] = det / norm2 if norm2 > 1e-18 else 0.0
+        contact_record.proper = CONFORMING if norm2 <= 1e-18 else proper
+        contact_record.fold = det / norm2 if norm2 > 1e-18 else 0.0
     return status, x, distance if frame[10] > 0.0 else -distance
 
 
 @kernel(inner=True)
 def start_row(table, pool, row, q, tracked, r):
     """The pair of the surfaces of a row wherever it is, into tracked[r]. A status."""
-    f, g = table[row + SURFACE_F], table[row + SURFACE_G]
-    return call_address(table[START_AT], (table, pool, f, g, table[row + BODY_F], table[row + BODY_G], q, tracked, r))
+    contact = contact_row_at(table, row)
+    fields = row_at(table, row)
+    f, g = contact.surface_f, contact.surface_g
+    return call_address(
+        header_at(table, 0).start_address, (table, pool, f, g, fields.body_f, fields.body_g, q, tracked, r)
+    )
 
 
 @kernel(inner=True)
@@ -107,42 +95,51 @@ def search_row(table, pool, row, q, tracked, r, crossing):
 
     Solids that are in each other have some if `crossing`, which takes a thousand times as long.
     """
-    shell_f = table[row + SHELL_F]
-    shell_g = table[row + SHELL_G]
-    i = table[row + BODY_F]
-    j = table[row + BODY_G]
-    nearest = table[NEAREST_AT]
-    deepest = table[DEEPEST_AT] if crossing else 0
-    found = call_address(table[SEARCH_AT], (table, pool, shell_f, shell_g, i, j, q, nearest, deepest, tracked, r))
+    header = header_at(table, 0)
+    contact = contact_row_at(table, row)
+    fields = row_at(table, row)
+    shell_f = contact.shell_f
+    shell_g = contact.shell_g
+    i = fields.body_f
+    j = fields.body_g
+    nearest = header.nearest_address
+    deepest = header.deepest_address if crossing else 0
+    found = call_address(header.search_address, (table, pool, shell_f, shell_g, i, j, q, nearest, deepest, tracked, r))
     return found == 1
 
 
 @kernel(inner=True)
 def track_row(table, pool, row, q, start, patience, records, tracked, r):
     """The features of the solids of a row from start[r] on, into tracked[r] and record r. A status."""
-    shell_f = table[row + SHELL_F]
-    shell_g = table[row + SHELL_G]
-    i = table[row + BODY_F]
-    j = table[row + BODY_G]
-    return call_address(table[TRACK_AT], (table, pool, shell_f, shell_g, i, j, q, start, patience, records, tracked, r))
+    contact = contact_row_at(table, row)
+    fields = row_at(table, row)
+    shell_f = contact.shell_f
+    shell_g = contact.shell_g
+    i = fields.body_f
+    j = fields.body_g
+    return call_address(
+        header_at(table, 0).track_address,
+        (table, pool, shell_f, shell_g, i, j, q, start, patience, records, tracked, r),
+    )
 
 
 @kernel(inline=True)
 def is_guard(table, r):
     """Whether row r is a clearance's."""
-    return table[FIRST_GUARD] <= r < table[FIRST_GUARD] + table[GUARDS]
+    header = header_at(table, 0)
+    return header.first_guard <= r < header.first_guard + header.guards
 
 
 @kernel(inline=True)
 def least_gap(table, pool, r, tracked):
     """The least gap of row r, less by what the bodies were in each other where the solve began and still touched."""
-    return pool[table[table[ROW_TABLE] + ROW * r + MINIMUM]] - tracked[r, ALLOWED]
+    return pool[contact_row_at(table, header_at(table, 0).row_table + ROW * r).minimum] - tracked_at(tracked, r).allowed
 
 
 @kernel(inline=True)
 def is_of_solids(table, r):
     """Whether row r is a contact of solids, or has no contact."""
-    return table[table[ROW_TABLE] + ROW * r + SHELL_F] >= 0
+    return contact_row_at(table, header_at(table, 0).row_table + ROW * r).shell_f >= 0
 
 
 @kernel(inline=True)
@@ -154,9 +151,11 @@ def may_go(table, r, residual):
 @kernel(inner=True)
 def hold_all(table, tracked):
     """No contact may be given up any more."""
-    for r in range(table[FIRST_GUARD], table[FIRST_GUARD] + table[GUARDS]):
-        if tracked[r, STAYS] <= MAY_GO:
-            tracked[r, STAYS] = MAY_GO - tracked[r, STAYS]
+    header = header_at(table, 0)
+    for r in range(header.first_guard, header.first_guard + header.guards):
+        pair = tracked_at(tracked, r)
+        if pair.stays <= MAY_GO:
+            pair.stays = MAY_GO - pair.stays
 
 
 @kernel(inline=True)
@@ -170,9 +169,10 @@ def copy_tracked(start, r, tracked):
 def idle_row(r, gap, point):
     """A row that is open by `gap`."""
     records = point[2]
-    records[r, GAP] = gap
-    records[r, PROPER] = 1.0
-    records[r, FOLD] = 1.0
+    contact = contact_record_at(records, r)
+    derivatives_at(records, r).gap = gap
+    contact.proper = 1.0
+    contact.fold = 1.0
     point[3][r] = gap
 
 
@@ -184,15 +184,19 @@ def lost_guard(table, pool, r, start, point, past, goes):
     hold every step. One that is lost already stays as it is. What the neighborhood holds now is for the next look to
     find.
     """
-    row = table[ROW_TABLE] + ROW * r
+    row = header_at(table, 0).row_table + ROW * r
     least = least_gap(table, pool, r, start)
-    gap = start[r, PAIR_GAP] - least
+    gap = tracked_at(start, r).gap - least
     if past:
         gap = max(gap, 0.0)
-    elif not gap > (-TOUCHING if table[row + SHELL_F] >= 0 else 0.0) and not goes and not math.isnan(start[r, 0]):
+    elif (
+        not gap > (-TOUCHING if contact_row_at(table, row).shell_f >= 0 else 0.0)
+        and not goes
+        and not math.isnan(start[r, 0])
+    ):
         return False
     idle_row(r, gap, point)
-    point[1][r, PAIR_GAP] = gap + least
+    tracked_at(point[1], r).gap = gap + least
     # Nothing moves it: its pair is not known.
     for i in range(RATES, RECORD):
         point[2][r, i] = 0.0
@@ -206,12 +210,13 @@ def lost_guard(table, pool, r, start, point, past, goes):
 def write_gap_row(table, pool, r, point):
     """Row r, of contact r, from its record: the gap less the least one, and its gradient over the twists."""
     _q, tracked, records, residual, jacobian = point
-    residual[r] = records[r, GAP] - least_gap(table, pool, r, tracked)
+    derivatives = derivatives_at(records, r)
+    residual[r] = derivatives.gap - least_gap(table, pool, r, tracked)
     gradient_row(records, r, jacobian, r)
     # A pair that follows the bodies has no unknowns of its own.
     for i in range(4):
         jacobian[r, FREE_COLUMN + i] = 0.0
-    tracked[r, PAIR_GAP] = records[r, GAP]
+    tracked_at(tracked, r).gap = derivatives.gap
 
 
 @kernel(inner=True)
@@ -222,21 +227,24 @@ def solids_row(table, pool, r, start, patience, point):
     row is one-sided or a step may end anywhere: the loop shortens steps as long as it can. A clearance has a watch for
     that.
     """
+    pair = tracked_at(start, r)
     q, tracked, records, _residual, _jacobian = point
-    row = table[ROW_TABLE] + ROW * r
-    goes = start[r, STAYS] <= MAY_GO
+    row = header_at(table, 0).row_table + ROW * r
+    goes = pair.stays <= MAY_GO
     if goes:
-        start[r, STAYS] = MAY_GO - start[r, STAYS]
-        tracked[r, STAYS] = start[r, STAYS]
+        pair.stays = MAY_GO - pair.stays
+        tracked_at(tracked, r).stays = pair.stays
     status = track_row(table, pool, row, q, start, patience, records, tracked, r)
-    found = (status == CONVERGED or status == SINGULAR) and (records[r, PROPER] != 0.0 or is_guard(table, r))
+    found = (status == CONVERGED or status == SINGULAR) and (
+        contact_record_at(records, r).proper != 0.0 or is_guard(table, r)
+    )
     if not found:
         if is_guard(table, r):
-            past = start[r, STAYS] > 0.0 and status == LEFT_PATCH
+            past = pair.stays > 0.0 and status == LEFT_PATCH
             return lost_guard(table, pool, r, start, point, past, goes)
         # Near touching a search takes long, and steps are short.
-        far = abs(start[r, PAIR_GAP]) > HARDLY
-        if not (far or table[row + ONE_SIDED] == 1 or patience == math.inf):
+        far = abs(pair.gap) > HARDLY
+        if not (far or row_at(table, row).one_sided == 1 or patience == math.inf):
             return False
         # Where an edge is farthest, solids may be deep in each other: a step that leads there is too long.
         lost = status != CONVERGED and status != SINGULAR
@@ -257,13 +265,15 @@ def row_of_pair(table, pool, r, start, patience, point):
     one-sided row that loses its pair takes the nearest one there is.
     """
     q, tracked, records, _residual, _jacobian = point
-    row = table[ROW_TABLE] + ROW * r
-    if table[row + SHELL_F] >= 0:
+    derivatives = derivatives_at(records, r)
+    contact = contact_record_at(records, r)
+    row = header_at(table, 0).row_table + ROW * r
+    if contact_row_at(table, row).shell_f >= 0:
         return solids_row(table, pool, r, start, patience, point)
     x = (start[r, 0], start[r, 1], start[r, 2], start[r, 3])
     status, x, distance = track_contact(table, pool, row, q, x, patience, records, r)
     if status != CONVERGED and status != SINGULAR:
-        if table[row + ONE_SIDED] == 0:
+        if row_at(table, row).one_sided == 0:
             return False
         if is_guard(table, r):
             return lost_guard(table, pool, r, start, point, False, False)
@@ -275,10 +285,10 @@ def row_of_pair(table, pool, r, start, patience, point):
                 return False
             for i in range(CONTACT_RECORD):
                 records[r, i] = 0.0
-            records[r, GAP] = distance
-            records[r, PROPER] = 1.0
-            records[r, FOLD] = 1.0
-        elif not records[r, GAP] > 0.0:
+            derivatives.gap = distance
+            contact.proper = 1.0
+            contact.fold = 1.0
+        elif not derivatives.gap > 0.0:
             return False
     write_gap_row(table, pool, r, point)
     tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3] = x
@@ -291,25 +301,28 @@ def contact_row(table, pool, r, start, patience, point):
 
     A row of a clearance that stays open is as `solve/loop/predict.py` left it.
     """
+    pair = tracked_at(start, r)
     _q, tracked, records, residual, _jacobian = point
-    row = table[ROW_TABLE] + ROW * r
+    contact_record = contact_record_at(records, r)
+    row = header_at(table, 0).row_table + ROW * r
+    contact = contact_row_at(table, row)
     copy_tracked(start, r, tracked)
-    if table[row + BODY_F] < 0:
+    if row_at(table, row).body_f < 0:
         idle_row(r, 1.0, point)
         return True
-    if start[r, IDLE] == 1.0:
-        tracked[r, IDLE] = 0.0
-        residual[r] = start[r, PAIR_GAP] - least_gap(table, pool, r, start)
+    if pair.idle == 1.0:
+        tracked_at(tracked, r).idle = 0.0
+        residual[r] = pair.gap - least_gap(table, pool, r, start)
         return True
     if not row_of_pair(table, pool, r, start, patience, point):
         return False
     tracks = not math.isnan(tracked[r, 0])
     # Features of solids switch as they move: their rows are followed.
-    open_far = is_guard(table, r) and table[row + SHELL_F] < 0 and residual[r] > FAR
-    records[r, SLACK] = 0.0
+    open_far = is_guard(table, r) and contact.shell_f < 0 and residual[r] > FAR
+    contact_record.slack = 0.0
     if tracks and open_far:
         # How far they may go is behind the least gap.
-        records[r, SLACK] = min(UNSEEN * residual[r], ASTRAY * pool[table[row + MINIMUM] + 1])
+        contact_record.slack = min(UNSEEN * residual[r], ASTRAY * pool[contact.minimum + 1])
     return True
 
 
@@ -319,7 +332,7 @@ def contact_row(table, pool, r, start, patience, point):
 def contact_rows(table, pool, start, patience, free, q, tracked, records, residual, jacobian):
     """All rows of contacts but those of free pairs, and their gradients. Returns one whose pair was lost, or -1."""
     point = (q, tracked, records, residual, jacobian)
-    for r in range(table[CONTACTS]):
+    for r in range(header_at(table, 0).contacts):
         if free[r] < 0 and not contact_row(table, pool, r, start, patience, point):
             return r
     return -1

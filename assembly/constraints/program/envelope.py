@@ -18,7 +18,7 @@ dexterities couple everything, no pair is listed, and last tells all.
 from __future__ import annotations
 
 from assembly._kernel import kernel
-from assembly.constraints.program.hessian_blocks import BLOCKS, is_blocked
+from assembly.constraints.program.hessian_blocks import blocks_at, is_blocked
 
 
 @kernel(inline=True)
@@ -32,7 +32,7 @@ def listed_folds(order):
 def clear_upper(order, n, hessian):
     """Zeros wherever the Hessian has entries."""
     if is_blocked(order):
-        for i in range(6 * order[3][BLOCKS]):
+        for i in range(6 * blocks_at(order[3], 0).blocks):
             for j in range(6):
                 hessian[i, j] = 0.0
         return

@@ -15,27 +15,15 @@ from assembly._kernel import kernel
 from assembly.constraints.program.contact import copy_tracked
 from assembly.constraints.program.primitives import coordinate, place_frames, write_gradient
 from assembly.constraints.program.records import (
-    CONTACT_ROWS_AT,
-    CONTACTS,
     COORDINATE,
     EXTRA_COLUMN,
-    FREE_ROW_AT,
     JOINT_RECORD,
     JOINT_ROW,
-    JOINT_TABLE,
-    JOINTS,
-    KIND,
-    PARAMETERS,
     ROW,
-    ROW_TABLE,
-    ROWS,
-    SECOND,
     TAPE_RECORD,
-    TAPE_TABLE,
-    TAPES,
-    TRACKED,
-    TRIM_ROWS_AT,
-    TRIMS,
+    header_at,
+    joint_row_at,
+    row_at,
 )
 from assembly.constraints.program.tapes import tape_rows
 
@@ -54,10 +42,12 @@ def coordinate_row(pool, kind, component, k, angle, factor, start, tracked, reco
 @kernel(inner=True)
 def joint_row(table, pool, r, start, tracked, records, residual, jacobian):
     """Row r, of a joint."""
-    row = table[ROW_TABLE] + ROW * r
-    o = table[row + PARAMETERS]
-    pairs = table[CONTACTS]
-    second = table[row + SECOND]
+    header = header_at(table, 0)
+    row = header.row_table + ROW * r
+    joint = joint_row_at(table, row)
+    o = joint.parameters
+    pairs = header.contacts
+    second = joint.second
     value = -pool[o + 2]
     for part in range(1 if second < 0 else 2):
         at = row + COORDINATE if part == 0 else second
@@ -85,29 +75,30 @@ def evaluate(table, pool, start, patience, loose, room, point):
     `start` are the tracked values to begin from. `point` is (poses, tracked values, records, residual, Jacobian); all
     but the poses are written. `loose` is what pairs need: (places of the free ones, lengths, room, ...).
     """
+    header = header_at(table, 0)
     q, tracked, records, residual, jacobian = point
-    pairs = table[CONTACTS]
+    pairs = header.contacts
     free = loose[0]
     for r in range(pairs):
         if free[r] >= 0:
             one = (table, pool, r, start, free, loose[1], loose[2], q, tracked, records, residual, jacobian)
-            call_address(table[FREE_ROW_AT], one)
+            call_address(header.free_row_address, one)
     if pairs > 0:
         others = (table, pool, start, patience, free, q, tracked, records, residual, jacobian)
-        lost = call_address(table[CONTACT_ROWS_AT], others)
+        lost = call_address(header.contact_rows_address, others)
         if lost >= 0:
             return lost
-    if table[TRIMS] > 0:
-        call_address(table[TRIM_ROWS_AT], (table, pool, free, loose[1], q, tracked, records, residual, jacobian))
-    for k in range(pairs, table[TRACKED]):
+    if header.trims > 0:
+        call_address(header.trim_rows_address, (table, pool, free, loose[1], q, tracked, records, residual, jacobian))
+    for k in range(pairs, header.tracked):
         # Of an angle that no row has, only an input of a dexterity, this is all that is known.
         copy_tracked(start, k, tracked)
-    for k in range(table[JOINTS]):
-        joint = table[JOINT_TABLE] + JOINT_RECORD * k
+    for k in range(header.joints):
+        joint = header.joint_table + JOINT_RECORD * k
         place_frames(pool, table[joint + 2], q, table[joint], table[joint + 1], records, pairs + k)
-    for r in range(pairs, table[ROWS]):
-        if table[table[ROW_TABLE] + ROW * r + KIND] == JOINT_ROW:
+    for r in range(pairs, header.rows):
+        if row_at(table, header.row_table + ROW * r).kind == JOINT_ROW:
             joint_row(table, pool, r, start, tracked, records, residual, jacobian)
-    for t in range(table[TAPES]):
-        tape_rows(table, pool, table[TAPE_TABLE] + TAPE_RECORD * t, q, room, residual, jacobian)
+    for t in range(header.tapes):
+        tape_rows(table, pool, header.tape_table + TAPE_RECORD * t, q, room, residual, jacobian)
     return -1

@@ -22,9 +22,41 @@ Where a pair at a fold has unknowns of its own, everything is dense in an envelo
 from __future__ import annotations
 
 from assembly._kernel import kernel
+from assembly._record import place_of, record_dtype, record_view, size_of
 
-COUNT, BLOCKS, FACTORED, PLACE, FIRST, COLUMN, SEAT, PANEL, ACROSS = 0, 1, 2, 3, 4, 5, 6, 7, 8
-MEETING, MEETING_ROW, MEETING_AT, FACTORIZE_AT, SOLVE_AT, BLOCK_HEADER = 9, 10, 11, 12, 13, 14
+BLOCK_HEADER_RECORD = record_dtype(
+    "i8",
+    count=1,
+    blocks=1,
+    factored=1,
+    place=1,
+    first=1,
+    column=1,
+    seat=1,
+    panel=1,
+    across=1,
+    meeting=1,
+    meeting_row=1,
+    meeting_at=1,
+    factorize_address=1,
+    solve_address=1,
+)
+blocks_at = record_view(BLOCK_HEADER_RECORD)
+COUNT = place_of(BLOCK_HEADER_RECORD, "count")
+BLOCKS = place_of(BLOCK_HEADER_RECORD, "blocks")
+FACTORED = place_of(BLOCK_HEADER_RECORD, "factored")
+PLACE = place_of(BLOCK_HEADER_RECORD, "place")
+FIRST = place_of(BLOCK_HEADER_RECORD, "first")
+COLUMN = place_of(BLOCK_HEADER_RECORD, "column")
+SEAT = place_of(BLOCK_HEADER_RECORD, "seat")
+PANEL = place_of(BLOCK_HEADER_RECORD, "panel")
+ACROSS = place_of(BLOCK_HEADER_RECORD, "across")
+MEETING = place_of(BLOCK_HEADER_RECORD, "meeting")
+MEETING_ROW = place_of(BLOCK_HEADER_RECORD, "meeting_row")
+MEETING_AT = place_of(BLOCK_HEADER_RECORD, "meeting_at")
+FACTORIZE_AT = place_of(BLOCK_HEADER_RECORD, "factorize_address")
+SOLVE_AT = place_of(BLOCK_HEADER_RECORD, "solve_address")
+BLOCK_HEADER = size_of(BLOCK_HEADER_RECORD)
 
 
 @kernel(inline=True)
@@ -38,18 +70,19 @@ def is_blocked(order):
 def choose_storage(order, n):
     """By blocks, if the scene has a record of them and all n unknowns are bodies'."""
     folds, blocks = order[1], order[3]
-    by_blocks = blocks.size > 0 and n == 6 * blocks[COUNT]
+    by_blocks = blocks.size > 0 and n == 6 * blocks_at(blocks, 0).count
     folds[folds.shape[0] - 1, 1] = 1 if by_blocks else 0
 
 
 @kernel(inner=True)
 def block_row(blocks, at, other):
     """Row of the array of blocks where that of the unknowns at.. and other.. begins."""
-    p = blocks[blocks[PLACE] + at // 6]
-    q = blocks[blocks[PLACE] + other // 6]
+    layout = blocks_at(blocks, 0)
+    p = blocks[layout.place + at // 6]
+    q = blocks[layout.place + other // 6]
     column = max(p, q)
-    e = blocks[blocks[FIRST] + min(p, q)]
-    while blocks[blocks[COLUMN] + e] != column:
+    e = blocks[layout.first + min(p, q)]
+    while blocks[layout.column + e] != column:
         e += 1
     return 6 * e
 

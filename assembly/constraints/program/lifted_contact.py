@@ -8,18 +8,13 @@ from __future__ import annotations
 from assembly._kernel import kernel
 from assembly.constraints.program.contact import copy_tracked, least_gap
 from assembly.constraints.program.records import (
-    BODY_F,
-    BODY_G,
-    MOVING,
     ROW,
-    ROW_TABLE,
-    ROWS,
-    SLOTS,
-    SURFACE_F,
-    SURFACE_G,
+    contact_row_at,
+    header_at,
+    row_at,
 )
 from assembly.proximity.extrema.lifted_pair import VARIABLES, free_hessian, free_rows
-from assembly.proximity.features.solid_contact import PAIR_GAP, SLACK
+from assembly.proximity.features.solid_contact import contact_record_at, tracked_at
 
 
 @kernel(
@@ -30,15 +25,18 @@ from assembly.proximity.features.solid_contact import PAIR_GAP, SLACK
 )
 def free_row(table, pool, r, start, free, lengths, vectors, q, tracked, records, residual, jacobian):
     """Row r, of a contact at the coordinates in start[r]; its four rows of tangency follow the rows of the program."""
-    row = table[ROW_TABLE] + ROW * r
+    header = header_at(table, 0)
+    row = header.row_table + ROW * r
+    contact = contact_row_at(table, row)
+    fields = row_at(table, row)
     copy_tracked(start, r, tracked)
     free_rows(
         table,
         pool,
-        table[row + SURFACE_F],
-        table[row + SURFACE_G],
-        table[row + BODY_F],
-        table[row + BODY_G],
+        contact.surface_f,
+        contact.surface_g,
+        fields.body_f,
+        fields.body_g,
         q,
         (start[r, 0], start[r, 1], start[r, 2], start[r, 3]),
         (lengths[r, 0], lengths[r, 1], lengths[r, 2], lengths[r, 3]),
@@ -46,11 +44,11 @@ def free_row(table, pool, r, start, free, lengths, vectors, q, tracked, records,
         residual,
         jacobian,
         r,
-        table[ROWS] + 4 * free[r],
+        header.rows + 4 * free[r],
     )
-    tracked[r, PAIR_GAP] = residual[r]
+    tracked_at(tracked, r).gap = residual[r]
     residual[r] -= least_gap(table, pool, r, tracked)
-    records[r, SLACK] = 0.0
+    contact_record_at(records, r).slack = 0.0
     return 0
 
 
@@ -62,18 +60,21 @@ def free_row(table, pool, r, start, free, lengths, vectors, q, tracked, records,
 )
 def free_terms(table, pool, r, free, lengths, vectors, block, q, tracked, jacobian, y, weights, hessian):
     """As `add_row_terms`, for the row of a free pair and its rows of tangency; `block` is room for its variables."""
-    row = table[ROW_TABLE] + ROW * r
-    f = 6 * table[table[SLOTS] + table[row + BODY_F]]
-    g = 6 * table[table[SLOTS] + table[row + BODY_G]]
-    e = table[ROWS] + 4 * free[r]
-    u = 6 * table[MOVING] + 4 * free[r]
+    header = header_at(table, 0)
+    row = header.row_table + ROW * r
+    fields = row_at(table, row)
+    contact = contact_row_at(table, row)
+    f = 6 * table[header.slots + fields.body_f]
+    g = 6 * table[header.slots + fields.body_g]
+    e = header.rows + 4 * free[r]
+    u = 6 * header.moving + 4 * free[r]
     free_hessian(
         table,
         pool,
-        table[row + SURFACE_F],
-        table[row + SURFACE_G],
-        table[row + BODY_F],
-        table[row + BODY_G],
+        contact.surface_f,
+        contact.surface_g,
+        fields.body_f,
+        fields.body_g,
         q,
         (tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3]),
         (lengths[r, 0], lengths[r, 1], lengths[r, 2], lengths[r, 3]),

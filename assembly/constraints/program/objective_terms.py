@@ -11,19 +11,44 @@ import math
 
 from assembly._address import call_address
 from assembly._kernel import kernel
+from assembly._record import place_of, record_dtype, record_view, size_of
 from assembly.constraints.program.envelope import clear_upper
 from assembly.constraints.program.hessian_blocks import block_row, is_blocked, spot
-from assembly.constraints.program.records import RUN_TAPE_AT, SCALE, SLOTS, TERM_TABLE, TERMS
+from assembly.constraints.program.records import header_at, pool_header_at
 from assembly.constraints.program.tapes import place_tape
 from assembly.geometry.vec import add, cross, dot, matvec, quaternion_product, sub
 from assembly.kinematics.motion import position, rotation
 
 # A term: kind, body, offset of its parameters, its tape, and whether a posture is that of the start of each solve.
-TERM = 8
-TERM_KIND, TERM_BODY, TERM_PARAMETERS, TERM_TAPE, TERM_FOLLOWS = 0, 1, 2, 3, 4
+TERM_RECORD = record_dtype(
+    "i8",
+    kind=1,
+    body=1,
+    parameters=1,
+    tape=1,
+    follows=1,
+    spare=3,
+)
+term_at = record_view(TERM_RECORD)
+TERM = size_of(TERM_RECORD)
+TERM_KIND = place_of(TERM_RECORD, "kind")
+TERM_BODY = place_of(TERM_RECORD, "body")
+TERM_PARAMETERS = place_of(TERM_RECORD, "parameters")
+TERM_TAPE = place_of(TERM_RECORD, "tape")
+TERM_FOLLOWS = place_of(TERM_RECORD, "follows")
 POINT_DISTANCE, POSTURE, TAPE_TERM, DEXTERITY = 0, 1, 2, 3
 # Parameters of a posture.
-POSTURE_LENGTH, POSTURE_POSITION, POSTURE_QUATERNION, POSTURE_TURN, POSTURE_PARAMETERS = 0, 1, 4, 8, 9
+POSTURE_FIELDS = record_dtype(
+    "f8",
+    length=1,
+    position=3,
+    quaternion=4,
+    turn=1,
+)
+posture_at = record_view(POSTURE_FIELDS)
+POSTURE_POSITION = place_of(POSTURE_FIELDS, "position")
+POSTURE_QUATERNION = place_of(POSTURE_FIELDS, "quaternion")
+POSTURE_PARAMETERS = size_of(POSTURE_FIELDS)
 
 
 @kernel(inline=True)
@@ -61,8 +86,9 @@ def point_distance(pool, o, q, body, s, order, gradient, hessian):
 @kernel(inner=True)
 def posture(pool, o, q, body, s, order, gradient, hessian):
     """|x - x0|^2 and 4 sin^2(angle / 2), with c and u the scalar and vector part of e0 e^*."""
-    weight = pool[o + POSTURE_LENGTH]
-    lever = pool[o + POSTURE_TURN]
+    posture_record = posture_at(pool, o)
+    weight = posture_record.length
+    lever = posture_record.turn
     d = sub(position(q, body), load(pool, o + POSTURE_POSITION))
     at = o + POSTURE_QUATERNION
     c, ux, uy, uz = quaternion_product(
@@ -86,30 +112,32 @@ def posture(pool, o, q, body, s, order, gradient, hessian):
 @kernel(inner=True)
 def tape_term(table, pool, term, q, order, room, entries, gradient, hessian):
     """Weight times the one value of a tape."""
+    header = header_at(table, 0)
+    term_record = term_at(table, term)
     inputs, outputs, work = room
-    weight = pool[table[term + TERM_PARAMETERS]]
-    size = pool[SCALE]
+    weight = pool[term_record.parameters]
+    size = pool_header_at(pool, 0).scale
     # A term's tape has the record of a row's tape, one value.
-    tape = table[term + TERM_TAPE]
+    tape = term_record.tape
     end = place_tape(table, pool, tape, q, inputs)
-    call_address(table[RUN_TAPE_AT], (table, pool, table[tape], inputs, work, outputs))
+    call_address(header.run_tape_address, (table, pool, table[tape], inputs, work, outputs))
     value = weight * outputs[0]
     count = table[tape + 3]
     bodies = table[tape + 4]
     if order == 0 or not math.isfinite(value):
         return value if math.isfinite(value) else math.inf
     for b in range(count):
-        s = 6 * table[table[SLOTS] + table[bodies + b]]
+        s = 6 * table[header.slots + table[bodies + b]]
         if s >= 0:
             for i in range(3):
                 gradient[s + i] += weight * size * outputs[1 + 6 * b + i]
                 gradient[s + 3 + i] += weight * outputs[4 + 6 * b + i]
     inputs[end] = weight
-    call_address(table[RUN_TAPE_AT], (table, pool, table[tape + 1], inputs, work, outputs))
+    call_address(header.run_tape_address, (table, pool, table[tape + 1], inputs, work, outputs))
     for b in range(count):
-        at = 6 * table[table[SLOTS] + table[bodies + b]]
+        at = 6 * table[header.slots + table[bodies + b]]
         for c in range(count):
-            other = 6 * table[table[SLOTS] + table[bodies + c]]
+            other = 6 * table[header.slots + table[bodies + c]]
             if at < 0 or other < at:
                 continue
             row, column = spot(entries, at, other)
@@ -136,12 +164,13 @@ def term_by_blocks(pool, o, kind, q, body, s, entries, gradient, hessian):
 @kernel(inner=True)
 def recenter(table, pool, q):
     """Postures that have no reference of their own from where their bodies are now."""
-    for t in range(table[TERMS]):
-        term = table[TERM_TABLE] + TERM * t
-        if table[term + TERM_KIND] == POSTURE and table[term + TERM_FOLLOWS] == 1:
-            o = table[term + TERM_PARAMETERS] + POSTURE_POSITION
+    header = header_at(table, 0)
+    for t in range(header.terms):
+        term = term_at(table, header.term_table + TERM * t)
+        if term.kind == POSTURE and term.follows == 1:
+            o = term.parameters + POSTURE_POSITION
             for k in range(7):
-                pool[o + k] = q[table[term + TERM_BODY], k]
+                pool[o + k] = q[term.body, k]
 
 
 @kernel(inner=True)
@@ -150,25 +179,27 @@ def objective(table, pool, q, order, room, entries, gradient, hessian):
 
     `entries` says where the Hessian has any (`constraints/program/envelope.py`).
     """
+    header = header_at(table, 0)
     if order > 0:
         for i in range(gradient.size):
             gradient[i] = 0.0
         clear_upper(entries, gradient.size, hessian)
     blocked = order > 0 and is_blocked(entries)
     value = 0.0
-    for t in range(table[TERMS]):
-        term = table[TERM_TABLE] + TERM * t
-        kind = table[term + TERM_KIND]
-        body = table[term + TERM_BODY]
+    for t in range(header.terms):
+        term = header.term_table + TERM * t
+        term_record = term_at(table, term)
+        kind = term_record.kind
+        body = term_record.body
         if blocked and (kind == POINT_DISTANCE or kind == POSTURE):
-            s = 6 * table[table[SLOTS] + body]
-            value += term_by_blocks(pool, table[term + TERM_PARAMETERS], kind, q, body, s, entries, gradient, hessian)
+            s = 6 * table[header.slots + body]
+            value += term_by_blocks(pool, term_record.parameters, kind, q, body, s, entries, gradient, hessian)
         elif kind == POINT_DISTANCE:
-            s = 6 * table[table[SLOTS] + body]
-            value += point_distance(pool, table[term + TERM_PARAMETERS], q, body, s, order, gradient, hessian)
+            s = 6 * table[header.slots + body]
+            value += point_distance(pool, term_record.parameters, q, body, s, order, gradient, hessian)
         elif kind == POSTURE:
-            s = 6 * table[table[SLOTS] + body]
-            value += posture(pool, table[term + TERM_PARAMETERS], q, body, s, order, gradient, hessian)
+            s = 6 * table[header.slots + body]
+            value += posture(pool, term_record.parameters, q, body, s, order, gradient, hessian)
         elif kind == TAPE_TERM:
             value += tape_term(table, pool, term, q, order, room, entries, gradient, hessian)
     return value

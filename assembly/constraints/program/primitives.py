@@ -20,6 +20,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
+from assembly._record import place_of, record_dtype, record_view, size_of
 from assembly.geometry.vec import add, blend, cross, dot, matvec, scale, sub
 from assembly.kinematics.motion import rotation
 from assembly.proximity.extrema.rates import load, put
@@ -28,7 +29,21 @@ COINCIDENT, SLIDE, DISTANCE, DOT, SWING, TURN, AZIMUTH, ANGLE = 0, 1, 2, 3, 4, 5
 # A joint's frames in the pool: p_a, x_a, y_a, z_a, p_b, x_b, y_b, z_b, each in the axes of its body.
 FRAMES = 24
 # A record: R_f p_a, the axes of a, R_g p_b, the axes of b, d; all in world axes.
-ARM_A, AXES_A, ARM_B, AXES_B, APART, RECORD = 0, 3, 12, 15, 24, 27
+JOINT_FRAMES = record_dtype(
+    "f8",
+    arm_a=3,
+    axes_a=(3, 3),
+    arm_b=3,
+    axes_b=(3, 3),
+    apart=3,
+)
+joint_frames_at = record_view(JOINT_FRAMES)
+ARM_A = place_of(JOINT_FRAMES, "arm_a")
+AXES_A = place_of(JOINT_FRAMES, "axes_a")
+ARM_B = place_of(JOINT_FRAMES, "arm_b")
+AXES_B = place_of(JOINT_FRAMES, "axes_b")
+APART = place_of(JOINT_FRAMES, "apart")
+RECORD = size_of(JOINT_FRAMES)
 
 # A vector shorter than this is rounding, and so is its direction.
 UNDEFINED = 1e-12
@@ -47,6 +62,7 @@ ZERO = (0.0, 0.0, 0.0)
 @kernel(inner=True)
 def place_frames(pool, o, q, i, j, records, k):
     """The frames at pool[o] on bodies i and j into records[k]."""
+    frames = joint_frames_at(records, k)
     turn = rotation(q, i)
     for l in range(4):
         put(records, k, ARM_A + 3 * l, matvec(turn, (pool[o + 3 * l], pool[o + 3 * l + 1], pool[o + 3 * l + 2])))
@@ -56,7 +72,7 @@ def place_frames(pool, o, q, i, j, records, k):
         put(records, k, ARM_B + 3 * l, matvec(turn, (pool[o + 3 * l], pool[o + 3 * l + 1], pool[o + 3 * l + 2])))
     for l in range(3):
         # The positions are subtracted first: a common offset cancels.
-        records[k, APART + l] = (q[j, l] - q[i, l]) + (records[k, ARM_B + l] - records[k, ARM_A + l])
+        frames.apart[l] = (q[j, l] - q[i, l]) + (frames.arm_b[l] - frames.arm_a[l])
 
 
 @kernel(inline=True)
@@ -140,7 +156,7 @@ def coordinate(kind, component, records, k, near):
     d = ZERO
     h = ZERO
     if kind == COINCIDENT:
-        value = records[k, APART + component]
+        value = joint_frames_at(records, k).apart[component]
         n = world_axis(component, 1.0)
     elif kind == SLIDE:
         n = load(records, k, AXES_A + 3 * component)

@@ -12,25 +12,16 @@ from assembly._kernel import kernel
 from assembly.constraints.program.hessian_blocks import add_patch, block_row, clear_patch, is_blocked
 from assembly.constraints.program.primitives import add_coordinate_hessian
 from assembly.constraints.program.records import (
-    CONTACTS,
     COORDINATE,
     EXTRA_COLUMN,
     FREE_COLUMN,
-    FREE_TERMS_AT,
     JOINT_ROW,
-    KIND,
-    PARAMETERS,
     ROW,
-    ROW_TABLE,
-    ROWS,
-    SECOND,
     TAPE_RECORD,
-    TAPE_ROW_AT,
-    TAPE_TABLE,
-    TAPE_VALUES,
-    TAPES,
-    TRIM_TERMS_AT,
-    TRIMS,
+    header_at,
+    joint_row_at,
+    row_at,
+    tape_at,
 )
 from assembly.constraints.program.tapes import add_tape_hessian
 from assembly.proximity.extrema.rates import add_gap_terms
@@ -107,15 +98,16 @@ def add_row_terms(table, pool, loose, room, shape, point, y, weights, hessian):
 
     The rows of tangency of a free pair go with its row.
     """
+    header = header_at(table, 0)
     q, tracked, records, _residual, jacobian = point
     bases, order = shape[0], shape[2]
     blocked = is_blocked(order)
-    pairs = table[CONTACTS]
+    pairs = header.contacts
     free, lengths, vectors, block = loose[0], loose[1], loose[2], loose[3]
     for r in range(pairs):
         if free[r] >= 0:
             call_address(
-                table[FREE_TERMS_AT],
+                header.free_terms_address,
                 (table, pool, r, free, lengths, vectors, block, q, tracked, jacobian, y, weights, hessian),
             )
         elif blocked and (y[r] != 0.0 or weights[r] != 0.0):
@@ -124,37 +116,39 @@ def add_row_terms(table, pool, loose, room, shape, point, y, weights, hessian):
             add_patch(order, bases[r, 0], bases[r, 1], hessian)
         elif y[r] != 0.0 or weights[r] != 0.0:
             add_gap_terms(records, r, jacobian, r, y[r], weights[r], hessian, bases[r, 0], bases[r, 1])
-    for r in range(pairs, pairs + table[TRIMS]):
+    for r in range(pairs, pairs + header.trims):
         if weights[r] != 0.0:
             add_gram(bases, jacobian, r, weights[r], hessian)
         if y[r] != 0.0:
             call_address(
-                table[TRIM_TERMS_AT],
+                header.trim_terms_address,
                 (table, pool, r, free, lengths, bases, tracked, records, jacobian, y[r], hessian),
             )
-    for r in range(pairs + table[TRIMS], table[ROWS]):
+    for r in range(pairs + header.trims, header.rows):
         if weights[r] != 0.0 and blocked:
             add_gram_blocks(order[3], bases, jacobian, r, weights[r], hessian)
         elif weights[r] != 0.0:
             add_gram(bases, jacobian, r, weights[r], hessian)
-        row = table[ROW_TABLE] + ROW * r
-        if y[r] == 0.0 or table[row + KIND] != JOINT_ROW:
+        row = header.row_table + ROW * r
+        joint = joint_row_at(table, row)
+        if y[r] == 0.0 or row_at(table, row).kind != JOINT_ROW:
             continue
-        second = table[row + SECOND]
+        second = joint.second
         for part in range(1 if second < 0 else 2):
             at = row + COORDINATE if part == 0 else second
             f = bases[r, 0 if part == 0 else 3]
             g = bases[r, 1 if part == 0 else 4]
             k = pairs + table[at + 2]
-            factor = y[r] * pool[table[row + PARAMETERS] + part]
+            factor = y[r] * pool[joint.parameters + part]
             if blocked:
                 add_coordinate_blocks(table[at], table[at + 1], records, k, factor, order, hessian, f, g)
             else:
                 add_coordinate_hessian(table[at], table[at + 1], records, k, factor, hessian, f, g)
-    for t in range(table[TAPES]):
-        tape = table[TAPE_TABLE] + TAPE_RECORD * t
+    for t in range(header.tapes):
+        tape = header.tape_table + TAPE_RECORD * t
+        expression = tape_at(table, tape)
         idle = True
-        for v in range(table[tape + TAPE_VALUES]):
-            idle = idle and y[table[tape + TAPE_ROW_AT] + v] == 0.0
+        for v in range(expression.values):
+            idle = idle and y[expression.first_row + v] == 0.0
         if not idle:
             add_tape_hessian(table, pool, tape, q, room, order, y, hessian)

@@ -13,20 +13,11 @@ from assembly._kernel import kernel
 from assembly.constraints.program.hessian_blocks import spot
 from assembly.constraints.program.records import (
     EXTRA_COLUMN,
-    ONE_SIDED,
-    REFERENCE,
     ROW,
-    ROW_TABLE,
-    RUN_TAPE_AT,
-    SCALE,
-    SLOTS,
-    TAPE_BODIES,
-    TAPE_FIRST,
-    TAPE_LIST,
-    TAPE_ROW_AT,
-    TAPE_SCALE,
-    TAPE_SECOND,
-    TAPE_VALUES,
+    header_at,
+    pool_header_at,
+    row_at,
+    tape_at,
 )
 from assembly.geometry.expression.tape import run_tape
 
@@ -41,29 +32,33 @@ def run_scene_tape(table, pool, o, x, work, y):
 @kernel(inner=True)
 def place_tape(table, pool, tape, q, room):
     """The poses of a tape's bodies, in the user's units, to the front of its room. Returns where its inputs end."""
-    size = pool[SCALE]
-    for b in range(table[tape + TAPE_BODIES]):
-        body = table[table[tape + TAPE_LIST] + b]
+    units = pool_header_at(pool, 0)
+    expression = tape_at(table, tape)
+    size = units.scale
+    for b in range(expression.bodies):
+        body = table[expression.body_list + b]
         for i in range(3):
-            room[7 * b + i] = q[body, i] * size + pool[REFERENCE + i]
+            room[7 * b + i] = q[body, i] * size + units.reference[i]
         for i in range(3, 7):
             room[7 * b + i] = q[body, i]
-    return 7 * table[tape + TAPE_BODIES]
+    return 7 * expression.bodies
 
 
 @kernel(inner=True)
 def tape_rows(table, pool, tape, q, room, residual, jacobian):
     """All rows of a tape; a value or a slope that is not finite is an infinite violation, of one side too."""
+    header = header_at(table, 0)
+    expression = tape_at(table, tape)
     inputs, outputs, work = room
     place_tape(table, pool, tape, q, inputs)
-    call_address(table[RUN_TAPE_AT], (table, pool, table[tape + TAPE_FIRST], inputs, work, outputs))
-    m = table[tape + TAPE_VALUES]
-    count = table[tape + TAPE_BODIES]
-    each = 1.0 / pool[table[tape + TAPE_SCALE]]
-    size = pool[SCALE]
+    call_address(header.run_tape_address, (table, pool, expression.first_order, inputs, work, outputs))
+    m = expression.values
+    count = expression.bodies
+    each = 1.0 / pool[expression.unit]
+    size = pool_header_at(pool, 0).scale
     for v in range(m):
-        r = table[tape + TAPE_ROW_AT] + v
-        nowhere = -math.inf if table[table[ROW_TABLE] + ROW * r + ONE_SIDED] == 1 else math.inf
+        r = expression.first_row + v
+        nowhere = -math.inf if row_at(table, header.row_table + ROW * r).one_sided == 1 else math.inf
         residual[r] = outputs[v] * each if math.isfinite(outputs[v]) else nowhere
         for b in range(count):
             at = m + 6 * (count * v + b)
@@ -78,19 +73,21 @@ def tape_rows(table, pool, tape, q, room, residual, jacobian):
 @kernel(inner=True)
 def add_tape_hessian(table, pool, tape, q, room, order, y, hessian):
     """Upper triangle of hessian += second derivative of y . rows, for the rows of a tape."""
+    header = header_at(table, 0)
+    expression = tape_at(table, tape)
     inputs, outputs, work = room
-    m = table[tape + TAPE_VALUES]
-    count = table[tape + TAPE_BODIES]
-    each = 1.0 / pool[table[tape + TAPE_SCALE]]
-    size = pool[SCALE]
+    m = expression.values
+    count = expression.bodies
+    each = 1.0 / pool[expression.unit]
+    size = pool_header_at(pool, 0).scale
     end = place_tape(table, pool, tape, q, inputs)
     for v in range(m):
-        inputs[end + v] = y[table[tape + TAPE_ROW_AT] + v] * each
-    call_address(table[RUN_TAPE_AT], (table, pool, table[tape + TAPE_SECOND], inputs, work, outputs))
+        inputs[end + v] = y[expression.first_row + v] * each
+    call_address(header.run_tape_address, (table, pool, expression.second_order, inputs, work, outputs))
     for b in range(count):
-        at = 6 * table[table[SLOTS] + table[table[tape + TAPE_LIST] + b]]
+        at = 6 * table[header.slots + table[expression.body_list + b]]
         for c in range(count):
-            other = 6 * table[table[SLOTS] + table[table[tape + TAPE_LIST] + c]]
+            other = 6 * table[header.slots + table[expression.body_list + c]]
             if at < 0 or other < at:
                 continue
             row, column = spot(order, at, other)

@@ -26,39 +26,28 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly.constraints.program.records import (
     BETWEEN,
-    BODY_F,
-    BODY_G,
     CARTESIAN,
-    CONTACTS,
     FREE_COLUMN,
-    JOINTS,
     PARAMETRIC,
     ROW,
-    ROW_TABLE,
     SIGNED,
     SURFACE_F,
     SURFACE_G,
-    TRIM_COUNT,
-    TRIM_EDGES,
-    TRIM_FACTOR,
-    TRIM_FORM,
-    TRIM_LENGTH,
-    TRIM_LOOP,
-    TRIM_PAIR,
-    TRIM_SIDE,
-    TRIMS,
+    header_at,
+    row_at,
+    trim_row_at,
 )
 from assembly.constraints.program.row_terms import add_gram
 from assembly.geometry.faces.trim_nearest import trim_nearest
-from assembly.geometry.faces.trim_pieces import TRIM_CURVES
+from assembly.geometry.faces.trim_pieces import trim_at
 from assembly.geometry.splines.evaluate import curve_point, surface_point
 from assembly.geometry.vec import add, cross, dot, matvec, matvec_t, scale, sub
 from assembly.kinematics.motion import position, relative_pose, rotation
 from assembly.proximity.brep.borders import on_surface
-from assembly.proximity.brep.records import EDGE, EDGE_CURVE, EDGE_RECORD, FACE
+from assembly.proximity.brep.records import EDGE, EDGE_RECORD, FACE, edge_at
 from assembly.proximity.extrema.face_face import CONVERGED, SINGULAR
 from assembly.proximity.extrema.feature_pair import feature_record, solve_features
-from assembly.proximity.extrema.rates import GAP, NORMAL, RATES, ZED
+from assembly.proximity.extrema.rates import derivatives_at
 from assembly.proximity.features.trim_distance import trim_distance
 
 # A vector shorter than this has no direction of its own.
@@ -86,21 +75,22 @@ def add_coordinate(loose, records, k, i, factor, jacobian, r):
 @kernel(inner=True)
 def add_rate(records, k, i, factor, jacobian, r):
     """Row r += factor times the rate of coordinate i of record k over the twists."""
+    derivatives = derivatives_at(records, k)
     for l in range(4):
-        rate = factor * records[k, RATES + 4 * i + l]
+        rate = factor * derivatives.rates[i, l]
         for j in range(12):
-            jacobian[r, j] += rate * records[k, ZED + 12 * l + j]
+            jacobian[r, j] += rate * derivatives.zed[l, j]
 
 
 @kernel(inner=True)
 def signed_row(table, pool, r, loose, point):
     """Row r, of a trim in the signed form."""
     _q, tracked, records, residual, jacobian = point
-    row = table[ROW_TABLE] + ROW * r
-    k = table[row + TRIM_PAIR]
-    o = 2 * table[row + TRIM_SIDE]
-    factor = pool[table[row + TRIM_FACTOR]]
-    s, n, _bend = trim_distance(table, pool, table[row + TRIM_LOOP], tracked[k, o], tracked[k, o + 1])
+    row = trim_row_at(table, header_at(table, 0).row_table + ROW * r)
+    k = row.contact
+    o = 2 * row.side
+    factor = pool[row.factor]
+    s, n, _bend = trim_distance(table, pool, row.loop, tracked[k, o], tracked[k, o + 1])
     residual[r] = factor * s
     clear(jacobian, r)
     add_coordinate(loose, records, k, o, factor * n[0], jacobian, r)
@@ -113,9 +103,10 @@ def loop_extremum(table, pool, row, x, o, turn, relative, shift, records, scratc
 
     Returns the curve, its parameter, whether it moves (it does not at a corner), and the signed distance of x.
     """
-    loop = table[row + TRIM_LOOP]
-    s, number, t, _cu, _cv, _nu, _nv = trim_nearest(table, pool, loop, 0, table[loop + TRIM_CURVES], x[o], x[o + 1])
-    edge = table[row + TRIM_EDGES] + EDGE_RECORD * number
+    trim = trim_row_at(table, row)
+    loop = trim.loop
+    s, number, t, _cu, _cv, _nu, _nv = trim_nearest(table, pool, loop, 0, trim_at(table, loop).curves, x[o], x[o + 1])
+    edge = trim.edges + EDGE_RECORD * number
     other = other_surface(table, row)
     none = (0.0, 0.0, 0.0)
     if o == 0:
@@ -134,21 +125,23 @@ def loop_extremum(table, pool, row, x, o, turn, relative, shift, records, scratc
     if moves:
         t = found
         feature_record(turn, shift, frame, records, scratch)
-    return table[edge + EDGE_CURVE], t, moves, s
+    return edge_at(table, edge).curve, t, moves, s
 
 
 @kernel(inline=True)
 def own_surface(table, row):
     """The surface that has the loop of a trim."""
-    pair = table[ROW_TABLE] + ROW * table[row + TRIM_PAIR]
-    return table[pair + SURFACE_F + table[row + TRIM_SIDE]]
+    trim = trim_row_at(table, row)
+    pair = header_at(table, 0).row_table + ROW * trim.contact
+    return table[pair + SURFACE_F + trim.side]
 
 
 @kernel(inline=True)
 def other_surface(table, row):
     """The surface that touches the one with the loop."""
-    pair = table[ROW_TABLE] + ROW * table[row + TRIM_PAIR]
-    return table[pair + SURFACE_G - table[row + TRIM_SIDE]]
+    trim = trim_row_at(table, row)
+    pair = header_at(table, 0).row_table + ROW * trim.contact
+    return table[pair + SURFACE_G - trim.side]
 
 
 @kernel(inner=True)
@@ -181,21 +174,25 @@ def offset_tangents(pu, pv, puu, puv, pvv, n, beta):
 @kernel(inner=True)
 def vector_rows(table, pool, first, loose, point):
     """The rows of a trim from `first` on, in one of the paper's forms."""
+    header = header_at(table, 0)
     q, tracked, records, residual, jacobian = point
-    row = table[ROW_TABLE] + ROW * first
-    k = table[row + TRIM_PAIR]
-    side = table[row + TRIM_SIDE]
-    form = table[row + TRIM_FORM]
+    row = header.row_table + ROW * first
+    trim = trim_row_at(table, row)
+    fields = row_at(table, row)
+    k = trim.contact
+    derivatives = derivatives_at(records, k)
+    side = trim.side
+    form = trim.form
     o = 2 * side
-    i = table[row + BODY_F]
-    j = table[row + BODY_G]
+    i = fields.body_f
+    j = fields.body_g
     x = (tracked[k, 0], tracked[k, 1], tracked[k, 2], tracked[k, 3])
     turn_f = rotation(q, i)
     turn_g = rotation(q, j)
     relative, shift = relative_pose(q, i, turn_f, j, turn_g)
-    scratch = table[CONTACTS] + table[JOINTS]
+    scratch = header.contacts + header.joints
     curve, t, moves, s = loop_extremum(table, pool, row, x, o, turn_f, relative, shift, records, scratch)
-    factor = pool[table[row + TRIM_FACTOR]]
+    factor = pool[trim.factor]
     kept = 1.0 if factor >= 0.0 else -1.0
     factor = abs(factor)
     turn = turn_f if side == 0 else turn_g
@@ -215,10 +212,10 @@ def vector_rows(table, pool, first, loose, point):
     # Seen from the side of the loop the other point is p + beta n.
     toward = (0.0, 0.0, 0.0)
     if form == BETWEEN and not free:
-        n = (records[k, NORMAL], records[k, NORMAL + 1], records[k, NORMAL + 2])
+        n = (derivatives.normal[0], derivatives.normal[1], derivatives.normal[2])
         toward = scale(1.0 - 2.0 * side, matvec_t(turn, n))
-        pu, pv = offset_tangents(pu, pv, puu, puv, pvv, toward, records[k, GAP])
-    for l in range(table[row + TRIM_COUNT]):
+        pu, pv = offset_tangents(pu, pv, puu, puv, pvv, toward, derivatives.gap)
+    for l in range(trim.count):
         r = first + l
         clear(jacobian, r)
         if form == PARAMETRIC:
@@ -249,8 +246,8 @@ def vector_rows(table, pool, first, loose, point):
             add_coordinate(loose, records, k, 3 - o, dot(axis, dv), jacobian, r)
         if moves:
             add_rate(records, scratch, o, -slope, jacobian, r)
-    if table[row + TRIM_LENGTH] == 1:
-        signed_length(table, pool, first, table[row + TRIM_COUNT], 1.0 if kept * s >= 0.0 else -1.0, loose, point)
+    if trim.is_length == 1:
+        signed_length(table, pool, first, trim.count, 1.0 if kept * s >= 0.0 else -1.0, loose, point)
 
 
 @kernel(inner=True)
@@ -306,34 +303,36 @@ def growth(table, pool, r, j, loose, point):
     """The derivative along column j of the signed distance, positive on the right side of the loop."""
     tracked = point[1]
     records = point[2]
-    row = table[ROW_TABLE] + ROW * r
-    k = table[row + TRIM_PAIR]
-    o = 2 * table[row + TRIM_SIDE]
-    factor = pool[table[row + TRIM_FACTOR]]
-    _s, n, _bend = trim_distance(table, pool, table[row + TRIM_LOOP], tracked[k, o], tracked[k, o + 1])
+    row = trim_row_at(table, header_at(table, 0).row_table + ROW * r)
+    k = row.contact
+    derivatives = derivatives_at(records, k)
+    o = 2 * row.side
+    factor = pool[row.factor]
+    _s, n, _bend = trim_distance(table, pool, row.loop, tracked[k, o], tracked[k, o + 1])
     value = 0.0
     for i in range(2):
         if loose[0][k] >= 0:
             value += n[i] if j == FREE_COLUMN + o + i else 0.0
         elif j < FREE_COLUMN:
             for l in range(4):
-                value += n[i] * records[k, RATES + 4 * (o + i) + l] * records[k, ZED + 12 * l + j]
+                value += n[i] * derivatives.rates[o + i, l] * derivatives.zed[l, j]
     return factor * value
 
 
 @kernel(signatures="(i8[::1], f8[::1], i8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1])")
 def trim_rows(table, pool, free, lengths, q, tracked, records, residual, jacobian):
     """All rows of trims, and their gradients."""
+    header = header_at(table, 0)
     loose = (free, lengths)
     point = (q, tracked, records, residual, jacobian)
-    r = table[CONTACTS]
-    while r < table[CONTACTS] + table[TRIMS]:
-        row = table[ROW_TABLE] + ROW * r
-        if table[row + TRIM_FORM] == SIGNED:
+    r = header.contacts
+    while r < header.contacts + header.trims:
+        row = trim_row_at(table, header.row_table + ROW * r)
+        if row.form == SIGNED:
             signed_row(table, pool, r, loose, point)
         else:
             vector_rows(table, pool, r, loose, point)
-        r += table[row + TRIM_COUNT]
+        r += row.count
     return 0
 
 
@@ -366,17 +365,17 @@ def trim_terms(table, pool, r, free, lengths, bases, tracked, records, jacobian,
     Of a signed row of a free contact that is all; else what the change of u_q adds is left out. A vector's row counts
     as the signed distance, times what its gradient has of that one's: at a solution all else in it is the gap's.
     """
-    row = table[ROW_TABLE] + ROW * r
-    k = table[row + TRIM_PAIR]
-    o = 2 * table[row + TRIM_SIDE]
+    row = trim_row_at(table, header_at(table, 0).row_table + ROW * r)
+    k = row.contact
+    o = 2 * row.side
     loose = (free, lengths)
-    _s, n, bend = trim_distance(table, pool, table[row + TRIM_LOOP], tracked[k, o], tracked[k, o + 1])
+    _s, n, bend = trim_distance(table, pool, row.loop, tracked[k, o], tracked[k, o + 1])
     places = np.empty((1, bases.shape[1]), np.int64)
     for b in range(bases.shape[1]):
         places[0, b] = bases[r, b]
     rates = np.zeros((1, jacobian.shape[1]))
-    factor = pool[table[row + TRIM_FACTOR]]
-    if table[row + TRIM_FORM] != SIGNED:
+    factor = pool[row.factor]
+    if row.form != SIGNED:
         add_coordinate(loose, records, k, o, n[0], rates, 0)
         add_coordinate(loose, records, k, o + 1, n[1], rates, 0)
         factor = part_of(jacobian, r, rates, k)

@@ -26,32 +26,31 @@ from assembly.distance.curves.nodes import (
     A0,
     A1,
     A2,
-    AWAY,
-    BOX_CENTER,
-    BOX_HALF,
-    E0,
-    E1,
-    E2,
     ROWS,
+    curve_node_at,
     length,
     three,
 )
-from assembly.geometry.splines.bezier_pieces import DEGREE, UNIT
+from assembly.geometry.splines.bezier_pieces import UNIT, bezier_curve_at
 from assembly.geometry.vec import dot
 
 
 @kernel(inner=True, exact=True)
 def box_bound(a, o, b, p, shift, slack):
     """Distance of two boxes, the second moved by the shift."""
+    node = curve_node_at(a, o)
+    node_record = curve_node_at(b, p)
     total = 0.0
     for j in range(3):
         gap = (
-            abs((a[o + BOX_CENTER + j] - b[p + BOX_CENTER + j]) - shift[j]) - a[o + BOX_HALF + j] - b[p + BOX_HALF + j]
+            abs((node.box_center[j] - node_record.box_center[j]) - shift[j])
+            - node.box_half[j]
+            - node_record.box_half[j]
         )
         gap -= slack
         if gap > 0.0:
             total += gap * gap
-    return math.sqrt(total) * (1.0 - 8.0 * UNIT) - a[o + AWAY] - b[p + AWAY]
+    return math.sqrt(total) * (1.0 - 8.0 * UNIT) - node.away - node_record.away
 
 
 @kernel(inline=True)
@@ -127,6 +126,8 @@ def square_minimum(c, g, h, p, q, r):
 @kernel(inner=True, exact=True)
 def model_bound(a, o, b, p, shift, slack):
     """The bound of the quadratic models, and where they are closest, as (d, e)."""
+    node = curve_node_at(a, o)
+    node_record = curve_node_at(b, p)
     a0 = three(a, o + A0)
     b0 = three(b, p + A0)
     d0 = ((a0[0] - b0[0]) - shift[0], (a0[1] - b0[1]) - shift[1], (a0[2] - b0[2]) - shift[2])
@@ -145,21 +146,23 @@ def model_bound(a, o, b, p, shift, slack):
     size = c + aa + bb + abs(da) + abs(db) + dot(a2, a2) + dot(b2, b2)
     least -= cubic * (1.0 + 1e-12) + 128.0 * UNIT * size
     root = math.sqrt(least) * (1.0 - 8.0 * UNIT) if least > 0.0 else 0.0
-    away = a[o + AWAY] + b[p + AWAY] + a[o + E0] + b[p + E0] + slack
+    away = node.away + node_record.away + node.e0 + node_record.e0 + slack
     return root - away * (1.0 + 16.0 * UNIT), x, y
 
 
 @kernel(inner=True, exact=True)
 def hull_bound(ra, a, o, rb, b, p, shift, slack, x, y):
     """The bound of the control points in the direction between the points of the models at (x, y)."""
-    n = ra[DEGREE]
-    m = rb[DEGREE]
-    n0 = (a[o + A0] - b[p + A0]) - shift[0]
-    n1 = (a[o + A0 + 1] - b[p + A0 + 1]) - shift[1]
-    n2 = (a[o + A0 + 2] - b[p + A0 + 2]) - shift[2]
-    n0 += x * a[o + A1] - y * b[p + A1]
-    n1 += x * a[o + A1 + 1] - y * b[p + A1 + 1]
-    n2 += x * a[o + A1 + 2] - y * b[p + A1 + 2]
+    node = curve_node_at(a, o)
+    node_record = curve_node_at(b, p)
+    n = bezier_curve_at(ra, 0).degree
+    m = bezier_curve_at(rb, 0).degree
+    n0 = (node.a0[0] - node_record.a0[0]) - shift[0]
+    n1 = (node.a0[1] - node_record.a0[1]) - shift[1]
+    n2 = (node.a0[2] - node_record.a0[2]) - shift[2]
+    n0 += x * node.a1[0] - y * node_record.a1[0]
+    n1 += x * node.a1[1] - y * node_record.a1[1]
+    n2 += x * node.a1[2] - y * node_record.a1[2]
     size = math.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
     if not size > 0.0:
         return 0.0
@@ -178,18 +181,20 @@ def hull_bound(ra, a, o, rb, b, p, shift, slack, x, y):
         i += 4
         high = max(high, n0 * b[i] + n1 * b[i + 1] + n2 * b[i + 2])
     gap = (low - high) - (n0 * shift[0] + n1 * shift[1] + n2 * shift[2])
-    return gap * (1.0 - 16.0 * UNIT) - 4.0 * slack - a[o + AWAY] - b[p + AWAY]
+    return gap * (1.0 - 16.0 * UNIT) - 4.0 * slack - node.away - node_record.away
 
 
 @kernel(inline=True)
 def positions(record, o):
     """Where the positions of a node's control points begin."""
-    return o + ROWS + (4 * (record[DEGREE] + 1)) * record[2]
+    return o + ROWS + (4 * (bezier_curve_at(record, 0).degree + 1)) * record[2]
 
 
 @kernel(inner=True, exact=True)
 def convexity(ra, a, o, rb, b, p, shift):
     """Least curvatures (lambda_a, lambda_b) of F over the box of two pieces; zeros where it is not proven convex."""
+    node = curve_node_at(a, o)
+    node_record = curve_node_at(b, p)
     a0 = three(a, o + A0)
     b0 = three(b, p + A0)
     d0 = ((a0[0] - b0[0]) - shift[0], (a0[1] - b0[1]) - shift[1], (a0[2] - b0[2]) - shift[2])
@@ -201,20 +206,20 @@ def convexity(ra, a, o, rb, b, p, shift):
     lb = length(b1)
     ka = length(a2)
     kb = length(b2)
-    ea0 = a[o + E0]
-    ea1 = a[o + E1]
-    ea2 = a[o + E2]
-    eb0 = b[p + E0]
-    eb1 = b[p + E1]
-    eb2 = b[p + E2]
-    away = a[o + AWAY] + b[p + AWAY]
+    ea0 = node.e0
+    ea1 = node.e1
+    ea2 = node.e2
+    eb0 = node_record.e0
+    eb1 = node_record.e1
+    eb2 = node_record.e2
+    away = node.away + node_record.away
     far = length(d0) + 0.5 * (la + lb) + 0.125 * (ka + kb) + ea0 + eb0
     bent = 0.125 * abs(dot(a2, b2))
     mixed_a = 0.5 * abs(dot(a2, b1))
     mixed_b = 0.5 * abs(dot(a1, b2))
     slack = 1e-13 * (la + lb + ka + kb) * (la + lb + ka + kb + far)
     error = ea0 + eb0 + away
-    if rb[DEGREE] == 0:
+    if bezier_curve_at(rb, 0).degree == 0:
         ss = (
             la * la
             + dot(d0, a2)

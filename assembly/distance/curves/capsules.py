@@ -18,15 +18,38 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly._record import place_of, record_dtype, record_view, size_of
 from assembly.distance.curves.bounds import square_minimum
 from assembly.distance.curves.nodes import length, three
-from assembly.geometry.splines.bezier_pieces import CENTER, DEGREE, ERROR, PIECES, REACH, SPANS, UNIT
+from assembly.geometry.splines.bezier_pieces import (
+    UNIT,
+    bezier_curve_at,
+    bezier_head_at,
+)
 from assembly.geometry.vec import dot
 
 # Doubles of a node: the segment's middle and extent, the radius; below zero for a node of nothing.
-POSITION, EXTENT, RADIUS, STRIDE = 0, 3, 6, 8
+CAPSULE = record_dtype(
+    "f8",
+    position=3,
+    extent=3,
+    radius=1,
+    spare=1,
+)
+capsule_at = record_view(CAPSULE)
+EXTENT = place_of(CAPSULE, "extent")
+RADIUS = place_of(CAPSULE, "radius")
+STRIDE = size_of(CAPSULE)
 # Doubles of the head: the first leaf's number, the center and the size of the curve.
-LEAVES, ORIGIN, SIZE = 0, 1, 4
+CAPSULE_HEAD = record_dtype(
+    "f8",
+    leaves=1,
+    origin=3,
+    extent=1,
+)
+capsule_head_at = record_view(CAPSULE_HEAD)
+LEAVES = place_of(CAPSULE_HEAD, "leaves")
+ORIGIN = place_of(CAPSULE_HEAD, "origin")
 # What a comparison says.
 FARTHER, NEARER, OPEN = 1, -1, 0
 # Pieces that a tree has at least.
@@ -37,8 +60,10 @@ _STACK = 128
 @kernel(signatures="(i8[::1], f8[::1])", allocates=True, exact=True)
 def capsule_tree(record, pool):
     """The tree of a packed curve."""
-    n = record[DEGREE]
-    spans = record[SPANS]
+    pool_head = bezier_head_at(pool, 0)
+    curve = bezier_curve_at(record, 0)
+    n = curve.degree
+    spans = curve.spans
     parts = 1
     halvings = 0
     while parts * spans < _LEAVES:
@@ -52,7 +77,7 @@ def capsule_tree(record, pool):
     rows = np.empty(pieces * size)
     for span in range(spans):
         base = span * parts * size
-        source = record[PIECES] + size * span
+        source = curve.pieces + size * span
         for j in range(size):
             rows[base + j] = pool[source + j]
         count = 1
@@ -66,12 +91,13 @@ def capsule_tree(record, pool):
         for j in range(3):
             rows[4 * i + j] *= w
     tree = np.empty(2 * slots * STRIDE)
-    tree[LEAVES] = slots
-    tree[SIZE] = pool[REACH]
+    head = capsule_head_at(tree, 0)
+    head.leaves = slots
+    head.extent = pool_head.reach
     for j in range(3):
-        tree[ORIGIN + j] = pool[CENTER + j]
+        head.origin[j] = pool_head.center[j]
     # Halvings (see `distance/curves/nodes.py`), the quotient, and the sums of a radius.
-    away = pool[ERROR] + (4.0 * n * halvings + 128.0) * UNIT * pool[REACH]
+    away = pool_head.error + (4.0 * n * halvings + 128.0) * UNIT * pool_head.reach
     low = slots
     width = 1
     while low > 0:
@@ -102,8 +128,9 @@ def _halve(rows, o, a, n):
 @kernel(inner=True, exact=True)
 def _enclose(rows, first, last, tree, o, away):
     """The capsule of the points [first, last) around their first and last one."""
+    capsule = capsule_at(tree, o)
     if first >= last:
-        tree[o + RADIUS] = -1.0
+        capsule.radius = -1.0
         return
     a = three(rows, 4 * first)
     b = three(rows, 4 * (last - 1))
@@ -118,9 +145,9 @@ def _enclose(rows, first, last, tree, o, away):
         e = (e[0] - t * d[0], e[1] - t * d[1], e[2] - t * d[2])
         most = max(most, dot(e, e))
     for j in range(3):
-        tree[o + POSITION + j] = 0.5 * (a[j] + b[j])
-        tree[o + EXTENT + j] = d[j]
-    tree[o + RADIUS] = math.sqrt(most) * (1.0 + 16.0 * UNIT) + away
+        capsule.position[j] = 0.5 * (a[j] + b[j])
+        capsule.extent[j] = d[j]
+    capsule.radius = math.sqrt(most) * (1.0 + 16.0 * UNIT) + away
 
 
 @kernel(inline=True, exact=True)
@@ -129,10 +156,12 @@ def _segments(a, o, b, p, shift):
 
     The lower one is a multiple of u of all that was summed below the least square (see `distance/curves/bounds.py`).
     """
+    capsule = capsule_at(a, o)
+    capsule_record = capsule_at(b, p)
     d = (
-        (a[o + POSITION] - b[p + POSITION]) - shift[0],
-        (a[o + POSITION + 1] - b[p + POSITION + 1]) - shift[1],
-        (a[o + POSITION + 2] - b[p + POSITION + 2]) - shift[2],
+        (capsule.position[0] - capsule_record.position[0]) - shift[0],
+        (capsule.position[1] - capsule_record.position[1]) - shift[1],
+        (capsule.position[2] - capsule_record.position[2]) - shift[2],
     )
     u = three(a, o + EXTENT)
     v = three(b, p + EXTENT)
@@ -149,16 +178,22 @@ def _segments(a, o, b, p, shift):
 @kernel(inline=True)
 def _extent(tree, o):
     """How large a capsule is."""
-    return length(three(tree, o + EXTENT)) + 2.0 * tree[o + RADIUS]
+    return length(three(tree, o + EXTENT)) + 2.0 * capsule_at(tree, o).radius
 
 
 @kernel(signatures="(f8[::1], f8[::1], f8)", allocates=True, exact=True)
 def compare_curves(a, b, clearance):
     """Whether two curves are proven farther apart than a clearance, or proven not to be; else OPEN."""
-    shift = (b[ORIGIN] - a[ORIGIN], b[ORIGIN + 1] - a[ORIGIN + 1], b[ORIGIN + 2] - a[ORIGIN + 2])
-    slack = 16.0 * UNIT * (a[SIZE] + b[SIZE] + length(shift)) + 1e-150
-    leaf_a = int(a[LEAVES])
-    leaf_b = int(b[LEAVES])
+    head = capsule_head_at(b, 0)
+    tree_head = capsule_head_at(a, 0)
+    shift = (
+        head.origin[0] - tree_head.origin[0],
+        head.origin[1] - tree_head.origin[1],
+        head.origin[2] - tree_head.origin[2],
+    )
+    slack = 16.0 * UNIT * (tree_head.extent + head.extent + length(shift)) + 1e-150
+    leaf_a = int(tree_head.leaves)
+    leaf_b = int(head.leaves)
     stack = np.empty(2 * _STACK, np.int64)
     stack[0] = 1
     stack[1] = 1
@@ -170,7 +205,7 @@ def compare_curves(a, b, clearance):
         o = STRIDE * i
         p = STRIDE * j
         lower, upper = _segments(a, o, b, p, shift)
-        radius = (a[o + RADIUS] + b[p + RADIUS] + slack) * (1.0 + 8.0 * UNIT)
+        radius = (capsule_at(a, o).radius + capsule_at(b, p).radius + slack) * (1.0 + 8.0 * UNIT)
         if lower * (1.0 - 4.0 * UNIT) - radius > clearance:
             continue
         if i >= leaf_a and j >= leaf_b:
@@ -179,7 +214,7 @@ def compare_curves(a, b, clearance):
         for half in range(1, -1, -1):
             k = 2 * i + half if split_a else i
             m = j if split_a else 2 * j + half
-            if a[STRIDE * k + RADIUS] >= 0.0 and b[STRIDE * m + RADIUS] >= 0.0:
+            if capsule_at(a, STRIDE * k).radius >= 0.0 and capsule_at(b, STRIDE * m).radius >= 0.0:
                 stack[top] = k
                 stack[top + 1] = m
                 top += 2
@@ -189,9 +224,10 @@ def compare_curves(a, b, clearance):
 @kernel(signatures="(f8[::1], f8, f8, f8, f8)", allocates=True, exact=True)
 def compare_point(tree, x, y, z, clearance):
     """The same of a curve and a point."""
-    p = (x - tree[ORIGIN], y - tree[ORIGIN + 1], z - tree[ORIGIN + 2])
-    slack = 16.0 * UNIT * (tree[SIZE] + length(p)) + 1e-150
-    leaf = int(tree[LEAVES])
+    head = capsule_head_at(tree, 0)
+    p = (x - head.origin[0], y - head.origin[1], z - head.origin[2])
+    slack = 16.0 * UNIT * (head.extent + length(p)) + 1e-150
+    leaf = int(head.leaves)
     stack = np.empty(_STACK, np.int64)
     stack[0] = 1
     top = 1
@@ -199,7 +235,8 @@ def compare_point(tree, x, y, z, clearance):
         top -= 1
         k = stack[top]
         o = STRIDE * k
-        d = (p[0] - tree[o + POSITION], p[1] - tree[o + POSITION + 1], p[2] - tree[o + POSITION + 2])
+        capsule = capsule_at(tree, o)
+        d = (p[0] - capsule.position[0], p[1] - capsule.position[1], p[2] - capsule.position[2])
         u = three(tree, o + EXTENT)
         square = dot(u, u)
         t = dot(d, u)
@@ -207,14 +244,14 @@ def compare_point(tree, x, y, z, clearance):
         t = min(max(t / square, -0.5), 0.5) if square > 1e-280 else 0.0
         e = (d[0] - t * u[0], d[1] - t * u[1], d[2] - t * u[2])
         far = length(e)
-        radius = (tree[o + RADIUS] + slack) * (1.0 + 8.0 * UNIT)
+        radius = (capsule.radius + slack) * (1.0 + 8.0 * UNIT)
         wrong = 16.0 * UNIT * (far + length(u))
         if (far - wrong) - radius > clearance * (1.0 + 8.0 * UNIT):
             continue
         if k >= leaf:
             return NEARER if (far + wrong + radius) * (1.0 + 8.0 * UNIT) <= clearance else OPEN
         for half in range(1, -1, -1):
-            if tree[STRIDE * (2 * k + half) + RADIUS] >= 0.0:
+            if capsule_at(tree, STRIDE * (2 * k + half)).radius >= 0.0:
                 stack[top] = 2 * k + half
                 top += 1
     return FARTHER

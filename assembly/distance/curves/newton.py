@@ -13,7 +13,7 @@ import math
 from assembly._kernel import kernel
 from assembly._lanes import lane
 from assembly.distance.curves.nodes import ROWS
-from assembly.geometry.splines.bezier_pieces import BINOMIALS, DEGREE, bezier_derivatives, bezier_value
+from assembly.geometry.splines.bezier_pieces import bezier_curve_at, bezier_derivatives, bezier_value
 from assembly.geometry.splines.evaluate import xyz
 from assembly.geometry.vec import dot
 
@@ -24,17 +24,19 @@ _SHORTENINGS = 12
 @kernel(inner=True)
 def node_point(record, pool, nodes, o, x):
     """The point of a piece."""
-    v = bezier_value(nodes, o + ROWS, pool, record[BINOMIALS], record[DEGREE], x)
+    curve = bezier_curve_at(record, 0)
+    v = bezier_value(nodes, o + ROWS, pool, curve.binomials, curve.degree, x)
     return xyz((1.0 / lane(v, 3)) * v)
 
 
 @kernel(inner=True)
 def node_derivatives(record, pool, nodes, o, x):
     """Point, first and second derivative of a piece."""
-    if record[DEGREE] == 0:
+    curve = bezier_curve_at(record, 0)
+    if curve.degree == 0:
         zero = (0.0, 0.0, 0.0)
         return node_point(record, pool, nodes, o, x), zero, zero
-    v, d, h = bezier_derivatives(nodes, o + ROWS, pool, record[BINOMIALS], record[DEGREE], x)
+    v, d, h = bezier_derivatives(nodes, o + ROWS, pool, curve.binomials, curve.degree, x)
     i = 1.0 / lane(v, 3)
     p = i * v
     q = i * (d - lane(d, 3) * p)
@@ -84,7 +86,7 @@ def nearest_points(ra, qa, a, o, rb, qb, b, p, shift, x, y):
     sx = sy = 0.0
     part = 1.0
     shortenings = 0
-    flat = rb[DEGREE] == 0
+    flat = bezier_curve_at(rb, 0).degree == 0
     for _ in range(_STEPS):
         u, du, hu = node_derivatives(ra, qa, a, o, x)
         v, dv, hv = node_derivatives(rb, qb, b, p, y)

@@ -24,39 +24,62 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
+from assembly._record import place_of, record_dtype, record_view, size_of
 from assembly.geometry.splines.bezier_pieces import (
     BOX,
-    DEGREE,
-    ERROR,
-    MIDDLE,
-    PIECES,
-    RATIONAL,
-    REACH,
-    SPANS,
-    TREE,
     UNIT,
+    bezier_curve_at,
+    bezier_head_at,
 )
 
 # Doubles of a node: center and half extents of the box, the model, E0, E1, E2, the largest speed, how far the piece may
 # be from what it stands for, the interval on the span, then rows of (w x, w y, w z, w), then positions where weights
 # differ.
-BOX_CENTER, BOX_HALF, A0, A1, A2, E0, E1, E2, SPEED, AWAY, BEGIN, END, ROWS = (
-    0,
-    3,
-    6,
-    9,
-    12,
-    15,
-    16,
-    17,
-    18,
-    19,
-    20,
-    21,
-    22,
+CURVE_NODE = record_dtype(
+    "f8",
+    box_center=3,
+    box_half=3,
+    a0=3,
+    a1=3,
+    a2=3,
+    e0=1,
+    e1=1,
+    e2=1,
+    speed=1,
+    away=1,
+    begin=1,
+    end=1,
 )
+curve_node_at = record_view(CURVE_NODE)
+BOX_CENTER = place_of(CURVE_NODE, "box_center")
+BOX_HALF = place_of(CURVE_NODE, "box_half")
+A0 = place_of(CURVE_NODE, "a0")
+A1 = place_of(CURVE_NODE, "a1")
+A2 = place_of(CURVE_NODE, "a2")
+E0 = place_of(CURVE_NODE, "e0")
+E1 = place_of(CURVE_NODE, "e1")
+E2 = place_of(CURVE_NODE, "e2")
+SPEED = place_of(CURVE_NODE, "speed")
+AWAY = place_of(CURVE_NODE, "away")
+BEGIN = place_of(CURVE_NODE, "begin")
+END = place_of(CURVE_NODE, "end")
+ROWS = size_of(CURVE_NODE)
 # Integers: the halves (-1: not made yet), the spans [first, last), halvings, box in the tree over the spans.
-LEFT, RIGHT, FIRST, LAST, DEPTH, TREE_NODE, NODE_INTS = 0, 1, 2, 3, 4, 5, 6
+CURVE_NODE_LINKS = record_dtype(
+    "i8",
+    left=1,
+    right=1,
+    first=1,
+    last=1,
+    depth=1,
+    tree_node=1,
+)
+curve_node_links_at = record_view(CURVE_NODE_LINKS)
+LEFT = place_of(CURVE_NODE_LINKS, "left")
+FIRST = place_of(CURVE_NODE_LINKS, "first")
+LAST = place_of(CURVE_NODE_LINKS, "last")
+DEPTH = place_of(CURVE_NODE_LINKS, "depth")
+NODE_INTS = size_of(CURVE_NODE_LINKS)
 
 
 @kernel(inline=True)
@@ -72,81 +95,90 @@ def length(a):
 @kernel(inline=True)
 def node_stride(record):
     """Doubles of a node."""
-    return ROWS + 4 * (record[DEGREE] + 1) * (1 + record[RATIONAL])
+    curve = bezier_curve_at(record, 0)
+    return ROWS + 4 * (curve.degree + 1) * (1 + curve.rational)
 
 
 @kernel(inner=True, exact=True)
 def start_nodes(record, pool, ints, nodes):
     """The root of a curve's tree as node 0."""
-    fill_spans(record, pool, ints, nodes, 0, 0, record[SPANS], 0)
-    if record[SPANS] == 1:
+    curve = bezier_curve_at(record, 0)
+    fill_spans(record, pool, ints, nodes, 0, 0, curve.spans, 0)
+    if curve.spans == 1:
         describe(record, pool, nodes, 0)
 
 
 @kernel(inner=True, exact=True)
 def fill_spans(record, pool, ints, nodes, k, first, last, tree_node):
     """Node k for the spans [first, last); that of a single one is not described yet."""
+    curve = bezier_curve_at(record, 0)
     stride = node_stride(record)
-    i = NODE_INTS * k
+    i = curve_node_links_at(ints, NODE_INTS * k)
     o = stride * k
-    ints[i + LEFT] = -1
-    ints[i + RIGHT] = -1
-    ints[i + FIRST] = first
-    ints[i + LAST] = last
-    ints[i + DEPTH] = 0
-    ints[i + TREE_NODE] = tree_node
-    nodes[o + AWAY] = pool[ERROR]
+    node = curve_node_at(nodes, o)
+    i.left = -1
+    i.right = -1
+    i.first = first
+    i.last = last
+    i.depth = 0
+    i.tree_node = tree_node
+    node.away = bezier_head_at(pool, 0).error
     if last - first == 1:
-        n = record[DEGREE]
-        source = record[PIECES] + 4 * (n + 1) * first
+        n = curve.degree
+        source = curve.pieces + 4 * (n + 1) * first
         for j in range(4 * (n + 1)):
             nodes[o + ROWS + j] = pool[source + j]
-        nodes[o + BEGIN] = 0.0
-        nodes[o + END] = 1.0
+        node.begin = 0.0
+        node.end = 1.0
         return
-    b = record[TREE] + BOX * tree_node
+    b = curve.tree + BOX * tree_node
     for j in range(3):
-        nodes[o + BOX_CENTER + j] = pool[b + j]
-        nodes[o + BOX_HALF + j] = pool[b + 3 + j]
+        node.box_center[j] = pool[b + j]
+        node.box_half[j] = pool[b + 3 + j]
 
 
 @kernel(inner=True, exact=True)
 def split_node(record, pool, ints, nodes, k, left):
     """Make the halves of node k as nodes left and left + 1."""
-    i = NODE_INTS * k
-    ints[i + LEFT] = left
-    ints[i + RIGHT] = left + 1
-    first = ints[i + FIRST]
-    last = ints[i + LAST]
+    i = curve_node_links_at(ints, NODE_INTS * k)
+    i.left = left
+    i.right = left + 1
+    first = i.first
+    last = i.last
     if last - first > 1:
         middle = (first + last) // 2
-        tree_node = ints[i + TREE_NODE]
+        tree_node = i.tree_node
         fill_spans(record, pool, ints, nodes, left, first, middle, tree_node + 1)
         fill_spans(record, pool, ints, nodes, left + 1, middle, last, tree_node + 2 * (middle - first))
     else:
         halve(record, pool, ints, nodes, k, left)
     for j in range(left, left + 2):
-        if ints[NODE_INTS * j + LAST] - ints[NODE_INTS * j + FIRST] == 1:
+        links = curve_node_links_at(ints, NODE_INTS * j)
+        if links.last - links.first == 1:
             describe(record, pool, nodes, node_stride(record) * j)
 
 
 @kernel(inline=True)
 def halve(record, pool, ints, nodes, k, left):
     """Rows of the halves of a piece."""
-    n = record[DEGREE]
-    i = NODE_INTS * k
+    curve = bezier_curve_at(record, 0)
+    n = curve.degree
+    i = curve_node_links_at(ints, NODE_INTS * k)
     stride = node_stride(record)
     o = stride * k
+    node = curve_node_at(nodes, o)
     a = stride * left
+    node_record = curve_node_at(nodes, a)
     b = a + stride
+    node_b = curve_node_at(nodes, b)
     for j in range(left, left + 2):
-        c = NODE_INTS * j
-        ints[c + LEFT] = -1
-        ints[c + RIGHT] = -1
-        ints[c + FIRST] = ints[i + FIRST]
-        ints[c + LAST] = ints[i + LAST]
-        ints[c + DEPTH] = ints[i + DEPTH] + 1
-        ints[c + TREE_NODE] = ints[i + TREE_NODE]
+        c = curve_node_links_at(ints, NODE_INTS * j)
+        c.left = -1
+        c.right = -1
+        c.first = i.first
+        c.last = i.last
+        c.depth = i.depth + 1
+        c.tree_node = i.tree_node
     # de Casteljau at 1/2: the right half in place, the left half of first points.
     for j in range(4 * (n + 1)):
         nodes[b + ROWS + j] = nodes[o + ROWS + j]
@@ -155,22 +187,24 @@ def halve(record, pool, ints, nodes, k, left):
             nodes[a + ROWS + 4 * r + j] = nodes[b + ROWS + j]
         for j in range(4 * (n - r)):
             nodes[b + ROWS + j] = 0.5 * (nodes[b + ROWS + j] + nodes[b + ROWS + j + 4])
-    middle = 0.5 * (nodes[o + BEGIN] + nodes[o + END])
-    nodes[a + BEGIN] = nodes[o + BEGIN]
-    nodes[a + END] = middle
-    nodes[b + BEGIN] = middle
-    nodes[b + END] = nodes[o + END]
-    away = nodes[o + AWAY] + (2.0 + 2.0 * record[RATIONAL]) * n * UNIT * pool[REACH]
-    nodes[a + AWAY] = away
-    nodes[b + AWAY] = away
+    middle = 0.5 * (node.begin + node.end)
+    node_record.begin = node.begin
+    node_record.end = middle
+    node_b.begin = middle
+    node_b.end = node.end
+    away = node.away + (2.0 + 2.0 * curve.rational) * n * UNIT * bezier_head_at(pool, 0).reach
+    node_record.away = away
+    node_b.away = away
 
 
 @kernel(inner=True, exact=True)
 def describe(record, pool, nodes, o):
     """Box and model of a piece from its rows."""
-    n = record[DEGREE]
+    node = curve_node_at(nodes, o)
+    curve = bezier_curve_at(record, 0)
+    n = curve.degree
     p = o + ROWS
-    if record[RATIONAL] == 1:
+    if curve.rational == 1:
         p += 4 * (n + 1)
         for i in range(n + 1):
             q = o + ROWS + 4 * i
@@ -194,17 +228,17 @@ def describe(record, pool, nodes, o):
         z0 = min(z0, nodes[q + 2])
         z1 = max(z1, nodes[q + 2])
     center = (0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.5 * (z0 + z1))
-    slack = 8.0 * UNIT * pool[REACH]
+    slack = 8.0 * UNIT * bezier_head_at(pool, 0).reach
     half = (0.5 * (x1 - x0) + slack, 0.5 * (y1 - y0) + slack, 0.5 * (z1 - z0) + slack)
     nodes[o], nodes[o + 1], nodes[o + 2] = center
     nodes[o + 3], nodes[o + 4], nodes[o + 5] = half
     if n == 0:
-        nodes[o + A0], nodes[o + A0 + 1], nodes[o + A0 + 2] = center
+        node.a0[0], node.a0[1], node.a0[2] = center
         for j in range(A1, AWAY):
             nodes[o + j] = 0.0
         return
     r = length(half)
-    if record[RATIONAL] == 1:
+    if curve.rational == 1:
         rational_model(record, pool, nodes, o, p, center, r)
     else:
         polynomial_model(record, pool, nodes, o, p, center, r)
@@ -212,8 +246,10 @@ def describe(record, pool, nodes, o):
 
 @kernel(inner=True, exact=True)
 def polynomial_model(record, pool, nodes, o, p, center, r):
-    n = record[DEGREE]
-    m = record[MIDDLE]
+    node = curve_node_at(nodes, o)
+    curve = bezier_curve_at(record, 0)
+    n = curve.degree
+    m = curve.middle
     vx = vy = vz = 0.0
     dx = dy = dz = 0.0
     hx = hy = hz = 0.0
@@ -250,29 +286,31 @@ def polynomial_model(record, pool, nodes, o, p, center, r):
         third = max(third, x * x + y * y + z * z)
     u = 4.0 * (n + 8.0) * UNIT * r
     s = n * (n - 1.0) * (n - 2.0) * (math.sqrt(third) + 64.0 * UNIT * r) * (1.0 + 1e-12)
-    nodes[o + A0] = center[0] + vx
-    nodes[o + A0 + 1] = center[1] + vy
-    nodes[o + A0 + 2] = center[2] + vz
-    nodes[o + A1] = dx
-    nodes[o + A1 + 1] = dy
-    nodes[o + A1 + 2] = dz
-    nodes[o + A2] = hx
-    nodes[o + A2 + 1] = hy
-    nodes[o + A2 + 2] = hz
+    node.a0[0] = center[0] + vx
+    node.a0[1] = center[1] + vy
+    node.a0[2] = center[2] + vz
+    node.a1[0] = dx
+    node.a1[1] = dy
+    node.a1[2] = dz
+    node.a2[0] = hx
+    node.a2[1] = hy
+    node.a2[2] = hz
     # The sum with the center is rounded at the size of a coordinate.
-    e0 = u + 4.0 * UNIT * pool[REACH]
+    e0 = u + 4.0 * UNIT * bezier_head_at(pool, 0).reach
     e1 = 2.0 * n * u
     e2 = 4.0 * n * n * u
-    nodes[o + E0] = s / 48.0 * (1.0 + 1e-12) + e0 + 0.5 * e1 + 0.125 * e2
-    nodes[o + E1] = 0.125 * s + e1 + 0.5 * e2
-    nodes[o + E2] = 0.5 * s + e2
-    nodes[o + SPEED] = n * (math.sqrt(first) + 8.0 * UNIT * r) * (1.0 + 1e-12)
+    node.e0 = s / 48.0 * (1.0 + 1e-12) + e0 + 0.5 * e1 + 0.125 * e2
+    node.e1 = 0.125 * s + e1 + 0.5 * e2
+    node.e2 = 0.5 * s + e2
+    node.speed = n * (math.sqrt(first) + 8.0 * UNIT * r) * (1.0 + 1e-12)
 
 
 @kernel(inner=True, exact=True)
 def rational_model(record, pool, nodes, o, p, center, r):
-    n = record[DEGREE]
-    m = record[MIDDLE]
+    node = curve_node_at(nodes, o)
+    curve = bezier_curve_at(record, 0)
+    n = curve.degree
+    m = curve.middle
     v = (0.0, 0.0, 0.0)
     d = (0.0, 0.0, 0.0)
     h = (0.0, 0.0, 0.0)
@@ -336,19 +374,19 @@ def rational_model(record, pool, nodes, o, p, center, r):
     i = 1.0 / w
     v = (i * v[0], i * v[1], i * v[2])
     d = (i * (d[0] - dw * v[0]), i * (d[1] - dw * v[1]), i * (d[2] - dw * v[2]))
-    nodes[o + A0] = center[0] + v[0]
-    nodes[o + A0 + 1] = center[1] + v[1]
-    nodes[o + A0 + 2] = center[2] + v[2]
-    nodes[o + A1], nodes[o + A1 + 1], nodes[o + A1 + 2] = d
+    node.a0[0] = center[0] + v[0]
+    node.a0[1] = center[1] + v[1]
+    node.a0[2] = center[2] + v[2]
+    node.a1[0], node.a1[1], node.a1[2] = d
     for j in range(3):
-        nodes[o + A2 + j] = i * (h[j] - 2.0 * dw * d[j] - hw * v[j])
+        node.a2[j] = i * (h[j] - 2.0 * dw * d[j] - hw * v[j])
     # As above with every term a quotient: |w'| / w <= 2 n ratio and |w''| / w <= 4 n^2 ratio multiply the errors of the
     # lower derivatives.
     u = 8.0 * (n + 8.0) * UNIT * r * ratio
-    e0 = u + 4.0 * UNIT * pool[REACH]
+    e0 = u + 4.0 * UNIT * bezier_head_at(pool, 0).reach
     e1 = 8.0 * n * u * ratio
     e2 = 64.0 * n * n * u * ratio * ratio
-    nodes[o + E0] = s3 / 48.0 * grow + e0 + 0.5 * e1 + 0.125 * e2
-    nodes[o + E1] = 0.125 * s3 + e1 + 0.5 * e2
-    nodes[o + E2] = 0.5 * s3 + e2
-    nodes[o + SPEED] = s1
+    node.e0 = s3 / 48.0 * grow + e0 + 0.5 * e1 + 0.125 * e2
+    node.e1 = 0.125 * s3 + e1 + 0.5 * e2
+    node.e2 = 0.5 * s3 + e2
+    node.speed = s1

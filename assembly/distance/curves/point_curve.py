@@ -23,43 +23,27 @@ from assembly.distance.curves.nodes import length
 from assembly.distance.curves.search import (
     APART,
     CONVERGED,
-    COUNT,
-    LOWER,
     NEAR,
-    PARAMETER_A,
-    PARAMETER_B,
-    POINT_A,
-    POINT_B,
     SPENT,
     UNDECIDED,
-    UPPER,
+    curve_answer_at,
     in_span,
 )
 from assembly.distance.curves.squared_distance import (
-    CUTS,
-    HIGH,
-    LOW,
     SQUARE,
     convex_least,
     cut,
     form_square,
+    interval_at,
     least_quotient,
     mend,
 )
 from assembly.geometry.splines.bezier_pieces import (
-    BINOMIALS,
     BOX,
-    BREAKS,
-    CENTER,
-    DEGREE,
-    ERROR,
-    PIECES,
-    RATIONAL,
-    REACH,
-    SPANS,
-    TREE,
     UNIT,
+    bezier_curve_at,
     bezier_derivatives,
+    bezier_head_at,
 )
 from assembly.geometry.splines.evaluate import xyz
 from assembly.geometry.vec import dot, sub
@@ -78,9 +62,10 @@ _NEAR_END = 1e-3
 @kernel(inner=True)
 def curve_at(record, pool, span, x):
     """w, C, C', C'', w' / w and X' of a span."""
-    n = record[DEGREE]
-    rows = record[PIECES] + 4 * (n + 1) * span
-    v, d, h = bezier_derivatives(pool, rows, pool, record[BINOMIALS], n, x)
+    curve = bezier_curve_at(record, 0)
+    n = curve.degree
+    rows = curve.pieces + 4 * (n + 1) * span
+    v, d, h = bezier_derivatives(pool, rows, pool, curve.binomials, n, x)
     w = lane(v, 3)
     i = 1.0 / w
     p = i * v
@@ -130,9 +115,10 @@ def span_distance(
     record, pool, span, p, reach, error, away, step, clearance, budget, work, upper, let_go, bounded, out
 ):
     """Take one span into account: (upper, let_go, pairs bounded, parameter on the span or -1)."""
-    n = record[DEGREE]
+    curve = bezier_curve_at(record, 0)
+    n = curve.degree
     m = 2 * n + 1
-    stride = SQUARE + m * (1 + record[RATIONAL])
+    stride = SQUARE + m * (1 + curve.rational)
     form_square(record, pool, span, p, reach, work)
     found = -1.0
     looks = 0
@@ -143,14 +129,14 @@ def span_distance(
         if clearance >= 0.0:
             limit = min(limit, clearance + 2.0 * away)
         least, k = least_quotient(record, work, o)
-        low = work[o + LOW]
-        high = work[o + HIGH]
+        low = interval_at(work, o).low
+        high = interval_at(work, o).high
         if limit <= 0.0 or least >= limit * limit:
             let_go = min(let_go, least)
             o -= stride
             continue
         looks += 1
-        if bounded >= budget or looks > _PATIENCE or work[o + CUTS] >= _DEEPEST:
+        if bounded >= budget or looks > _PATIENCE or interval_at(work, o).cuts >= _DEEPEST:
             let_go = min(let_go, least)
             o -= stride
             continue
@@ -189,7 +175,7 @@ def span_distance(
 @kernel(inline=True)
 def box_square(record, pool, node, p):
     """Square of the distance of a point and a box of the tree."""
-    b = record[TREE] + BOX * node
+    b = bezier_curve_at(record, 0).tree + BOX * node
     total = 0.0
     for j in range(3):
         gap = abs(p[j] - pool[b + j]) * (1.0 - 4.0 * UNIT) - pool[b + 3 + j]
@@ -201,13 +187,16 @@ def box_square(record, pool, node, p):
 @kernel(inner=True, exact=True)
 def nearest_on_curve(record, pool, px, py, pz, tolerance, clearance, budget, work, stack, out):
     """Bounds of the distance of a point and a curve of degree 1 or more."""
-    p = (px - pool[CENTER], py - pool[CENTER + 1], pz - pool[CENTER + 2])
-    n = record[DEGREE]
-    reach = (pool[REACH] + length(p)) * (1.0 + 16.0 * UNIT)
-    away = pool[ERROR] + 4.0 * UNIT * length(p) + 1e-150
-    error = (1.0 + record[RATIONAL]) * (8.0 * n + 16.0) * UNIT * pool[REACH] + 2.0 * UNIT * reach
+    answer = curve_answer_at(out, 0)
+    head = bezier_head_at(pool, 0)
+    curve = bezier_curve_at(record, 0)
+    p = (px - head.center[0], py - head.center[1], pz - head.center[2])
+    n = curve.degree
+    reach = (head.reach + length(p)) * (1.0 + 16.0 * UNIT)
+    away = head.error + 4.0 * UNIT * length(p) + 1e-150
+    error = (1.0 + curve.rational) * (8.0 * n + 16.0) * UNIT * head.reach + 2.0 * UNIT * reach
     step = max(0.999 * tolerance, 8.0 * (away + error))
-    o = record[PIECES]
+    o = curve.pieces
     w = 1.0 / pool[o + 3]
     far = length((pool[o] * w - p[0], pool[o + 1] * w - p[1], pool[o + 2] * w - p[2]))
     upper = far * (1.0 + 16.0 * UNIT) + error + away
@@ -218,7 +207,7 @@ def nearest_on_curve(record, pool, px, py, pz, tolerance, clearance, budget, wor
     # Nodes of the tree that are still to be looked at: node, first and last span.
     stack[0] = 0
     stack[1] = 0
-    stack[2] = record[SPANS]
+    stack[2] = curve.spans
     # The first point of the curve may be near enough.
     top = 3 if upper > clearance else 0
     while top > 0:
@@ -230,7 +219,7 @@ def nearest_on_curve(record, pool, px, py, pz, tolerance, clearance, budget, wor
         if clearance >= 0.0:
             limit = min(limit, clearance + 2.0 * away)
         square = 0.0
-        if record[SPANS] > 1:
+        if curve.spans > 1:
             square = box_square(record, pool, node, p)
             bounded += 1
             if limit <= 0.0 or square >= limit * limit or bounded >= budget:
@@ -261,16 +250,16 @@ def nearest_on_curve(record, pool, px, py, pz, tolerance, clearance, budget, wor
     if let_go > 0.0 and upper > clearance:
         lower = max(min(math.sqrt(let_go) * (1.0 - 8.0 * UNIT) - away, upper), 0.0)
     w, c, _d, _h, _dw = curve_at(record, pool, best_span, best)
-    out[LOWER] = lower
-    out[UPPER] = upper
-    out[PARAMETER_B] = 0.0
-    out[PARAMETER_A] = in_span(pool, record[BREAKS] + best_span, best)
+    answer.lower = lower
+    answer.upper = upper
+    answer.parameter_b = 0.0
+    answer.parameter_a = in_span(pool, curve.breaks + best_span, best)
     for j in range(3):
-        out[POINT_A + j] = c[j] + pool[CENTER + j]
-    out[POINT_B] = px
-    out[POINT_B + 1] = py
-    out[POINT_B + 2] = pz
-    out[COUNT] = bounded
+        answer.point_a[j] = c[j] + head.center[j]
+    answer.point_b[0] = px
+    answer.point_b[1] = py
+    answer.point_b[2] = pz
+    answer.count = bounded
     if clearance >= 0.0:
         if upper <= clearance:
             return NEAR
@@ -286,27 +275,30 @@ def nearest_on_curve(record, pool, px, py, pz, tolerance, clearance, budget, wor
 @kernel(signatures="(i8[::1], f8[::1], f8, f8, f8, f8, f8, i8, f8[::1])")
 def point_distance(record, pool, px, py, pz, tolerance, clearance, budget, out):
     """Bounds of the distance of a point and a packed curve; a clearance below zero asks for the distance itself."""
+    answer = curve_answer_at(out, 0)
+    head = bezier_head_at(pool, 0)
+    curve = bezier_curve_at(record, 0)
     if clearance >= 0.0:
         # Apart at once, by the box around all.
-        p = (px - pool[CENTER], py - pool[CENTER + 1], pz - pool[CENTER + 2])
+        p = (px - head.center[0], py - head.center[1], pz - head.center[2])
         far = math.sqrt(box_square(record, pool, 0, p)) * (1.0 - 8.0 * UNIT)
-        far -= pool[ERROR] + 4.0 * UNIT * length(p) + 1e-150
+        far -= head.error + 4.0 * UNIT * length(p) + 1e-150
         if far > clearance:
-            o = record[PIECES]
+            o = curve.pieces
             w = 1.0 / pool[o + 3]
             e = (pool[o] * w, pool[o + 1] * w, pool[o + 2] * w)
             for j in range(3):
-                out[POINT_A + j] = e[j] + pool[CENTER + j]
-            out[POINT_B] = px
-            out[POINT_B + 1] = py
-            out[POINT_B + 2] = pz
-            out[LOWER] = far
-            reach = pool[REACH] + length(p)
-            out[UPPER] = length(sub(e, p)) * (1.0 + 16.0 * UNIT) + 2.0 * pool[ERROR] + 16.0 * UNIT * reach
-            out[PARAMETER_A] = pool[record[BREAKS]]
-            out[COUNT] = 1
+                answer.point_a[j] = e[j] + head.center[j]
+            answer.point_b[0] = px
+            answer.point_b[1] = py
+            answer.point_b[2] = pz
+            answer.lower = far
+            reach = head.reach + length(p)
+            answer.upper = length(sub(e, p)) * (1.0 + 16.0 * UNIT) + 2.0 * head.error + 16.0 * UNIT * reach
+            answer.parameter_a = pool[curve.breaks]
+            answer.count = 1
             return APART
-    work = np.empty((_DEEPEST + 2) * (SQUARE + (2 * record[DEGREE] + 1) * (1 + record[RATIONAL])))
+    work = np.empty((_DEEPEST + 2) * (SQUARE + (2 * curve.degree + 1) * (1 + curve.rational)))
     stack = np.empty(200, np.int64)
     return nearest_on_curve(record, pool, px, py, pz, tolerance, clearance, budget, work, stack, out)
 
@@ -314,7 +306,8 @@ def point_distance(record, pool, px, py, pz, tolerance, clearance, budget, out):
 @kernel(signatures="(i8[::1], f8[::1], f8[:, ::1], f8, i8, i8[::1], f8[:, ::1])")
 def point_distances(record, pool, points, tolerance, budget, codes, out):
     """`point_distance` for the rows of an array (n, 3) into rows of `out` and `codes`."""
-    work = np.empty((_DEEPEST + 2) * (SQUARE + (2 * record[DEGREE] + 1) * (1 + record[RATIONAL])))
+    curve = bezier_curve_at(record, 0)
+    work = np.empty((_DEEPEST + 2) * (SQUARE + (2 * curve.degree + 1) * (1 + curve.rational)))
     stack = np.empty(200, np.int64)
     for i in range(points.shape[0]):
         codes[i] = nearest_on_curve(

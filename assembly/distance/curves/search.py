@@ -16,21 +16,15 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly._record import place_of, record_dtype, record_view, size_of
 from assembly.distance.curves.bounds import box_bound, convexity, hull_bound, least_change, model_bound
 from assembly.distance.curves.newton import difference, nearest_points, node_derivatives, node_point
 from assembly.distance.curves.nodes import (
     A2,
-    AWAY,
-    BEGIN,
     BOX_HALF,
-    DEPTH,
-    E2,
-    END,
-    FIRST,
-    LAST,
-    LEFT,
     NODE_INTS,
-    SPEED,
+    curve_node_at,
+    curve_node_links_at,
     length,
     node_stride,
     split_node,
@@ -38,22 +32,34 @@ from assembly.distance.curves.nodes import (
     three,
 )
 from assembly.geometry.splines.bezier_pieces import (
-    BREAKS,
-    CENTER,
-    DEGREE,
-    ERROR,
-    PIECES,
-    RATIONAL,
-    REACH,
     UNIT,
-    WEIGHT_RATIO,
+    bezier_curve_at,
+    bezier_head_at,
 )
 from assembly.geometry.vec import dot
 
 # What a search ended with.
 CONVERGED, APART, NEAR, UNDECIDED, SPENT, MEETING = 0, 1, 2, 3, 4, 5
 # What it writes: bounds, parameters, the two points, pairs bounded.
-LOWER, UPPER, PARAMETER_A, PARAMETER_B, POINT_A, POINT_B, COUNT, ANSWER = 0, 1, 2, 3, 4, 7, 10, 11
+CURVE_ANSWER = record_dtype(
+    "f8",
+    lower=1,
+    upper=1,
+    parameter_a=1,
+    parameter_b=1,
+    point_a=3,
+    point_b=3,
+    count=1,
+)
+curve_answer_at = record_view(CURVE_ANSWER)
+LOWER = place_of(CURVE_ANSWER, "lower")
+UPPER = place_of(CURVE_ANSWER, "upper")
+PARAMETER_A = place_of(CURVE_ANSWER, "parameter_a")
+PARAMETER_B = place_of(CURVE_ANSWER, "parameter_b")
+POINT_A = place_of(CURVE_ANSWER, "point_a")
+POINT_B = place_of(CURVE_ANSWER, "point_b")
+COUNT = place_of(CURVE_ANSWER, "count")
+ANSWER = size_of(CURVE_ANSWER)
 _DEEPEST = 48
 _ROOM = 64
 # Pairs for which a question that bounds alone may answer is not helped by Newton's method.
@@ -137,7 +143,8 @@ def ended(top, upper, step, clearance, left, bounded, budget):
 @kernel(inline=True)
 def is_piece(ints, k):
     """Whether a node is a Bezier piece, and not several spans."""
-    return ints[NODE_INTS * k + LAST] - ints[NODE_INTS * k + FIRST] == 1
+    links = curve_node_links_at(ints, NODE_INTS * k)
+    return links.last - links.first == 1
 
 
 @kernel(inline=True)
@@ -145,14 +152,15 @@ def size_of(ints, nodes, stride, k):
     """Length of a piece, or half the diagonal of the box of several."""
     o = stride * k
     if is_piece(ints, k):
-        return nodes[o + SPEED]
+        return curve_node_at(nodes, o).speed
     return 2.0 * length(three(nodes, o + BOX_HALF))
 
 
 @kernel(inline=True)
 def evaluation_error(record, pool):
     """How far an evaluated point may be from the packed curve (see `proven_minimum`)."""
-    return (1.0 + record[RATIONAL]) * (8.0 * record[DEGREE] + 16.0) * UNIT * pool[REACH]
+    curve = bezier_curve_at(record, 0)
+    return (1.0 + curve.rational) * (8.0 * curve.degree + 16.0) * UNIT * bezier_head_at(pool, 0).reach
 
 
 @kernel(inner=True, exact=True)
@@ -162,62 +170,81 @@ def proven_minimum(ra, qa, a, o, rb, qb, b, p, shift, error, lambda_a, lambda_b,
     Horner's rule multiplies the term i by at most 6 n + 10 rounded factors, all terms are positive multiples of control
     points: a point has an error below (6 n + 10) u REACH, a derivative the same part of n times the largest difference.
     """
+    node = curve_node_at(a, o)
+    node_record = curve_node_at(b, p)
+    curve = bezier_curve_at(ra, 0)
+    head = bezier_head_at(qa, 0)
+    curve_record = bezier_curve_at(rb, 0)
+    pool_head = bezier_head_at(qb, 0)
     u, du, _hu = node_derivatives(ra, qa, a, o, x)
     v, dv, _hv = node_derivatives(rb, qb, b, p, y)
     d = difference(u, v, shift)
     far = length(d)
     size = 16.0 * UNIT * far
     gx = dot(d, du)
-    speed_a = a[o + SPEED]
-    speed_b = b[p + SPEED]
-    ea = (16.0 * ra[DEGREE] + 40.0) * UNIT * (speed_a + 2.0 * ra[RATIONAL] * ra[DEGREE] * qa[REACH] * qa[WEIGHT_RATIO])
-    eb = (16.0 * rb[DEGREE] + 40.0) * UNIT * (speed_b + 2.0 * rb[RATIONAL] * rb[DEGREE] * qb[REACH] * qb[WEIGHT_RATIO])
+    speed_a = node.speed
+    speed_b = node_record.speed
+    ea = (
+        (16.0 * curve.degree + 40.0)
+        * UNIT
+        * (speed_a + 2.0 * curve.rational * curve.degree * head.reach * head.weight_ratio)
+    )
+    eb = (
+        (16.0 * curve_record.degree + 40.0)
+        * UNIT
+        * (speed_b + 2.0 * curve_record.rational * curve_record.degree * pool_head.reach * pool_head.weight_ratio)
+    )
     change = least_change(gx, (error + size) * (speed_a + ea) + far * ea, lambda_a, x, 1.0 - x)
-    if rb[DEGREE] > 0:
+    if curve_record.degree > 0:
         change += least_change(-dot(d, dv), (error + size) * (speed_b + eb) + far * eb, lambda_b, y, 1.0 - y)
     near = max(far - size - error, 0.0)
     square = near * near + 2.0 * change * (1.0 + 1e-12)
     lower = math.sqrt(square) * (1.0 - 8.0 * UNIT) if square > 0.0 else 0.0
-    return lower - a[o + AWAY] - b[p + AWAY], far + size + error + a[o + AWAY] + b[p + AWAY]
+    return lower - node.away - node_record.away, far + size + error + node.away + node_record.away
 
 
 @kernel(inner=True)
 def keep(ra, qa, ia, a, ka, rb, qb, ib, b, kb, x, y, upper, out):
     """Write nearest points that are known: the points at (x, y) of two nodes."""
+    answer = curve_answer_at(out, 0)
     o = node_stride(ra) * ka
     p = node_stride(rb) * kb
-    out[UPPER] = upper
-    out[PARAMETER_A] = parameter(ra, qa, ia, a, ka, o, x)
-    out[PARAMETER_B] = parameter(rb, qb, ib, b, kb, p, y)
+    answer.upper = upper
+    answer.parameter_a = parameter(ra, qa, ia, a, ka, o, x)
+    answer.parameter_b = parameter(rb, qb, ib, b, kb, p, y)
     u = node_point(ra, qa, a, o, x)
     v = node_point(rb, qb, b, p, y)
     for j in range(3):
-        out[POINT_A + j] = u[j] + qa[CENTER + j]
-        out[POINT_B + j] = v[j] + qb[CENTER + j]
+        answer.point_a[j] = u[j] + bezier_head_at(qa, 0).center[j]
+        answer.point_b[j] = v[j] + bezier_head_at(qb, 0).center[j]
 
 
 @kernel(inner=True)
 def keep_starts(ra, qa, rb, qb, shift, out):
     """Write the first points of both curves as the nearest that are known; their distance, rounded up."""
-    o = ra[PIECES]
-    p = rb[PIECES]
+    curve = bezier_curve_at(ra, 0)
+    curve_record = bezier_curve_at(rb, 0)
+    answer = curve_answer_at(out, 0)
+    o = curve.pieces
+    p = curve_record.pieces
     wa = 1.0 / qa[o + 3]
     wb = 1.0 / qb[p + 3]
     u = (wa * qa[o], wa * qa[o + 1], wa * qa[o + 2])
     v = (wb * qb[p], wb * qb[p + 1], wb * qb[p + 2])
-    out[PARAMETER_A] = qa[ra[BREAKS]]
-    out[PARAMETER_B] = qb[rb[BREAKS]]
+    answer.parameter_a = qa[curve.breaks]
+    answer.parameter_b = qb[curve_record.breaks]
     for j in range(3):
-        out[POINT_A + j] = u[j] + qa[CENTER + j]
-        out[POINT_B + j] = v[j] + qb[CENTER + j]
+        answer.point_a[j] = u[j] + bezier_head_at(qa, 0).center[j]
+        answer.point_b[j] = v[j] + bezier_head_at(qb, 0).center[j]
     return length(difference(u, v, shift)) * (1.0 + 16.0 * UNIT)
 
 
 @kernel(inline=True)
 def parameter(record, pool, ints, nodes, k, o, x):
     """The curve's parameter of a place on a node."""
-    at = record[BREAKS] + ints[NODE_INTS * k + FIRST]
-    u = nodes[o + BEGIN] + x * (nodes[o + END] - nodes[o + BEGIN])
+    node = curve_node_at(nodes, o)
+    at = bezier_curve_at(record, 0).breaks + curve_node_links_at(ints, NODE_INTS * k).first
+    u = node.begin + x * (node.end - node.begin)
     return in_span(pool, at, u)
 
 
@@ -237,7 +264,9 @@ def meeting_proven(ra, qa, a, o, rb, qb, b, p, shift, error, x, y):
     (Brouwer), a zero of D, if |J^-1| (|D| + (sup |a''| + sup |b''|) r^2 + rounding) <= r. D may be any continuous
     function within the error, the given curves' among them.
     """
-    if rb[DEGREE] == 0:
+    node = curve_node_at(a, o)
+    node_record = curve_node_at(b, p)
+    if bezier_curve_at(rb, 0).degree == 0:
         return False
     u, du, _hu = node_derivatives(ra, qa, a, o, x)
     v, dv, _hv = node_derivatives(rb, qb, b, p, y)
@@ -247,8 +276,8 @@ def meeting_proven(ra, qa, a, o, rb, qb, b, p, shift, error, x, y):
         return False
     # The rows of the inverse are at most this long.
     inverse = max(length(du), length(dv)) / det
-    far = length(d) * (1.0 + 16.0 * UNIT) + error + a[o + AWAY] + b[p + AWAY]
-    bend = length(three(a, o + A2)) + a[o + E2] + length(three(b, p + A2)) + b[p + E2]
+    far = length(d) * (1.0 + 16.0 * UNIT) + error + node.away + node_record.away
+    bend = length(three(a, o + A2)) + node.e2 + length(three(b, p + A2)) + node_record.e2
     r = min(min(x, 1.0 - x), min(y, 1.0 - y))
     if bend * inverse * r > 0.25:
         r = 0.25 / (bend * inverse)
@@ -259,16 +288,24 @@ def meeting_proven(ra, qa, a, o, rb, qb, b, p, shift, error, x, y):
 @kernel(signatures="(i8[::1], f8[::1], i8[::1], f8[::1], f8, f8, i8, b1, b1, f8[::1])", allocates=True)
 def curve_distance(ra, qa, rb, qb, tolerance, clearance, budget, polish, plane, out):
     """Bounds of the distance of two packed curves; a clearance below zero asks for the distance itself."""
-    shift = (qb[CENTER] - qa[CENTER], qb[CENTER + 1] - qa[CENTER + 1], qb[CENTER + 2] - qa[CENTER + 2])
+    head = bezier_head_at(qb, 0)
+    pool_head = bezier_head_at(qa, 0)
+    curve = bezier_curve_at(rb, 0)
+    answer = curve_answer_at(out, 0)
+    shift = (
+        head.center[0] - pool_head.center[0],
+        head.center[1] - pool_head.center[1],
+        head.center[2] - pool_head.center[2],
+    )
     # Of the sums that lead to a difference of two points; the last number is for what underflows.
-    slack = 8.0 * UNIT * (qa[REACH] + qb[REACH] + length(shift)) + 1e-150
+    slack = 8.0 * UNIT * (pool_head.reach + head.reach + length(shift)) + 1e-150
     error = slack + evaluation_error(ra, qa) + evaluation_error(rb, qb)
     # Nothing closer than this can be told apart.
-    step = max(0.999 * tolerance, 8.0 * (error + qa[ERROR] + qb[ERROR]))
+    step = max(0.999 * tolerance, 8.0 * (error + pool_head.error + head.error))
     sa = node_stride(ra)
     sb = node_stride(rb)
     room_a = _ROOM
-    room_b = _ROOM if rb[DEGREE] > 0 else 2
+    room_b = _ROOM if curve.degree > 0 else 2
     room = _ROOM
     a = np.empty(room_a * sa)
     b = np.empty(room_b * sb)
@@ -282,8 +319,8 @@ def curve_distance(ra, qa, rb, qb, tolerance, clearance, budget, polish, plane, 
     used_a = 1
     used_b = 1
     count = 0
-    upper = keep_starts(ra, qa, rb, qb, shift, out) + error + qa[ERROR] + qb[ERROR]
-    out[UPPER] = upper
+    upper = keep_starts(ra, qa, rb, qb, shift, out) + error + pool_head.error + head.error
+    answer.upper = upper
     let_go = math.inf
     bounded = 0
     status = CONVERGED
@@ -300,9 +337,9 @@ def curve_distance(ra, qa, rb, qb, tolerance, clearance, budget, polish, plane, 
             jb = kb
             if halves == 2:
                 if split_a:
-                    ja = ia[NODE_INTS * ka + LEFT] + half
+                    ja = curve_node_links_at(ia, NODE_INTS * ka).left + half
                 else:
-                    jb = ib[NODE_INTS * kb + LEFT] + half
+                    jb = curve_node_links_at(ib, NODE_INTS * kb).left + half
             oa = sa * ja
             ob = sb * jb
             bounded += 1
@@ -334,7 +371,7 @@ def curve_distance(ra, qa, rb, qb, tolerance, clearance, budget, polish, plane, 
         piece_a = is_piece(ia, ka)
         piece_b = is_piece(ib, kb)
         if piece_a and piece_b:
-            away = a[oa + AWAY] + b[ob + AWAY]
+            away = curve_node_at(a, oa).away + curve_node_at(b, ob).away
             low, x, y = model_bound(a, oa, b, ob, shift, slack)
             x += 0.5
             y += 0.5
@@ -365,22 +402,26 @@ def curve_distance(ra, qa, rb, qb, tolerance, clearance, budget, polish, plane, 
                 continue
         # Halve the longer one.
         long_a = size_of(ia, a, sa, ka)
-        long_b = size_of(ib, b, sb, kb) if rb[DEGREE] > 0 else -1.0
+        long_b = size_of(ib, b, sb, kb) if curve.degree > 0 else -1.0
         split_a = long_a >= long_b
         if piece_a != piece_b:
             split_a = piece_b
-        if max(long_a, long_b) <= step or max(ia[NODE_INTS * ka + DEPTH], ib[NODE_INTS * kb + DEPTH]) >= _DEEPEST:
+        if (
+            max(long_a, long_b) <= step
+            or max(curve_node_links_at(ia, NODE_INTS * ka).depth, curve_node_links_at(ib, NODE_INTS * kb).depth)
+            >= _DEEPEST
+        ):
             let_go = min(let_go, key)
             continue
         if split_a:
-            if ia[NODE_INTS * ka + LEFT] < 0:
+            if curve_node_links_at(ia, NODE_INTS * ka).left < 0:
                 if used_a + 2 > room_a:
                     room_a *= 4
                     a = longer(a, room_a * sa)
                     ia = longer(ia, room_a * NODE_INTS)
                 split_node(ra, qa, ia, a, ka, used_a)
                 used_a += 2
-        elif ib[NODE_INTS * kb + LEFT] < 0:
+        elif curve_node_links_at(ib, NODE_INTS * kb).left < 0:
             if used_b + 2 > room_b:
                 room_b *= 4
                 b = longer(b, room_b * sb)
@@ -393,6 +434,6 @@ def curve_distance(ra, qa, rb, qb, tolerance, clearance, budget, polish, plane, 
             first = longer(first, room)
             second = longer(second, room)
         halves = 2
-    out[LOWER] = 0.0 if status == MEETING else max(min(top, upper), 0.0)
-    out[COUNT] = bounded
+    answer.lower = 0.0 if status == MEETING else max(min(top, upper), 0.0)
+    answer.count = bounded
     return status

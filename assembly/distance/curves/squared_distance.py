@@ -14,21 +14,39 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
+from assembly._record import place_of, record_dtype, record_view, size_of
 from assembly.distance.curves.bounds import least_change
 from assembly.distance.curves.nodes import length
-from assembly.geometry.splines.bezier_pieces import DEGREE, PIECES, RATIONAL, SQUARES, UNIT
+from assembly.geometry.splines.bezier_pieces import UNIT, bezier_curve_at
 from assembly.geometry.vec import dot
 
 # One interval: error of the coefficients, of the two at its low and at its high end, its ends, its depth, then q and v.
-ERROR_ALL, ERROR_LOW, ERROR_HIGH, LOW, HIGH, CUTS, SQUARE = 0, 1, 2, 3, 4, 5, 6
+INTERVAL_RECORD = record_dtype(
+    "f8",
+    error_all=1,
+    error_low=1,
+    error_high=1,
+    low=1,
+    high=1,
+    cuts=1,
+)
+interval_at = record_view(INTERVAL_RECORD)
+ERROR_LOW = place_of(INTERVAL_RECORD, "error_low")
+ERROR_HIGH = place_of(INTERVAL_RECORD, "error_high")
+LOW = place_of(INTERVAL_RECORD, "low")
+HIGH = place_of(INTERVAL_RECORD, "high")
+CUTS = place_of(INTERVAL_RECORD, "cuts")
+SQUARE = size_of(INTERVAL_RECORD)
 
 
 @kernel(inner=True, exact=True)
 def form_square(record, pool, span, p, reach, work):
     """q and v on a span as the interval 0."""
-    n = record[DEGREE]
+    interval = interval_at(work, 0)
+    curve = bezier_curve_at(record, 0)
+    n = curve.degree
     m = 2 * n + 1
-    s = record[SQUARES] + 5 * m * span
+    s = curve.squares + 5 * m * span
     pp = dot(p, p)
     px = 2.0 * p[0]
     py = 2.0 * p[1]
@@ -37,16 +55,16 @@ def form_square(record, pool, span, p, reach, work):
         v = pool[s + 4 * m + k]
         q = pool[s + k] - (px * pool[s + m + k] + py * pool[s + 2 * m + k] + pz * pool[s + 3 * m + k]) + pp * v
         work[SQUARE + k] = q
-    if record[RATIONAL] == 1:
+    if curve.rational == 1:
         for k in range(m):
             work[SQUARE + m + k] = pool[s + 4 * m + k]
     error = (4.0 * n + 32.0) * UNIT * reach * reach
-    work[ERROR_ALL] = error
-    work[LOW] = 0.0
-    work[HIGH] = 1.0
-    work[CUTS] = 0.0
+    interval.error_all = error
+    interval.low = 0.0
+    interval.high = 1.0
+    interval.cuts = 0.0
     # Ends anew: Y_0.Y_0 and Y_0.Y_1 are the coefficients themselves.
-    rows = record[PIECES] + 4 * (n + 1) * span
+    rows = curve.pieces + 4 * (n + 1) * span
     for end in range(2):
         i = rows + 4 * n * end
         j = i + 4 - 8 * end
@@ -64,19 +82,21 @@ def form_square(record, pool, span, p, reach, work):
 @kernel(inner=True, exact=True)
 def least_quotient(record, work, o):
     """min (q_k / v_k - error), and its k."""
-    n = record[DEGREE]
+    interval = interval_at(work, o)
+    curve = bezier_curve_at(record, 0)
+    n = curve.degree
     m = 2 * n + 1
     s = o + SQUARE
-    rational = record[RATIONAL] == 1
+    rational = curve.rational == 1
     at = 0
-    e = work[o + ERROR_LOW]
+    e = interval.error_low
     least = (work[s] / work[s + m] if rational else work[s]) - e
     k = 1
     value = (work[s + k] / work[s + m + k] if rational else work[s + k]) - e
     if value < least:
         least = value
         at = k
-    e = work[o + ERROR_HIGH]
+    e = interval.error_high
     for k in range(m - 2, m):
         value = (work[s + k] / work[s + m + k] if rational else work[s + k]) - e
         if value < least:
@@ -87,26 +107,29 @@ def least_quotient(record, work, o):
         value = work[s + k] / work[s + m + k] if rational else work[s + k]
         if value < inner:
             inner = value
-            if value - work[o + ERROR_ALL] < least:
+            if value - interval.error_all < least:
                 at = k
-    return min(least, inner - work[o + ERROR_ALL]), at
+    return min(least, inner - interval.error_all), at
 
 
 @kernel(inner=True, exact=True)
 def cut(record, work, o, x, reach):
     """Cut the interval at o in two at its own x in (0, 1): the high part stays there, the low part comes behind it."""
-    n = record[DEGREE]
+    interval = interval_at(work, o)
+    curve = bezier_curve_at(record, 0)
+    n = curve.degree
     m = 2 * n + 1
-    rational = record[RATIONAL]
+    rational = curve.rational
     low = o + SQUARE + m * (1 + rational)
+    interval_record = interval_at(work, low)
     s = o + SQUARE
     # The two coefficients at an end are combined with one another alone.
     v = min(work[s + m], work[s + m + 1]) if rational == 1 else 1.0
-    work[low + ERROR_LOW] = work[o + ERROR_LOW] + 4.0 * UNIT * (abs(work[s]) + abs(work[s + 1])) / v
+    interval_record.error_low = interval.error_low + 4.0 * UNIT * (abs(work[s]) + abs(work[s + 1])) / v
     v = min(work[s + 2 * m - 1], work[s + 2 * m - 2]) if rational == 1 else 1.0
-    work[o + ERROR_HIGH] += 4.0 * UNIT * (abs(work[s + m - 1]) + abs(work[s + m - 2])) / v
-    work[o + ERROR_ALL] += 16.0 * n * UNIT * reach * reach
-    work[low + ERROR_ALL] = work[o + ERROR_ALL]
+    interval.error_high += 4.0 * UNIT * (abs(work[s + m - 1]) + abs(work[s + m - 2])) / v
+    interval.error_all += 16.0 * n * UNIT * reach * reach
+    interval_record.error_all = interval.error_all
     rest = 1.0 - x
     for part in range(1 + rational):
         s = o + SQUARE + m * part
@@ -115,19 +138,20 @@ def cut(record, work, o, x, reach):
             work[t + r] = work[s]
             for k in range(m - 1 - r):
                 work[s + k] = rest * work[s + k] + x * work[s + k + 1]
-    middle = work[o + LOW] + x * (work[o + HIGH] - work[o + LOW])
-    work[low + LOW] = work[o + LOW]
-    work[low + HIGH] = middle
-    work[o + LOW] = middle
-    work[o + CUTS] += 1.0
-    work[low + CUTS] = work[o + CUTS]
+    middle = interval.low + x * (interval.high - interval.low)
+    interval_record.low = interval.low
+    interval_record.high = middle
+    interval.low = middle
+    interval.cuts += 1.0
+    interval_record.cuts = interval.cuts
     return low
 
 
 @kernel(inner=True, exact=True)
 def mend(record, work, o, low, w, e, d, dw, error, reach):
     """The coefficients beside a cut anew, from the weight, D = C - p, C' and w' there."""
-    n = record[DEGREE]
+    curve = bezier_curve_at(record, 0)
+    n = curve.degree
     m = 2 * n + 1
     far = length(e)
     # Y = w D, Y' = w C' + w' D.
@@ -139,10 +163,11 @@ def mend(record, work, o, low, w, e, d, dw, error, reach):
     rough = (16.0 * n + 40.0) * UNIT * 2.0 * n * reach
     for side in range(2):
         a = o if side == 0 else low
-        width = (work[a + HIGH] - work[a + LOW]) * (1.0 - 2.0 * side) / n
+        interval = interval_at(work, a)
+        width = (interval.high - interval.low) * (1.0 - 2.0 * side) / n
         k = 0 if side == 0 else m - 1
         j = 1 if side == 0 else m - 2
-        v = work[a + SQUARE + m + j] if record[RATIONAL] == 1 else 1.0
+        v = work[a + SQUARE + m + j] if curve.rational == 1 else 1.0
         work[a + SQUARE + k] = square
         work[a + SQUARE + j] = square + slope * width
         wrong = w * w * (2.0 * far + error) * error + abs(width) * w * (far * rough + error * (speed + rough))
@@ -156,10 +181,12 @@ def convex_least(record, work, o, x, w, e, d, dw, error, reach):
 
     With h = q - |D(x)|^2 v, h(x) = 0 and h'' >= lambda there: |C - p|^2 >= |D|^2 + (h' d + lambda d^2 / 2) / v.
     """
-    n = record[DEGREE]
+    interval = interval_at(work, o)
+    curve = bezier_curve_at(record, 0)
+    n = curve.degree
     m = 2 * n + 1
     s = o + SQUARE
-    rational = record[RATIONAL] == 1
+    rational = curve.rational == 1
     square = dot(e, e)
     bend = math.inf
     least_v = 1.0
@@ -177,11 +204,11 @@ def convex_least(record, work, o, x, w, e, d, dw, error, reach):
     else:
         for k in range(2, m):
             bend = min(bend, (work[s + k] - work[s + k - 1]) - (work[s + k - 1] - work[s + k - 2]))
-    wrong = max(work[o + ERROR_ALL], work[o + ERROR_LOW], work[o + ERROR_HIGH])
+    wrong = max(interval.error_all, interval.error_low, interval.error_high)
     curvature = 2.0 * n * (2.0 * n - 1.0) * (bend - 4.0 * wrong - 64.0 * UNIT * reach * reach)
     if not curvature > 0.0:
         return -1.0
-    width = work[o + HIGH] - work[o + LOW]
+    width = interval.high - interval.low
     far = length(e)
     # w C' = X' - w' C with X' and w' off by parts of n times the largest differences; twice that for what follows.
     rough = (32.0 * n + 80.0) * UNIT * 2.0 * n
@@ -189,7 +216,7 @@ def convex_least(record, work, o, x, w, e, d, dw, error, reach):
     doubt = far * (rough * (reach + far) + abs(dw) * error) + error * (w * length(d) + rough * reach)
     doubt += (4.0 * far * error + 32.0 * UNIT * square) * (abs(dw) + rough)
     doubt = 4.0 * width * w * doubt + 64.0 * UNIT * abs(slope)
-    part = (x - work[o + LOW]) / width
+    part = (x - interval.low) / width
     change = least_change(slope, doubt, curvature, part, 1.0 - part)
     near = max(far * (1.0 - 16.0 * UNIT) - error, 0.0)
     return near * near * (1.0 - 8.0 * UNIT) + change / least_v * (1.0 + 1e-12)

@@ -23,11 +23,24 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
+from assembly._record import place_of, record_dtype, record_view, size_of
 from assembly.geometry.expression import formula
-from assembly.geometry.expression.formula import arc_bound, point_bounds, range_bounds, refine
+from assembly.geometry.expression.formula import (
+    arc_bound,
+    formula_at,
+    formula_head_at,
+    point_bounds,
+    range_bounds,
+    refine,
+)
 from assembly.geometry.interval import _GROW, UNIT, down, middle_of, most, off_of, up
 from assembly.geometry.splines import bezier_ranges
-from assembly.geometry.splines.bezier_ranges import bezier_point_bounds, bezier_range_bounds
+from assembly.geometry.splines.bezier_ranges import (
+    bezier_point_bounds,
+    bezier_range_bounds,
+    range_room_at,
+    ranged_curve_at,
+)
 
 # Kinds of operands.
 HULL, FORMULA, BEZIER = 0, 1, 2
@@ -36,10 +49,61 @@ AUTO, ELLIPSOID, CAPSULE, TAYLOR = 0, 1, 2, 3
 # Record of a piece: its interval, ends and middle point and how far these may be off, the width, the length of the
 # ellipsoid, the radius of the capsule, the Bezier piece, ranges (twelve pairs), values in the middle (nine pairs), and
 # whether its ends are ends of a smooth part of the curve.
-T0, T1, P0, P1, PM, OFF, WIDE, LENGTH, RADIUS, SPAN, BOX = 0, 1, 2, 5, 8, 11, 12, 13, 14, 15, 16
-SPEED, BEND, JERK, MID, MID_SPEED, MID_BEND, FIRST_END, LAST_END = 22, 28, 34, 40, 46, 52, 58, 59
 # How far the first end, the last and the middle may be off, each by itself; OFF is the largest.
-OFF_0, OFF_1, OFF_MID, PIECE = 60, 61, 62, 63
+PIECE_RECORD = record_dtype(
+    "f8",
+    t0=1,
+    t1=1,
+    p0=3,
+    p1=3,
+    pm=3,
+    off=1,
+    wide=1,
+    length=1,
+    radius=1,
+    span=1,
+    box=6,
+    speed=6,
+    bend=6,
+    jerk=6,
+    mid=6,
+    mid_speed=6,
+    mid_bend=6,
+    first_end=1,
+    last_end=1,
+    off_0=1,
+    off_1=1,
+    off_mid=1,
+)
+enclosed_piece_at = record_view(PIECE_RECORD)
+T0 = place_of(PIECE_RECORD, "t0")
+T1 = place_of(PIECE_RECORD, "t1")
+P0 = place_of(PIECE_RECORD, "p0")
+P1 = place_of(PIECE_RECORD, "p1")
+PM = place_of(PIECE_RECORD, "pm")
+OFF = place_of(PIECE_RECORD, "off")
+WIDE = place_of(PIECE_RECORD, "wide")
+LENGTH = place_of(PIECE_RECORD, "length")
+RADIUS = place_of(PIECE_RECORD, "radius")
+SPAN = place_of(PIECE_RECORD, "span")
+BOX = place_of(PIECE_RECORD, "box")
+SPEED = place_of(PIECE_RECORD, "speed")
+BEND = place_of(PIECE_RECORD, "bend")
+JERK = place_of(PIECE_RECORD, "jerk")
+MID = place_of(PIECE_RECORD, "mid")
+MID_BEND = place_of(PIECE_RECORD, "mid_bend")
+FIRST_END = place_of(PIECE_RECORD, "first_end")
+LAST_END = place_of(PIECE_RECORD, "last_end")
+OFF_0 = place_of(PIECE_RECORD, "off_0")
+OFF_MID = place_of(PIECE_RECORD, "off_mid")
+PIECE = size_of(PIECE_RECORD)
+
+
+@kernel(inline=True)
+def copy_values(source, at, target, to):
+    """The nine pairs of C, C' and C'' at source[at:] to target[to:]."""
+    for k in range(18):
+        target[to + k] = source[at + k]
 
 
 @kernel(inner=True, exact=True)
@@ -47,47 +111,55 @@ def point_values(kind, table, pool, span, t, room, out, o):
     """Intervals of C, C', C'' at t to out[o:], nine pairs."""
     if kind == FORMULA:
         point_bounds(table, pool, t, room)
-        for k in range(18):
-            out[o + k] = room[formula.RESULTS + k]
+        copy_values(room, formula.RESULTS, out, o)
     else:
         at = bezier_ranges.BEZIER_AT
         bezier_point_bounds(table, pool, span, t, room, at)
-        for k in range(18):
-            out[o + k] = room[at + k]
+        copy_values(room, at, out, o)
+
+
+@kernel(inline=True)
+def set_ranges(piece, room, at):
+    """The ranges of C and of its three derivatives, six numbers each, from room[at:]."""
+    for k in range(6):
+        piece.box[k] = room[at + k]
+        piece.speed[k] = room[at + 6 + k]
+        piece.bend[k] = room[at + 12 + k]
+        piece.jerk[k] = room[at + 18 + k]
 
 
 @kernel(inner=True, exact=True)
 def fill_piece(kind, table, pool, room, x, o):
     """All of the record at x[o:] from its interval, its ends with how far these may be off, and its Bezier piece."""
-    t0 = x[o + T0]
-    t1 = x[o + T1]
+    piece = enclosed_piece_at(x, o)
+    work = range_room_at(room, 0)
+    t0 = piece.t0
+    t1 = piece.t1
     middle = 0.5 * (t0 + t1)
-    span = int(x[o + SPAN])
+    span = int(piece.span)
     point_values(kind, table, pool, span, middle, room, x, o + MID)
     for k in range(3):
-        x[o + PM + k] = middle_of(x, o + MID, k)
-    x[o + OFF_MID] = off_of(x, o + MID)
-    x[o + OFF] = max(x[o + OFF_0], max(x[o + OFF_1], x[o + OFF_MID]))
+        piece.pm[k] = middle_of(x, o + MID, k)
+    piece.off_mid = off_of(x, o + MID)
+    piece.off = max(piece.off_0, max(piece.off_1, piece.off_mid))
     width = math.inf
     arc = math.inf
     if kind == FORMULA:
         range_bounds(table, pool, t0, t1, room)
-        for k in range(24):
-            x[o + BOX + k] = room[formula.RESULTS + k]
-        if table[formula.ARC_TAPE] != 0:
+        set_ranges(piece, room, formula.RESULTS)
+        if formula_at(table, 0).arc_tape != 0:
             arc = arc_bound(table, pool, t0, t1, room)
     else:
         bezier_range_bounds(table, pool, span, t0, t1, room)
-        for k in range(24):
-            x[o + BOX + k] = room[bezier_ranges.RANGES + k]
-        width = room[bezier_ranges.WIDTH]
+        set_ranges(piece, room, 0)
+        width = work.width
     refine(x, o + BOX, up(max(middle - t0, t1 - middle)), o + MID)
     step = up(t1 - t0)
     bend = most(x, o + BEND)
-    x[o + RADIUS] = _GROW * 0.125 * step * step * bend
-    a = x[o + P1] - x[o + P0]
-    b = x[o + P1 + 1] - x[o + P0 + 1]
-    c = x[o + P1 + 2] - x[o + P0 + 2]
+    piece.radius = _GROW * 0.125 * step * step * bend
+    a = piece.p1[0] - piece.p0[0]
+    b = piece.p1[1] - piece.p0[1]
+    c = piece.p1[2] - piece.p0[2]
     chord = math.sqrt(a * a + b * b + c * c)
     if width == math.inf:
         # 1 / sqrt 12 and 1 / sqrt 320, rounded up.
@@ -96,37 +168,39 @@ def fill_piece(kind, table, pool, room, x, o):
         root = _GROW * step * step * root
         width = _GROW * root * root
         arc = min(arc, _GROW * step * most(x, o + SPEED))
-        least = max(0.0, chord * (1.0 - 8.0 * UNIT) - 2.0 * x[o + OFF])
+        least = max(0.0, chord * (1.0 - 8.0 * UNIT) - 2.0 * piece.off)
         across = arc - least if arc > least else 0.0
         # u^2 - |chi|^2 as a product: sums of squares would cancel once more.
         other = _GROW * across * (arc + least) if arc < math.inf else math.inf
         width = min(width, other)
     if not (width < math.inf):
         width = math.inf
-    x[o + WIDE] = width
-    x[o + LENGTH] = math.sqrt(width + chord * chord)
+    piece.wide = width
+    piece.length = math.sqrt(width + chord * chord)
 
 
 @kernel(inner=True, exact=True)
 def split_piece(kind, table, pool, room, x, o, p):
     """Both halves of the piece at x[o:] to x[p:] and behind it. Returns whether doubles can tell the halves apart."""
-    t0 = x[o + T0]
-    t1 = x[o + T1]
+    piece = enclosed_piece_at(x, o)
+    t0 = piece.t0
+    t1 = piece.t1
     middle = 0.5 * (t0 + t1)
     if not (t0 < middle < t1):
         return False
     for side in range(2):
         q = p + PIECE * side
-        x[q + T0] = t0 if side == 0 else middle
-        x[q + T1] = middle if side == 0 else t1
+        piece_record = enclosed_piece_at(x, q)
+        piece_record.t0 = t0 if side == 0 else middle
+        piece_record.t1 = middle if side == 0 else t1
         for k in range(3):
-            x[q + P0 + k] = x[o + P0 + k] if side == 0 else x[o + PM + k]
-            x[q + P1 + k] = x[o + PM + k] if side == 0 else x[o + P1 + k]
-        x[q + OFF_0] = x[o + OFF_0] if side == 0 else x[o + OFF_MID]
-        x[q + OFF_1] = x[o + OFF_MID] if side == 0 else x[o + OFF_1]
-        x[q + SPAN] = x[o + SPAN]
-        x[q + FIRST_END] = x[o + FIRST_END] if side == 0 else 0.0
-        x[q + LAST_END] = 0.0 if side == 0 else x[o + LAST_END]
+            piece_record.p0[k] = piece.p0[k] if side == 0 else piece.pm[k]
+            piece_record.p1[k] = piece.pm[k] if side == 0 else piece.p1[k]
+        piece_record.off_0 = piece.off_0 if side == 0 else piece.off_mid
+        piece_record.off_1 = piece.off_mid if side == 0 else piece.off_1
+        piece_record.span = piece.span
+        piece_record.first_end = piece.first_end if side == 0 else 0.0
+        piece_record.last_end = 0.0 if side == 0 else piece.last_end
         fill_piece(kind, table, pool, room, x, q)
     return True
 
@@ -134,18 +208,20 @@ def split_piece(kind, table, pool, room, x, o, p):
 @kernel(inner=True, exact=True)
 def first_pieces(kind, table, pool, room, x):
     """Records of the smooth parts of a curve to x. Returns how many."""
-    count = 1 if kind == FORMULA else table[bezier_ranges.PIECES]
+    head = formula_head_at(pool, 0)
+    count = 1 if kind == FORMULA else ranged_curve_at(table, 0).pieces
     for i in range(count):
         o = PIECE * i
-        x[o + T0] = pool[formula.DOMAIN] if kind == FORMULA else 0.0
-        x[o + T1] = pool[formula.DOMAIN + 1] if kind == FORMULA else 1.0
-        x[o + SPAN] = i
-        x[o + FIRST_END] = 1.0
-        x[o + LAST_END] = 1.0
+        piece = enclosed_piece_at(x, o)
+        piece.t0 = head.domain[0] if kind == FORMULA else 0.0
+        piece.t1 = head.domain[1] if kind == FORMULA else 1.0
+        piece.span = i
+        piece.first_end = 1.0
+        piece.last_end = 1.0
         for side in range(2):
             point_values(kind, table, pool, i, x[o + T0 + side], room, x, o + MID)
             for k in range(3):
-                x[o + P0 + 3 * side + k] = middle_of(x, o + MID, k)
+                (piece.p0 if side == 0 else piece.p1)[k] = middle_of(x, o + MID, k)
             x[o + OFF_0 + side] = off_of(x, o + MID)
         fill_piece(kind, table, pool, room, x, o)
     return count
@@ -173,27 +249,28 @@ def hull_support(x, o, count, n, c):
 @kernel(inner=True, exact=True)
 def piece_support(x, o, n, c, bound):
     """Upper bound of n.(C - c) over a piece, |n| at most 1 up to 2 units, by a kind of enclosure."""
+    piece = enclosed_piece_at(x, o)
     f0, e0 = along(x, o + P0, n, c)
     f1, e1 = along(x, o + P1, n, c)
-    slack = x[o + OFF] * _GROW + e0 + e1
+    slack = piece.off * _GROW + e0 + e1
     d = f1 - f0
     best = math.inf
     # That of the box alone, which does not rest on points.
     boxed = math.inf
     if bound == AUTO or bound == ELLIPSOID:
         # Ends that are off by OFF change both the center and the chord; each by less than OFF in the sum below.
-        best = 0.5 * (f0 + f1) + _GROW * 0.5 * math.sqrt(x[o + WIDE] * _GROW + d * d) + slack
+        best = 0.5 * (f0 + f1) + _GROW * 0.5 * math.sqrt(piece.wide * _GROW + d * d) + slack
     if bound == CAPSULE:
-        best = max(f0, f1) + x[o + RADIUS] * _GROW
+        best = max(f0, f1) + piece.radius * _GROW
     if bound == AUTO or bound == TAYLOR:
         least = 0.0
         for k in range(3):
             if n[k] == 0.0:  # times infinity it would be no number
                 continue
-            p = n[k] * x[o + BEND + 2 * k]
-            q = n[k] * x[o + BEND + 2 * k + 1]
+            p = n[k] * piece.bend[2 * k]
+            q = n[k] * piece.bend[2 * k + 1]
             least += min(p, q) - UNIT * 4.0 * max(abs(p), abs(q)) - 1e-300
-        step = up(x[o + T1] - x[o + T0])
+        step = up(piece.t1 - piece.t0)
         # q / 2 of the heading.
         bulge = _GROW * 0.5 * step * step * max(0.0, -least)
         if not (bulge < math.inf):
@@ -207,8 +284,8 @@ def piece_support(x, o, n, c, bound):
         for k in range(3):
             if n[k] == 0.0:
                 continue
-            p = n[k] * (x[o + BOX + 2 * k] - c[k])
-            q = n[k] * (x[o + BOX + 2 * k + 1] - c[k])
+            p = n[k] * (piece.box[2 * k] - c[k])
+            q = n[k] * (piece.box[2 * k + 1] - c[k])
             high += max(p, q) + UNIT * 4.0 * max(abs(p), abs(q))
         if high == high:
             boxed = high
@@ -221,12 +298,13 @@ def piece_support(x, o, n, c, bound):
 @kernel(inner=True, exact=True)
 def separation_along(xa, oa, xb, ob, count_b, n, bound):
     """Lower bound of the distance of two pieces, or of a piece and `count_b` points, from a direction of a to b."""
+    piece = enclosed_piece_at(xa, oa)
     size = math.sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2])
     if not (0.0 < size < math.inf):
         return 0.0
     n = (n[0] / size, n[1] / size, n[2] / size)
     back = (-n[0], -n[1], -n[2])
-    c = (xa[oa + PM], xa[oa + PM + 1], xa[oa + PM + 2])
+    c = (piece.pm[0], piece.pm[1], piece.pm[2])
     high_a = piece_support(xa, oa, n, c, bound)
     if count_b > 0:
         high_b = hull_support(xb, ob, count_b, back, c)
@@ -240,12 +318,13 @@ def separation_along(xa, oa, xb, ob, count_b, n, bound):
 @kernel(signatures="(i8, i8[::1], f8[::1], f8[::1], i8, f8, f8, f8[::1])")
 def enclose(kind, table, pool, room, span, t0, t1, x):
     """The record of the piece over [t0, t1], to x; of a smooth part `span` of the curve."""
-    x[T0], x[T1], x[SPAN] = t0, t1, span
-    x[FIRST_END], x[LAST_END] = 1.0, 1.0
+    piece = enclosed_piece_at(x, 0)
+    piece.t0, piece.t1, piece.span = t0, t1, span
+    piece.first_end, piece.last_end = 1.0, 1.0
     for side in range(2):
         point_values(kind, table, pool, span, x[T0 + side], room, x, MID)
         for k in range(3):
-            x[P0 + 3 * side + k] = middle_of(x, MID, k)
+            (piece.p0 if side == 0 else piece.p1)[k] = middle_of(x, MID, k)
         x[OFF_0 + side] = off_of(x, MID)
     fill_piece(kind, table, pool, room, x, 0)
 
@@ -253,9 +332,10 @@ def enclose(kind, table, pool, room, span, t0, t1, x):
 @kernel(signatures="(f8[::1], f8[:, ::1], i8, f8[::1])")
 def supports(x, directions, bound, out):
     """Upper bounds of n.C over the piece of a record for unit directions (k, 3)."""
+    piece = enclosed_piece_at(x, 0)
     for i in range(directions.shape[0]):
         n = (directions[i, 0], directions[i, 1], directions[i, 2])
-        c = (x[PM], x[PM + 1], x[PM + 2])
+        c = (piece.pm[0], piece.pm[1], piece.pm[2])
         shift = n[0] * c[0] + n[1] * c[1] + n[2] * c[2]
         size = abs(n[0] * c[0]) + abs(n[1] * c[1]) + abs(n[2] * c[2])
         out[i] = up(piece_support(x, 0, n, c, bound) + shift + 8.0 * UNIT * size)

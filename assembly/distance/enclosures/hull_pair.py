@@ -10,15 +10,11 @@ from assembly._kernel import kernel
 from assembly.distance.enclosures.enclosure import hull_support
 from assembly.distance.enclosures.gjk import INSIDE, ROOM, VERTEX, gjk, inside_weights, witnesses
 from assembly.distance.enclosures.node import (
-    COUNT,
-    MET,
     NEAR_BY,
-    POINT_A,
-    POINT_B,
     STATE,
-    UPPER,
     corner_around,
     inside_proven,
+    search_state_at,
 )
 from assembly.distance.enclosures.search import about_center
 from assembly.geometry.interval import UNIT, down, up
@@ -66,6 +62,7 @@ def overlap_proven(full, a, count_a, b, count_b, slack, g):
 @kernel(signatures="(i8, f8[::1], i8, f8[::1], i8, f8[::1])")
 def hull_distance(full, a, count_a, b, count_b, state):
     """What `search` of `distance/enclosures/search.py` answers, of two hulls."""
+    best = search_state_at(state, 0)
     g = np.zeros(ROOM)
     center = np.empty(3)
     for c in range(3):
@@ -83,7 +80,7 @@ def hull_distance(full, a, count_a, b, count_b, state):
         differences(g, kept)
         off = 4.0 * UNIT * (abs(g[0]) + abs(g[1]) + abs(g[2])) + slack
         if inside_proven(full, g, (0.0, 0.0, 0.0), off):
-            state[MET] = 1.0
+            best.met = 1.0
     else:
         x, y = witnesses(g, kept)
         size = math.sqrt(dot(v, v))
@@ -94,13 +91,13 @@ def hull_distance(full, a, count_a, b, count_b, state):
     d = sub(x, y)
     off = slack
     for c in range(3):
-        state[POINT_A + c] = x[c] + center[c]
-        state[POINT_B + c] = y[c] + center[c]
+        best.point_a[c] = x[c] + center[c]
+        best.point_b[c] = y[c] + center[c]
         off += 16.0 * UNIT * (abs(x[c]) + abs(y[c]))
-    if state[MET] == 0.0 and lower == 0.0:
+    if best.met == 0.0 and lower == 0.0:
         if overlap_proven(full, a, count_a, b, count_b, slack, g):
-            state[MET] = 1.0
-    state[UPPER] = up(math.sqrt(dot(d, d)) * (1.0 + 8.0 * UNIT) + off)
-    state[STATE - 1] = min(lower, state[UPPER])
-    state[COUNT] = 1.0
+            best.met = 1.0
+    best.upper = up(math.sqrt(dot(d, d)) * (1.0 + 8.0 * UNIT) + off)
+    state[STATE - 1] = min(lower, best.upper)
+    best.count = 1.0
     return how == INSIDE

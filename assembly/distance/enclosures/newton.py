@@ -10,7 +10,7 @@ from assembly.distance.enclosures.gjk import INSIDE, VERTEX, WEIGHTS, gjk, insid
 from assembly.geometry.expression import formula
 from assembly.geometry.expression.formula import formula_point
 from assembly.geometry.interval import UNIT
-from assembly.geometry.splines.bezier_ranges import BEZIER_AT, RATIONAL, piece_points, value
+from assembly.geometry.splines.bezier_ranges import BEZIER_AT, piece_points, ranged_curve_at, value
 from assembly.geometry.vec import blend, dot, sub
 
 _ROUNDS = 24
@@ -42,7 +42,7 @@ def local_point(kind, table, pool, span, t, room):
         value(pool, o, n, t, room, BEZIER_AT)
         w2 = room[BEZIER_AT + 3]
         dd = (room[BEZIER_AT], room[BEZIER_AT + 1], room[BEZIER_AT + 2])
-    if table[RATIONAL] == 0:
+    if ranged_curve_at(table, 0).rational == 0:
         return p, d, dd
     f = 1.0 / w
     p = (f * p[0], f * p[1], f * p[2])

@@ -9,19 +9,16 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
+from assembly._record import place_of, record_dtype, record_view, size_of
 from assembly.distance.enclosures.enclosure import (
     ELLIPSOID,
     FORMULA,
     HULL,
     MID,
-    OFF_MID,
     P0,
     PIECE,
-    PM,
-    SPAN,
-    T0,
-    T1,
-    WIDE,
+    copy_values,
+    enclosed_piece_at,
     point_values,
     separation_along,
 )
@@ -34,13 +31,38 @@ from assembly.distance.enclosures.taylor import (
     taylor_bound,
     turn_values,
 )
-from assembly.geometry.expression import formula
+from assembly.geometry.expression.formula import formula_head_at
 from assembly.geometry.interval import UNIT, middle_of, off_of, up
 from assembly.geometry.vec import add, cross, dot, scale, sub
 
 # What the best points are: their distance rounded up, parameters and pieces, points, whether a meeting is proven, the
 # number of pairs bounded, and how far vertices of a hull may be off.
-UPPER, AT_S, SPAN_A, AT_T, SPAN_B, POINT_A, POINT_B, MET, COUNT, SLACK, STATE = 0, 1, 2, 3, 4, 5, 8, 11, 12, 13, 16
+SEARCH_STATE = record_dtype(
+    "f8",
+    upper=1,
+    at_s=1,
+    span_a=1,
+    at_t=1,
+    span_b=1,
+    point_a=3,
+    point_b=3,
+    met=1,
+    count=1,
+    slack=1,
+    spare=2,
+)
+search_state_at = record_view(SEARCH_STATE)
+UPPER = place_of(SEARCH_STATE, "upper")
+AT_S = place_of(SEARCH_STATE, "at_s")
+SPAN_A = place_of(SEARCH_STATE, "span_a")
+AT_T = place_of(SEARCH_STATE, "at_t")
+SPAN_B = place_of(SEARCH_STATE, "span_b")
+POINT_A = place_of(SEARCH_STATE, "point_a")
+POINT_B = place_of(SEARCH_STATE, "point_b")
+MET = place_of(SEARCH_STATE, "met")
+COUNT = place_of(SEARCH_STATE, "count")
+SLACK = place_of(SEARCH_STATE, "slack")
+STATE = size_of(SEARCH_STATE)
 # Behind it: values at two parameters, a record across a feature, rows of the feature.
 VALUES, OTHER_VALUES, ACROSS, ROWS, SCRATCH = 16, 34, 52, 112, 128
 # Corners of a triangle and of a tetrahedron around zero, turned so that nothing made by hand is parallel to them, and
@@ -117,18 +139,19 @@ def meet_points(full, kb, points, count, a, off_a, b, off_b, state, g):
 
     A point that is proven inside the hull is noted.
     """
+    best = search_state_at(state, 0)
     kept = 0
-    off_a += state[SLACK]
+    off_a += best.slack
     if count > 1:
         b, kept, inside, off_b = hull_point(full, points, count, a, g)
         if inside and inside_proven(full, g, a, off_a):
-            state[MET] = 1.0
+            best.met = 1.0
             return 0.0, a, full
     d = sub(a, b)
     distance = math.sqrt(dot(d, d))
     if count > full and distance <= off_a + off_b:
         if surrounded(full, points, count, a, off_a, g):
-            state[MET] = 1.0
+            best.met = 1.0
             return 0.0, a, full
         # For what carries the point.
         b, kept, _inside, off_b = hull_point(full, points, count, a, g)
@@ -138,12 +161,13 @@ def meet_points(full, kb, points, count, a, off_a, b, off_b, state, g):
 @kernel(inner=True, exact=True)
 def note(state, distance, s, span_a, t, span_b, a, b):
     """Keep points that are nearer than the best."""
-    if distance < state[UPPER]:
-        state[UPPER] = distance
-        state[AT_S], state[SPAN_A], state[AT_T], state[SPAN_B] = s, span_a, t, span_b
+    best = search_state_at(state, 0)
+    if distance < best.upper:
+        best.upper = distance
+        best.at_s, best.span_a, best.at_t, best.span_b = s, span_a, t, span_b
         for k in range(3):
-            state[POINT_A + k] = a[k]
-            state[POINT_B + k] = b[k]
+            best.point_a[k] = a[k]
+            best.point_b[k] = b[k]
         return True
     return False
 
@@ -156,8 +180,7 @@ def note_parameters(full, ka, ta, pa, ra, kb, tb, pb, rb, count, s, span_a, t, s
     off_a = off_of(state, VALUES)
     if kb == HULL:
         if count == 1:
-            for k in range(18):
-                state[OTHER_VALUES + k] = xb[MID + k]
+            copy_values(xb, MID, state, OTHER_VALUES)
         b = (pb[0], pb[1], pb[2])
         off_b = 0.0
     else:
@@ -172,8 +195,9 @@ def note_parameters(full, ka, ta, pa, ra, kb, tb, pb, rb, count, s, span_a, t, s
 @kernel(inner=True, exact=True)
 def domain_of(kind, pool):
     """Parameters of a smooth part of a curve."""
+    head = formula_head_at(pool, 0)
     if kind == FORMULA:
-        return pool[formula.DOMAIN], pool[formula.DOMAIN + 1]
+        return head.domain[0], head.domain[1]
     return 0.0, (0.0 if kind == HULL else 1.0)
 
 
@@ -207,44 +231,45 @@ def bound_node(
     full, ka, ta, pa, ra, xa, oa, kb, tb, pb, rb, xb, ob, count, bound, polish, tolerance, clearance, state, zero, g
 ):
     """Lower bound of the distance of two pieces; better points go to the state. Infinite where no minimum is inside."""
-    state[COUNT] += 1.0
+    piece = enclosed_piece_at(xa, oa)
+    piece_record = enclosed_piece_at(xb, ob)
+    best = search_state_at(state, 0)
+    best.count += 1.0
     hull = count > 1
-    a = (xa[oa + PM], xa[oa + PM + 1], xa[oa + PM + 2])
-    b = (xb[ob + PM], xb[ob + PM + 1], xb[ob + PM + 2]) if not hull else (0.0, 0.0, 0.0)
-    off_b = xb[ob + OFF_MID] if not hull else 0.0
-    s = 0.5 * (xa[oa + T0] + xa[oa + T1])
-    t = 0.5 * (xb[ob + T0] + xb[ob + T1]) if not hull else 0.0
-    span_a = int(xa[oa + SPAN])
-    span_b = int(xb[ob + SPAN]) if not hull else 0
-    upper, b, kept = meet_points(full, kb, pb, count, a, xa[oa + OFF_MID], b, off_b, state, g)
+    a = (piece.pm[0], piece.pm[1], piece.pm[2])
+    b = (piece_record.pm[0], piece_record.pm[1], piece_record.pm[2]) if not hull else (0.0, 0.0, 0.0)
+    off_b = piece_record.off_mid if not hull else 0.0
+    s = 0.5 * (piece.t0 + piece.t1)
+    t = 0.5 * (piece_record.t0 + piece_record.t1) if not hull else 0.0
+    span_a = int(piece.span)
+    span_b = int(piece_record.span) if not hull else 0
+    upper, b, kept = meet_points(full, kb, pb, count, a, piece.off_mid, b, off_b, state, g)
     feature = (g[9], g[VERTEX + 9], g[2 * VERTEX + 9])
     better = note(state, upper, s, span_a, t, span_b, a, b)
-    if state[MET] > 0.0:
+    if best.met > 0.0:
         return 0.0, upper
     # Asked for a clearance, most searches end before a better point is worth its price.
-    if polish and better and (not clearance >= 0.0 or state[COUNT] > 8.0):
+    if polish and better and (not clearance >= 0.0 or best.count > 8.0):
         s0, s1 = domain_of(ka, pa)
         t0, t1 = domain_of(kb, pb)
         u, w = newton(full, ka, ta, pa, span_a, ra, kb, tb, pb, span_b, rb, count, s, t, s0, s1, t0, t1, g)
         note_parameters(full, ka, ta, pa, ra, kb, tb, pb, rb, count, u, span_a, w, span_b, xb, state, g)
-        if state[MET] > 0.0:
+        if best.met > 0.0:
             return 0.0, upper
     # A direction by which the pieces are far apart.
     points_b = count if hull else 3
     place_b = 0 if hull else ob + P0
     set_b = pb if hull else xb
     first = sub(a, b)
-    if bound == ELLIPSOID and xa[oa + WIDE] < math.inf and (hull or xb[ob + WIDE] < math.inf):
-        wide_b = -1.0 if hull else xb[ob + WIDE]
-        how, v, _k = gjk(
-            full, xa, oa + P0, 2, xa[oa + WIDE], set_b, place_b, points_b, wide_b, first, state[UPPER], 1e-6, g
-        )
+    if bound == ELLIPSOID and piece.wide < math.inf and (hull or piece_record.wide < math.inf):
+        wide_b = -1.0 if hull else piece_record.wide
+        how, v, _k = gjk(full, xa, oa + P0, 2, piece.wide, set_b, place_b, points_b, wide_b, first, best.upper, 1e-6, g)
     else:
         how, v, _k = gjk(full, xa, oa + P0, 3, -1.0, set_b, place_b, points_b, -1.0, first, math.inf, 1e-9, g)
     lower = 0.0
     if how != INSIDE:
         lower = separation_along(xa, oa, set_b, 0 if hull else ob, count if hull else 0, (-v[0], -v[1], -v[2]), bound)
-    if not polish or lower >= state[UPPER] - 0.5 * tolerance:
+    if not polish or lower >= best.upper - 0.5 * tolerance:
         return lower, upper
     return max(
         lower,
@@ -259,10 +284,13 @@ def polished_bound(
     full, ka, ta, pa, ra, xa, oa, kb, tb, pb, rb, xb, ob, count, kept, feature, tolerance, state, zero, g
 ):
     """Bound by second derivatives about the middle, and about the minimum inside if there is but one."""
+    piece = enclosed_piece_at(xa, oa)
+    piece_record = enclosed_piece_at(xb, ob)
+    best = search_state_at(state, 0)
     hull = count > 1
-    s0, s1 = xa[oa + T0], xa[oa + T1]
+    s0, s1 = piece.t0, piece.t1
     s = 0.5 * (s0 + s1)
-    span_a = int(xa[oa + SPAN])
+    span_a = int(piece.span)
     t0, t1, span_b = 0.0, 0.0, 0
     hessian = (0.0, 0.0, 0.0, False)
     if hull:
@@ -271,24 +299,24 @@ def polished_bound(
         if empty:
             return math.inf
     else:
-        t0, t1 = xb[ob + T0], xb[ob + T1]
-        span_b = int(xb[ob + SPAN])
+        t0, t1 = piece_record.t0, piece_record.t1
+        span_b = int(piece_record.span)
         hessian = box_hessian(xa, oa, xb, ob)
         if hessian[3]:
             return math.inf
         t = 0.5 * (t0 + t1)
         lower, convex = taylor_bound(xa, oa, xb, ob, hessian, xa, oa + MID, s, xb, ob + MID, t)
-    here = state[SPAN_A] == span_a and s0 <= state[AT_S] <= s1
-    here = here and (hull or (state[SPAN_B] == span_b and t0 <= state[AT_T] <= t1))
-    if lower >= state[UPPER] - 0.5 * tolerance or not (convex or here):
+    here = best.span_a == span_a and s0 <= best.at_s <= s1
+    here = here and (hull or (best.span_b == span_b and t0 <= best.at_t <= t1))
+    if lower >= best.upper - 0.5 * tolerance or not (convex or here):
         return lower
     t = 0.5 * (t0 + t1)
     if here:
-        s, t = state[AT_S], state[AT_T]
+        s, t = best.at_s, best.at_t
     else:
         s, t = newton(full, ka, ta, pa, span_a, ra, kb, tb, pb, span_b, rb, count, s, t, s0, s1, t0, t1, g)
     kept = note_parameters(full, ka, ta, pa, ra, kb, tb, pb, rb, count, s, span_a, t, span_b, xb, state, g)
-    if state[MET] > 0.0:
+    if best.met > 0.0:
         return 0.0
     if hull:
         if kept >= full:

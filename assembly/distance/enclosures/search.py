@@ -22,35 +22,20 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly.distance.enclosures.enclosure import (
-    FIRST_END,
     HULL,
-    LAST_END,
-    LENGTH,
     MID,
-    OFF,
     PIECE,
-    SPAN,
-    T0,
-    T1,
+    enclosed_piece_at,
     fill_piece,
     first_pieces,
     split_piece,
 )
 from assembly.distance.enclosures.gjk import ROOM
 from assembly.distance.enclosures.node import (
-    AT_S,
-    AT_T,
-    COUNT,
-    MET,
-    POINT_A,
-    POINT_B,
-    SLACK,
-    SPAN_A,
-    SPAN_B,
     STATE,
-    UPPER,
     bound_node,
     domain_of,
+    search_state_at,
 )
 from assembly.distance.enclosures.taylor import crossing_proven, point_piece
 from assembly.geometry.interval import UNIT
@@ -105,9 +90,12 @@ def drop_top(heap, size):
 @kernel(inner=True, exact=True)
 def proven_hit(ka, ta, pa, ra, xa, oa, kb, tb, pb, rb, xb, ob, state):
     """Whether two plane curves are proven to meet near the best parameters. Overwrites the records at oa and ob."""
+    piece = enclosed_piece_at(xa, oa)
+    piece_record = enclosed_piece_at(xb, ob)
+    best = search_state_at(state, 0)
     lo_a, hi_a = domain_of(ka, pa)
     lo_b, hi_b = domain_of(kb, pb)
-    s, t = state[AT_S], state[AT_T]
+    s, t = best.at_s, best.at_t
     part = 1e-9
     for _ in range(3):
         h = part * (hi_a - lo_a)
@@ -115,8 +103,8 @@ def proven_hit(ka, ta, pa, ra, xa, oa, kb, tb, pb, rb, xb, ob, state):
         part *= 100.0
         if not (lo_a <= s - h and s + h <= hi_a and lo_b <= t - k and t + k <= hi_b):
             return False
-        xa[oa + T0], xa[oa + T1], xa[oa + SPAN] = s - h, s + h, state[SPAN_A]
-        xb[ob + T0], xb[ob + T1], xb[ob + SPAN] = t - k, t + k, state[SPAN_B]
+        piece.t0, piece.t1, piece.span = s - h, s + h, best.span_a
+        piece_record.t0, piece_record.t1, piece_record.span = t - k, t + k, best.span_b
         fill_piece(ka, ta, pa, ra, xa, oa)
         fill_piece(kb, tb, pb, rb, xb, ob)
         if crossing_proven(xa, oa, xb, ob, xa, oa + MID, xb, ob + MID):
@@ -158,16 +146,18 @@ def least_off(x, count):
     """How far points of the best known of the first pieces may be off."""
     least = math.inf
     for i in range(count):
-        least = min(least, x[PIECE * i + OFF])
+        least = min(least, enclosed_piece_at(x, PIECE * i).off)
     return least
 
 
 @kernel(inner=True)
 def longer(xa, oa, xb, ob):
     """Whether a is the piece to halve; one that cannot be bounded goes first, then the one longer in its parameter."""
-    a, b = xa[oa + LENGTH], xb[ob + LENGTH]
+    piece = enclosed_piece_at(xa, oa)
+    piece_record = enclosed_piece_at(xb, ob)
+    a, b = piece.length, piece_record.length
     if a == math.inf and b == math.inf:
-        return xa[oa + T1] - xa[oa + T0] >= xb[ob + T1] - xb[ob + T0]
+        return piece.t1 - piece.t0 >= piece_record.t1 - piece_record.t0
     return a >= b
 
 
@@ -206,29 +196,31 @@ def search(
     Records of pieces go to xa and xb, their children to child (2, pieces), nodes to the heap; the state is described
     above, the lower bound goes behind it. A clearance below zero asks for the distance. Returns why it ended.
     """
+    best = search_state_at(state, 0)
     g = np.zeros(ROOM)
     zero = np.zeros(PIECE)
-    zero[FIRST_END] = 1.0
-    zero[LAST_END] = 1.0
-    state[UPPER] = math.inf
-    state[MET] = 0.0
-    state[COUNT] = 0.0
-    state[SLACK] = 0.0
+    piece = enclosed_piece_at(zero, 0)
+    piece.first_end = 1.0
+    piece.last_end = 1.0
+    best.upper = math.inf
+    best.met = 0.0
+    best.count = 0.0
+    best.slack = 0.0
     room_a, room_b = child.shape[1] - 2, child.shape[1] - 2
     used_a = first_pieces(ka, ta, pa, ra, xa)
     count = 0
     if kb == HULL:
         count = tb[1]
         used_b = 1
-        pb, state[SLACK] = about_center(pb, count, center)
+        pb, best.slack = about_center(pb, count, center)
         if count == 1:
             point_piece(pb, 0, xb)
         else:
-            xb[LENGTH] = -1.0
+            enclosed_piece_at(xb, 0).length = -1.0
     else:
         used_b = first_pieces(kb, tb, pb, rb, xb)
     child[:, : max(used_a, used_b)] = -1
-    slack = state[SLACK]
+    slack = best.slack
     noise = 0.0
     size = 0
     for i in range(used_a):
@@ -256,7 +248,7 @@ def search(
                 zero,
                 g,
             )
-            if lower < state[UPPER]:
+            if lower < best.upper:
                 size = push(heap, size, lower, upper, i, j)
     # Of the best known pieces: a single point may be unlucky, at a joint of the formula.
     off_a = least_off(xa, used_a)
@@ -267,23 +259,23 @@ def search(
     crowded = False
     lower_bound = 0.0
     while True:
-        while size > 0 and heap[0] >= state[UPPER]:
+        while size > 0 and heap[0] >= best.upper:
             size = 0
-        lowest = max(lowest, min(min(state[UPPER], stuck), heap[0] if size > 0 else math.inf))
-        lowest = min(lowest, state[UPPER])
-        if state[MET] > 0.0:
+        lowest = max(lowest, min(min(best.upper, stuck), heap[0] if size > 0 else math.inf))
+        lowest = min(lowest, best.upper)
+        if best.met > 0.0:
             lowest = 0.0
-        if full == 3 and kb != HULL and state[MET] == 0.0 and state[UPPER] <= tolerance and not clearance > 0.0:
+        if full == 3 and kb != HULL and best.met == 0.0 and best.upper <= tolerance and not clearance > 0.0:
             if proven_hit(ka, ta, pa, ra, xa, PIECE * room_a, kb, tb, pb, rb, xb, PIECE * room_b, state):
-                state[MET] = 1.0
+                best.met = 1.0
                 lowest = 0.0
         lower_bound = max(lowest - slack, 0.0)
-        if state[COUNT] >= LOOKS and off_a + off_b < math.inf:
+        if best.count >= LOOKS and off_a + off_b < math.inf:
             noise = 8.0 * (off_a + off_b + slack)
-        why = verdict(lower_bound, state[UPPER], state[MET] > 0.0, tolerance, noise, clearance)
+        why = verdict(lower_bound, best.upper, best.met > 0.0, tolerance, noise, clearance)
         if why >= 0:
             break
-        if state[COUNT] >= budget:
+        if best.count >= budget:
             why = BUDGET_SPENT
             break
         if size == 0 or heap[0] > stuck:
@@ -341,13 +333,13 @@ def search(
                 g,
             )
             lower = max(lower, parent)
-            off_a = min(off_a, xa[PIECE * p + OFF])
+            off_a = min(off_a, enclosed_piece_at(xa, PIECE * p).off)
             if kb != HULL:
-                off_b = min(off_b, xb[PIECE * q + OFF])
-            if lower < state[UPPER] and state[MET] == 0.0:
+                off_b = min(off_b, enclosed_piece_at(xb, PIECE * q).off)
+            if lower < best.upper and best.met == 0.0:
                 size = push(heap, size, lower, upper, p, q)
     state[STATE - 1] = lower_bound
     for k in range(3):
-        state[POINT_A + k] += center[k]
-        state[POINT_B + k] += center[k]
+        best.point_a[k] += center[k]
+        best.point_b[k] += center[k]
     return why

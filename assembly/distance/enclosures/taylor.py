@@ -20,13 +20,10 @@ from assembly._kernel import kernel
 from assembly.distance.enclosures.enclosure import (
     BEND,
     BOX,
-    FIRST_END,
-    LAST_END,
     MID,
     PIECE,
     SPEED,
-    T0,
-    T1,
+    enclosed_piece_at,
 )
 from assembly.geometry.interval import UNIT, down, idifference, iproduct, isquare, isum, magnitude, up
 from assembly.geometry.vec import cross, dot, sub
@@ -57,6 +54,8 @@ def slope_minimum(g, h, reach):
 @kernel(inner=True, exact=True)
 def box_hessian(xa, oa, xb, ob):
     """(p, q, m) of the heading over a box, and whether the slopes leave a minimum inside."""
+    piece = enclosed_piece_at(xa, oa)
+    piece_record = enclosed_piece_at(xb, ob)
     ss = (0.0, 0.0)
     tt = (0.0, 0.0)
     st = (0.0, 0.0)
@@ -71,17 +70,19 @@ def box_hessian(xa, oa, xb, ob):
         st = isum(st, iproduct(a1, b1))
         gs = isum(gs, iproduct(r, a1))
         gt = idifference(gt, iproduct(r, b1))
-    empty = (gs[0] > 0.0 and xa[oa + FIRST_END] == 0.0) or (gs[1] < 0.0 and xa[oa + LAST_END] == 0.0)
-    empty = empty or (gt[0] > 0.0 and xb[ob + FIRST_END] == 0.0) or (gt[1] < 0.0 and xb[ob + LAST_END] == 0.0)
+    empty = (gs[0] > 0.0 and piece.first_end == 0.0) or (gs[1] < 0.0 and piece.last_end == 0.0)
+    empty = empty or (gt[0] > 0.0 and piece_record.first_end == 0.0) or (gt[1] < 0.0 and piece_record.last_end == 0.0)
     return ss[0], tt[0], magnitude(st), empty
 
 
 @kernel(inner=True, exact=True)
 def taylor_bound(xa, oa, xb, ob, hessian, va, pa, s, vb, pb, t):
     """Lower bound of the distance over a box from values (nine pairs) at s and t, and whether F is convex there."""
+    piece = enclosed_piece_at(xa, oa)
+    piece_record = enclosed_piece_at(xb, ob)
     p, q, m, _empty = hessian
-    reach_s = xa[oa + T1] - xa[oa + T0]
-    reach_t = xb[ob + T1] - xb[ob + T0]
+    reach_s = piece.t1 - piece.t0
+    reach_t = piece_record.t1 - piece_record.t0
     if not (p > -math.inf and q > -math.inf and m < math.inf):
         return 0.0, False
     if m > 0.0:
@@ -104,8 +105,8 @@ def taylor_bound(xa, oa, xb, ob, hessian, va, pa, s, vb, pb, t):
     if not (gs[1] - gs[0] < math.inf and gt[1] - gt[0] < math.inf):
         return 0.0, False
     low = 0.5 * total * (1.0 - 4.0 * UNIT)
-    low += min(slope_minimum(gs[0], p, up(xa[oa + T1] - s)), slope_minimum(-gs[1], p, up(s - xa[oa + T0])))
-    low += min(slope_minimum(gt[0], q, up(xb[ob + T1] - t)), slope_minimum(-gt[1], q, up(t - xb[ob + T0])))
+    low += min(slope_minimum(gs[0], p, up(piece.t1 - s)), slope_minimum(-gs[1], p, up(s - piece.t0)))
+    low += min(slope_minimum(gt[0], q, up(piece_record.t1 - t)), slope_minimum(-gt[1], q, up(t - piece_record.t0)))
     low -= 4.0 * UNIT * total
     convex = (p > 0.0 or reach_s == 0.0) and (q > 0.0 or reach_t == 0.0)
     if not (low > 0.0):
@@ -178,18 +179,20 @@ def across_feature(xa, oa, points, count, feature, n, y):
     least |N (x - v)| less the largest (r / |r|).(z - v) over its vertices z: this largest, over the piece, is what is
     returned; zero or a rounding where the feature is the nearest one for all of the piece.
     """
+    piece = enclosed_piece_at(y, 0)
+    piece_record = enclosed_piece_at(xa, oa)
     f = 3 * feature[0]
     v = (points[f], points[f + 1], points[f + 2])
     none = (0.0, 0.0, 0.0)
-    y[T0], y[T1] = xa[oa + T0], xa[oa + T1]
-    y[FIRST_END], y[LAST_END] = xa[oa + FIRST_END], xa[oa + LAST_END]
+    piece.t0, piece.t1 = piece_record.t0, piece_record.t1
+    piece.first_end, piece.last_end = piece_record.first_end, piece_record.last_end
     near = 0.0
     for row in range(3):
         r = turned(xa, oa + BOX, n, row, v)
-        y[BOX + 2 * row], y[BOX + 2 * row + 1] = r
+        piece.box[2 * row], piece.box[2 * row + 1] = r
         near += isquare(r)[0]
-        y[SPEED + 2 * row], y[SPEED + 2 * row + 1] = turned(xa, oa + SPEED, n, row, none)
-        y[BEND + 2 * row], y[BEND + 2 * row + 1] = turned(xa, oa + BEND, n, row, none)
+        piece.speed[2 * row], piece.speed[2 * row + 1] = turned(xa, oa + SPEED, n, row, none)
+        piece.bend[2 * row], piece.bend[2 * row + 1] = turned(xa, oa + BEND, n, row, none)
         turn_values(xa, oa + MID, n, row, v, y, MID)
     near = math.sqrt(near) * (1.0 - 8.0 * UNIT)
     worst = 0.0
@@ -202,7 +205,7 @@ def across_feature(xa, oa, points, count, feature, n, y):
             o = 3 * row
             c = n[o] * d[0] + n[o + 1] * d[1] + n[o + 2] * d[2]
             slack = 8.0 * UNIT * size if n[o] != 0.0 or n[o + 1] != 0.0 or n[o + 2] != 0.0 else 0.0
-            inner = isum(inner, iproduct((c - slack, c + slack), (y[BOX + 2 * row], y[BOX + 2 * row + 1])))
+            inner = isum(inner, iproduct((c - slack, c + slack), (piece.box[2 * row], piece.box[2 * row + 1])))
             small += (abs(c) + slack) * (abs(c) + slack)
         # By the angle to the direction, or by the length across alone, which is a rounding for the feature's own.
         if inner[1] > 0.0:
@@ -225,6 +228,7 @@ def turn_values(x, o, n, row, v, y, p):
 @kernel(inner=True, exact=True)
 def point_piece(points, o, x):
     """The record of a point, as a curve that stands still."""
+    piece = enclosed_piece_at(x, 0)
     for k in range(PIECE):
         x[k] = 0.0
     for k in range(3):
@@ -235,8 +239,8 @@ def point_piece(points, o, x):
         x[2 + k] = p
         x[5 + k] = p
         x[8 + k] = p
-    x[FIRST_END] = 1.0
-    x[LAST_END] = 1.0
+    piece.first_end = 1.0
+    piece.last_end = 1.0
 
 
 @kernel(inner=True, exact=True)
@@ -246,8 +250,10 @@ def crossing_proven(xa, oa, xb, ob, va, pa, vb, pb):
     With r = a - b, J = [a', -b'] over the box and Y about the inverse of its middle: if -Y r + (I - Y J) X is inside
     X, the box about the point, then r has a zero there.
     """
-    h = 0.5 * (xa[oa + T1] - xa[oa + T0])
-    k = 0.5 * (xb[ob + T1] - xb[ob + T0])
+    piece = enclosed_piece_at(xa, oa)
+    piece_record = enclosed_piece_at(xb, ob)
+    h = 0.5 * (piece.t1 - piece.t0)
+    k = 0.5 * (piece_record.t1 - piece_record.t0)
     a0, a1 = pair(xa, oa + SPEED, 0), pair(xa, oa + SPEED, 1)
     b0, b1 = pair(xb, ob + SPEED, 0), pair(xb, ob + SPEED, 1)
     ax, ay = 0.5 * (a0[0] + a0[1]), 0.5 * (a1[0] + a1[1])

@@ -29,32 +29,16 @@ import math
 
 from assembly._kernel import kernel
 from assembly.distance.patches.nodes import (
-    A0,
-    AWAY,
-    BOX_CENTER,
-    BOX_HALF,
     DEEPEST,
-    DEPTH,
-    E0,
-    E1,
-    E2,
-    HALVES,
-    HIGH_U,
-    HIGH_V,
-    JU,
-    KUU,
-    LOW_U,
-    LOW_V,
     NODE_INTS,
-    PATCH,
     ROWS,
-    SPEED_U,
-    SPEED_V,
+    patch_node_at,
+    patch_node_links_at,
     patch_stride,
 )
-from assembly.distance.patches.pair import OFF, PATCH_J, PATCH_K
+from assembly.distance.patches.pair import patch_work_at
 from assembly.geometry.expression import formula
-from assembly.geometry.expression.formula import point_bounds, range_bounds, refine
+from assembly.geometry.expression.formula import formula_head_at, point_bounds, range_bounds, refine
 from assembly.geometry.interval import UNIT, idifference, magnitude, middle_of, most, off_of, up
 
 NONE = 1e100
@@ -72,31 +56,33 @@ def half_width(t0, t1):
 @kernel(inner=True)
 def set_interval(record, ints, nodes, k, t0, t1):
     """Node k for [t0, t1], not described yet."""
-    o = patch_stride(record) * k
-    nodes[o + AWAY] = 0.0
-    nodes[o + LOW_U], nodes[o + HIGH_U] = t0, t1
-    nodes[o + LOW_V], nodes[o + HIGH_V] = 0.0, 1.0
-    ints[NODE_INTS * k + HALVES] = -1
-    ints[NODE_INTS * k + PATCH] = 0
+    links = patch_node_links_at(ints, NODE_INTS * k)
+    o = patch_node_at(nodes, patch_stride(record) * k)
+    o.away = 0.0
+    o.low_u, o.high_u = t0, t1
+    o.low_v, o.high_v = 0.0, 1.0
+    links.halves = -1
+    links.patch = 0
     # Where doubles have no middle there is nothing to halve.
-    ints[NODE_INTS * k + DEPTH] = 0 if t0 < 0.5 * (t0 + t1) < t1 else DEEPEST
+    links.depth = 0 if t0 < 0.5 * (t0 + t1) < t1 else DEEPEST
 
 
 @kernel(inner=True)
 def start_formula(curve, record, ints, nodes):
     """All of the curve as node 0."""
     pool = curve[1]
-    set_interval(record, ints, nodes, 0, pool[formula.DOMAIN], pool[formula.DOMAIN + 1])
+    head = formula_head_at(pool, 0)
+    set_interval(record, ints, nodes, 0, head.domain[0], head.domain[1])
 
 
 @kernel(inner=True)
 def split_formula(record, ints, nodes, k, low):
     """Make the halves of node k as nodes low and low + 1, not described yet."""
-    o = patch_stride(record) * k
-    t0 = nodes[o + LOW_U]
-    t1 = nodes[o + HIGH_U]
+    o = patch_node_at(nodes, patch_stride(record) * k)
+    t0 = o.low_u
+    t1 = o.high_u
     middle = 0.5 * (t0 + t1)
-    ints[NODE_INTS * k + HALVES] = low
+    patch_node_links_at(ints, NODE_INTS * k).halves = low
     set_interval(record, ints, nodes, low, t0, middle)
     set_interval(record, ints, nodes, low + 1, middle, t1)
 
@@ -128,15 +114,16 @@ def bounded(x):
 @kernel(inline=True)
 def is_dot(nodes, o):
     """Whether a piece counts as a point."""
-    return nodes[o + SPEED_V] < 0.0
+    return patch_node_at(nodes, o).speed_v < 0.0
 
 
 @kernel(inner=True, exact=True)
 def describe_formula(curve, short, nodes, o, x):
     """Box and model of a piece from its interval; x (42) is for work, `short` the radius of a dot."""
+    node = patch_node_at(nodes, o)
     table, pool, room = curve
-    t0 = nodes[o + LOW_U]
-    t1 = nodes[o + HIGH_U]
+    t0 = node.low_u
+    t1 = node.high_u
     half = half_width(t0, t1)
     h = 2.0 * half
     range_bounds(table, pool, t0, t1, room)
@@ -149,8 +136,8 @@ def describe_formula(curve, short, nodes, o, x):
     for k in range(3):
         c = known_middle(x, 0, k)
         r = bounded(up(max(x[2 * k + 1] - c, c - x[2 * k])))
-        nodes[o + BOX_CENTER + k] = c
-        nodes[o + BOX_HALF + k] = r
+        node.box_center[k] = c
+        node.box_half[k] = r
     speed = h * most(x, _SPEED)
     grow = 1.0 + 64.0 * UNIT
     off = off_of(x, _MIDDLE)
@@ -180,29 +167,29 @@ def describe_formula(curve, short, nodes, o, x):
             j = 0.0
             e0 = radius
             e1 = NONE
-    nodes[o + SPEED_U] = bounded(speed)
-    nodes[o + SPEED_V] = dot
+    node.speed_u = bounded(speed)
+    node.speed_v = dot
     # Products of h and the sums with rows are rounded, too.
     size = 0.0
     for k in range(3):
         a = known_middle(x, _MIDDLE, k)
         slope = j * known_middle(x, _MIDDLE + _SPEED, k)
         bend = k2 * known_middle(x, _MIDDLE + _BEND, k)
-        nodes[o + A0 + k] = a
-        nodes[o + JU + k] = slope
-        nodes[o + JU + 3 + k] = 0.0
-        nodes[o + KUU + k] = bend
-        nodes[o + KUU + 3 + k] = 0.0
-        nodes[o + KUU + 6 + k] = 0.0
+        node.a0[k] = a
+        node.ju[k] = slope
+        node.ju[3 + k] = 0.0
+        node.kuu[k] = bend
+        node.kuu[3 + k] = 0.0
+        node.kuu[6 + k] = 0.0
         nodes[o + ROWS + k] = a - 0.5 * slope + 0.125 * bend
         nodes[o + ROWS + 4 + k] = a - 0.125 * bend
         nodes[o + ROWS + 8 + k] = a + 0.5 * slope + 0.125 * bend
         size += abs(a) + abs(slope) + abs(bend)
     for k in range(3):
         nodes[o + ROWS + 4 * k + 3] = 1.0
-    nodes[o + E0] = bounded(e0 * grow + 8.0 * UNIT * size)
-    nodes[o + E1] = bounded(e1 * grow + 8.0 * UNIT * size)
-    nodes[o + E2] = bounded(e2 * grow + 8.0 * UNIT * size)
+    node.e0 = bounded(e0 * grow + 8.0 * UNIT * size)
+    node.e1 = bounded(e1 * grow + 8.0 * UNIT * size)
+    node.e2 = bounded(e2 * grow + 8.0 * UNIT * size)
 
 
 @kernel(inner=True, exact=True)
@@ -211,29 +198,32 @@ def formula_derivatives(curve, nodes, o, x, w):
 
     To OFF how far the point and the first derivative may be off, and how far z can go back and ahead within the piece.
     """
+    work = patch_work_at(w, 0)
+    node = patch_node_at(nodes, o)
     table, pool, room = curve
-    t0 = nodes[o + LOW_U]
-    t1 = nodes[o + HIGH_U]
+    t0 = node.low_u
+    t1 = node.high_u
     h = 2.0 * half_width(t0, t1)
     t = formula_parameter(nodes, o, x)
     point_bounds(table, pool, t, room)
     at = formula.RESULTS
     size = 0.0
     for k in range(3):
-        w[PATCH_J + k] = h * known_middle(room, at + _SPEED, k)
-        w[PATCH_K + k] = h * h * known_middle(room, at + _BEND, k)
-        size += abs(w[PATCH_J + k])
-    w[OFF] = bounded(off_of(room, at))
-    w[OFF + 1] = bounded(h * off_of(room, at + _SPEED) + 2.0 * UNIT * size)
-    w[OFF + 2] = up(up(t - t0) / h)
-    w[OFF + 3] = up(up(t1 - t) / h)
+        work.patch_j[k] = h * known_middle(room, at + _SPEED, k)
+        work.patch_k[k] = h * h * known_middle(room, at + _BEND, k)
+        size += abs(work.patch_j[k])
+    work.off[0] = bounded(off_of(room, at))
+    work.off[1] = bounded(h * off_of(room, at + _SPEED) + 2.0 * UNIT * size)
+    work.off[2] = up(up(t - t0) / h)
+    work.off[3] = up(up(t1 - t) / h)
     return known_middle(room, at, 0), known_middle(room, at, 1), known_middle(room, at, 2)
 
 
 @kernel(inline=True)
 def formula_parameter(nodes, o, x):
     """The curve's parameter of a place on a piece, as `formula_derivatives` takes it."""
-    t0 = nodes[o + LOW_U]
-    t1 = nodes[o + HIGH_U]
+    node = patch_node_at(nodes, o)
+    t0 = node.low_u
+    t1 = node.high_u
     t = 0.5 * (t0 + t1) + 2.0 * half_width(t0, t1) * (x - 0.5)
     return min(max(t, t0), t1)

@@ -13,25 +13,18 @@ import math
 from assembly._kernel import kernel
 from assembly.distance.curves.bounds import least_change
 from assembly.distance.patches.formula_nodes import formula_derivatives
-from assembly.distance.patches.nodes import AWAY, DEGREE_U, DEGREE_V, ROWS
+from assembly.distance.patches.nodes import ROWS, bezier_surface_at, patch_node_at
 from assembly.distance.patches.pair import (
     BASIS,
-    BEST,
-    FACTOR,
     MARGIN,
-    OFF,
     PATCH_J,
     PATCH_K,
-    PLACE,
-    STEP,
     D,
-    G,
-    H,
     J,
-    Z,
     factorize,
     load_hessian,
     load_side,
+    patch_work_at,
     size_at,
     vector_dot,
 )
@@ -68,8 +61,10 @@ def fill_basis(w, at, n, x):
 @kernel(inner=True)
 def patch_derivatives(record, nodes, o, x, y, w):
     """Point of a patch; its first and second derivatives at PATCH_J and PATCH_K."""
-    p = record[DEGREE_U]
-    q = record[DEGREE_V]
+    work = patch_work_at(w, 0)
+    patch = bezier_surface_at(record, 0)
+    p = patch.degree_u
+    q = patch.degree_v
     bu = BASIS
     bv = BASIS + 3 * (p + 1)
     fill_basis(w, bu, p, x)
@@ -105,11 +100,11 @@ def patch_derivatives(record, nodes, o, x, y, w):
         v = d * s[c]
         vu = d * (su[c] - su[3] * v)
         vv = d * (sv[c] - sv[3] * v)
-        w[PATCH_J + c] = vu
-        w[PATCH_J + 3 + c] = vv
-        w[PATCH_K + c] = d * (suu[c] - 2.0 * su[3] * vu - suu[3] * v)
-        w[PATCH_K + 3 + c] = d * (suv[c] - su[3] * vv - sv[3] * vu - suv[3] * v)
-        w[PATCH_K + 6 + c] = d * (svv[c] - 2.0 * sv[3] * vv - svv[3] * v)
+        work.patch_j[c] = vu
+        work.patch_j[3 + c] = vv
+        work.patch_k[c] = d * (suu[c] - 2.0 * su[3] * vu - suu[3] * v)
+        work.patch_k[3 + c] = d * (suv[c] - su[3] * vv - sv[3] * vu - suv[3] * v)
+        work.patch_k[6 + c] = d * (svv[c] - 2.0 * sv[3] * vv - svv[3] * v)
     return (d * s[0], d * s[1], d * s[2])
 
 
@@ -121,47 +116,49 @@ def add4(a, s, b):
 @kernel(inner=True)
 def load_points(ra, a, o, na, rb, b, p, nb, curve, shift, w):
     """D, J and K at PLACE in the unit cube; the two points."""
-    u = patch_derivatives(ra, a, o, w[PLACE], w[PLACE + 1] if na > 1 else 0.0, w)
+    work = patch_work_at(w, 0)
+    u = patch_derivatives(ra, a, o, work.place[0], work.place[1] if na > 1 else 0.0, w)
     load_side(w, PATCH_J, PATCH_K, 1.0, na, 0, w)
-    x = w[PLACE + na] if nb > 0 else 0.0
+    x = work.place[na] if nb > 0 else 0.0
     if curve is None:
-        v = patch_derivatives(rb, b, p, x, w[PLACE + na + 1] if nb > 1 else 0.0, w)
+        v = patch_derivatives(rb, b, p, x, work.place[na + 1] if nb > 1 else 0.0, w)
     else:
         v = formula_derivatives(curve, b, p, x, w)
     load_side(w, PATCH_J, PATCH_K, -1.0, nb, na, w)
     for j in range(3):
-        w[D + j] = (u[j] - v[j]) - shift[j]
+        work.d[j] = (u[j] - v[j]) - shift[j]
     return u, v
 
 
 @kernel(inner=True)
 def newton_direction(w, n):
     """A step of Newton's method into STEP, variables held at the ends that the slope pushes them out of."""
+    work = patch_work_at(w, 0)
     size = 0.0
     for i in range(n):
-        size = max(size, abs(w[H + 5 * i]))
+        size = max(size, abs(work.h[5 * i]))
     for i in range(n):
-        z = w[PLACE + i]
-        if (z <= 0.0 and w[G + i] >= 0.0) or (z >= 1.0 and w[G + i] <= 0.0):
-            w[G + i] = 0.0
+        z = work.place[i]
+        if (z <= 0.0 and work.g[i] >= 0.0) or (z >= 1.0 and work.g[i] <= 0.0):
+            work.g[i] = 0.0
             for j in range(n):
-                w[H + 4 * i + j] = 0.0
-                w[H + 4 * j + i] = 0.0
-            w[H + 5 * i] = size
-        w[STEP + i] = 0.0
+                work.h[4 * i + j] = 0.0
+                work.h[4 * j + i] = 0.0
+            work.h[5 * i] = size
+        work.step[i] = 0.0
     raised = -1e-14 * size
     for _ in range(40):
         if factorize(w, n, False, raised):
             for i in range(n):
-                value = -w[G + i]
+                value = -work.g[i]
                 for j in range(i):
-                    value -= w[FACTOR + 4 * i + j] * w[STEP + j]
-                w[STEP + i] = value / w[FACTOR + 5 * i]
+                    value -= work.factor[4 * i + j] * work.step[j]
+                work.step[i] = value / work.factor[5 * i]
             for i in range(n - 1, -1, -1):
-                value = w[STEP + i]
+                value = work.step[i]
                 for j in range(i + 1, n):
-                    value -= w[FACTOR + 4 * j + i] * w[STEP + j]
-                w[STEP + i] = value / w[FACTOR + 5 * i]
+                    value -= work.factor[4 * j + i] * work.step[j]
+                work.step[i] = value / work.factor[5 * i]
             return
         raised = min(10.0 * raised, -1e-6 * size)
 
@@ -169,12 +166,13 @@ def newton_direction(w, n):
 @kernel(inner=True)
 def nearest_in_patches(ra, a, o, na, rb, b, p, nb, curve, shift, w):
     """From PLACE to a local minimum in the unit cube."""
+    work = patch_work_at(w, 0)
     n = na + nb
     best = math.inf
     part = 1.0
     shortenings = 0
     for i in range(n):
-        w[BEST + i] = w[PLACE + i]
+        work.best[i] = work.place[i]
     for _ in range(_STEPS):
         load_points(ra, a, o, na, rb, b, p, nb, curve, shift, w)
         f = vector_dot(w, D, D)
@@ -186,9 +184,9 @@ def nearest_in_patches(ra, a, o, na, rb, b, p, nb, curve, shift, w):
             fall = 0.0
             way = 0.0
             for i in range(n):
-                w[BEST + i] = w[PLACE + i]
-                fall += w[G + i] * w[STEP + i]
-                way += abs(w[STEP + i])
+                work.best[i] = work.place[i]
+                fall += work.g[i] * work.step[i]
+                way += abs(work.step[i])
             if slow or fall > -1e-17 * f or way < 1e-16:
                 break
             part = 1.0
@@ -199,9 +197,9 @@ def nearest_in_patches(ra, a, o, na, rb, b, p, nb, curve, shift, w):
             if shortenings > _SHORTENINGS:
                 break
         for i in range(n):
-            w[PLACE + i] = min(max(w[BEST + i] + part * w[STEP + i], 0.0), 1.0)
+            work.place[i] = min(max(work.best[i] + part * work.step[i], 0.0), 1.0)
     for i in range(n):
-        w[PLACE + i] = w[BEST + i]
+        work.place[i] = work.best[i]
 
 
 @kernel(inner=True, exact=True)
@@ -210,25 +208,26 @@ def proven_in_patches(ra, a, o, na, rb, b, p, nb, curve, shift, error, rough, cu
 
     The Hessian is at least MARGIN times the diagonal in Z, if it is proven curved.
     """
+    work = patch_work_at(w, 0)
     u, v = load_points(ra, a, o, na, rb, b, p, nb, curve, shift, w)
     if curve is not None:
-        error += w[OFF]
+        error += work.off[0]
     far = size_at(w, D)
     size = 16.0 * UNIT * far
     change = 0.0
     if curved:
         for i in range(na + nb):
             off = rough
-            back = w[PLACE + i]
+            back = work.place[i]
             ahead = 1.0 - back
             if curve is not None and i == na:
-                off += w[OFF + 1]
-                back = w[OFF + 2]
-                ahead = w[OFF + 3]
+                off += work.off[1]
+                back = work.off[2]
+                ahead = work.off[3]
             doubt = (error + size) * (size_at(w, J + 3 * i) + off) + far * off
-            change += least_change(vector_dot(w, D, J + 3 * i), doubt, MARGIN * w[Z + i], back, ahead)
+            change += least_change(vector_dot(w, D, J + 3 * i), doubt, MARGIN * work.z[i], back, ahead)
     near = max(far - size - error, 0.0)
     square = near * near + 2.0 * change * (1.0 + 1e-12)
     lower = math.sqrt(square) * (1.0 - 8.0 * UNIT) if square > 0.0 else 0.0
-    away = a[o + AWAY] + b[p + AWAY]
+    away = patch_node_at(a, o).away + patch_node_at(b, p).away
     return lower - away, far + size + error + away, u, v

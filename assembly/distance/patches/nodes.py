@@ -18,20 +18,82 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
+from assembly._record import place_of, record_dtype, record_view, size_of
 from assembly.distance.curves.nodes import length
-from assembly.geometry.splines.bezier_pieces import ERROR, REACH, UNIT
+from assembly.geometry.splines.bezier_pieces import UNIT, bezier_head_at
 
 # Integers of a record: degrees, patches along u and v, 1 where weights differ, and where in the pool its tables are:
 # breaks, weights of the middles, binomials (as for curves, each direction), nets.
-DEGREE_U, DEGREE_V, PATCHES_U, PATCHES_V, RATIONAL, BREAKS_U, BREAKS_V, MIDDLE_U, MIDDLE_V, NETS, PATCH_RECORD = (
-    0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10
-)  # fmt: skip
+BEZIER_SURFACE = record_dtype(
+    "i8",
+    degree_u=1,
+    degree_v=1,
+    patches_u=1,
+    patches_v=1,
+    rational=1,
+    breaks_u=1,
+    breaks_v=1,
+    middle_u=1,
+    middle_v=1,
+    nets=1,
+)
+bezier_surface_at = record_view(BEZIER_SURFACE)
+DEGREE_U = place_of(BEZIER_SURFACE, "degree_u")
+DEGREE_V = place_of(BEZIER_SURFACE, "degree_v")
+PATCHES_U = place_of(BEZIER_SURFACE, "patches_u")
+PATCHES_V = place_of(BEZIER_SURFACE, "patches_v")
+RATIONAL = place_of(BEZIER_SURFACE, "rational")
+BREAKS_U = place_of(BEZIER_SURFACE, "breaks_u")
+BREAKS_V = place_of(BEZIER_SURFACE, "breaks_v")
+PATCH_RECORD = size_of(BEZIER_SURFACE)
 # Doubles of a node.
-BOX_CENTER, BOX_HALF, A0, JU, KUU, E0, E1, E2, SPEED_U, SPEED_V, AWAY, LOW_U, HIGH_U, LOW_V, HIGH_V, ROWS = (
-    0, 3, 6, 9, 15, 24, 25, 26, 27, 28, 29, 30, 31, 32, 33, 34
-)  # fmt: skip
+PATCH_NODE = record_dtype(
+    "f8",
+    box_center=3,
+    box_half=3,
+    a0=3,
+    ju=6,
+    kuu=9,
+    e0=1,
+    e1=1,
+    e2=1,
+    speed_u=1,
+    speed_v=1,
+    away=1,
+    low_u=1,
+    high_u=1,
+    low_v=1,
+    high_v=1,
+)
+patch_node_at = record_view(PATCH_NODE)
+BOX_CENTER = place_of(PATCH_NODE, "box_center")
+BOX_HALF = place_of(PATCH_NODE, "box_half")
+A0 = place_of(PATCH_NODE, "a0")
+JU = place_of(PATCH_NODE, "ju")
+KUU = place_of(PATCH_NODE, "kuu")
+E0 = place_of(PATCH_NODE, "e0")
+E1 = place_of(PATCH_NODE, "e1")
+E2 = place_of(PATCH_NODE, "e2")
+SPEED_U = place_of(PATCH_NODE, "speed_u")
+SPEED_V = place_of(PATCH_NODE, "speed_v")
+AWAY = place_of(PATCH_NODE, "away")
+LOW_U = place_of(PATCH_NODE, "low_u")
+HIGH_U = place_of(PATCH_NODE, "high_u")
+LOW_V = place_of(PATCH_NODE, "low_v")
+HIGH_V = place_of(PATCH_NODE, "high_v")
+ROWS = size_of(PATCH_NODE)
 # Integers: the halves (-1: not made yet), the patch, halvings.
-HALVES, PATCH, DEPTH, NODE_INTS = 0, 1, 2, 3
+PATCH_NODE_LINKS = record_dtype(
+    "i8",
+    halves=1,
+    patch=1,
+    depth=1,
+)
+patch_node_links_at = record_view(PATCH_NODE_LINKS)
+HALVES = place_of(PATCH_NODE_LINKS, "halves")
+PATCH = place_of(PATCH_NODE_LINKS, "patch")
+DEPTH = place_of(PATCH_NODE_LINKS, "depth")
+NODE_INTS = size_of(PATCH_NODE_LINKS)
 # Halvings after which a node is let go.
 DEEPEST = 60
 
@@ -39,52 +101,60 @@ DEEPEST = 60
 @kernel(inline=True)
 def patch_stride(record):
     """Doubles of a node."""
-    return ROWS + 4 * (record[DEGREE_U] + 1) * (record[DEGREE_V] + 1) * (1 + record[RATIONAL])
+    patch = bezier_surface_at(record, 0)
+    return ROWS + 4 * (patch.degree_u + 1) * (patch.degree_v + 1) * (1 + patch.rational)
 
 
 @kernel(inline=True)
 def patch_positions(record, o):
     """Where the positions of a node's control points begin."""
-    return o + ROWS + 4 * (record[DEGREE_U] + 1) * (record[DEGREE_V] + 1) * record[RATIONAL]
+    patch = bezier_surface_at(record, 0)
+    return o + ROWS + 4 * (patch.degree_u + 1) * (patch.degree_v + 1) * patch.rational
 
 
 @kernel(inner=True, exact=True)
 def fill_patch(record, pool, ints, nodes, k):
     """Node k for the patch k."""
-    count = 4 * (record[DEGREE_U] + 1) * (record[DEGREE_V] + 1)
+    patch = bezier_surface_at(record, 0)
+    links = patch_node_links_at(ints, NODE_INTS * k)
+    count = 4 * (patch.degree_u + 1) * (patch.degree_v + 1)
     o = patch_stride(record) * k
+    node = patch_node_at(nodes, o)
     for j in range(count):
-        nodes[o + ROWS + j] = pool[record[NETS] + count * k + j]
-    nodes[o + AWAY] = pool[ERROR]
-    nodes[o + LOW_U] = 0.0
-    nodes[o + HIGH_U] = 1.0
-    nodes[o + LOW_V] = 0.0
-    nodes[o + HIGH_V] = 1.0
-    ints[NODE_INTS * k + HALVES] = -1
-    ints[NODE_INTS * k + PATCH] = k
-    ints[NODE_INTS * k + DEPTH] = 0
+        nodes[o + ROWS + j] = pool[patch.nets + count * k + j]
+    node.away = bezier_head_at(pool, 0).error
+    node.low_u = 0.0
+    node.high_u = 1.0
+    node.low_v = 0.0
+    node.high_v = 1.0
+    links.halves = -1
+    links.patch = k
+    links.depth = 0
 
 
 @kernel(inner=True, exact=True)
 def split_patch(record, pool, ints, nodes, k, low):
     """Make the halves of node k, across its longer direction, as nodes low and low + 1, not described yet."""
-    p = record[DEGREE_U]
-    q = record[DEGREE_V]
+    patch = bezier_surface_at(record, 0)
+    links = patch_node_links_at(ints, NODE_INTS * k)
+    p = patch.degree_u
+    q = patch.degree_v
     stride = patch_stride(record)
     o = stride * k
+    node = patch_node_at(nodes, o)
     a = stride * low
     b = a + stride
-    ints[NODE_INTS * k + HALVES] = low
+    links.halves = low
     for j in range(low, low + 2):
-        ints[NODE_INTS * j + HALVES] = -1
-        ints[NODE_INTS * j + PATCH] = ints[NODE_INTS * k + PATCH]
-        ints[NODE_INTS * j + DEPTH] = ints[NODE_INTS * k + DEPTH] + 1
+        patch_node_links_at(ints, NODE_INTS * j).halves = -1
+        patch_node_links_at(ints, NODE_INTS * j).patch = links.patch
+        patch_node_links_at(ints, NODE_INTS * j).depth = links.depth + 1
     for j in range(A0, ROWS):
         nodes[a + j] = nodes[o + j]
         nodes[b + j] = nodes[o + j]
     for j in range(4 * (p + 1) * (q + 1)):
         nodes[b + ROWS + j] = nodes[o + ROWS + j]
-    along_u = nodes[o + SPEED_U] >= nodes[o + SPEED_V]
+    along_u = node.speed_u >= node.speed_v
     n = p if along_u else q
     step = 4 * (q + 1) if along_u else 4
     lines = q + 1 if along_u else p + 1
@@ -102,9 +172,9 @@ def split_patch(record, pool, ints, nodes, k, low):
     middle = 0.5 * (nodes[o + side] + nodes[o + side + 1])
     nodes[a + side + 1] = middle
     nodes[b + side] = middle
-    away = nodes[o + AWAY] + (2.0 + 2.0 * record[RATIONAL]) * n * UNIT * pool[REACH]
-    nodes[a + AWAY] = away
-    nodes[b + AWAY] = away
+    away = node.away + (2.0 + 2.0 * patch.rational) * n * UNIT * bezier_head_at(pool, 0).reach
+    patch_node_at(nodes, a).away = away
+    patch_node_at(nodes, b).away = away
 
 
 @kernel(inner=True, exact=True)
@@ -144,9 +214,12 @@ def falling(n, k):
 @kernel(inner=True, exact=True)
 def describe_patch(record, pool, nodes, o, m):
     """Box and model of a patch from its rows; m (32) is for work."""
-    p = record[DEGREE_U]
-    q = record[DEGREE_V]
-    rational = record[RATIONAL] == 1
+    head = bezier_head_at(pool, 0)
+    node = patch_node_at(nodes, o)
+    patch = bezier_surface_at(record, 0)
+    p = patch.degree_u
+    q = patch.degree_v
+    rational = patch.rational == 1
     at = patch_positions(record, o)
     count = (p + 1) * (q + 1)
     least = math.inf
@@ -166,8 +239,8 @@ def describe_patch(record, pool, nodes, o, m):
         for i in range(count):
             low = min(low, nodes[at + 4 * i + j])
             high = max(high, nodes[at + 4 * i + j])
-        nodes[o + BOX_CENTER + j] = 0.5 * (low + high)
-        nodes[o + BOX_HALF + j] = 0.5 * (high - low) + 8.0 * UNIT * pool[REACH]
+        node.box_center[j] = 0.5 * (low + high)
+        node.box_half[j] = 0.5 * (high - low) + 8.0 * UNIT * head.reach
     center = (nodes[o], nodes[o + 1], nodes[o + 2])
     r = length((nodes[o + 3], nodes[o + 4], nodes[o + 5]))
     ratio = heaviest / least
@@ -199,8 +272,8 @@ def describe_patch(record, pool, nodes, o, m):
     uu = v
     uv = v
     vv = v
-    mu = record[MIDDLE_U]
-    mv = record[MIDDLE_V]
+    mu = patch.middle_u
+    mv = patch.middle_v
     for i in range(p + 1):
         for j in range(q + 1):
             s = at + 4 * ((q + 1) * i + j)
@@ -223,26 +296,26 @@ def describe_patch(record, pool, nodes, o, m):
         c = w * v[j]
         cu = w * (du[j] - du[3] * c)
         cv = w * (dv[j] - dv[3] * c)
-        nodes[o + A0 + j] = center[j] + c
-        nodes[o + JU + j] = cu
-        nodes[o + JU + 3 + j] = cv
-        nodes[o + KUU + j] = w * (uu[j] - 2.0 * du[3] * cu - uu[3] * c)
-        nodes[o + KUU + 3 + j] = w * (uv[j] - du[3] * cv - dv[3] * cu - uv[3] * c)
-        nodes[o + KUU + 6 + j] = w * (vv[j] - 2.0 * dv[3] * cv - vv[3] * c)
+        node.a0[j] = center[j] + c
+        node.ju[j] = cu
+        node.ju[3 + j] = cv
+        node.kuu[j] = w * (uu[j] - 2.0 * du[3] * cu - uu[3] * c)
+        node.kuu[3 + j] = w * (uv[j] - du[3] * cv - dv[3] * cu - uv[3] * c)
+        node.kuu[6 + j] = w * (vv[j] - 2.0 * dv[3] * cv - vv[3] * c)
     n = p + q + 1.0
     u = 8.0 * (n + 8.0) * UNIT * r * ratio
-    e0 = u + 4.0 * UNIT * pool[REACH]
+    e0 = u + 4.0 * UNIT * head.reach
     e1 = 8.0 * n * u * ratio
     e2 = 64.0 * n * n * u * ratio * ratio
     m30 = m[12]
     m21 = m[9]
     m12 = m[6]
     m03 = m[3]
-    nodes[o + E0] = (m30 + 3.0 * m21 + 3.0 * m12 + m03) / 48.0 * grow + e0 + e1 + 0.5 * e2
-    nodes[o + E1] = 0.125 * max(m30 + 2.0 * m21 + m12, m21 + 2.0 * m12 + m03) * grow + e1 + e2
-    nodes[o + E2] = 0.5 * max(m30 + m21, m21 + m12, m12 + m03) * grow + e2
-    nodes[o + SPEED_U] = m[4]
-    nodes[o + SPEED_V] = m[1]
+    node.e0 = (m30 + 3.0 * m21 + 3.0 * m12 + m03) / 48.0 * grow + e0 + e1 + 0.5 * e2
+    node.e1 = 0.125 * max(m30 + 2.0 * m21 + m12, m21 + 2.0 * m12 + m03) * grow + e1 + e2
+    node.e2 = 0.5 * max(m30 + m21, m21 + m12, m12 + m03) * grow + e2
+    node.speed_u = m[4]
+    node.speed_v = m[1]
 
 
 @kernel(inline=True)

@@ -24,27 +24,49 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
+from assembly._record import place_of, record_dtype, record_view, size_of
 from assembly.distance.patches.nodes import (
-    A0,
-    AWAY,
-    BOX_CENTER,
-    BOX_HALF,
-    DEGREE_U,
-    DEGREE_V,
-    E0,
-    E1,
-    E2,
     JU,
     KUU,
+    bezier_surface_at,
+    patch_node_at,
     patch_positions,
 )
 from assembly.geometry.splines.bezier_pieces import UNIT
 
 # Doubles for work: D, J_i, K_ij (rows of four), Hessian, gradient, the place in the models and in the cube, a step, a
 # factor, what a patch gives, what a formula leaves open (`distance/patches/formula_nodes.py`), basis functions.
-D, J, K, H, G, Z, PLACE, BEST, STEP, FACTOR, PATCH_J, PATCH_K, OFF, BASIS = (
-    0, 3, 15, 63, 79, 83, 87, 91, 95, 99, 115, 121, 130, 134
-)  # fmt: skip
+PATCH_WORK = record_dtype(
+    "f8",
+    d=3,
+    j=12,
+    k=48,
+    h=16,
+    g=4,
+    z=4,
+    place=4,
+    best=4,
+    step=4,
+    factor=16,
+    patch_j=6,
+    patch_k=9,
+    off=4,
+)
+patch_work_at = record_view(PATCH_WORK)
+D = place_of(PATCH_WORK, "d")
+J = place_of(PATCH_WORK, "j")
+K = place_of(PATCH_WORK, "k")
+H = place_of(PATCH_WORK, "h")
+G = place_of(PATCH_WORK, "g")
+Z = place_of(PATCH_WORK, "z")
+PLACE = place_of(PATCH_WORK, "place")
+BEST = place_of(PATCH_WORK, "best")
+STEP = place_of(PATCH_WORK, "step")
+FACTOR = place_of(PATCH_WORK, "factor")
+PATCH_J = place_of(PATCH_WORK, "patch_j")
+PATCH_K = place_of(PATCH_WORK, "patch_k")
+OFF = place_of(PATCH_WORK, "off")
+BASIS = size_of(PATCH_WORK)
 MARGIN = 0.05
 _SWEEPS = 12
 
@@ -63,31 +85,33 @@ def size_at(w, i):
 @kernel(inline=True)
 def free_count(record):
     """Parameters of a shape: a curve is of degree 0 in v, a point in both."""
-    return int(record[DEGREE_U] > 0) + int(record[DEGREE_V] > 0)
+    patch = bezier_surface_at(record, 0)
+    return int(patch.degree_u > 0) + int(patch.degree_v > 0)
 
 
 @kernel(inner=True, exact=True)
 def load_side(source, first, second, sign, n, at, w):
     """J and K of one shape with n parameters as parameters at, at + 1, from where its own are."""
+    work = patch_work_at(w, 0)
     for i in range(n):
         for c in range(3):
-            w[J + 3 * (at + i) + c] = sign * source[first + 3 * i + c]
+            work.j[3 * (at + i) + c] = sign * source[first + 3 * i + c]
             for j in range(n):
-                w[K + 3 * (4 * (at + i) + at + j) + c] = sign * source[second + 3 * (i + j) + c]
+                work.k[3 * (4 * (at + i) + at + j) + c] = sign * source[second + 3 * (i + j) + c]
 
 
 @kernel(inner=True)
 def clear_bends(w):
     """Zeros for K of parameters of different shapes."""
     for i in range(48):
-        w[K + i] = 0.0
+        patch_work_at(w, 0).k[i] = 0.0
 
 
 @kernel(inner=True, exact=True)
 def load_models(a, o, na, b, p, nb, shift, w):
     """D, J and K at the middles of two patches with na and nb parameters."""
     for j in range(3):
-        w[D + j] = (a[o + A0 + j] - b[p + A0 + j]) - shift[j]
+        patch_work_at(w, 0).d[j] = (patch_node_at(a, o).a0[j] - patch_node_at(b, p).a0[j]) - shift[j]
     load_side(a, o + JU, o + KUU, 1.0, na, 0, w)
     load_side(b, p + JU, p + KUU, -1.0, nb, na, w)
 
@@ -95,12 +119,13 @@ def load_models(a, o, na, b, p, nb, shift, w):
 @kernel(inner=True, exact=True)
 def load_hessian(w, n):
     """Gradient and Hessian of F from D, J and K."""
+    work = patch_work_at(w, 0)
     for i in range(n):
-        w[G + i] = vector_dot(w, D, J + 3 * i)
+        work.g[i] = vector_dot(w, D, J + 3 * i)
         for j in range(i + 1):
             value = vector_dot(w, J + 3 * i, J + 3 * j) + vector_dot(w, D, K + 3 * (4 * i + j))
-            w[H + 4 * i + j] = value
-            w[H + 4 * j + i] = value
+            work.h[4 * i + j] = value
+            work.h[4 * j + i] = value
 
 
 @kernel(inner=True, exact=True)
@@ -108,49 +133,56 @@ def factorize(w, n, scaled, shift):
     """Cholesky's factor of H - shift or, scaled, H - shift diag(H); False where it is not positive definite by more
     than rounding.
     """
+    work = patch_work_at(w, 0)
     for i in range(n):
         for j in range(i + 1):
-            value = w[H + 4 * i + j]
+            value = work.h[4 * i + j]
             if i == j:
-                value -= shift * w[H + 5 * i] if scaled else shift
+                value -= shift * work.h[5 * i] if scaled else shift
             size = abs(value)
             for k in range(j):
-                product = w[FACTOR + 4 * i + k] * w[FACTOR + 4 * j + k]
+                product = work.factor[4 * i + k] * work.factor[4 * j + k]
                 value -= product
                 size += abs(product)
             if i == j:
                 if not value > 64.0 * UNIT * size:
                     return False
-                w[FACTOR + 5 * i] = math.sqrt(value)
+                work.factor[5 * i] = math.sqrt(value)
             else:
-                w[FACTOR + 4 * i + j] = value / w[FACTOR + 5 * j]
+                work.factor[4 * i + j] = value / work.factor[5 * j]
     return True
 
 
 @kernel(inner=True, exact=True)
 def patch_box_bound(a, o, b, p, shift, slack):
     """Distance of two boxes, the second moved by the shift."""
+    node = patch_node_at(a, o)
+    node_record = patch_node_at(b, p)
     total = 0.0
     for j in range(3):
-        gap = abs((a[o + BOX_CENTER + j] - b[p + BOX_CENTER + j]) - shift[j])
-        gap -= a[o + BOX_HALF + j] + b[p + BOX_HALF + j] + 2.0 * slack
+        gap = abs((node.box_center[j] - node_record.box_center[j]) - shift[j])
+        gap -= node.box_half[j] + node_record.box_half[j] + 2.0 * slack
         if gap > 0.0:
             total += gap * gap
-    return math.sqrt(total) * (1.0 - 8.0 * UNIT) - a[o + AWAY] - b[p + AWAY]
+    return math.sqrt(total) * (1.0 - 8.0 * UNIT) - node.away - node_record.away
 
 
 @kernel(inline=True)
 def slope_at(w, n, i, raised):
     """Component i of the gradient of g.z + z'(H + raised) z / 2 at z."""
-    slope = w[G + i] + raised * w[Z + i]
+    work = patch_work_at(w, 0)
+    slope = work.g[i] + raised * work.z[i]
     for j in range(n):
-        slope += w[H + 4 * i + j] * w[Z + j]
+        slope += work.h[4 * i + j] * work.z[j]
     return slope
 
 
 @kernel(inner=True, exact=True)
 def patch_model_bound(a, o, b, p, slack, n, w):
     """The bound of the quadratic models that `load_models` and `load_hessian` left; Z is near its place."""
+    work = patch_work_at(w, 0)
+    node = patch_node_at(a, o)
+    node_record = patch_node_at(b, p)
     c = vector_dot(w, D, D)
     raised = 0.0
     size = c
@@ -161,46 +193,49 @@ def patch_model_bound(a, o, b, p, slack, n, w):
             k = K + 3 * (4 * i + j)
             bend = abs(vector_dot(w, D, k))
             row += bend
-            size += bend + abs(w[H + 4 * i + j]) + vector_dot(w, k, k)
+            size += bend + abs(work.h[4 * i + j]) + vector_dot(w, k, k)
             for l in range(n):
                 cubic += abs(vector_dot(w, J + 3 * l, k))
         raised = max(raised, row)
-        w[Z + i] = 0.0
+        work.z[i] = 0.0
     if factorize(w, n, False, 1e-12 * size):
         raised = 0.0
     for _ in range(_SWEEPS):
         change = 0.0
         for i in range(n):
             slope = slope_at(w, n, i, raised)
-            curvature = w[H + 5 * i] + raised
+            curvature = work.h[5 * i] + raised
             z = math.copysign(0.5, -slope)
             if curvature > 0.0:
-                z = min(max(w[Z + i] - slope / curvature, -0.5), 0.5)
-            change = max(change, abs(z - w[Z + i]))
-            w[Z + i] = z
+                z = min(max(work.z[i] - slope / curvature, -0.5), 0.5)
+            change = max(change, abs(z - work.z[i]))
+            work.z[i] = z
         if change < 1e-9:
             break
     least = c
     for i in range(n):
         slope = slope_at(w, n, i, raised)
         # The value at z, and from there the tangent plane's fall to the corner behind its slope.
-        least += (slope + w[G + i]) * w[Z + i] - 2.0 * slope * w[Z + i] - abs(slope) - 0.25 * raised
+        least += (slope + work.g[i]) * work.z[i] - 2.0 * slope * work.z[i] - abs(slope) - 0.25 * raised
     least -= 0.125 * cubic * (1.0 + 1e-12) + 512.0 * UNIT * size
     root = math.sqrt(least) * (1.0 - 8.0 * UNIT) if least > 0.0 else 0.0
-    away = a[o + AWAY] + b[p + AWAY] + a[o + E0] + b[p + E0] + slack
+    away = node.away + node_record.away + node.e0 + node_record.e0 + slack
     return root - away * (1.0 + 16.0 * UNIT)
 
 
 @kernel(inner=True, exact=True)
 def patch_hull_bound(ra, a, o, rb, b, p, shift, slack, n, w):
     """The bound of the control points in the direction between the points of the models at z, without bends."""
-    n0 = w[D]
-    n1 = w[D + 1]
-    n2 = w[D + 2]
+    work = patch_work_at(w, 0)
+    patch = bezier_surface_at(ra, 0)
+    patch_record = bezier_surface_at(rb, 0)
+    n0 = work.d[0]
+    n1 = work.d[1]
+    n2 = work.d[2]
     for i in range(n):
-        n0 += w[Z + i] * w[J + 3 * i]
-        n1 += w[Z + i] * w[J + 3 * i + 1]
-        n2 += w[Z + i] * w[J + 3 * i + 2]
+        n0 += work.z[i] * work.j[3 * i]
+        n1 += work.z[i] * work.j[3 * i + 1]
+        n2 += work.z[i] * work.j[3 * i + 2]
     size = math.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
     if not size > 0.0:
         return 0.0
@@ -210,54 +245,57 @@ def patch_hull_bound(ra, a, o, rb, b, p, shift, slack, n, w):
     n2 *= size
     low = math.inf
     i = patch_positions(ra, o)
-    for _ in range((ra[DEGREE_U] + 1) * (ra[DEGREE_V] + 1)):
+    for _ in range((patch.degree_u + 1) * (patch.degree_v + 1)):
         low = min(low, n0 * a[i] + n1 * a[i + 1] + n2 * a[i + 2])
         i += 4
     high = -math.inf
     i = patch_positions(rb, p)
-    for _ in range((rb[DEGREE_U] + 1) * (rb[DEGREE_V] + 1)):
+    for _ in range((patch_record.degree_u + 1) * (patch_record.degree_v + 1)):
         high = max(high, n0 * b[i] + n1 * b[i + 1] + n2 * b[i + 2])
         i += 4
     gap = (low - high) - (n0 * shift[0] + n1 * shift[1] + n2 * shift[2])
-    return gap * (1.0 - 16.0 * UNIT) - 4.0 * slack - a[o + AWAY] - b[p + AWAY]
+    return gap * (1.0 - 16.0 * UNIT) - 4.0 * slack - patch_node_at(a, o).away - patch_node_at(b, p).away
 
 
 @kernel(inner=True, exact=True)
 def patch_convexity(a, o, na, b, p, n, w):
     """Whether F is proven convex on the box, its Hessian at least MARGIN diag(H) there; uses `load_hessian`'s H."""
+    work = patch_work_at(w, 0)
+    node = patch_node_at(a, o)
+    node_record = patch_node_at(b, p)
     far = size_at(w, D)
     total = 0.0
     for i in range(n):
-        if not w[H + 5 * i] > 0.0:
+        if not work.h[5 * i] > 0.0:
             return False
         far += 0.5 * size_at(w, J + 3 * i)
         # Half the sum of a row of |K|, for now where a step will be.
         row = 0.0
         for j in range(n):
             row += size_at(w, K + 3 * (4 * i + j))
-        w[STEP + i] = 0.5 * row
+        work.step[i] = 0.5 * row
         total += row
-    e0 = a[o + E0] + b[p + E0] + a[o + AWAY] + b[p + AWAY]
+    e0 = node.e0 + node_record.e0 + node.away + node_record.away
     far += 0.125 * total + e0
     rho = 0.0
     for i in range(n):
         row = 0.0
-        e1 = a[o + E1] if i < na else b[p + E1]
-        e2 = a[o + E2] if i < na else b[p + E2]
-        ji = size_at(w, J + 3 * i) + w[STEP + i]
+        e1 = node.e1 if i < na else node_record.e1
+        e2 = node.e2 if i < na else node_record.e2
+        ji = size_at(w, J + 3 * i) + work.step[i]
         for j in range(n):
-            f1 = a[o + E1] if j < na else b[p + E1]
+            f1 = node.e1 if j < na else node_record.e1
             v = 0.0
             for l in range(n):
                 turn = vector_dot(w, J + 3 * i, K + 3 * (4 * j + l)) + vector_dot(w, J + 3 * j, K + 3 * (4 * i + l))
                 v += 0.5 * abs(turn + vector_dot(w, J + 3 * l, K + 3 * (4 * i + j)))
-            jj = size_at(w, J + 3 * j) + w[STEP + j]
+            jj = size_at(w, J + 3 * j) + work.step[j]
             bend = size_at(w, K + 3 * (4 * i + j))
-            v += w[STEP + i] * w[STEP + j] + 0.125 * bend * total + e1 * (jj + f1) + f1 * ji + e0 * bend
+            v += work.step[i] * work.step[j] + 0.125 * bend * total + e1 * (jj + f1) + f1 * ji + e0 * bend
             if (i < na) == (j < na):
                 v += far * e2
             v += 1e-13 * (ji * jj + far * bend)
-            row += v / math.sqrt(w[H + 5 * i] * w[H + 5 * j])
+            row += v / math.sqrt(work.h[5 * i] * work.h[5 * j])
         rho = max(rho, row)
     rho = rho * (1.0 + 1e-12) + MARGIN * (1.0 + 1e-6)
     return rho < 1.0 and factorize(w, n, True, rho)

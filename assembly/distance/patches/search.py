@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly._record import record_dtype, record_view, size_of
 from assembly.distance.curves.nodes import length
 from assembly.distance.curves.search import CONVERGED, bound_to_beat, ended, in_span, longer, pop, push
 from assembly.distance.patches.formula_nodes import (
@@ -22,37 +23,19 @@ from assembly.distance.patches.formula_nodes import (
 )
 from assembly.distance.patches.newton import load_points, nearest_in_patches, proven_in_patches
 from assembly.distance.patches.nodes import (
-    AWAY,
-    BREAKS_U,
-    BREAKS_V,
     DEEPEST,
-    DEGREE_U,
-    DEGREE_V,
-    DEPTH,
-    E0,
-    HALVES,
-    HIGH_U,
-    HIGH_V,
-    LOW_U,
-    LOW_V,
     NODE_INTS,
-    PATCH,
-    PATCHES_U,
-    PATCHES_V,
-    RATIONAL,
-    SPEED_U,
-    SPEED_V,
+    bezier_surface_at,
     describe_patch,
     fill_patch,
+    patch_node_at,
+    patch_node_links_at,
     patch_stride,
     split_patch,
 )
 from assembly.distance.patches.pair import (
     BASIS,
-    PLACE,
     D,
-    H,
-    Z,
     clear_bends,
     free_count,
     load_hessian,
@@ -61,57 +44,78 @@ from assembly.distance.patches.pair import (
     patch_convexity,
     patch_hull_bound,
     patch_model_bound,
+    patch_work_at,
     size_at,
 )
-from assembly.geometry.splines.bezier_pieces import CENTER, ERROR, REACH, UNIT, WEIGHT_RATIO
+from assembly.geometry.splines.bezier_pieces import UNIT, bezier_head_at
 
 # What it writes: bounds, parameters of a and of b, the two points, pairs bounded.
-LOWER, UPPER, PARAMETERS, POINTS, COUNT, PATCH_ANSWER = 0, 1, 2, 6, 12, 13
+PATCH_ANSWER_RECORD = record_dtype(
+    "f8",
+    lower=1,
+    upper=1,
+    parameters=4,
+    points=6,
+    count=1,
+)
+patch_answer_at = record_view(PATCH_ANSWER_RECORD)
+PATCH_ANSWER = size_of(PATCH_ANSWER_RECORD)
 _ROOM = 512
 
 
 @kernel(inline=True)
 def patch_size(nodes, o):
     """The longer side of a patch."""
-    return max(nodes[o + SPEED_U], nodes[o + SPEED_V])
+    node = patch_node_at(nodes, o)
+    return max(node.speed_u, node.speed_v)
 
 
 @kernel(inline=True)
 def point_error(record, pool):
     """How far an evaluated point may be from the packed patch: sums of positive terms in triangles of 3 n roundings."""
-    n = record[DEGREE_U] + record[DEGREE_V]
-    return (1.0 + record[RATIONAL]) * (8.0 * n + 24.0) * UNIT * pool[REACH]
+    patch = bezier_surface_at(record, 0)
+    n = patch.degree_u + patch.degree_v
+    return (1.0 + patch.rational) * (8.0 * n + 24.0) * UNIT * bezier_head_at(pool, 0).reach
 
 
 @kernel(inline=True)
 def derivative_error(record, pool):
     """The same of a derivative: n differences of such sums, in a quotient also of the weights."""
-    n = record[DEGREE_U] + record[DEGREE_V] + 1.0
-    return 8.0 * n * (4.0 * n + 16.0) * UNIT * pool[REACH] * pool[WEIGHT_RATIO] ** (2 * record[RATIONAL])
+    head = bezier_head_at(pool, 0)
+    patch = bezier_surface_at(record, 0)
+    n = patch.degree_u + patch.degree_v + 1.0
+    return 8.0 * n * (4.0 * n + 16.0) * UNIT * head.reach * head.weight_ratio ** (2 * patch.rational)
 
 
 @kernel(inner=True)
 def keep_patch_points(ra, qa, ia, a, ka, rb, qb, ib, b, kb, na, nb, curve, w, u, v, upper, out):
     """Write nearest points that are known: u and v at PLACE of two nodes."""
-    o = patch_stride(ra) * ka
+    work = patch_work_at(w, 0)
+    patch_record = bezier_surface_at(ra, 0)
+    patch_0 = bezier_surface_at(rb, 0)
+    answer = patch_answer_at(out, 0)
+    o = patch_node_at(a, patch_stride(ra) * ka)
     p = patch_stride(rb) * kb
-    patch = ia[NODE_INTS * ka + PATCH]
-    out[PARAMETERS] = between(qa, ra[BREAKS_U] + patch // ra[PATCHES_V], a[o + LOW_U], a[o + HIGH_U], w[PLACE])
-    out[PARAMETERS + 1] = between(
-        qa, ra[BREAKS_V] + patch % ra[PATCHES_V], a[o + LOW_V], a[o + HIGH_V], w[PLACE + 1] if na > 1 else 0.0
+    node = patch_node_at(b, p)
+    patch = patch_node_links_at(ia, NODE_INTS * ka).patch
+    answer.parameters[0] = between(
+        qa, patch_record.breaks_u + patch // patch_record.patches_v, o.low_u, o.high_u, work.place[0]
     )
-    patch = ib[NODE_INTS * kb + PATCH]
-    x = w[PLACE + na] if nb > 0 else 0.0
-    y = w[PLACE + na + 1] if nb > 1 else 0.0
+    answer.parameters[1] = between(
+        qa, patch_record.breaks_v + patch % patch_record.patches_v, o.low_v, o.high_v, work.place[1] if na > 1 else 0.0
+    )
+    patch = patch_node_links_at(ib, NODE_INTS * kb).patch
+    x = work.place[na] if nb > 0 else 0.0
+    y = work.place[na + 1] if nb > 1 else 0.0
     if curve is None:
-        out[PARAMETERS + 2] = between(qb, rb[BREAKS_U] + patch // rb[PATCHES_V], b[p + LOW_U], b[p + HIGH_U], x)
-        out[PARAMETERS + 3] = between(qb, rb[BREAKS_V] + patch % rb[PATCHES_V], b[p + LOW_V], b[p + HIGH_V], y)
+        answer.parameters[2] = between(qb, patch_0.breaks_u + patch // patch_0.patches_v, node.low_u, node.high_u, x)
+        answer.parameters[3] = between(qb, patch_0.breaks_v + patch % patch_0.patches_v, node.low_v, node.high_v, y)
     else:
-        out[PARAMETERS + 2] = formula_parameter(b, p, x)
-    out[UPPER] = upper
+        answer.parameters[2] = formula_parameter(b, p, x)
+    answer.upper = upper
     for j in range(3):
-        out[POINTS + j] = u[j] + qa[CENTER + j]
-        out[POINTS + 3 + j] = v[j] + qb[CENTER + j]
+        answer.points[j] = u[j] + bezier_head_at(qa, 0).center[j]
+        answer.points[3 + j] = v[j] + bezier_head_at(qb, 0).center[j]
 
 
 @kernel(inline=True)
@@ -132,18 +136,27 @@ def patch_distance(ra, qa, rb, qb, curve, tolerance, clearance, budget, polish, 
 
     The second may stand for a curve given by a formula, which is None else.
     """
-    shift = (qb[CENTER] - qa[CENTER], qb[CENTER + 1] - qa[CENTER + 1], qb[CENTER + 2] - qa[CENTER + 2])
-    slack = 8.0 * UNIT * (qa[REACH] + qb[REACH] + length(shift)) + 1e-150
+    head = bezier_head_at(qb, 0)
+    pool_head = bezier_head_at(qa, 0)
+    patch = bezier_surface_at(ra, 0)
+    patch_record = bezier_surface_at(rb, 0)
+    answer = patch_answer_at(out, 0)
+    shift = (
+        head.center[0] - pool_head.center[0],
+        head.center[1] - pool_head.center[1],
+        head.center[2] - pool_head.center[2],
+    )
+    slack = 8.0 * UNIT * (pool_head.reach + head.reach + length(shift)) + 1e-150
     error = slack + point_error(ra, qa) + point_error(rb, qb)
     rough = max(derivative_error(ra, qa), derivative_error(rb, qb))
-    step = max(0.999 * tolerance, 8.0 * (error + qa[ERROR] + qb[ERROR]))
+    step = max(0.999 * tolerance, 8.0 * (error + pool_head.error + head.error))
     na = free_count(ra)
     nb = free_count(rb)
     n = na + nb
     sa = patch_stride(ra)
     sb = patch_stride(rb)
-    used_a = ra[PATCHES_U] * ra[PATCHES_V]
-    used_b = rb[PATCHES_U] * rb[PATCHES_V]
+    used_a = patch.patches_u * patch.patches_v
+    used_b = patch_record.patches_u * patch_record.patches_v
     room_a = used_a + _ROOM
     room_b = used_b + _ROOM
     room = used_a * used_b + _ROOM
@@ -154,8 +167,9 @@ def patch_distance(ra, qa, rb, qb, curve, tolerance, clearance, budget, polish, 
     keys = np.empty(room)
     first = np.empty(room, np.int64)
     second = np.empty(room, np.int64)
-    degree = max(max(ra[DEGREE_U], ra[DEGREE_V]), max(rb[DEGREE_U], rb[DEGREE_V]))
+    degree = max(max(patch.degree_u, patch.degree_v), max(patch_record.degree_u, patch_record.degree_v))
     w = np.empty(BASIS + 6 * (degree + 1))
+    work = patch_work_at(w, 0)
     m = np.empty(42)
     clear_bends(w)
     for k in range(used_a):
@@ -168,7 +182,7 @@ def patch_distance(ra, qa, rb, qb, curve, tolerance, clearance, budget, polish, 
     count = 0
     # The first corners, which are on both shapes.
     for i in range(4):
-        w[PLACE + i] = 0.0
+        work.place[i] = 0.0
     _low, upper, u, v = proven_in_patches(ra, a, 0, na, rb, b, 0, nb, curve, shift, error, rough, False, w)
     keep_patch_points(ra, qa, ia, a, 0, rb, qb, ib, b, 0, na, nb, curve, w, u, v, upper, out)
     at_start = True
@@ -210,7 +224,7 @@ def patch_distance(ra, qa, rb, qb, curve, tolerance, clearance, budget, polish, 
                     bound = max(bound, patch_model_bound(a, oa, b, ob, slack, n, w))
                     if bound < limit:
                         # The rows of a formula are its model's, which is not the curve.
-                        rest = 0.0 if curve is None else b[ob + E0]
+                        rest = 0.0 if curve is None else patch_node_at(b, ob).e0
                         bound = max(bound, patch_hull_bound(ra, a, oa, rb, b, ob, shift, slack, n, w) - rest)
                 if bound < limit:
                     push(keys, first, second, count, bound, ja, jb)
@@ -233,15 +247,15 @@ def patch_distance(ra, qa, rb, qb, curve, tolerance, clearance, budget, polish, 
         if curve is not None:
             nb = 0 if is_dot(b, ob) else 1
             n = na + nb
-        away = a[oa + AWAY] + b[ob + AWAY]
+        away = patch_node_at(a, oa).away + patch_node_at(b, ob).away
         load_models(a, oa, na, b, ob, nb, shift, w)
         load_hessian(w, n)
         key = max(key, patch_model_bound(a, oa, b, ob, slack, n, w))
         for i in range(n):
-            w[PLACE + i] = w[Z + i] + 0.5
+            work.place[i] = work.z[i] + 0.5
         proven = polish and patch_convexity(a, oa, na, b, ob, n, w)
         for i in range(n):
-            w[Z + i] = w[H + 5 * i]
+            work.z[i] = work.h[5 * i]
         descend = proven
         if polish and not proven:
             load_points(ra, a, oa, na, rb, b, ob, nb, curve, shift, w)
@@ -254,7 +268,7 @@ def patch_distance(ra, qa, rb, qb, curve, tolerance, clearance, budget, polish, 
             keep_patch_points(ra, qa, ia, a, ka, rb, qb, ib, b, kb, na, nb, curve, w, u, v, upper, out)
         if proven:
             # A dot's point stands for others: no patch, however small, comes nearer to the truth than that.
-            doubt = 2.0 * b[ob + E0] if curve is not None and nb == 0 else 0.0
+            doubt = 2.0 * patch_node_at(b, ob).e0 if curve is not None and nb == 0 else 0.0
             key = max(key, low - doubt)
             if far - low <= max(step, 16.0 * (error + away)) + doubt:
                 let_go = min(let_go, key)
@@ -265,8 +279,8 @@ def patch_distance(ra, qa, rb, qb, curve, tolerance, clearance, budget, polish, 
         # Halve the longer one.
         long_a = patch_size(a, oa)
         long_b = patch_size(b, ob)
-        ends_a = ia[NODE_INTS * ka + DEPTH] >= DEEPEST
-        ends_b = ib[NODE_INTS * kb + DEPTH] >= DEEPEST
+        ends_a = patch_node_links_at(ia, NODE_INTS * ka).depth >= DEEPEST
+        ends_b = patch_node_links_at(ib, NODE_INTS * kb).depth >= DEEPEST
         if max(long_a, long_b) <= step or (ends_a and ends_b):
             let_go = min(let_go, key)
             continue
@@ -275,17 +289,17 @@ def patch_distance(ra, qa, rb, qb, curve, tolerance, clearance, budget, polish, 
         first_b = kb
         last_b = kb + 1
         if ends_b or (long_a >= long_b and not ends_a):
-            if ia[NODE_INTS * ka + HALVES] < 0:
+            if patch_node_links_at(ia, NODE_INTS * ka).halves < 0:
                 if used_a + 2 > room_a:
                     room_a *= 4
                     a = longer(a, room_a * sa)
                     ia = longer(ia, room_a * NODE_INTS)
                 split_patch(ra, qa, ia, a, ka, used_a)
                 used_a += 2
-            first_a = ia[NODE_INTS * ka + HALVES]
+            first_a = patch_node_links_at(ia, NODE_INTS * ka).halves
             last_a = first_a + 2
         else:
-            if ib[NODE_INTS * kb + HALVES] < 0:
+            if patch_node_links_at(ib, NODE_INTS * kb).halves < 0:
                 if used_b + 2 > room_b:
                     room_b *= 4
                     b = longer(b, room_b * sb)
@@ -295,13 +309,13 @@ def patch_distance(ra, qa, rb, qb, curve, tolerance, clearance, budget, polish, 
                 else:
                     split_formula(rb, ib, b, kb, used_b)
                 used_b += 2
-            first_b = ib[NODE_INTS * kb + HALVES]
+            first_b = patch_node_links_at(ib, NODE_INTS * kb).halves
             last_b = first_b + 2
         if count + 2 > room:
             room *= 4
             keys = longer(keys, room)
             first = longer(first, room)
             second = longer(second, room)
-    out[LOWER] = max(min(top, upper), 0.0)
-    out[COUNT] = bounded
+    answer.lower = max(min(top, upper), 0.0)
+    answer.count = bounded
     return status

@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
+from assembly._record import place_of, record_dtype, record_view, size_of
 from assembly.geometry.expression.arithmetic import LANES, lane_constants, run_lanes
 from assembly.geometry.expression.tape import run_tape
 from assembly.geometry.expression.tape_bounds import JUMP, KINK, SMOOTH, run_bounds
@@ -26,8 +27,36 @@ from assembly.geometry.interval import down, idifference, magnitude, meet, up, w
 # C' bounds C across them; doubles of room; whether the tape of the arc length is for plain doubles
 # (`geometry/expression/rounding.py`). In
 # the pool: the ends of the domain, how far C may be off, and the center that it is taken about.
-DIMENSION, POINT_TAPE, RANGE_TAPE, ARC_TAPE, HAS_RANGE, CONTINUOUS, ROOM, ARC_PLAIN, FORMULA_RECORD = range(9)
-DOMAIN, ERROR, CENTER, FORMULA_POOL = 0, 2, 3, 6
+FORMULA = record_dtype(
+    "i8",
+    dimension=1,
+    point_tape=1,
+    range_tape=1,
+    arc_tape=1,
+    has_range=1,
+    continuous=1,
+    room=1,
+    arc_plain=1,
+)
+formula_at = record_view(FORMULA)
+DIMENSION = place_of(FORMULA, "dimension")
+POINT_TAPE = place_of(FORMULA, "point_tape")
+RANGE_TAPE = place_of(FORMULA, "range_tape")
+ARC_TAPE = place_of(FORMULA, "arc_tape")
+HAS_RANGE = place_of(FORMULA, "has_range")
+CONTINUOUS = place_of(FORMULA, "continuous")
+ROOM = place_of(FORMULA, "room")
+ARC_PLAIN = place_of(FORMULA, "arc_plain")
+FORMULA_RECORD = size_of(FORMULA)
+FORMULA_HEAD = record_dtype(
+    "f8",
+    domain=2,
+    error=1,
+    center=3,
+)
+formula_head_at = record_view(FORMULA_HEAD)
+CENTER = place_of(FORMULA_HEAD, "center")
+FORMULA_POOL = size_of(FORMULA_HEAD)
 RESULTS, WORK_AT = 4, 28
 _VALUES, _ORDERS = 9, 12
 
@@ -36,16 +65,16 @@ _VALUES, _ORDERS = 9, 12
 def formula_point(table, pool, t, room):
     """C, C', C'' at t to room[RESULTS:], nine doubles."""
     room[0] = t
-    run_tape(table, pool, table[POINT_TAPE], room, room[WORK_AT:], room[RESULTS:])
+    run_tape(table, pool, formula_at(table, 0).point_tape, room, room[WORK_AT:], room[RESULTS:])
     for k in range(3):
-        room[RESULTS + k] -= pool[CENTER + k]
+        room[RESULTS + k] -= formula_head_at(pool, 0).center[k]
 
 
 @kernel(inline=True)
 def forget(table, room, first, last):
     """The whole line for orders of the results, as far as there are coordinates."""
     for order in range(first, last):
-        for k in range(table[DIMENSION]):
+        for k in range(formula_at(table, 0).dimension):
             o = RESULTS + 6 * order + 2 * k
             room[o] = -math.inf
             room[o + 1] = math.inf
@@ -54,17 +83,19 @@ def forget(table, room, first, last):
 @kernel(inline=True)
 def settle(table, pool, room, told, orders):
     """What a run tells forgets of its derivatives, below `orders`; C with its error, about the center."""
+    head = formula_head_at(pool, 0)
+    formula = formula_at(table, 0)
     if told >= KINK:
         forget(table, room, 2, orders)
-    if told >= JUMP and table[CONTINUOUS] == 0:
+    if told >= JUMP and formula.continuous == 0:
         forget(table, room, 1, 2)
-    error = pool[ERROR]
-    for k in range(table[DIMENSION]):
+    error = head.error
+    for k in range(formula.dimension):
         o = RESULTS + 2 * k
         if error > 0.0:
             room[o] = down(room[o] - error)
             room[o + 1] = up(room[o + 1] + error)
-        c = pool[CENTER + k]
+        c = head.center[k]
         if c != 0.0:
             room[o], room[o + 1] = idifference((room[o], room[o + 1]), (c, c))
 
@@ -74,17 +105,18 @@ def point_bounds(table, pool, t, room):
     """Intervals of C, C', C'' at t to room[RESULTS:], nine pairs."""
     room[0] = t
     room[1] = t
-    told = run_bounds(table, pool, table[POINT_TAPE], room, room[WORK_AT:], room[RESULTS:])
+    told = run_bounds(table, pool, formula_at(table, 0).point_tape, room, room[WORK_AT:], room[RESULTS:])
     settle(table, pool, room, told, 3)
 
 
 @kernel(inner=True, exact=True)
 def range_bounds(table, pool, lo, hi, room):
     """Intervals of C, C', C'', C''' over [lo, hi] to room[RESULTS:], twelve pairs."""
+    formula = formula_at(table, 0)
     room[0] = lo
     room[1] = hi
-    told = run_bounds(table, pool, table[RANGE_TAPE], room, room[WORK_AT:], room[RESULTS:])
-    if table[HAS_RANGE] == 0:
+    told = run_bounds(table, pool, formula.range_tape, room, room[WORK_AT:], room[RESULTS:])
+    if formula.has_range == 0:
         forget(table, room, 0, 1)
     settle(table, pool, room, told, 4)
     return told
@@ -116,18 +148,19 @@ def refine(values, o, half, m):
 @kernel(inner=True, exact=True)
 def arc_bound(table, pool, lo, hi, room):
     """Upper bound of the length of arc over [lo, hi] by the user's expression; infinite where it has no length."""
-    if table[ARC_TAPE] == 0:
+    formula = formula_at(table, 0)
+    if formula.arc_tape == 0:
         return math.inf
-    if table[ARC_PLAIN] != 0:
+    if formula.arc_plain != 0:
         room[0] = lo
         room[1] = hi
-        run_tape(table, pool, table[ARC_TAPE], room, room[WORK_AT:], room[RESULTS:])
+        run_tape(table, pool, formula.arc_tape, room, room[WORK_AT:], room[RESULTS:])
         return room[RESULTS] if room[RESULTS] >= 0.0 else math.inf
     room[0] = lo
     room[1] = lo
     room[2] = hi
     room[3] = hi
-    run_bounds(table, pool, table[ARC_TAPE], room, room[WORK_AT:], room[RESULTS:])
+    run_bounds(table, pool, formula.arc_tape, room, room[WORK_AT:], room[RESULTS:])
     return room[RESULTS + 1] if room[RESULTS + 1] >= 0.0 else math.inf
 
 
@@ -169,10 +202,11 @@ def formula_ranges(table, pool, lo, hi, out, room):
 @kernel(signatures="(i8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1])")
 def arc_bounds(table, pool, lo, hi, out, room):
     """`arc_bound` of every interval [lo[i], hi[i]]; many at a time where plain doubles do."""
-    if table[ARC_TAPE] != 0 and table[ARC_PLAIN] != 0:
-        work = lane_constants(table, pool, table[ARC_TAPE])
+    formula = formula_at(table, 0)
+    if formula.arc_tape != 0 and formula.arc_plain != 0:
+        work = lane_constants(table, pool, formula.arc_tape)
         for i in range(0, lo.size, LANES):
-            run_lanes(table, table[ARC_TAPE], lo, hi, i, work, out)
+            run_lanes(table, formula.arc_tape, lo, hi, i, work, out)
         return
     for i in range(lo.size):
         out[i] = arc_bound(table, pool, lo[i], hi[i], room)

@@ -11,20 +11,11 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly.geometry.faces.trim_pieces import (
-    BOUND_2,
-    END,
-    MIDDLE,
-    PIECE_AFTER,
-    PIECE_COEFFICIENTS,
-    PIECE_DEGREE,
     PIECE_DOUBLES,
     PIECE_INTS,
-    PIECE_T0,
-    PIECE_T1,
-    SHIFT_U,
-    SHIFT_V,
-    START,
+    piece_bounds_at,
     piece_line,
+    piece_links_at,
 )
 
 # Around a corner that two pieces share, as a part of the size, they are not compared.
@@ -74,37 +65,37 @@ def _segments(ax, ay, bx, by, cx, cy, dx, dy):
 @kernel(inner=True)
 def _place(table, pool, ints, doubles, piece, t, move_u, move_v):
     """The point of a piece at a parameter; its ends are as the table has them."""
-    o = ints + PIECE_INTS * piece
-    i = doubles + PIECE_DOUBLES * piece
-    if t <= pool[i + PIECE_T0]:
-        return pool[i + START] + move_u, pool[i + START + 1] + move_v
-    if t >= pool[i + PIECE_T1]:
-        return pool[i + END] + move_u, pool[i + END + 1] + move_v
-    x, y, _dx, _dy = piece_line(pool, table[o + PIECE_COEFFICIENTS], table[o + PIECE_DEGREE], t - pool[i + MIDDLE])
-    return x + pool[i + SHIFT_U] + move_u, y + pool[i + SHIFT_V] + move_v
+    o = piece_links_at(table, ints + PIECE_INTS * piece)
+    i = piece_bounds_at(pool, doubles + PIECE_DOUBLES * piece)
+    if t <= i.t0:
+        return i.start[0] + move_u, i.start[1] + move_v
+    if t >= i.t1:
+        return i.end[0] + move_u, i.end[1] + move_v
+    x, y, _dx, _dy = piece_line(pool, o.coefficients, o.degree, t - i.middle)
+    return x + i.shift_u + move_u, y + i.shift_v + move_v
 
 
 @kernel(inner=True)
 def _follows(table, pool, ints, doubles, a, b, tolerance):
     """Whether b comes after a, at once or after a stretch of next to nothing."""
     length = 0.0
-    k = table[ints + PIECE_INTS * a + PIECE_AFTER]
+    k = piece_links_at(table, ints + PIECE_INTS * a).after
     while k >= 0:
         if k == b:
             return True
-        i = doubles + PIECE_DOUBLES * k
-        length += abs(pool[i + END] - pool[i + START]) + abs(pool[i + END + 1] - pool[i + START + 1])
+        i = piece_bounds_at(pool, doubles + PIECE_DOUBLES * k)
+        length += abs(i.end[0] - i.start[0]) + abs(i.end[1] - i.start[1])
         if length > 4.0 * tolerance or k == a:
             return False
-        k = table[ints + PIECE_INTS * k + PIECE_AFTER]
+        k = piece_links_at(table, ints + PIECE_INTS * k).after
     return False
 
 
 @kernel(inner=True)
 def _meet(table, pool, ints, doubles, a, b, move_u, move_v, tolerance, size, stack, budget):
     """Whether two pieces meet beside a common corner, where, and what is left of the budget."""
-    ia = doubles + PIECE_DOUBLES * a
-    ib = doubles + PIECE_DOUBLES * b
+    ia = piece_bounds_at(pool, doubles + PIECE_DOUBLES * a)
+    ib = piece_bounds_at(pool, doubles + PIECE_DOUBLES * b)
     corners = 0
     corner_u = 0.0
     corner_v = 0.0
@@ -112,14 +103,14 @@ def _meet(table, pool, ints, doubles, a, b, move_u, move_v, tolerance, size, sta
     other_v = 0.0
     near = 8.0 * tolerance
     if _follows(table, pool, ints, doubles, a, b, tolerance):
-        corner_u = pool[ia + END]
-        corner_v = pool[ia + END + 1]
-        if abs(corner_u - pool[ib + START] - move_u) + abs(corner_v - pool[ib + START + 1] - move_v) <= near:
+        corner_u = ia.end[0]
+        corner_v = ia.end[1]
+        if abs(corner_u - ib.start[0] - move_u) + abs(corner_v - ib.start[1] - move_v) <= near:
             corners = 1
     if _follows(table, pool, ints, doubles, b, a, tolerance):
-        other_u = pool[ia + START]
-        other_v = pool[ia + START + 1]
-        if abs(other_u - pool[ib + END] - move_u) + abs(other_v - pool[ib + END + 1] - move_v) <= near:
+        other_u = ia.start[0]
+        other_v = ia.start[1]
+        if abs(other_u - ib.end[0] - move_u) + abs(other_v - ib.end[1] - move_v) <= near:
             if corners == 0:
                 corner_u = other_u
                 corner_v = other_v
@@ -128,10 +119,10 @@ def _meet(table, pool, ints, doubles, a, b, move_u, move_v, tolerance, size, sta
         other_u = corner_u
         other_v = corner_v
     radius = max(_CORNER * size, 2.0 * near) if corners > 0 else 0.0
-    stack[0, 0] = pool[ia + PIECE_T0]
-    stack[0, 1] = pool[ia + PIECE_T1]
-    stack[0, 2] = pool[ib + PIECE_T0]
-    stack[0, 3] = pool[ib + PIECE_T1]
+    stack[0, 0] = ia.t0
+    stack[0, 1] = ia.t1
+    stack[0, 2] = ib.t0
+    stack[0, 3] = ib.t1
     top = 1
     while top > 0:
         top -= 1
@@ -158,8 +149,8 @@ def _meet(table, pool, ints, doubles, a, b, move_u, move_v, tolerance, size, sta
             needed = min(tolerance, _OPENING * square / size)
         if apart > needed:
             continue
-        bent_a = 0.125 * pool[ia + BOUND_2] * (a1 - a0) ** 2
-        bent_b = 0.125 * pool[ib + BOUND_2] * (b1 - b0) ** 2
+        bent_a = 0.125 * ia.bound_2 * (a1 - a0) ** 2
+        bent_b = 0.125 * ib.bound_2 * (b1 - b0) ** 2
         if _segments(px, py, qx, qy, rx, ry, sx, sy) - bent_a - bent_b > needed:
             continue
         if corners > 0:

@@ -13,13 +13,8 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly.geometry.faces.trim_pieces import piece_line
 from assembly.geometry.splines.evaluate import (
-    BREAKS_U,
-    BREAKS_V,
-    CLOSED_U,
-    CLOSED_V,
-    SPANS_U,
-    SPANS_V,
     into_domain,
+    surface_at,
     surface_point,
 )
 from assembly.geometry.vec import cross, dot
@@ -28,9 +23,10 @@ from assembly.geometry.vec import cross, dot
 @kernel(inner=True)
 def _column(table, pool, u, v, levels, nodes, weights):
     """Integrals over a column from v to the top of |Su x Sv| and of S.(Su x Sv) / 3."""
+    patch = surface_at(table, 0)
     area = 0.0
     volume = 0.0
-    x, _fits = into_domain(pool, table[BREAKS_U], table[SPANS_U], table[CLOSED_U], u)
+    x, _fits = into_domain(pool, patch.breaks_u, patch.spans_u, patch.closed_u, u)
     for k in range(levels.size - 1):
         low = max(v, levels[k])
         half = 0.5 * (levels[k + 1] - low)
@@ -38,7 +34,7 @@ def _column(table, pool, u, v, levels, nodes, weights):
             continue
         for n in range(nodes.size):
             y = low + half * (1.0 + nodes[n])
-            y, _fits = into_domain(pool, table[BREAKS_V], table[SPANS_V], table[CLOSED_V], y)
+            y, _fits = into_domain(pool, patch.breaks_v, patch.spans_v, patch.closed_v, y)
             s, su, sv, _suu, _suv, _svv = surface_point(table, pool, 0, x, y)
             normal = cross(su, sv)
             area += half * weights[n] * np.sqrt(dot(normal, normal))

@@ -11,33 +11,17 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly.geometry.faces.trim_pieces import (
-    BOUND_1,
-    BOUND_2,
-    BOUND_3,
     LET_GO,
-    MIDDLE,
-    PIECE_COEFFICIENTS,
-    PIECE_CURVE,
-    PIECE_DEGREE,
     PIECE_DOUBLES,
     PIECE_INTS,
-    PIECE_T0,
-    PIECE_T1,
-    SHIFT_U,
-    SHIFT_V,
-    TRIM_PIECE_POOL,
-    TRIM_PIECE_TABLE,
-    TRIM_PIECES,
     piece_bend,
+    piece_bounds_at,
+    piece_links_at,
+    trim_at,
 )
 from assembly.geometry.splines.evaluate import (
-    BREAKS_U,
-    BREAKS_V,
-    CLOSED_U,
-    CLOSED_V,
-    SPANS_U,
-    SPANS_V,
     into_domain,
+    surface_at,
     surface_point,
 )
 from assembly.geometry.vec import add, blend, dot, scale, sub
@@ -49,18 +33,19 @@ _ROUNDING = 4e-15
 @kernel(inner=True)
 def _on_surface(table, pool, surface, u, v):
     """The point and derivatives at parameters of any sheet; beyond an open end, those of the end."""
-    x, _fits = into_domain(pool, table[surface + BREAKS_U], table[surface + SPANS_U], table[surface + CLOSED_U], u)
-    y, _fits = into_domain(pool, table[surface + BREAKS_V], table[surface + SPANS_V], table[surface + CLOSED_V], v)
+    patch = surface_at(table, surface)
+    x, _fits = into_domain(pool, patch.breaks_u, patch.spans_u, patch.closed_u, u)
+    y, _fits = into_domain(pool, patch.breaks_v, patch.spans_v, patch.closed_v, v)
     return surface_point(table, pool, surface, x, y)
 
 
 @kernel(inner=True)
 def _on_curve(table, pool, surface, o, i, t):
     """A point of S(c(t)) with its first two derivatives."""
-    u, v, du, dv, ddu, ddv = piece_bend(
-        pool, table[o + PIECE_COEFFICIENTS], table[o + PIECE_DEGREE], t - pool[i + MIDDLE]
-    )
-    s, su, sv, suu, suv, svv = _on_surface(table, pool, surface, u + pool[i + SHIFT_U], v + pool[i + SHIFT_V])
+    piece = piece_bounds_at(pool, i)
+    links = piece_links_at(table, o)
+    u, v, du, dv, ddu, ddv = piece_bend(pool, links.coefficients, links.degree, t - piece.middle)
+    s, su, sv, suu, suv, svv = _on_surface(table, pool, surface, u + piece.shift_u, v + piece.shift_v)
     bend = add(blend(du * du, suu, 2.0 * du * dv, suv), blend(dv * dv, svv, 1.0, blend(ddu, su, ddv, sv)))
     return s, blend(du, su, dv, sv), bend
 
@@ -103,8 +88,9 @@ def _newton(table, pool, surface, o, i, a, b, t, q):
 @kernel(inner=True)
 def _search(table, pool, surface, o, i, q, m1, m2, m3, best):
     """As `trim.nearest_on_piece`, in space."""
-    t0 = pool[i + PIECE_T0]
-    t1 = pool[i + PIECE_T1]
+    piece = piece_bounds_at(pool, i)
+    t0 = piece.t0
+    t1 = piece.t1
     found = t0 - 1.0
     level = 0
     index = 0
@@ -158,32 +144,33 @@ def nearest_in_space(table, pool, surface, trim, bounds, u, v, out):
 
     `bounds` are g1, g2, g3 of the surface.
     """
-    count = table[trim + TRIM_PIECES]
+    trim_record = trim_at(table, trim)
+    count = trim_record.pieces
     for n in range(u.size):
         q, _su, _sv, _suu, _suv, _svv = _on_surface(table, pool, surface, u[n], v[n])
         best = np.inf
         out[n, 1] = -1.0
         out[n, 2] = 0.0
         for k in range(2 * count):
-            o = table[trim + TRIM_PIECE_TABLE] + PIECE_INTS * (k >> 1)
-            i = table[trim + TRIM_PIECE_POOL] + PIECE_DOUBLES * (k >> 1)
-            t = pool[i + PIECE_T0] if k % 2 == 0 else pool[i + PIECE_T1]
+            o = trim_record.piece_table + PIECE_INTS * (k >> 1)
+            i = trim_record.piece_pool + PIECE_DOUBLES * (k >> 1)
+            t = piece_bounds_at(pool, i).t0 if k % 2 == 0 else piece_bounds_at(pool, i).t1
             p, _d, _h = _on_curve(table, pool, surface, o, i, t)
             e = sub(p, q)
             if 0.5 * dot(e, e) < best:
                 best = 0.5 * dot(e, e)
-                out[n, 1] = table[o + PIECE_CURVE]
+                out[n, 1] = piece_links_at(table, o).curve
                 out[n, 2] = t
         for k in range(count):
-            o = table[trim + TRIM_PIECE_TABLE] + PIECE_INTS * k
-            i = table[trim + TRIM_PIECE_POOL] + PIECE_DOUBLES * k
-            c1 = pool[i + BOUND_1]
-            c2 = pool[i + BOUND_2]
+            o = trim_record.piece_table + PIECE_INTS * k
+            i = trim_record.piece_pool + PIECE_DOUBLES * k
+            c1 = piece_bounds_at(pool, i).bound_1
+            c2 = piece_bounds_at(pool, i).bound_2
             m1 = bounds[0] * c1
             m2 = bounds[1] * c1 * c1 + bounds[0] * c2
-            m3 = bounds[2] * c1**3 + 3.0 * bounds[1] * c1 * c2 + bounds[0] * pool[i + BOUND_3]
+            m3 = bounds[2] * c1**3 + 3.0 * bounds[1] * c1 * c2 + bounds[0] * piece_bounds_at(pool, i).bound_3
             best, t = _search(table, pool, surface, o, i, q, m1, m2, m3, best)
-            if t >= pool[i + PIECE_T0]:
-                out[n, 1] = table[o + PIECE_CURVE]
+            if t >= piece_bounds_at(pool, i).t0:
+                out[n, 1] = piece_links_at(table, o).curve
                 out[n, 2] = t
         out[n, 0] = np.sqrt(2.0 * best)

@@ -15,36 +15,13 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly.geometry.faces.trim_pieces import (
-    BOTTOM,
-    END,
-    HIGH_U,
-    HIGH_V,
-    LOW_U,
-    LOW_V,
-    MIDDLE,
-    ON,
-    PERIOD_U,
-    PERIOD_V,
-    PIECE_COEFFICIENTS,
-    PIECE_DEGREE,
     PIECE_DOUBLES,
     PIECE_INTS,
-    PIECE_MAJOR,
-    PIECE_SIGN_U,
-    PIECE_SIGN_V,
-    PIECE_T0,
-    PIECE_T1,
-    SHIFT_U,
-    SHIFT_V,
-    START,
-    TRIM_ALL,
-    TRIM_FRAME,
-    TRIM_PIECE_POOL,
-    TRIM_PIECE_TABLE,
-    TRIM_PIECES,
-    TRIM_STEP_POOL,
-    TRIM_STEPS,
     piece_at,
+    piece_bounds_at,
+    piece_links_at,
+    trim_at,
+    trim_frame_at,
 )
 
 
@@ -72,43 +49,45 @@ def _steps(pool, first, count, start, u):
 @kernel(inner=True)
 def _below(table, pool, o, i, u, v, tolerance):
     """What a piece adds to w at a point, and whether the point is on it."""
+    piece = piece_bounds_at(pool, i)
+    links = piece_links_at(table, o)
     if v > pool[i + 3] + tolerance:
-        return table[o + PIECE_SIGN_U] if pool[i] <= u < pool[i + 1] else 0, False
+        return links.sign_u if pool[i] <= u < pool[i + 1] else 0, False
     if v < pool[i + 2] - tolerance:
         return 0, False
-    shift_u = pool[i + SHIFT_U]
-    shift_v = pool[i + SHIFT_V]
-    sign_u = table[o + PIECE_SIGN_U]
-    sign_v = table[o + PIECE_SIGN_V]
+    shift_u = piece.shift_u
+    shift_v = piece.shift_v
+    sign_u = links.sign_u
+    sign_v = links.sign_v
     within = pool[i] <= u < pool[i + 1]
-    major = table[o + PIECE_MAJOR]
+    major = links.major
     x = u
     # The ends first: beyond them the curve is not the piece's.
-    near = (u - pool[i + START]) ** 2 + (v - pool[i + START + 1]) ** 2
-    near = min(near, (u - pool[i + END]) ** 2 + (v - pool[i + END + 1]) ** 2)
+    near = (u - piece.start[0]) ** 2 + (v - piece.start[1]) ** 2
+    near = min(near, (u - piece.end[0]) ** 2 + (v - piece.end[1]) ** 2)
     if near <= tolerance * tolerance:
         return 0, True
     if major == 0:
         x = u
-        start = pool[i + START]
-        end = pool[i + END]
+        start = piece.start[0]
+        end = piece.end[0]
         shift = shift_u
         inside = pool[i] <= u <= pool[i + 1]
     else:
         x = v
-        start = pool[i + START + 1]
-        end = pool[i + END + 1]
+        start = piece.start[1]
+        end = piece.end[1]
         shift = shift_v
         inside = pool[i + 2] <= v <= pool[i + 3]
     if not inside:
         return sign_u if within and v > pool[i + 3] else 0, False
     at, cu, cv, du, dv = piece_at(
         pool,
-        table[o + PIECE_COEFFICIENTS],
-        table[o + PIECE_DEGREE],
-        pool[i + MIDDLE],
-        pool[i + PIECE_T0],
-        pool[i + PIECE_T1],
+        links.coefficients,
+        links.degree,
+        piece.middle,
+        piece.t0,
+        piece.t1,
         major,
         x - shift,
         start - shift,
@@ -128,19 +107,20 @@ def _below(table, pool, o, i, u, v, tolerance):
 @kernel(inner=True)
 def winding(table, pool, trim, u, v):
     """w at a point, and whether the point is on the boundary."""
-    frame = table[trim + TRIM_FRAME]
-    tolerance = pool[frame + ON]
-    x = into_cell(u, pool[frame + LOW_U], pool[frame + HIGH_U], pool[frame + PERIOD_U])
-    y = into_cell(v, pool[frame + LOW_V], pool[frame + HIGH_V], pool[frame + PERIOD_V])
+    trim_record = trim_at(table, trim)
+    frame = trim_frame_at(pool, trim_record.frame)
+    tolerance = frame.on
+    x = into_cell(u, frame.low_u, frame.high_u, frame.period_u)
+    y = into_cell(v, frame.low_v, frame.high_v, frame.period_v)
     # A pole edge is no boundary: its points belong to the face, with those just inside.
     z = x
-    extent = pool[frame + HIGH_U] - pool[frame + LOW_U]
-    if pool[frame + PERIOD_U] == 0.0 and 0.0 <= x - pool[frame + HIGH_U] <= 1e-14 * extent:
-        z = pool[frame + HIGH_U] - 1e-15 * extent
-    w = _steps(pool, table[trim + TRIM_STEP_POOL], table[trim + TRIM_STEPS], pool[frame + BOTTOM], x)
-    o = table[trim + TRIM_PIECE_TABLE]
-    i = table[trim + TRIM_PIECE_POOL]
-    for _ in range(table[trim + TRIM_PIECES]):
+    extent = frame.high_u - frame.low_u
+    if frame.period_u == 0.0 and 0.0 <= x - frame.high_u <= 1e-14 * extent:
+        z = frame.high_u - 1e-15 * extent
+    w = _steps(pool, trim_record.step_pool, trim_record.steps, frame.bottom, x)
+    o = trim_record.piece_table
+    i = trim_record.piece_pool
+    for _ in range(trim_record.pieces):
         if pool[i] - tolerance <= x <= pool[i + 1] + tolerance:
             part, on = _below(table, pool, o, i, x, y, tolerance)
             if on:
@@ -148,8 +128,8 @@ def winding(table, pool, trim, u, v):
             w += part
         o += PIECE_INTS
         i += PIECE_DOUBLES
-    for _ in range(table[trim + TRIM_PIECES], table[trim + TRIM_ALL]):
-        sign = table[o + PIECE_SIGN_U]
+    for _ in range(trim_record.pieces, trim_record.all_pieces):
+        sign = piece_links_at(table, o).sign_u
         if pool[i] <= z < pool[i + 1] and (y > pool[i + 2] or (y == pool[i + 2] and sign > 0)):
             w += sign
         o += PIECE_INTS
@@ -163,12 +143,12 @@ def trim_side(table, pool, trim, u, v):
     w, on = winding(table, pool, trim, u, v)
     if on:
         return 0
-    frame = table[trim + TRIM_FRAME]
-    slack = 1e-14 * (pool[frame + HIGH_U] - pool[frame + LOW_U])
-    if pool[frame + PERIOD_U] == 0.0 and not pool[frame + LOW_U] - slack <= u <= pool[frame + HIGH_U] + slack:
+    frame = trim_frame_at(pool, trim_at(table, trim).frame)
+    slack = 1e-14 * (frame.high_u - frame.low_u)
+    if frame.period_u == 0.0 and not frame.low_u - slack <= u <= frame.high_u + slack:
         return -1
-    slack = 1e-14 * (pool[frame + HIGH_V] - pool[frame + LOW_V])
-    if pool[frame + PERIOD_V] == 0.0 and not pool[frame + LOW_V] - slack <= v <= pool[frame + HIGH_V] + slack:
+    slack = 1e-14 * (frame.high_v - frame.low_v)
+    if frame.period_v == 0.0 and not frame.low_v - slack <= v <= frame.high_v + slack:
         return -1
     return 1 if w == 1.0 else -1
 

@@ -13,37 +13,17 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly.geometry.faces.trim import into_cell, winding
 from assembly.geometry.faces.trim_pieces import (
-    BOUND_1,
-    BOUND_2,
-    BOUND_3,
     END,
-    HIGH_U,
-    HIGH_V,
-    LOW_U,
-    LOW_V,
-    MIDDLE,
-    PERIOD_U,
-    PERIOD_V,
-    PIECE_AFTER,
-    PIECE_BEFORE,
-    PIECE_COEFFICIENTS,
-    PIECE_CURVE,
-    PIECE_DEGREE,
     PIECE_DOUBLES,
     PIECE_INTS,
-    PIECE_T0,
-    PIECE_T1,
-    SHIFT_U,
-    SHIFT_V,
-    SIZE,
     START,
-    TRIM_CURVE_PIECES,
-    TRIM_FRAME,
-    TRIM_PIECE_POOL,
-    TRIM_PIECE_TABLE,
     nearest_on_piece,
+    piece_bounds_at,
     piece_line,
+    piece_links_at,
     polished,
+    trim_at,
+    trim_frame_at,
 )
 
 # Neighbors whose directions differ by less [rad] are one smooth curve.
@@ -64,12 +44,14 @@ def _gap(x, low, high):
 @kernel(inner=True)
 def _end_direction(table, pool, o, i, at_end):
     """Unit direction of a piece at one of its ends, from the chord where its speed vanishes there."""
-    t = pool[i + PIECE_T1] if at_end else pool[i + PIECE_T0]
-    x, y, dx, dy = piece_line(pool, table[o + PIECE_COEFFICIENTS], table[o + PIECE_DEGREE], t - pool[i + MIDDLE])
+    piece = piece_bounds_at(pool, i)
+    links = piece_links_at(table, o)
+    t = piece.t1 if at_end else piece.t0
+    x, y, dx, dy = piece_line(pool, links.coefficients, links.degree, t - piece.middle)
     length = np.sqrt(dx * dx + dy * dy)
-    if length <= _SLOW * pool[i + BOUND_1]:
-        near = t + 1e-4 * (pool[i + PIECE_T0] - pool[i + PIECE_T1]) * (1.0 if at_end else -1.0)
-        a, b, dx, dy = piece_line(pool, table[o + PIECE_COEFFICIENTS], table[o + PIECE_DEGREE], near - pool[i + MIDDLE])
+    if length <= _SLOW * piece.bound_1:
+        near = t + 1e-4 * (piece.t0 - piece.t1) * (1.0 if at_end else -1.0)
+        a, b, dx, dy = piece_line(pool, links.coefficients, links.degree, near - piece.middle)
         dx = x - a if at_end else a - x
         dy = y - b if at_end else b - y
         length = np.sqrt(dx * dx + dy * dy)
@@ -82,17 +64,17 @@ def _nearest_end(pool, doubles, begin, stop, x, y, best):
     piece = begin
     t = 0.0
     for k in range(begin, stop):
-        i = doubles + PIECE_DOUBLES * k
-        f = 0.5 * ((x - pool[i + START]) ** 2 + (y - pool[i + START + 1]) ** 2)
+        i = piece_bounds_at(pool, doubles + PIECE_DOUBLES * k)
+        f = 0.5 * ((x - i.start[0]) ** 2 + (y - i.start[1]) ** 2)
         if f < best:
             best = f
             piece = k
-            t = pool[i + PIECE_T0]
-        f = 0.5 * ((x - pool[i + END]) ** 2 + (y - pool[i + END + 1]) ** 2)
+            t = i.t0
+        f = 0.5 * ((x - i.end[0]) ** 2 + (y - i.end[1]) ** 2)
         if f < best:
             best = f
             piece = k
-            t = pool[i + PIECE_T1]
+            t = i.t1
     return best, piece, t
 
 
@@ -102,26 +84,27 @@ def _nearest_inside(table, pool, ints, doubles, begin, stop, x, y, best):
     piece = begin
     t = 0.0
     for k in range(begin, stop):
-        o = ints + PIECE_INTS * k
+        o = piece_links_at(table, ints + PIECE_INTS * k)
         i = doubles + PIECE_DOUBLES * k
+        piece_bounds = piece_bounds_at(pool, i)
         gap_u = _gap(x, pool[i], pool[i + 1])
         gap_v = _gap(y, pool[i + 2], pool[i + 3])
         if 0.5 * (gap_u * gap_u + gap_v * gap_v) < best:
             best, at = nearest_on_piece(
                 pool,
-                table[o + PIECE_COEFFICIENTS],
-                table[o + PIECE_DEGREE],
-                pool[i + MIDDLE],
-                pool[i + PIECE_T0],
-                pool[i + PIECE_T1],
-                pool[i + BOUND_1],
-                pool[i + BOUND_2],
-                pool[i + BOUND_3],
-                x - pool[i + SHIFT_U],
-                y - pool[i + SHIFT_V],
+                o.coefficients,
+                o.degree,
+                piece_bounds.middle,
+                piece_bounds.t0,
+                piece_bounds.t1,
+                piece_bounds.bound_1,
+                piece_bounds.bound_2,
+                piece_bounds.bound_3,
+                x - piece_bounds.shift_u,
+                y - piece_bounds.shift_v,
                 best,
             )
-            if at >= pool[i + PIECE_T0]:
+            if at >= piece_bounds.t0:
                 piece = k
                 t = at
     return best, piece, t
@@ -133,22 +116,23 @@ def trim_nearest(table, pool, trim, first, count, u, v):
 
     The distance is positive on the material side of the curves `first` to `first + count - 1`.
     """
-    frame = table[trim + TRIM_FRAME]
-    period_u = pool[frame + PERIOD_U]
-    period_v = pool[frame + PERIOD_V]
-    qx = into_cell(u, pool[frame + LOW_U], pool[frame + HIGH_U], period_u)
-    qy = into_cell(v, pool[frame + LOW_V], pool[frame + HIGH_V], period_v)
-    begin = table[table[trim + TRIM_CURVE_PIECES] + first]
-    stop = table[table[trim + TRIM_CURVE_PIECES] + first + count]
-    ints = table[trim + TRIM_PIECE_TABLE]
-    doubles = table[trim + TRIM_PIECE_POOL]
+    trim_record = trim_at(table, trim)
+    frame = trim_frame_at(pool, trim_record.frame)
+    period_u = frame.period_u
+    period_v = frame.period_v
+    qx = into_cell(u, frame.low_u, frame.high_u, period_u)
+    qy = into_cell(v, frame.low_v, frame.high_v, period_v)
+    begin = table[trim_record.curve_pieces + first]
+    stop = table[trim_record.curve_pieces + first + count]
+    ints = trim_record.piece_table
+    doubles = trim_record.piece_pool
     copies_u = 1 if period_u != 0.0 else 0
     copies_v = 1 if period_v != 0.0 else 0
     if begin == stop:
         return np.inf, -1, 0.0, u, v, 0.0, 0.0
     best = np.inf
     piece = begin
-    t = pool[doubles + PIECE_DOUBLES * begin + PIECE_T0]
+    t = piece_bounds_at(pool, doubles + PIECE_DOUBLES * begin).t0
     move_u = 0.0
     move_v = 0.0
     # Ends of pieces first: near ones spare the search of most others. Then the pieces; copies one period away last.
@@ -156,11 +140,11 @@ def trim_nearest(table, pool, trim, first, count, u, v):
         for copy_u in range(1 + 2 * copies_u):
             move_a = (copy_u + 1) // 2 * (period_u if copy_u % 2 else -period_u)
             x = qx - move_a
-            cell_u = _gap(x, pool[frame + LOW_U], pool[frame + HIGH_U]) if copy_u else 0.0
+            cell_u = _gap(x, frame.low_u, frame.high_u) if copy_u else 0.0
             for copy_v in range(1 + 2 * copies_v):
                 move_b = (copy_v + 1) // 2 * (period_v if copy_v % 2 else -period_v)
                 y = qy - move_b
-                cell_v = _gap(y, pool[frame + LOW_V], pool[frame + HIGH_V]) if copy_v else 0.0
+                cell_v = _gap(y, frame.low_v, frame.high_v) if copy_v else 0.0
                 if 0.5 * (cell_u * cell_u + cell_v * cell_v) >= best:
                     continue
                 if search == 0:
@@ -173,18 +157,18 @@ def trim_nearest(table, pool, trim, first, count, u, v):
                     t = at
                     move_u = move_a
                     move_v = move_b
-    o = ints + PIECE_INTS * piece
-    i = doubles + PIECE_DOUBLES * piece
+    o = piece_links_at(table, ints + PIECE_INTS * piece)
+    i = piece_bounds_at(pool, doubles + PIECE_DOUBLES * piece)
     t = polished(
         pool,
-        table[o + PIECE_COEFFICIENTS],
-        table[o + PIECE_DEGREE],
-        pool[i + MIDDLE],
-        pool[i + PIECE_T0],
-        pool[i + PIECE_T1],
+        o.coefficients,
+        o.degree,
+        i.middle,
+        i.t0,
+        i.t1,
         t,
-        qx - move_u - pool[i + SHIFT_U],
-        qy - move_v - pool[i + SHIFT_V],
+        qx - move_u - i.shift_u,
+        qy - move_v - i.shift_v,
     )
     return _foot(table, pool, trim, begin, stop, piece, t, u, v, qx - move_u, qy - move_v)
 
@@ -192,36 +176,39 @@ def trim_nearest(table, pool, trim, first, count, u, v):
 @kernel(inner=True)
 def _foot(table, pool, trim, begin, stop, piece, t, u, v, qx, qy):
     """What `trim_nearest` returns, from the piece and the parameter of the foot; (qx, qy) is (u, v) in the cell."""
-    o = table[trim + TRIM_PIECE_TABLE] + PIECE_INTS * piece
-    i = table[trim + TRIM_PIECE_POOL] + PIECE_DOUBLES * piece
-    size = pool[table[trim + TRIM_FRAME] + SIZE]
-    x, y, dx, dy = piece_line(pool, table[o + PIECE_COEFFICIENTS], table[o + PIECE_DEGREE], t - pool[i + MIDDLE])
-    ox = qx - x - pool[i + SHIFT_U]
-    oy = qy - y - pool[i + SHIFT_V]
+    trim_record = trim_at(table, trim)
+    o = trim_record.piece_table + PIECE_INTS * piece
+    links = piece_links_at(table, o)
+    i = trim_record.piece_pool + PIECE_DOUBLES * piece
+    piece_bounds = piece_bounds_at(pool, i)
+    size = trim_frame_at(pool, trim_record.frame).extent
+    x, y, dx, dy = piece_line(pool, links.coefficients, links.degree, t - piece_bounds.middle)
+    ox = qx - x - piece_bounds.shift_u
+    oy = qy - y - piece_bounds.shift_v
     distance = np.sqrt(ox * ox + oy * oy)
-    at_start = t <= pool[i + PIECE_T0]
-    at_end = t >= pool[i + PIECE_T1]
+    at_start = t <= piece_bounds.t0
+    at_end = t >= piece_bounds.t1
     beyond = dx * ox + dy * oy
     speed = np.sqrt(dx * dx + dy * dy)
-    unsure = speed <= _SLOW * pool[i + BOUND_1]
+    unsure = speed <= _SLOW * piece_bounds.bound_1
     far = max(_BEYOND * size, 4e-15 * (abs(qx) + abs(qy)))
     if not (at_start or at_end) and (unsure or abs(beyond) > far * speed):
         # The way to the foot is not across the curve: is it an end, that rounding or a vanishing speed has left?
-        first = t - pool[i + PIECE_T0] < pool[i + PIECE_T1] - t if unsure else beyond < 0.0
+        first = t - piece_bounds.t0 < piece_bounds.t1 - t if unsure else beyond < 0.0
         end = START if first else END
-        ax = pool[i + end] - pool[i + SHIFT_U] - x
-        ay = pool[i + end + 1] - pool[i + SHIFT_V] - y
+        ax = pool[i + end] - piece_bounds.shift_u - x
+        ay = pool[i + end + 1] - piece_bounds.shift_v - y
         if ax * ax + ay * ay <= (_AT_END * size) ** 2:
             at_start = first
             at_end = not first
-            t = pool[i + PIECE_T0] if at_start else pool[i + PIECE_T1]
+            t = piece_bounds.t0 if at_start else piece_bounds.t1
             ox -= ax
             oy -= ay
             distance = np.sqrt(ox * ox + oy * oy)
     other = -1
     if at_start or at_end:
         dx, dy = _end_direction(table, pool, o, i, at_end)
-        other = table[o + PIECE_AFTER] if at_end else table[o + PIECE_BEFORE]
+        other = links.after if at_end else links.before
     else:
         length = np.sqrt(dx * dx + dy * dy)
         if length > 0.0:
@@ -233,8 +220,8 @@ def _foot(table, pool, trim, begin, stop, piece, t, u, v, qx, qy):
         ax, ay = _end_direction(
             table,
             pool,
-            table[trim + TRIM_PIECE_TABLE] + PIECE_INTS * other,
-            table[trim + TRIM_PIECE_POOL] + PIECE_DOUBLES * other,
+            trim_record.piece_table + PIECE_INTS * other,
+            trim_record.piece_pool + PIECE_DOUBLES * other,
             not at_end,
         )
         # Positive for a corner that is convex: only points outside have it nearest.
@@ -253,7 +240,7 @@ def _foot(table, pool, trim, begin, stop, piece, t, u, v, qx, qy):
         if length > 1e-9:
             dx /= length
             dy /= length
-    curve = table[o + PIECE_CURVE]
+    curve = links.curve
     if smooth:
         # Across the curve, not along the tiny and noisy way to the foot.
         return dx * oy - dy * ox, curve, t, u - ox, v - oy, -dy, dx

@@ -14,24 +14,111 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly._lanes import lane, load_lanes
+from assembly._record import place_of, record_dtype, record_view, size_of
 
 # Fields of a trim record: boundary curves and where their records begin, pieces (all, then those of the boundary
 # alone), table and pool offsets of the pieces, table offset of the first piece of every curve, pool offset of the
 # frame, number and pool offset of the steps of w along the bottom.
-TRIM_CURVES, TRIM_FIRST, TRIM_ALL, TRIM_PIECES = 0, 1, 2, 3
-TRIM_PIECE_TABLE, TRIM_PIECE_POOL, TRIM_CURVE_PIECES, TRIM_FRAME, TRIM_STEPS, TRIM_STEP_POOL = 4, 5, 6, 7, 8, 9
-TRIM_RECORD = 10
+TRIM = record_dtype(
+    "i8",
+    curves=1,
+    first=1,
+    all_pieces=1,
+    pieces=1,
+    piece_table=1,
+    piece_pool=1,
+    curve_pieces=1,
+    frame=1,
+    steps=1,
+    step_pool=1,
+)
+trim_at = record_view(TRIM)
+TRIM_CURVES = place_of(TRIM, "curves")
+TRIM_FIRST = place_of(TRIM, "first")
+TRIM_ALL = place_of(TRIM, "all_pieces")
+TRIM_PIECES = place_of(TRIM, "pieces")
+TRIM_PIECE_TABLE = place_of(TRIM, "piece_table")
+TRIM_PIECE_POOL = place_of(TRIM, "piece_pool")
+TRIM_CURVE_PIECES = place_of(TRIM, "curve_pieces")
+TRIM_FRAME = place_of(TRIM, "frame")
+TRIM_STEPS = place_of(TRIM, "steps")
+TRIM_STEP_POOL = place_of(TRIM, "step_pool")
+TRIM_RECORD = size_of(TRIM)
 # The frame: cell or domain, periods (0: open), nearness that is "on", w at the bottom left, the size.
-LOW_U, LOW_V, HIGH_U, HIGH_V, PERIOD_U, PERIOD_V, ON, BOTTOM, SIZE, FRAME = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9
+TRIM_FRAME_RECORD = record_dtype(
+    "f8",
+    low_u=1,
+    low_v=1,
+    high_u=1,
+    high_v=1,
+    period_u=1,
+    period_v=1,
+    on=1,
+    bottom=1,
+    extent=1,
+)
+trim_frame_at = record_view(TRIM_FRAME_RECORD)
+LOW_U = place_of(TRIM_FRAME_RECORD, "low_u")
+LOW_V = place_of(TRIM_FRAME_RECORD, "low_v")
+HIGH_U = place_of(TRIM_FRAME_RECORD, "high_u")
+HIGH_V = place_of(TRIM_FRAME_RECORD, "high_v")
+PERIOD_U = place_of(TRIM_FRAME_RECORD, "period_u")
+PERIOD_V = place_of(TRIM_FRAME_RECORD, "period_v")
+ON = place_of(TRIM_FRAME_RECORD, "on")
+BOTTOM = place_of(TRIM_FRAME_RECORD, "bottom")
+SIZE = place_of(TRIM_FRAME_RECORD, "extent")
+FRAME = size_of(TRIM_FRAME_RECORD)
 # Integers of a piece: its curve, where its coefficients are, its degree, neighbors (-1: none), signs of u' and v',
 # and the coordinate that changes faster (0: u, 1: v).
-PIECE_CURVE, PIECE_COEFFICIENTS, PIECE_DEGREE, PIECE_BEFORE, PIECE_AFTER = 0, 1, 2, 3, 4
-PIECE_SIGN_U, PIECE_SIGN_V, PIECE_MAJOR, PIECE_INTS = 5, 6, 7, 8
+PIECE_LINKS = record_dtype(
+    "i8",
+    curve=1,
+    coefficients=1,
+    degree=1,
+    before=1,
+    after=1,
+    sign_u=1,
+    sign_v=1,
+    major=1,
+)
+piece_links_at = record_view(PIECE_LINKS)
+PIECE_CURVE = place_of(PIECE_LINKS, "curve")
+PIECE_COEFFICIENTS = place_of(PIECE_LINKS, "coefficients")
+PIECE_DEGREE = place_of(PIECE_LINKS, "degree")
+PIECE_BEFORE = place_of(PIECE_LINKS, "before")
+PIECE_AFTER = place_of(PIECE_LINKS, "after")
+PIECE_SIGN_U = place_of(PIECE_LINKS, "sign_u")
+PIECE_SIGN_V = place_of(PIECE_LINKS, "sign_v")
+PIECE_MAJOR = place_of(PIECE_LINKS, "major")
+PIECE_INTS = size_of(PIECE_LINKS)
 # Doubles of a piece: its box, its parameters, what moves its curve into the cell, the middle of its span, bounds on
 # |C'|, |C''|, |C'''|, and its ends.
-BOX, PIECE_T0, PIECE_T1, SHIFT_U, SHIFT_V, MIDDLE = 0, 4, 5, 6, 7, 8
-BOUND_1, BOUND_2, BOUND_3, START, END = 9, 10, 11, 12, 14
-PIECE_DOUBLES = 16
+PIECE_BOUNDS = record_dtype(
+    "f8",
+    box=4,
+    t0=1,
+    t1=1,
+    shift_u=1,
+    shift_v=1,
+    middle=1,
+    bound_1=1,
+    bound_2=1,
+    bound_3=1,
+    start=2,
+    end=2,
+)
+piece_bounds_at = record_view(PIECE_BOUNDS)
+PIECE_T0 = place_of(PIECE_BOUNDS, "t0")
+PIECE_T1 = place_of(PIECE_BOUNDS, "t1")
+SHIFT_U = place_of(PIECE_BOUNDS, "shift_u")
+SHIFT_V = place_of(PIECE_BOUNDS, "shift_v")
+MIDDLE = place_of(PIECE_BOUNDS, "middle")
+BOUND_1 = place_of(PIECE_BOUNDS, "bound_1")
+BOUND_2 = place_of(PIECE_BOUNDS, "bound_2")
+BOUND_3 = place_of(PIECE_BOUNDS, "bound_3")
+START = place_of(PIECE_BOUNDS, "start")
+END = place_of(PIECE_BOUNDS, "end")
+PIECE_DOUBLES = size_of(PIECE_BOUNDS)
 # Where the distance hardly changes, as from the center of a circle, this part of its square is let go.
 LET_GO = 1e-10
 _ROUNDING = 4e-15

@@ -9,15 +9,49 @@ from __future__ import annotations
 
 from assembly._kernel import kernel
 from assembly._lanes import lane, load_lanes, store_xyz
+from assembly._record import place_of, record_dtype, record_view, size_of
 from assembly.geometry.splines.evaluate import find_span, into_domain
 
 # Integers of a record: degree, spans, 1 where weights differ, and where in the pool its tables are.
-DEGREE, SPANS, RATIONAL, BREAKS, BINOMIALS, MIDDLE, PIECES, TREE, SQUARES, SQUARE_BINOMIALS, RECORD = (
-    0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10
-)  # fmt: skip
+BEZIER_CURVE = record_dtype(
+    "i8",
+    degree=1,
+    spans=1,
+    rational=1,
+    breaks=1,
+    binomials=1,
+    middle=1,
+    pieces=1,
+    tree=1,
+    squares=1,
+    square_binomials=1,
+)
+bezier_curve_at = record_view(BEZIER_CURVE)
+DEGREE = place_of(BEZIER_CURVE, "degree")
+SPANS = place_of(BEZIER_CURVE, "spans")
+RATIONAL = place_of(BEZIER_CURVE, "rational")
+BREAKS = place_of(BEZIER_CURVE, "breaks")
+BINOMIALS = place_of(BEZIER_CURVE, "binomials")
+MIDDLE = place_of(BEZIER_CURVE, "middle")
+PIECES = place_of(BEZIER_CURVE, "pieces")
+TREE = place_of(BEZIER_CURVE, "tree")
+SQUARES = place_of(BEZIER_CURVE, "squares")
+RECORD = size_of(BEZIER_CURVE)
 # Doubles at the head of a pool: the largest distance of a control point from the center, how far the packed curve may
 # be from the one that was given, the center, the largest quotient of two weights.
-REACH, ERROR, CENTER, WEIGHT_RATIO, HEAD = 0, 1, 2, 5, 6
+BEZIER_HEAD = record_dtype(
+    "f8",
+    reach=1,
+    error=1,
+    center=3,
+    weight_ratio=1,
+)
+bezier_head_at = record_view(BEZIER_HEAD)
+REACH = place_of(BEZIER_HEAD, "reach")
+ERROR = place_of(BEZIER_HEAD, "error")
+CENTER = place_of(BEZIER_HEAD, "center")
+WEIGHT_RATIO = place_of(BEZIER_HEAD, "weight_ratio")
+HEAD = size_of(BEZIER_HEAD)
 # A box of the tree over the spans: center and half extents; first the root, then its left subtree, then its right one.
 BOX = 6
 # Half a unit in the last place of one.
@@ -98,23 +132,24 @@ def bezier_derivatives(rows, o, pool, binomials, n, x):
 @kernel(signatures="(i8[::1], f8[::1], f8[::1], b1, i8, f8[::1])")
 def evaluate_pieces(record, pool, t, closed, order, out):
     """`spline.evaluate_curve` from Bezier pieces: as accurate at any degree."""
+    curve = bezier_curve_at(record, 0)
     count = t.size
-    n = record[DEGREE]
+    n = curve.degree
     for i in range(count):
-        x, fits = into_domain(pool, record[BREAKS], record[SPANS], int(closed), t[i])
+        x, fits = into_domain(pool, curve.breaks, curve.spans, int(closed), t[i])
         if not fits:
             return i
-        span = find_span(pool, record[BREAKS], record[SPANS], x)
-        low = pool[record[BREAKS] + span]
-        width = pool[record[BREAKS] + span + 1] - low
-        rows = record[PIECES] + 4 * (n + 1) * span
-        v, d, h = bezier_derivatives(pool, rows, pool, record[BINOMIALS], n, min(max((x - low) / width, 0.0), 1.0))
+        span = find_span(pool, curve.breaks, curve.spans, x)
+        low = pool[curve.breaks + span]
+        width = pool[curve.breaks + span + 1] - low
+        rows = curve.pieces + 4 * (n + 1) * span
+        v, d, h = bezier_derivatives(pool, rows, pool, curve.binomials, n, min(max((x - low) / width, 0.0), 1.0))
         w = 1.0 / lane(v, 3)
         p = w * v
         q = w * (d - lane(d, 3) * p)
         store_xyz(p, out, 3 * i)
         for j in range(3):
-            out[3 * i + j] += pool[CENTER + j]
+            out[3 * i + j] += bezier_head_at(pool, 0).center[j]
         if order >= 1:
             store_xyz((1.0 / width) * q, out, 3 * (count + i))
         if order >= 2:

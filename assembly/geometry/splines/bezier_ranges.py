@@ -20,13 +20,45 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
+from assembly._record import place_of, record_dtype, record_view, size_of
 from assembly.geometry.interval import UNIT, idifference, iproduct, iquotient, up, widened
 
 # Record: dimension, degree, pieces, whether it is rational; where in the pool the points of C, C', C'', C''' begin
 # (four numbers each, (degree + 1 - order) a piece), then the largest of each order and R, the Gram matrix, the knots.
-DIMENSION, DEGREE, PIECES, RATIONAL, POINTS, LARGEST, GRAM, BREAKS, BEZIER_RECORD = 0, 1, 2, 3, 4, 8, 9, 10, 11
+RANGED_CURVE = record_dtype(
+    "i8",
+    dimension=1,
+    degree=1,
+    pieces=1,
+    rational=1,
+    points=4,
+    largest=1,
+    gram=1,
+    breaks=1,
+)
+ranged_curve_at = record_view(RANGED_CURVE)
+DIMENSION = place_of(RANGED_CURVE, "dimension")
+DEGREE = place_of(RANGED_CURVE, "degree")
+PIECES = place_of(RANGED_CURVE, "pieces")
+RATIONAL = place_of(RANGED_CURVE, "rational")
+POINTS = place_of(RANGED_CURVE, "points")
+LARGEST = place_of(RANGED_CURVE, "largest")
+GRAM = place_of(RANGED_CURVE, "gram")
+BREAKS = place_of(RANGED_CURVE, "breaks")
+BEZIER_RECORD = size_of(RANGED_CURVE)
 # Room: 24 numbers of the ranges, 18 of values in the middle, 3 + 3 of the ends, the width, then Bezier points.
-RANGES, MIDDLE, FIRST, LAST, WIDTH, BEZIER_AT = 0, 24, 42, 45, 48, 52
+RANGE_ROOM = record_dtype(
+    "f8",
+    ranges=24,
+    middle=18,
+    first=3,
+    last=3,
+    width=1,
+    spare=3,
+)
+range_room_at = record_view(RANGE_ROOM)
+RANGES = place_of(RANGE_ROOM, "ranges")
+BEZIER_AT = size_of(RANGE_ROOM)
 # Of the largest numbers: that of the positions.
 _SIZE = 4
 
@@ -69,27 +101,28 @@ def value(pool, o, n, s, room, at):
 @kernel(inline=True)
 def piece_points(table, span, order):
     """Where the points of a derivative of a piece begin, and their degree; a degree below zero is none."""
-    n = table[DEGREE] - order
-    return table[POINTS + order] + 4 * (n + 1) * span, n
+    curve = ranged_curve_at(table, 0)
+    n = curve.degree - order
+    return curve.points[order] + 4 * (n + 1) * span, n
 
 
 @kernel(inline=True)
 def error_of(table, pool, order):
     """How far values and Bezier points of a derivative may be off."""
-    return units(table) * pool[table[LARGEST] + order]
+    return units(table) * pool[ranged_curve_at(table, 0).largest + order]
 
 
 @kernel(inline=True)
 def units(table):
     """Roundings of a value, as a part of the largest."""
-    return (16.0 * table[DEGREE] + 32.0) * UNIT
+    return (16.0 * ranged_curve_at(table, 0).degree + 32.0) * UNIT
 
 
 @kernel(inner=True, exact=True)
 def project(table, pool, free, count, room, at):
     """Pairs of C and of w from homogeneous points at room[free:], to room[at:], eight numbers."""
     part = units(table)
-    off = 4.0 * part * pool[table[LARGEST] + _SIZE]
+    off = 4.0 * part * pool[ranged_curve_at(table, 0).largest + _SIZE]
     for k in range(4):
         lo = math.inf
         hi = -math.inf
@@ -137,6 +170,7 @@ def quotients(room, at, orders):
 @kernel(inner=True, exact=True)
 def bezier_point_bounds(table, pool, span, s, room, at):
     """Intervals of C, C', C'' (by s) at s of a piece to room[at:], nine pairs; room behind them is used."""
+    curve = ranged_curve_at(table, 0)
     free = at + 32
     for order in range(3):
         o, n = piece_points(table, span, order)
@@ -145,13 +179,13 @@ def bezier_point_bounds(table, pool, span, s, room, at):
             room[free + k] = 0.0
         if n >= 0:
             value(pool, o, n, s, room, free)
-        if order == 0 and table[RATIONAL] != 0:
+        if order == 0 and curve.rational != 0:
             project(table, pool, free, 1, room, at)
             continue
         for k in range(4):
             lo, hi = room[free + k] - error, room[free + k] + error
             room[at + 8 * order + 2 * k], room[at + 8 * order + 2 * k + 1] = widened(lo, hi, UNIT)
-    if table[RATIONAL] == 0:
+    if curve.rational == 0:
         for order in range(1, 3):
             for k in range(6):
                 room[at + 6 * order + k] = room[at + 8 * order + k]
@@ -166,8 +200,9 @@ def bezier_range_bounds(table, pool, span, s0, s1, room):
     The width of a polynomial piece is (s1 - s0) int |C' - chi / (s1 - s0)|^2 ds by the closed form of its Bezier
     points, a quadratic form in differences and so free of cancellation; of a rational piece it is infinite here.
     """
-    polynomial = table[RATIONAL] == 0
-    room[WIDTH] = math.inf
+    work = range_room_at(room, 0)
+    polynomial = ranged_curve_at(table, 0).rational == 0
+    work.width = math.inf
     free = BEZIER_AT
     if not polynomial:
         s0 *= 1.0 - 4.0 * UNIT
@@ -177,7 +212,7 @@ def bezier_range_bounds(table, pool, span, s0, s1, room):
         error = error_of(table, pool, order)
         if n < 0:
             for k in range(8):
-                room[RANGES + 8 * order + k] = 0.0
+                room[8 * order + k] = 0.0
             continue
         restrict(pool, o, n, s0, s1, room, free)
         if order == 0 and not polynomial:
@@ -193,11 +228,11 @@ def bezier_range_bounds(table, pool, span, s0, s1, room):
             place = RANGES + 8 * order + 2 * k
             room[place], room[place + 1] = widened(lo - error, hi + error, UNIT)
         if polynomial and order == 1:
-            room[WIDTH] = gram_width(table, pool, n, s1 - s0, room, free, error)
+            work.width = gram_width(table, pool, n, s1 - s0, room, free, error)
     if polynomial:
         for order in range(1, 4):
             for k in range(6):
-                room[RANGES + 6 * order + k] = room[RANGES + 8 * order + k]
+                room[6 * order + k] = room[8 * order + k]
     else:
         quotients(room, RANGES, 4)
 
@@ -205,6 +240,7 @@ def bezier_range_bounds(table, pool, span, s0, s1, room):
 @kernel(inner=True, exact=True)
 def gram_width(table, pool, n, step, room, at, error):
     """(step)^2 times the variance of C' from its Bezier points at room[at:], of degree n; rounded up."""
+    curve = ranged_curve_at(table, 0)
     total = 0.0
     off = 0.0
     for k in range(3):
@@ -214,7 +250,7 @@ def gram_width(table, pool, n, step, room, at, error):
         mean /= n + 1
         for i in range(n + 1):
             room[at + 4 * i + k] -= mean
-    g = table[GRAM]
+    g = curve.gram
     for i in range(n + 1):
         for j in range(n + 1):
             p = at + 4 * i
@@ -225,5 +261,5 @@ def gram_width(table, pool, n, step, room, at, error):
     # Points are off by `error` each, and a mean by as much: in the norm of the variance, which is at most the largest
     # of them. Sums of (n + 1)^2 positive and negative terms are off by that many units of their absolute sum.
     root = math.sqrt(max(total, 0.0) + UNIT * (n + 2.0) * (n + 2.0) * off) * (1.0 + 8.0 * UNIT)
-    root += 2.0 * math.sqrt(3.0) * (error + UNIT * (n + 2.0) * pool[table[LARGEST] + 1])
+    root += 2.0 * math.sqrt(3.0) * (error + UNIT * (n + 2.0) * pool[curve.largest + 1])
     return up(up(step * root) * up(step * root))

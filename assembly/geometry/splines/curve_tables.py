@@ -9,12 +9,8 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly.geometry.splines.evaluate import (
-    CURVE_BREAKS,
-    CURVE_CLOSED,
-    CURVE_COEFFICIENTS,
-    CURVE_DEGREE,
-    CURVE_SPANS,
     curve_lanes,
+    spline_curve_at,
     xyz,
 )
 
@@ -35,6 +31,7 @@ def bezier_tables(points, weights, knots, shape, powers, coincident, bezier, poo
     place = 0
     finite = True
     for curve in range(shape.shape[0]):
+        arc = spline_curve_at(records, curve)
         p = shape[curve, 0]
         n = shape[curve, 1]
         # The ends of the spans.
@@ -45,10 +42,10 @@ def bezier_tables(points, weights, knots, shape, powers, coincident, bezier, poo
                 pool[place] = knots[j]
                 place += 1
                 spans += 1
-        records[curve, CURVE_DEGREE] = p
-        records[curve, CURVE_SPANS] = spans
-        records[curve, CURVE_BREAKS] = breaks
-        records[curve, CURVE_COEFFICIENTS] = place
+        arc.degree = p
+        arc.spans = spans
+        arc.breaks = breaks
+        arc.coefficients = place
         begin = at
         for j in range(p, n):
             a = knots[first_knot + j]
@@ -97,7 +94,7 @@ def bezier_tables(points, weights, knots, shape, powers, coincident, bezier, poo
         size = np.sqrt((high_u - low_u) ** 2 + (high_v - low_v) ** 2)
         gap_u = bezier[begin] / bezier[begin + 2] - bezier[at - 3] / bezier[at - 1]
         gap_v = bezier[begin + 1] / bezier[begin + 2] - bezier[at - 2] / bezier[at - 1]
-        records[curve, CURVE_CLOSED] = 1 if size > 0.0 and np.sqrt(gap_u**2 + gap_v**2) <= coincident * size else 0
+        arc.closed = 1 if size > 0.0 and np.sqrt(gap_u**2 + gap_v**2) <= coincident * size else 0
         first_point += n
         first_knot += n + p + 1
     return at, place, finite
@@ -109,9 +106,10 @@ def swept_area(pool, records, u, v, nodes, weights):
     total = 0.0
     table = records.ravel()
     for curve in range(records.shape[0]):
+        arc = spline_curve_at(records, curve)
         r = curve * records.shape[1]
-        breaks = records[curve, CURVE_BREAKS]
-        for span in range(records[curve, CURVE_SPANS]):
+        breaks = arc.breaks
+        for span in range(arc.spans):
             half = 0.5 * (pool[breaks + span + 1] - pool[breaks + span])
             middle = 0.5 * (pool[breaks + span + 1] + pool[breaks + span])
             for k in range(nodes.size):

@@ -5,28 +5,29 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly.geometry.splines.evaluate import BREAKS_U, BREAKS_V, CLOSED_U, CLOSED_V, SPANS_U, SPANS_V
+from assembly.geometry.splines.evaluate import surface_at
 
 
 @kernel(inline=True)
 def into_domain(table, pool, r, u, v):
     """Parameters wrapped where the surface is closed, clamped where it ends; whether it was clamped."""
+    patch = surface_at(table, r)
     clamped = False
-    ou = table[r + BREAKS_U]
+    ou = patch.breaks_u
     lo = pool[ou]
-    hi = pool[ou + table[r + SPANS_U]]
+    hi = pool[ou + patch.spans_u]
     if u < lo or u > hi:
-        if table[r + CLOSED_U] == 1:
+        if patch.closed_u == 1:
             u -= (hi - lo) * math.floor((u - lo) / (hi - lo))
             u = min(max(u, lo), hi)
         else:
             u = lo if u < lo else hi
             clamped = True
-    ov = table[r + BREAKS_V]
+    ov = patch.breaks_v
     lo = pool[ov]
-    hi = pool[ov + table[r + SPANS_V]]
+    hi = pool[ov + patch.spans_v]
     if v < lo or v > hi:
-        if table[r + CLOSED_V] == 1:
+        if patch.closed_v == 1:
             v -= (hi - lo) * math.floor((v - lo) / (hi - lo))
             v = min(max(v, lo), hi)
         else:
@@ -38,13 +39,14 @@ def into_domain(table, pool, r, u, v):
 @kernel(inline=True)
 def is_within(table, pool, surface, x, y, u, v, half_u, half_v):
     """Whether parameters (x, y) are in a box around (u, v)."""
+    patch = surface_at(table, surface)
     du = abs(x - u)
     dv = abs(y - v)
     if surface >= 0:
-        if table[surface + CLOSED_U] == 1:
-            period = pool[table[surface + BREAKS_U] + table[surface + SPANS_U]] - pool[table[surface + BREAKS_U]]
+        if patch.closed_u == 1:
+            period = pool[patch.breaks_u + patch.spans_u] - pool[patch.breaks_u]
             du = min(du, period - du)
-        if table[surface + CLOSED_V] == 1:
-            period = pool[table[surface + BREAKS_V] + table[surface + SPANS_V]] - pool[table[surface + BREAKS_V]]
+        if patch.closed_v == 1:
+            period = pool[patch.breaks_v + patch.spans_v] - pool[patch.breaks_v]
             dv = min(dv, period - dv)
     return du <= half_u and dv <= half_v

@@ -15,16 +15,57 @@ from __future__ import annotations
 
 from assembly._kernel import kernel
 from assembly._lanes import lane, load_lanes, store_xyz
+from assembly._record import place_of, record_dtype, record_view, size_of
 
-SURFACE_RECORD = 13
 # Fields of a surface record.
-DEGREE_U, DEGREE_V, SPANS_U, SPANS_V, BREAKS_U, BREAKS_V, COEFFICIENTS = 0, 1, 2, 3, 4, 5, 6
-CLOSED_U, CLOSED_V, SIGN, CELLS, CELL_COUNT = 7, 8, 9, 10, 11
 # Edges of the domain that are one point: 1, 2, 4, 8 for the low and high end of u, then of v.
-POLES = 12
-CURVE_RECORD = 5
+SURFACE = record_dtype(
+    "i8",
+    degree_u=1,
+    degree_v=1,
+    spans_u=1,
+    spans_v=1,
+    breaks_u=1,
+    breaks_v=1,
+    coefficients=1,
+    closed_u=1,
+    closed_v=1,
+    sign=1,
+    cells=1,
+    cell_count=1,
+    poles=1,
+)
+surface_at = record_view(SURFACE)
+SURFACE_RECORD = size_of(SURFACE)
+DEGREE_U = place_of(SURFACE, "degree_u")
+DEGREE_V = place_of(SURFACE, "degree_v")
+SPANS_U = place_of(SURFACE, "spans_u")
+SPANS_V = place_of(SURFACE, "spans_v")
+BREAKS_U = place_of(SURFACE, "breaks_u")
+BREAKS_V = place_of(SURFACE, "breaks_v")
+COEFFICIENTS = place_of(SURFACE, "coefficients")
+CLOSED_U = place_of(SURFACE, "closed_u")
+CLOSED_V = place_of(SURFACE, "closed_v")
+SIGN = place_of(SURFACE, "sign")
+CELLS = place_of(SURFACE, "cells")
+CELL_COUNT = place_of(SURFACE, "cell_count")
+POLES = place_of(SURFACE, "poles")
 # Fields of a curve record.
-CURVE_DEGREE, CURVE_SPANS, CURVE_BREAKS, CURVE_COEFFICIENTS, CURVE_CLOSED = 0, 1, 2, 3, 4
+CURVE = record_dtype(
+    "i8",
+    degree=1,
+    spans=1,
+    breaks=1,
+    coefficients=1,
+    closed=1,
+)
+spline_curve_at = record_view(CURVE)
+CURVE_RECORD = size_of(CURVE)
+CURVE_DEGREE = place_of(CURVE, "degree")
+CURVE_SPANS = place_of(CURVE, "spans")
+CURVE_BREAKS = place_of(CURVE, "breaks")
+CURVE_COEFFICIENTS = place_of(CURVE, "coefficients")
+CURVE_CLOSED = place_of(CURVE, "closed")
 
 
 # So many spans are searched without a guess.
@@ -135,15 +176,16 @@ def _quotient(a, au, av, auu, auv, avv):
 @kernel(inline=True)
 def surface_lanes(table, pool, r, u, v):
     """S, Su, Sv, Suu, Suv, Svv of the surface whose record starts at r, as four-lane values."""
-    iu = find_span(pool, table[r + BREAKS_U], table[r + SPANS_U], u)
-    iv = find_span(pool, table[r + BREAKS_V], table[r + SPANS_V], v)
-    ou = table[r + BREAKS_U] + iu
-    ov = table[r + BREAKS_V] + iv
+    patch = surface_at(table, r)
+    iu = find_span(pool, patch.breaks_u, patch.spans_u, u)
+    iv = find_span(pool, patch.breaks_v, patch.spans_v, v)
+    ou = patch.breaks_u + iu
+    ov = patch.breaks_v + iv
     s = u - 0.5 * (pool[ou] + pool[ou + 1])
     t = v - 0.5 * (pool[ov] + pool[ov + 1])
-    p = table[r + DEGREE_U]
-    q = table[r + DEGREE_V]
-    o = table[r + COEFFICIENTS] + 4 * (p + 1) * (q + 1) * (iu * table[r + SPANS_V] + iv)
+    p = patch.degree_u
+    q = patch.degree_v
+    o = patch.coefficients + 4 * (p + 1) * (q + 1) * (iu * patch.spans_v + iv)
     if p == 3 and q == 3:
         a, au, av, auu, auv, avv = _bicubic(pool, o, s, t)
     else:
@@ -188,13 +230,14 @@ def evaluate_surface(table, pool, u, v, order, out):
 
     Returns -1, or 2 i for a parameter u[i] that is not in the domain, or 2 i + 1 for v[i].
     """
+    patch = surface_at(table, 0)
     count = u.size
     block = 3 * count
     for i in range(count):
-        x, fits = into_domain(pool, table[BREAKS_U], table[SPANS_U], table[CLOSED_U], u[i])
+        x, fits = into_domain(pool, patch.breaks_u, patch.spans_u, patch.closed_u, u[i])
         if not fits:
             return 2 * i
-        y, fits = into_domain(pool, table[BREAKS_V], table[SPANS_V], table[CLOSED_V], v[i])
+        y, fits = into_domain(pool, patch.breaks_v, patch.spans_v, patch.closed_v, v[i])
         if not fits:
             return 2 * i + 1
         a, au, av, auu, auv, avv = surface_lanes(table, pool, 0, x, y)
@@ -213,11 +256,12 @@ def evaluate_surface(table, pool, u, v, order, out):
 @kernel(inline=True)
 def curve_lanes(table, pool, r, t):
     """C, Ct, Ctt of the curve whose record starts at r, as four-lane values."""
-    span = find_span(pool, table[r + CURVE_BREAKS], table[r + CURVE_SPANS], t)
-    at = table[r + CURVE_BREAKS] + span
+    arc = spline_curve_at(table, r)
+    span = find_span(pool, arc.breaks, arc.spans, t)
+    at = arc.breaks + span
     s = t - 0.5 * (pool[at] + pool[at + 1])
-    degree = table[r + CURVE_DEGREE]
-    a, d, h = _row(pool, table[r + CURVE_COEFFICIENTS] + 4 * (degree + 1) * span, degree, s)
+    degree = arc.degree
+    a, d, h = _row(pool, arc.coefficients + 4 * (degree + 1) * span, degree, s)
     i = 1.0 / lane(a, 3)
     p = i * a
     pt = i * (d - lane(d, 3) * p)
@@ -234,10 +278,11 @@ def curve_point(table, pool, r, t):
 @kernel(signatures="(i8[::1], f8[::1], f8[::1], i8, f8[::1])")
 def evaluate_curve(table, pool, t, order, out):
     """Points and derivatives to `order` at flat parameters into flat `out`; -1, or the index of a bad parameter."""
+    arc = spline_curve_at(table, 0)
     count = t.size
     block = 3 * count
     for i in range(count):
-        x, fits = into_domain(pool, table[CURVE_BREAKS], table[CURVE_SPANS], table[CURVE_CLOSED], t[i])
+        x, fits = into_domain(pool, arc.breaks, arc.spans, arc.closed, t[i])
         if not fits:
             return i
         a, d, h = curve_lanes(table, pool, 0, x)
@@ -268,16 +313,17 @@ def _row_third(pool, o, degree, t):
 @kernel(signatures="(i8[::1], f8[::1], i8, f8, f8)")
 def third_derivatives(table, pool, r, u, v):
     """Suuu, Suuv, Suvv, Svvv as 3-tuples: what a pair at a fold needs and nothing else does."""
-    iu = find_span(pool, table[r + BREAKS_U], table[r + SPANS_U], u)
-    iv = find_span(pool, table[r + BREAKS_V], table[r + SPANS_V], v)
-    ou = table[r + BREAKS_U] + iu
-    ov = table[r + BREAKS_V] + iv
+    patch = surface_at(table, r)
+    iu = find_span(pool, patch.breaks_u, patch.spans_u, u)
+    iv = find_span(pool, patch.breaks_v, patch.spans_v, v)
+    ou = patch.breaks_u + iu
+    ov = patch.breaks_v + iv
     s = u - 0.5 * (pool[ou] + pool[ou + 1])
     t = v - 0.5 * (pool[ov] + pool[ov + 1])
-    p = table[r + DEGREE_U]
-    q = table[r + DEGREE_V]
+    p = patch.degree_u
+    q = patch.degree_v
     stride = 4 * (q + 1)
-    o = table[r + COEFFICIENTS] + stride * (p + 1) * (iu * table[r + SPANS_V] + iv)
+    o = patch.coefficients + stride * (p + 1) * (iu * patch.spans_v + iv)
     a, b, c, d = _row_third(pool, o + stride * p, q, t)
     # Names: derivatives in u by letter, in v by number; Taylor coefficients (halves and sixths) until the end.
     a1 = 0.0 * a

@@ -16,14 +16,7 @@ import math
 
 from assembly._kernel import kernel
 from assembly.geometry.splines.evaluate import (
-    BREAKS_U,
-    BREAKS_V,
-    CLOSED_U,
-    CLOSED_V,
-    POLES,
-    SIGN,
-    SPANS_U,
-    SPANS_V,
+    surface_at,
     surface_point,
 )
 from assembly.geometry.vec import add, blend, cross, dot, scale, sub
@@ -35,11 +28,12 @@ CHART = 1e-6
 @kernel(inline=True)
 def limits(table, pool, r, across):
     """Low and high end of u (across = 0) or v (1), and whether it is closed."""
+    patch = surface_at(table, r)
     if across == 0:
-        o = table[r + BREAKS_U]
-        return pool[o], pool[o + table[r + SPANS_U]], table[r + CLOSED_U]
-    o = table[r + BREAKS_V]
-    return pool[o], pool[o + table[r + SPANS_V]], table[r + CLOSED_V]
+        o = patch.breaks_u
+        return pool[o], pool[o + patch.spans_u], patch.closed_u
+    o = patch.breaks_v
+    return pool[o], pool[o + patch.spans_v], patch.closed_v
 
 
 @kernel(inner=True)
@@ -47,7 +41,7 @@ def nearest_pole(table, pool, r, u, v):
     """The pole edge nearest to (u, v): its bit, and the distance as a part of the domain."""
     ulo, uhi, _ = limits(table, pool, r, 0)
     vlo, vhi, _ = limits(table, pool, r, 1)
-    poles = table[r + POLES]
+    poles = surface_at(table, r).poles
     edge = 0
     least = 2.0
     for k in range(4):
@@ -83,7 +77,7 @@ def spoke(table, pool, r, edge, along):
 @kernel(inline=True)
 def spoke_normal(table, r, edge, e, turn):
     """Outward normal from E and dE/d(along), not normalized: S_uv x S_v, or S_u x S_uv for a pole in u."""
-    sign = float(table[r + SIGN])
+    sign = float(surface_at(table, r).sign)
     if edge <= 2:
         # d/du inward of Su x Sv is Su x Suv, and E = s Su, turn = s Suv: s (E x turn).
         return scale(sign if edge == 1 else -sign, cross(e, turn))

@@ -9,22 +9,15 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly.geometry.splines.evaluate import POLES
+from assembly.geometry.splines.evaluate import surface_at
 from assembly.geometry.splines.pole import limits, nearest_pole, spoke
 from assembly.geometry.vec import dot, scale, sub
 from assembly.proximity.brep.records import (
-    EDGES,
     FACE_RECORD,
-    FACE_SURFACE,
-    FACE_TABLE,
-    FACES,
-    VERTEX_EDGES,
-    VERTEX_FACE_LIST,
-    VERTEX_FACES,
-    VERTEX_POINT,
     VERTEX_RECORD,
-    VERTEX_TABLE,
-    VERTICES,
+    face_at,
+    shell_at,
+    vertex_at,
 )
 
 # Sine of the angle by which a normal must lean over a face or along an edge before that takes over.
@@ -51,7 +44,7 @@ def pole_point(table, pool, surface, pole):
 @kernel(inner=True)
 def is_at(table, pool, vertex, p):
     """Whether p is the point of a vertex."""
-    o = table[vertex + VERTEX_POINT]
+    o = vertex_at(table, vertex).point
     d = sub(p, (pool[o], pool[o + 1], pool[o + 2]))
     return dot(d, d) <= TIP * TIP * (1.0 + dot(p, p))
 
@@ -62,14 +55,15 @@ def from_tip(table, pool, shell, vertex, code, n):
 
     Where it leans along none, the tip itself, `code`.
     """
+    vertex_record = vertex_at(table, vertex)
     best = LEAN
     found = (0.0, 0.0)
-    for k in range(table[vertex + VERTEX_FACES]):
-        face = table[table[vertex + VERTEX_FACE_LIST] + k]
-        surface = table[table[shell + FACE_TABLE] + FACE_RECORD * face + FACE_SURFACE]
+    for k in range(vertex_record.faces):
+        face = table[vertex_record.face_list + k]
+        surface = face_at(table, shell_at(table, shell).face_table + FACE_RECORD * face).surface
         for bit in range(4):
             pole = 1 << bit
-            if table[surface + POLES] & pole == 0 or not is_at(
+            if surface_at(table, surface).poles & pole == 0 or not is_at(
                 table, pool, vertex, pole_point(table, pool, surface, pole)
             ):
                 continue
@@ -89,17 +83,18 @@ def from_tip(table, pool, shell, vertex, code, n):
 @kernel(inner=True)
 def tip_near(table, pool, shell, code, u, v):
     """The tip of a cone next to a point of a face where Newton's method gave up; else the face itself."""
-    if code >= table[shell + FACES]:
+    solid = shell_at(table, shell)
+    if code >= solid.faces:
         return code
-    surface = table[table[shell + FACE_TABLE] + FACE_RECORD * code + FACE_SURFACE]
-    if table[surface + POLES] == 0:
+    surface = face_at(table, solid.face_table + FACE_RECORD * code).surface
+    if surface_at(table, surface).poles == 0:
         return code
     pole, distance = nearest_pole(table, pool, surface, u, v)
     if distance > NEAR_TIP:
         return code
     p = pole_point(table, pool, surface, pole)
-    for k in range(table[shell + VERTICES]):
-        vertex = table[shell + VERTEX_TABLE] + VERTEX_RECORD * k
-        if table[vertex + VERTEX_EDGES] == 0 and is_at(table, pool, vertex, p):
-            return table[shell + FACES] + table[shell + EDGES] + k
+    for k in range(solid.vertices):
+        vertex = solid.vertex_table + VERTEX_RECORD * k
+        if vertex_at(table, vertex).edges == 0 and is_at(table, pool, vertex, p):
+            return solid.faces + solid.edges + k
     return code

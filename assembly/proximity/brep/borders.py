@@ -4,59 +4,49 @@ from __future__ import annotations
 
 from assembly._kernel import kernel
 from assembly.geometry.faces.trim_nearest import trim_nearest
-from assembly.geometry.faces.trim_pieces import TRIM_CURVES, TRIM_FIRST
+from assembly.geometry.faces.trim_pieces import trim_at
 from assembly.geometry.splines.domain import into_domain
 from assembly.geometry.splines.evaluate import (
-    CURVE_BREAKS,
-    CURVE_CLOSED,
     CURVE_RECORD,
-    CURVE_SPANS,
     curve_lanes,
+    spline_curve_at,
     surface_point,
     xyz,
 )
 from assembly.geometry.vec import blend, cross, dot, sub
 from assembly.proximity.brep.records import (
     EDGE,
-    EDGE_CURVE,
-    EDGE_CURVE_B,
-    EDGE_MAP,
     EDGE_RECORD,
-    EDGE_SURFACE,
-    EDGE_SURFACE_B,
-    EDGE_TABLE,
-    EDGES,
     FACE,
-    FACE_EDGES,
     FACE_RECORD,
-    FACE_SURFACE,
-    FACE_TABLE,
-    FACE_TRIM,
-    FACES,
     VERTEX,
     VERTEX_RECORD,
-    VERTEX_TABLE,
+    edge_at,
+    face_at,
+    shell_at,
 )
 
 
 @kernel(inline=True)
 def feature_kind(table, shell, code):
     """FACE, EDGE or VERTEX."""
-    if code < table[shell + FACES]:
+    solid = shell_at(table, shell)
+    if code < solid.faces:
         return FACE
-    return EDGE if code < table[shell + FACES] + table[shell + EDGES] else VERTEX
+    return EDGE if code < solid.faces + solid.edges else VERTEX
 
 
 @kernel(inline=True)
 def feature_at(table, shell, code):
     """What `solve_features` takes: the surface record of a face, the record of an edge or a vertex."""
-    faces = table[shell + FACES]
-    edges = table[shell + EDGES]
+    solid = shell_at(table, shell)
+    faces = solid.faces
+    edges = solid.edges
     if code < faces:
-        return table[table[shell + FACE_TABLE] + FACE_RECORD * code + FACE_SURFACE]
+        return face_at(table, solid.face_table + FACE_RECORD * code).surface
     if code < faces + edges:
-        return table[shell + EDGE_TABLE] + EDGE_RECORD * (code - faces)
-    return table[shell + VERTEX_TABLE] + VERTEX_RECORD * (code - faces - edges)
+        return solid.edge_table + EDGE_RECORD * (code - faces)
+    return solid.vertex_table + VERTEX_RECORD * (code - faces - edges)
 
 
 @kernel(inline=True)
@@ -73,12 +63,13 @@ def on_surface(table, pool, surface, curve, t):
 @kernel(inline=True)
 def clamp_to_curve(table, pool, curve, t):
     """A parameter within a curve's domain, or wrapped round it where the curve is closed."""
-    at = table[curve + CURVE_BREAKS]
+    arc = spline_curve_at(table, curve)
+    at = arc.breaks
     low = pool[at]
-    high = pool[at + table[curve + CURVE_SPANS]]
+    high = pool[at + arc.spans]
     if low <= t <= high:
         return t
-    if table[curve + CURVE_CLOSED] == 1:
+    if arc.closed == 1:
         return min(max(low + (t - low) % (high - low), low), high)
     return low if t < low else high
 
@@ -86,9 +77,10 @@ def clamp_to_curve(table, pool, curve, t):
 @kernel(inner=True)
 def other_parameter(table, pool, edge, t, p):
     """The parameter of an edge on its second face, at its point p with parameter t on the first."""
-    curve = table[edge + EDGE_CURVE_B]
-    surface = table[edge + EDGE_SURFACE_B]
-    at = table[edge + EDGE_MAP]
+    edge_record = edge_at(table, edge)
+    curve = edge_record.curve_b
+    surface = edge_record.surface_b
+    at = edge_record.map
     s = clamp_to_curve(table, pool, curve, pool[at] + pool[at + 1] * t)
     # The map is of first order; its error is smaller than the steps below can take away.
     for _ in range(3):
@@ -103,10 +95,11 @@ def other_parameter(table, pool, edge, t, p):
 @kernel(inner=True)
 def first_parameter(table, pool, edge, t, p):
     """The parameter of an edge near t whose point is nearest to p."""
-    curve = table[edge + EDGE_CURVE]
+    edge_record = edge_at(table, edge)
+    curve = edge_record.curve
     t = clamp_to_curve(table, pool, curve, t)
     for _ in range(3):
-        _u, _v, a, along, _normal = on_surface(table, pool, table[edge + EDGE_SURFACE], curve, t)
+        _u, _v, a, along, _normal = on_surface(table, pool, edge_record.surface, curve, t)
         square = dot(along, along)
         if not square > 0.0:
             break
@@ -117,27 +110,30 @@ def first_parameter(table, pool, edge, t, p):
 @kernel(inline=True)
 def edge_end(table, pool, edge, end):
     """The parameter of an edge at its start (0) or its end (1)."""
-    at = table[table[edge + EDGE_CURVE] + CURVE_BREAKS]
-    return pool[at] if end == 0 else pool[at + table[table[edge + EDGE_CURVE] + CURVE_SPANS]]
+    edge_record = edge_at(table, edge)
+    arc = spline_curve_at(table, edge_record.curve)
+    at = arc.breaks
+    return pool[at] if end == 0 else pool[at + arc.spans]
 
 
 @kernel(inner=True)
 def nearest_edge(table, pool, shell, code, u, v):
     """The edge of a face nearest to parameters beyond its boundary: code and (t, 0)."""
-    face = table[shell + FACE_TABLE] + FACE_RECORD * code
-    trim = table[face + FACE_TRIM]
-    _s, k, t, _cu, _cv, _nu, _nv = trim_nearest(table, pool, trim, 0, table[trim + TRIM_CURVES], u, v)
-    number = table[table[face + FACE_EDGES] + k]
+    solid = shell_at(table, shell)
+    face = face_at(table, solid.face_table + FACE_RECORD * code)
+    trim = face.trim
+    trim_record = trim_at(table, trim)
+    _s, k, t, _cu, _cv, _nu, _nv = trim_nearest(table, pool, trim, 0, trim_record.curves, u, v)
+    number = table[face.edges + k]
     if number < 0:
         # A boundary curve that is one point: the curve beside it begins or ends there.
-        k = k + 1 if k + 1 < table[trim + TRIM_CURVES] else k - 1
-        number = table[table[face + FACE_EDGES] + k]
-    edge = table[shell + EDGE_TABLE] + EDGE_RECORD * number
-    if table[edge + EDGE_CURVE] != table[trim + TRIM_FIRST] + CURVE_RECORD * k:
+        k = k + 1 if k + 1 < trim_record.curves else k - 1
+        number = table[face.edges + k]
+    edge = solid.edge_table + EDGE_RECORD * number
+    edge_record = edge_at(table, edge)
+    if edge_record.curve != trim_record.first + CURVE_RECORD * k:
         # The edge is measured on its other face.
-        _u, _v, p, _along, _normal = on_surface(
-            table, pool, table[face + FACE_SURFACE], table[trim + TRIM_FIRST] + CURVE_RECORD * k, t
-        )
-        at = table[edge + EDGE_MAP]
+        _u, _v, p, _along, _normal = on_surface(table, pool, face.surface, trim_record.first + CURVE_RECORD * k, t)
+        at = edge_record.map
         t = first_parameter(table, pool, edge, (t - pool[at]) / pool[at + 1], p)
-    return table[shell + FACES] + number, (t, 0.0)
+    return solid.faces + number, (t, 0.0)

@@ -19,10 +19,24 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly._record import place_of, record_dtype, record_view, size_of
 from assembly.geometry.vec import add, dot, matvec, sub
-from assembly.proximity.bvh.tree import CENTER, NODE_POOL, RADIUS, pairs_about, still_within, three
+from assembly.proximity.bvh.tree import CENTER, node_at, pairs_about, still_within, three, tree_at
 
-OWNER, COUNT, TURN, PLACE, RING, REACH, ENTRIES, ROOM = 0, 1, 2, 6, 9, 10, 11, 512
+ROOM = 512
+NEIGHBOR_LIST = record_dtype(
+    "i8",
+    owner=1,
+    count=1,
+    turn=4,
+    place=3,
+    ring=1,
+    reach=1,
+)
+neighbor_list_at = record_view(NEIGHBOR_LIST)
+OWNER = place_of(NEIGHBOR_LIST, "owner")
+COUNT = place_of(NEIGHBOR_LIST, "count")
+ENTRIES = size_of(NEIGHBOR_LIST)
 LIST_INTS = ENTRIES + 2 * ROOM
 # Multiples of this are within it of what they stand for; a list is not made for what is farther away than FAR.
 GRAIN, FAR = 2.0**-48, 1000.0
@@ -34,57 +48,60 @@ def moved_since(table, pool, at, p, moving):
 
     `moving` is the body whose motion is measured (`allowances.mover`).
     """
+    neighbors = neighbor_list_at(table, at)
     _side, tree, e, rotation, place = moving
-    if table[at + OWNER] != p:
+    if neighbors.owner != p:
         return math.inf
-    root = table[tree + NODE_POOL]
+    root = tree_at(table, tree).node_pool
     middle = add(matvec(rotation, three(pool, root + CENTER)), place)
     square = 0.0
     other = 0.0
     for k in range(4):
-        was = GRAIN * table[at + TURN + k]
+        was = GRAIN * neighbors.turn[k]
         square += (e[k] - was) * (e[k] - was)
         other += (e[k] + was) * (e[k] + was)
-    way = sub(middle, (GRAIN * table[at + PLACE], GRAIN * table[at + PLACE + 1], GRAIN * table[at + PLACE + 2]))
-    return math.sqrt(dot(way, way)) + 2.0 * pool[root + RADIUS] * math.sqrt(min(square, other))
+    way = sub(middle, (GRAIN * neighbors.place[0], GRAIN * neighbors.place[1], GRAIN * neighbors.place[2]))
+    return math.sqrt(dot(way, way)) + 2.0 * node_at(pool, root).radius * math.sqrt(min(square, other))
 
 
 @kernel(inner=True)
 def reaches(table, at, moved, reach):
     """Whether the list at `at` has what is within a reach after so far a motion: 1; 0 if not; -1 if it had no room."""
-    if moved > GRAIN * table[at + RING]:
+    neighbors = neighbor_list_at(table, at)
+    if moved > GRAIN * neighbors.ring:
         return 0
-    if table[at + COUNT] < 0:
+    if neighbors.count < 0:
         return -1
-    return 1 if reach + moved <= GRAIN * (table[at + REACH] + table[at + RING]) else 0
+    return 1 if reach + moved <= GRAIN * (neighbors.reach + neighbors.ring) else 0
 
 
 @kernel(inner=True)
 def can_be_listed(table, pool, moving, reach):
     """Whether lengths of a list are in its range."""
     _side, tree, _e, rotation, place = moving
-    root = table[tree + NODE_POOL]
+    root = tree_at(table, tree).node_pool
     middle = add(matvec(rotation, three(pool, root + CENTER)), place)
-    return dot(middle, middle) < FAR * FAR and reach < FAR and pool[root + RADIUS] < FAR
+    return dot(middle, middle) < FAR * FAR and reach < FAR and node_at(pool, root).radius < FAR
 
 
 @kernel(inner=True)
 def write_list(table, pool, at, p, moving, reach, ring, found, count):
     """Keep `count` pairs (k, 2), made for motions up to `ring`; none where there is no room. Whether there was."""
+    neighbors = neighbor_list_at(table, at)
     _side, tree, e, rotation, place = moving
-    middle = add(matvec(rotation, three(pool, table[tree + NODE_POOL] + CENTER)), place)
-    table[at + OWNER] = p
+    middle = add(matvec(rotation, three(pool, tree_at(table, tree).node_pool + CENTER)), place)
+    neighbors.owner = p
     for k in range(4):
-        table[at + TURN + k] = np.int64(e[k] / GRAIN)
+        neighbors.turn[k] = np.int64(e[k] / GRAIN)
     for k in range(3):
-        table[at + PLACE + k] = np.int64(middle[k] / GRAIN)
+        neighbors.place[k] = np.int64(middle[k] / GRAIN)
     # Less by more than what the pose is rounded by, at a radius of FAR.
-    table[at + RING] = np.int64((ring - 1e-10) / GRAIN)
-    table[at + REACH] = np.int64(reach / GRAIN)
+    neighbors.ring = np.int64((ring - 1e-10) / GRAIN)
+    neighbors.reach = np.int64(reach / GRAIN)
     if count < 0 or count > ROOM or count > found.shape[0]:
-        table[at + COUNT] = -1
+        neighbors.count = -1
         return False
-    table[at + COUNT] = count
+    neighbors.count = count
     for k in range(count):
         table[at + ENTRIES + 2 * k] = found[k, 0]
         table[at + ENTRIES + 2 * k + 1] = found[k, 1]
@@ -102,10 +119,10 @@ def listed_pairs(table, pool, at, p, trees, turn, shift, moving, reach, ring, st
     if fits < 0 or (fits == 0 and not can_be_listed(table, pool, moving, ring + reach)):
         return -1
     if fits == 0:
-        tilt = ring / pool[table[moving[1] + NODE_POOL] + RADIUS]
+        tilt = ring / node_at(pool, tree_at(table, moving[1]).node_pool).radius
         count = pairs_about(table, pool, trees[0], trees[1], turn, shift, reach, ring, tilt, stack, candidates)
         if not write_list(table, pool, at, p, moving, reach, ring, candidates, count):
             return -1
     return still_within(
-        table, pool, trees[0], trees[1], turn, shift, reach, at + ENTRIES, table[at + COUNT], candidates
+        table, pool, trees[0], trees[1], turn, shift, reach, at + ENTRIES, neighbor_list_at(table, at).count, candidates
     )

@@ -20,16 +20,64 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly._record import place_of, record_dtype, record_view, size_of
 from assembly.geometry.vec import add, dot, matvec, matvec_t, neg, scale, sub
 
 # Header: how many nodes, where their integers and their doubles begin, how many elements, where theirs begin.
-NODES, NODE_TABLE, NODE_POOL, ELEMENTS, ELEMENT_POOL, TREE = 0, 1, 2, 3, 4, 5
+TREE_RECORD = record_dtype(
+    "i8",
+    nodes=1,
+    node_table=1,
+    node_pool=1,
+    elements=1,
+    element_pool=1,
+)
+tree_at = record_view(TREE_RECORD)
+NODES = place_of(TREE_RECORD, "nodes")
+NODE_TABLE = place_of(TREE_RECORD, "node_table")
+NODE_POOL = place_of(TREE_RECORD, "node_pool")
+ELEMENTS = place_of(TREE_RECORD, "elements")
+ELEMENT_POOL = place_of(TREE_RECORD, "element_pool")
+TREE = size_of(TREE_RECORD)
 # A node: its first child, or -1 - element; the feature of the element, -1 of a node with children.
-CHILD, FEATURE, NODE_INTS = 0, 1, 2
+NODE_LINKS = record_dtype(
+    "i8",
+    child=1,
+    feature=1,
+)
+node_links_at = record_view(NODE_LINKS)
+CHILD = place_of(NODE_LINKS, "child")
+FEATURE = place_of(NODE_LINKS, "feature")
+NODE_INTS = size_of(NODE_LINKS)
 # Box (center and half widths), cone (axis, cosine and sine of its half angle), radius of a ball.
-CENTER, HALF, AXIS, COS, SIN, RADIUS, NODE = 0, 3, 6, 9, 10, 11, 12
+NODE_BOUNDS = record_dtype(
+    "f8",
+    center=3,
+    half=3,
+    axis=3,
+    cosine=1,
+    sine=1,
+    radius=1,
+)
+node_at = record_view(NODE_BOUNDS)
+CENTER = place_of(NODE_BOUNDS, "center")
+HALF = place_of(NODE_BOUNDS, "half")
+AXIS = place_of(NODE_BOUNDS, "axis")
+COS = place_of(NODE_BOUNDS, "cosine")
+SIN = place_of(NODE_BOUNDS, "sine")
+RADIUS = place_of(NODE_BOUNDS, "radius")
+NODE = size_of(NODE_BOUNDS)
 # Of an element: the middle of its box in (u, v), or (t, 0), half the widths, its feature, and its node.
-ELEMENT_FEATURE, ELEMENT_NODE, ELEMENT = 4, 5, 6
+ELEMENT_RECORD = record_dtype(
+    "f8",
+    before=4,
+    feature=1,
+    node=1,
+)
+element_at = record_view(ELEMENT_RECORD)
+ELEMENT_FEATURE = place_of(ELEMENT_RECORD, "feature")
+ELEMENT_NODE = place_of(ELEMENT_RECORD, "node")
+ELEMENT = size_of(ELEMENT_RECORD)
 # Rounding of unit vectors and of coordinates, relative: what is in doubt is kept.
 ROUNDING = 1e-13
 
@@ -114,17 +162,19 @@ def admits(pool, o, p, seen, rotation, bulk, reach, slack, tilt):
     `rotation` is that of the other tree, `bulk` its magnitudes; `slack` is how far points may be off, and `tilt` unit
     vectors. What excludes most pairs for little comes first.
     """
+    node = node_at(pool, o)
+    node_bounds = node_at(pool, p)
     center, around, axis_p = seen
     axis_o = three(pool, o + AXIS)
-    co = pool[o + COS]
-    so = pool[o + SIN]
-    cp = pool[p + COS]
-    sp = pool[p + SIN]
+    co = node.cosine
+    so = node.sine
+    cp = node_bounds.cosine
+    sp = node_bounds.sine
     if so * cp + co * sp > ROUNDING and -dot(axis_o, axis_p) < co * cp - so * sp - tilt:
         return False
     d = sub(center, three(pool, o + CENTER))
     dd = dot(d, d)
-    r = pool[o + RADIUS] + pool[p + RADIUS] + slack
+    r = node.radius + node_bounds.radius + slack
     if dd > (r + reach) * (r + reach):
         return False
     square = reach * reach
@@ -140,25 +190,28 @@ def admits(pool, o, p, seen, rotation, bulk, reach, slack, tilt):
 @kernel(inner=True)
 def facing(pool, o, p, rotation, shift, slack):
     """Whether leaves at o of f and at p of g, admitted, still may hold a pair when their boxes are looked at closer."""
+    node = node_at(pool, o)
+    node_bounds = node_at(pool, p)
     d = sub(add(matvec(rotation, three(pool, p + CENTER)), shift), three(pool, o + CENTER))
     ho = three(pool, o + HALF)
     hp = three(pool, p + HALF)
-    if beside_cone(d, three(pool, o + AXIS), pool[o + COS], pool[o + SIN], ho, hp, rotation, slack):
+    if beside_cone(d, three(pool, o + AXIS), node.cosine, node.sine, ho, hp, rotation, slack):
         return False
     axis = matvec(rotation, three(pool, p + AXIS))
-    return not beside_cone(d, axis, pool[p + COS], pool[p + SIN], ho, hp, rotation, slack)
+    return not beside_cone(d, axis, node_bounds.cosine, node_bounds.sine, ho, hp, rotation, slack)
 
 
 @kernel(inline=True)
 def node_of(table, pool, tree, e):
     """Where the node of element e is in the pool."""
-    return table[tree + NODE_POOL] + NODE * np.int64(pool[table[tree + ELEMENT_POOL] + ELEMENT * e + ELEMENT_NODE])
+    tree_record = tree_at(table, tree)
+    return tree_record.node_pool + NODE * np.int64(element_at(pool, tree_record.element_pool + ELEMENT * e).node)
 
 
 @kernel(inline=True)
 def rounding(pool, root_f, root_g, shift):
     """By how much coordinates may be off."""
-    size = pool[root_f + RADIUS] + pool[root_g + RADIUS]
+    size = node_at(pool, root_f).radius + node_at(pool, root_g).radius
     c = three(pool, root_f + CENTER)
     e = three(pool, root_g + CENTER)
     size += math.sqrt(dot(c, c)) + math.sqrt(dot(e, e)) + math.sqrt(dot(shift, shift))
@@ -175,10 +228,12 @@ def pairs_about(table, pool, tree_f, tree_g, rotation, shift, reach, ring, tilt,
 
     -1 where the stack (n, 2) is too short; more than `out` holds where `out` is: then what it holds are the first.
     """
-    node_f = table[tree_f + NODE_POOL]
-    node_g = table[tree_g + NODE_POOL]
-    ints_f = table[tree_f + NODE_TABLE]
-    ints_g = table[tree_g + NODE_TABLE]
+    tree = tree_at(table, tree_f)
+    tree_record = tree_at(table, tree_g)
+    node_f = tree.node_pool
+    node_g = tree_record.node_pool
+    ints_f = tree.node_table
+    ints_g = tree_record.node_table
     slack = ring + rounding(pool, node_f, node_g, shift)
     reach += slack
     tilt += ROUNDING
@@ -202,8 +257,8 @@ def pairs_about(table, pool, tree_f, tree_g, rotation, shift, reach, ring, tilt,
         j = stack[used, 1]
         o = node_f + NODE * i
         p = node_g + NODE * j
-        child_f = table[ints_f + NODE_INTS * i + CHILD]
-        child_g = table[ints_g + NODE_INTS * j + CHILD]
+        child_f = node_links_at(table, ints_f + NODE_INTS * i).child
+        child_g = node_links_at(table, ints_g + NODE_INTS * j).child
         if child_f < 0 and child_g < 0:
             if facing(pool, o, p, rotation, shift, slack + tilt * reach):
                 if count < out.shape[0]:
@@ -213,7 +268,7 @@ def pairs_about(table, pool, tree_f, tree_g, rotation, shift, reach, ring, tilt,
             continue
         if used + 2 > room:
             return -1
-        if child_g < 0 or (child_f >= 0 and pool[o + RADIUS] >= pool[p + RADIUS]):
+        if child_g < 0 or (child_f >= 0 and node_at(pool, o).radius >= node_at(pool, p).radius):
             seen = seen_from(pool, p, rotation, bulk, shift)
             for k in range(2):
                 if admits(pool, node_f + NODE * (child_f + k), p, seen, rotation, bulk, reach, slack, tilt):
@@ -242,7 +297,7 @@ def still_within(table, pool, tree_f, tree_g, rotation, shift, reach, listed, co
 
     As long as `out` holds them; their number.
     """
-    slack = rounding(pool, table[tree_f + NODE_POOL], table[tree_g + NODE_POOL], shift)
+    slack = rounding(pool, tree_at(table, tree_f).node_pool, tree_at(table, tree_g).node_pool, shift)
     reach += slack
     bulk = magnitudes(rotation)
     found = 0
@@ -280,10 +335,12 @@ def box_distance(pool, o, p, seen, rotation, bulk):
 @kernel(inner=True)
 def overlapping(table, pool, tree_f, tree_g, rotation, shift, stack, out):
     """Elements (k, 2) of two trees whose boxes meet; how many `out` holds of them."""
-    node_f = table[tree_f + NODE_POOL]
-    node_g = table[tree_g + NODE_POOL]
-    ints_f = table[tree_f + NODE_TABLE]
-    ints_g = table[tree_g + NODE_TABLE]
+    tree = tree_at(table, tree_f)
+    tree_record = tree_at(table, tree_g)
+    node_f = tree.node_pool
+    node_g = tree_record.node_pool
+    ints_f = tree.node_table
+    ints_g = tree_record.node_table
     bulk = magnitudes(rotation)
     count = 0
     stack[0, 0] = 0
@@ -297,14 +354,14 @@ def overlapping(table, pool, tree_f, tree_g, rotation, shift, stack, out):
         p = node_g + NODE * j
         if box_distance(pool, o, p, seen_from(pool, p, rotation, bulk, shift), rotation, bulk) > 0.0:
             continue
-        child_f = table[ints_f + NODE_INTS * i + CHILD]
-        child_g = table[ints_g + NODE_INTS * j + CHILD]
+        child_f = node_links_at(table, ints_f + NODE_INTS * i).child
+        child_g = node_links_at(table, ints_g + NODE_INTS * j).child
         if child_f < 0 and child_g < 0:
             out[count, 0] = -1 - child_f
             out[count, 1] = -1 - child_g
             count += 1
         elif used + 2 <= stack.shape[0]:
-            down_f = child_g < 0 or (child_f >= 0 and pool[o + RADIUS] >= pool[p + RADIUS])
+            down_f = child_g < 0 or (child_f >= 0 and node_at(pool, o).radius >= node_at(pool, p).radius)
             for k in range(2):
                 stack[used, 0] = child_f + k if down_f else i
                 stack[used, 1] = j if down_f else child_g + k
@@ -318,10 +375,12 @@ def least_distance(table, pool, tree_f, tree_g, rotation, shift, upper, stack):
 
     A stack (n, 2) that is too short makes what is found lower, not wrong.
     """
-    node_f = table[tree_f + NODE_POOL]
-    node_g = table[tree_g + NODE_POOL]
-    ints_f = table[tree_f + NODE_TABLE]
-    ints_g = table[tree_g + NODE_TABLE]
+    tree = tree_at(table, tree_f)
+    tree_record = tree_at(table, tree_g)
+    node_f = tree.node_pool
+    node_g = tree_record.node_pool
+    ints_f = tree.node_table
+    ints_g = tree_record.node_table
     slack = rounding(pool, node_f, node_g, shift)
     bulk = magnitudes(rotation)
     back = transposed(rotation)
@@ -345,12 +404,12 @@ def least_distance(table, pool, tree_f, tree_g, rotation, shift, upper, stack):
         # What was found since the pair was put here may exclude it.
         if bound >= best:
             continue
-        child_f = table[ints_f + NODE_INTS * i + CHILD]
-        child_g = table[ints_g + NODE_INTS * j + CHILD]
+        child_f = node_links_at(table, ints_f + NODE_INTS * i).child
+        child_g = node_links_at(table, ints_g + NODE_INTS * j).child
         if (child_f < 0 and child_g < 0) or used + 2 > room:
             best = bound
             continue
-        descend_f = child_g < 0 or (child_f >= 0 and pool[o + RADIUS] >= pool[p + RADIUS])
+        descend_f = child_g < 0 or (child_f >= 0 and node_at(pool, o).radius >= node_at(pool, p).radius)
         if descend_f:
             one = box_distance(pool, node_f + NODE * child_f, p, seen, rotation, bulk)
             other = box_distance(pool, node_f + NODE * (child_f + 1), p, seen, rotation, bulk)

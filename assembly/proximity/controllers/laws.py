@@ -17,8 +17,12 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
+from assembly._record import place_of, record_dtype, record_view, size_of
 from assembly.geometry.splines.domain import into_domain
-from assembly.geometry.splines.evaluate import BREAKS_U, BREAKS_V, CLOSED_U, CLOSED_V, SPANS_U, SPANS_V, surface_point
+from assembly.geometry.splines.evaluate import (
+    surface_at,
+    surface_point,
+)
 from assembly.geometry.vec import add, dot, matvec, matvec_t, sub
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.extrema.feedback import descent_step, end_of
@@ -28,8 +32,22 @@ UNIT, COVARIANT, CONTRAVARIANT = 0, 1, 2
 # Statuses of a run.
 CLOSEST, ON_ITS_WAY, MEETING, IRREGULAR = 0, 1, 2, 3
 # What is written of a step: parameters (4), distance, error, modes (2: how many parameters are held), gain.
-ROW = 9
-DISTANCE, ERROR, MODE_F, MODE_G, GAIN = 4, 5, 6, 7, 8
+STEP_ROW = record_dtype(
+    "f8",
+    before=4,
+    distance=1,
+    error=1,
+    mode_f=1,
+    mode_g=1,
+    gain=1,
+)
+step_row_at = record_view(STEP_ROW)
+ROW = size_of(STEP_ROW)
+DISTANCE = place_of(STEP_ROW, "distance")
+ERROR = place_of(STEP_ROW, "error")
+MODE_F = place_of(STEP_ROW, "mode_f")
+MODE_G = place_of(STEP_ROW, "mode_g")
+GAIN = place_of(STEP_ROW, "gain")
 # Fields of a law: gain (0: as large as the step allows), exponential rate (0: none), the least distance, feed-forward.
 LAW_GAIN, LAW_RATE, LAW_NEAREST, LAW_FEED, LAW = 0, 1, 2, 3, 4
 # A step without a given gain is halved at most so often.
@@ -101,9 +119,10 @@ def largest(h, b, held_u, held_v):
 
 @kernel(inline=True)
 def ends(table, pool, r, u, v):
+    patch = surface_at(table, r)
     return (
-        end_of(pool, table[r + BREAKS_U], table[r + SPANS_U], table[r + CLOSED_U], 0, 0, u),
-        end_of(pool, table[r + BREAKS_V], table[r + SPANS_V], table[r + CLOSED_V], 0, 0, v),
+        end_of(pool, patch.breaks_u, patch.spans_u, patch.closed_u, 0, 0, u),
+        end_of(pool, patch.breaks_v, patch.spans_v, patch.closed_v, 0, 0, v),
     )
 
 
@@ -243,12 +262,13 @@ def relative(table, poses, k, g, point):
 
 @kernel(inline=True)
 def write_row(out, row, x, distance, error, mode_f, mode_g, gain):
+    step = step_row_at(out, row)
     out[row, 0], out[row, 1], out[row, 2], out[row, 3] = x
-    out[row, DISTANCE] = distance
-    out[row, ERROR] = error
-    out[row, MODE_F] = mode_f
-    out[row, MODE_G] = mode_g
-    out[row, GAIN] = gain
+    step.distance = distance
+    step.error = error
+    step.mode_f = mode_f
+    step.mode_g = mode_g
+    step.gain = gain
 
 
 @kernel(

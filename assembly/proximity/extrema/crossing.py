@@ -7,12 +7,11 @@ import math
 from assembly._kernel import kernel
 from assembly.geometry.splines.domain import into_domain
 from assembly.geometry.splines.evaluate import (
-    CURVE_BREAKS,
-    CURVE_SPANS,
+    spline_curve_at,
     surface_point,
 )
 from assembly.geometry.vec import add, blend, cross, dot, matvec, scale, sub
-from assembly.proximity.brep.records import EDGE, EDGE_CURVE, EDGE_START, FACE, FACE_SURFACE
+from assembly.proximity.brep.records import EDGE, FACE, edge_at, face_at
 from assembly.proximity.extrema.feature_jets import edge_jet, vertex_point
 
 
@@ -21,7 +20,7 @@ def tangents(table, pool, kind, record, turn, shift, u, v):
     """Point and tangents of a feature, moved by a pose."""
     zero = (0.0, 0.0, 0.0)
     if kind == FACE:
-        p, su, sv, _uu, _uv, _vv = surface_point(table, pool, table[record + FACE_SURFACE], u, v)
+        p, su, sv, _uu, _uv, _vv = surface_point(table, pool, face_at(table, record).surface, u, v)
     elif kind == EDGE:
         p, su, _tt = edge_jet(table, pool, record, u)
         sv = zero
@@ -35,15 +34,16 @@ def tangents(table, pool, kind, record, turn, shift, u, v):
 @kernel(inner=True)
 def within(table, pool, kind, record, u, v):
     """Coordinates wrapped, or held at the ends of the domain."""
+    edge = edge_at(table, record)
     if kind == FACE:
-        u, v, _clamped = into_domain(table, pool, table[record + FACE_SURFACE], u, v)
+        u, v, _clamped = into_domain(table, pool, face_at(table, record).surface, u, v)
         return u, v
     if kind == EDGE:
-        c = table[record + EDGE_CURVE]
-        o = table[c + CURVE_BREAKS]
+        c = spline_curve_at(table, edge.curve)
+        o = c.breaks
         low = pool[o]
-        high = pool[o + table[c + CURVE_SPANS]]
-        if table[record + EDGE_START] < 0 and not low <= u <= high:
+        high = pool[o + c.spans]
+        if edge.start < 0 and not low <= u <= high:
             u -= (high - low) * math.floor((u - low) / (high - low))
         return min(max(u, low), high), v
     return u, v

@@ -22,8 +22,7 @@ import math
 from assembly._kernel import kernel
 from assembly.geometry.splines.domain import into_domain
 from assembly.geometry.splines.evaluate import (
-    POLES,
-    SIGN,
+    surface_at,
     surface_point,
 )
 from assembly.geometry.splines.pole import CHART, limits, nearest_pole, polar_step, pole_frame
@@ -71,14 +70,15 @@ def own_frame(table, pool, r, u, v):
 
     At a pole E^-1 is zero: the point moves, its polar coordinates have no rates.
     """
+    patch = surface_at(table, r)
     zero = (0.0, 0.0, 0.0)
-    if table[r + POLES] != 0:
+    if patch.poles != 0:
         edge, distance = nearest_pole(table, pool, r, u, v)
         if distance < CHART:
             p, n, x, y, a, smooth = pole_frame(table, pool, r, edge, u, v)
             return p, n, x, y, zero, a, smooth
     p, su, sv, suu, suv, svv = surface_point(table, pool, r, u, v)
-    sign = float(table[r + SIGN])
+    sign = float(patch.sign)
     normal = cross(su, sv)
     uu = dot(su, su)
     nn = dot(normal, normal)
@@ -103,7 +103,7 @@ def other_frame(table, pool, r, u, v, n, x, y):
     """
     zero = (0.0, 0.0, 0.0)
     none = (0.0, 0.0, 0.0, 0.0)
-    if table[r + POLES] != 0:
+    if surface_at(table, r).poles != 0:
         edge, distance = nearest_pole(table, pool, r, u, v)
         if distance < CHART:
             p, m, gx, gy, b, smooth = pole_frame(table, pool, r, edge, u, v)
@@ -166,7 +166,7 @@ def pair_frame(table, pool, f, g, rotation, shift, x):
 @kernel(inline=True)
 def advance(table, pool, r, u, v, du, dv, step):
     """Parameters moved by (du, dv), or over a pole by the tangential step (body axes); whether an end held them."""
-    if table[r + POLES] != 0:
+    if surface_at(table, r).poles != 0:
         edge, distance = nearest_pole(table, pool, r, u, v)
         ulo, uhi, _ = limits(table, pool, r, 0)
         vlo, vhi, _ = limits(table, pool, r, 1)

@@ -27,16 +27,19 @@ import math
 
 from assembly._kernel import kernel
 from assembly.geometry.splines.domain import into_domain
-from assembly.geometry.splines.evaluate import CURVE_BREAKS, CURVE_SPANS, curve_lanes, surface_point, xyz
+from assembly.geometry.splines.evaluate import (
+    curve_lanes,
+    spline_curve_at,
+    surface_point,
+    xyz,
+)
 from assembly.geometry.vec import add, blend, cross, dot, matvec, scale, sub
 from assembly.proximity.brep.records import (
-    EDGE_CURVE,
     EDGE_POINT,
-    EDGE_START,
-    EDGE_SURFACE,
     FACE_POINT,
     VERTEX,
-    VERTEX_POINT,
+    edge_at,
+    vertex_at,
 )
 from assembly.proximity.extrema.pair_matrix import RANK
 
@@ -53,11 +56,12 @@ BEYOND = 1e-12
 @kernel(inner=True)
 def edge_jet(table, pool, edge, t):
     """C, C_t, C_tt of an edge in body axes."""
-    c, d, h = curve_lanes(table, pool, table[edge + EDGE_CURVE], t)
+    edge_record = edge_at(table, edge)
+    c, d, h = curve_lanes(table, pool, edge_record.curve, t)
     p = xyz(c)
     q = xyz(d)
     w = xyz(h)
-    r = table[edge + EDGE_SURFACE]
+    r = edge_record.surface
     if r < 0:
         return p, q, w
     u, v, _clamped = into_domain(table, pool, r, p[0], p[1])
@@ -68,16 +72,17 @@ def edge_jet(table, pool, edge, t):
 
 @kernel(inline=True)
 def vertex_point(table, pool, vertex):
-    o = table[vertex + VERTEX_POINT]
+    o = vertex_at(table, vertex).point
     return (pool[o], pool[o + 1], pool[o + 2])
 
 
 @kernel(inline=True)
 def edge_limits(table, pool, edge):
     """Low and high end of t, and whether the edge has no ends."""
-    c = table[edge + EDGE_CURVE]
-    o = table[c + CURVE_BREAKS]
-    return pool[o], pool[o + table[c + CURVE_SPANS]], table[edge + EDGE_START] < 0
+    edge_record = edge_at(table, edge)
+    c = spline_curve_at(table, edge_record.curve)
+    o = c.breaks
+    return pool[o], pool[o + c.spans], edge_record.start < 0
 
 
 @kernel(inner=True)
@@ -103,7 +108,9 @@ def edge_held(table, pool, edge, t, dt):
 def edge_stride(table, pool, edge):
     """How far in t a straight part may be passed at once: one span with ends is straight all along, others in part."""
     lo, hi, endless = edge_limits(table, pool, edge)
-    return hi - lo if table[table[edge + EDGE_CURVE] + CURVE_SPANS] == 1 and not endless else 0.0625 * (hi - lo)
+    return (
+        hi - lo if spline_curve_at(table, edge_at(table, edge).curve).spans == 1 and not endless else 0.0625 * (hi - lo)
+    )
 
 
 @kernel(inline=True)

@@ -17,7 +17,7 @@ from assembly.proximity.extrema.face_edge import face_frame, solve_on_face, turn
 from assembly.proximity.extrema.face_face import CLOSE, LIMIT, pair_frame, solve_pair
 from assembly.proximity.extrema.feature_jets import face_side
 from assembly.proximity.extrema.pair_matrix import pair_matrix
-from assembly.proximity.extrema.rates import ARM_F, ARM_G, FORM, GAP, NORMAL, RATES, ZED, put
+from assembly.proximity.extrema.rates import ARM_F, ARM_G, NORMAL, ZED, derivatives_at, put
 
 
 @kernel(inner=True)
@@ -156,13 +156,14 @@ def store_velocities(x, y, arm_f, arm_g, records, row):
 @kernel(inner=True)
 def feature_record(turn, shift, frame, records, row):
     """Fill a record from the frame of two features in the axes of body f, whose rotation is `turn`; g is at `shift`."""
+    derivatives = derivatives_at(records, row)
     n, tx, ty, _pf, pg, beta, f, g, of_f, of_g, i, _r, _regular, _isolated, _proper, _fold = frame
     normal = matvec(turn, n)
     x = matvec(turn, tx)
     y = matvec(turn, ty)
     arm_f = matvec(turn, pg)
     arm_g = matvec(turn, sub(pg, shift))
-    records[row, GAP] = beta
+    derivatives.gap = beta
     put(records, row, NORMAL, normal)
     put(records, row, ARM_F, arm_f)
     put(records, row, ARM_G, arm_g)
@@ -191,11 +192,11 @@ def feature_record(turn, shift, frame, records, row):
         ay = f[2] * s0 + f[3] * s1
         bx = v11 * s0 + v12 * s1 - (1.0 if j == 0 else 0.0)
         by = v21 * s0 + v22 * s1 - (1.0 if j == 1 else 0.0)
-        records[row, RATES + j] = of_f[0] * ax + of_f[1] * ay
-        records[row, RATES + 4 + j] = of_f[2] * ax + of_f[3] * ay
-        records[row, RATES + 8 + j] = of_g[0] * bx + of_g[1] * by
-        records[row, RATES + 12 + j] = of_g[2] * bx + of_g[3] * by
+        derivatives.rates[0, j] = of_f[0] * ax + of_f[1] * ay
+        derivatives.rates[1, j] = of_f[2] * ax + of_f[3] * ay
+        derivatives.rates[2, j] = of_g[0] * bx + of_g[1] * by
+        derivatives.rates[3, j] = of_g[2] * bx + of_g[3] * by
         for l in range(4):
             # s.(Y_f^T z1 - (X_f + beta Y_f)^T z2), made symmetric; z1.z2 adds a half off the diagonal.
             value = 0.5 * (s0 * w[l] + s1 * w[4 + l] + m[l] * w[j] + m[4 + l] * w[4 + j])
-            records[row, FORM + 4 * j + l] = value + (0.5 if l == j + 2 or j == l + 2 else 0.0)
+            derivatives.form[j, l] = value + (0.5 if l == j + 2 or j == l + 2 else 0.0)

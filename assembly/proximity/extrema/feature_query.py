@@ -11,7 +11,13 @@ from assembly.geometry.vec import add, matvec, matvec_t
 from assembly.kinematics.motion import position, relative_pose, rotation
 from assembly.proximity.brep.records import FACE
 from assembly.proximity.extrema.feature_pair import feature_record, features_at, solve_features
-from assembly.proximity.extrema.rates import RATES, RECORD, ZED, add_gap_terms, gradient_row, into_quaternions
+from assembly.proximity.extrema.rates import (
+    RECORD,
+    add_gap_terms,
+    derivatives_at,
+    gradient_row,
+    into_quaternions,
+)
 
 # What is written of a pair: parameters (4), point of f, point of g, normal, gap, whether it is isolated, whether two
 # surfaces do not cross there, how far it is from a fold, residual (4).
@@ -69,6 +75,7 @@ def feature_derivatives(table, pool, kind_f, f, kind_g, g, q, x, n, size, first,
     r = frame[11]
     error = max(abs(r[0]), abs(r[1])) / size + max(abs(r[2]), abs(r[3]))
     records = np.empty((1, RECORD))
+    derivatives = derivatives_at(records, 0)
     gradient = np.empty((1, 12))
     row = np.empty(12)
     feature_record(turn_f, shift, frame, records, 0)
@@ -83,7 +90,7 @@ def feature_derivatives(table, pool, kind_f, f, kind_g, g, q, x, n, size, first,
         for j in range(12):
             row[j] = math.nan if at_pole else 0.0
             for l in range(4):
-                row[j] += records[0, RATES + 4 * i + l] * records[0, ZED + 12 * l + j]
+                row[j] += derivatives.rates[i, l] * derivatives.zed[l, j]
         into_quaternions(row, q, first, i)
     for i in range(12):
         for j in range(12):

@@ -17,13 +17,7 @@ import math
 
 from assembly._kernel import kernel
 from assembly.geometry.splines.evaluate import (
-    BREAKS_U,
-    BREAKS_V,
-    CLOSED_U,
-    CLOSED_V,
-    POLES,
-    SPANS_U,
-    SPANS_V,
+    surface_at,
     surface_point,
 )
 from assembly.geometry.vec import add, blend, dot, matvec, matvec_t, sub
@@ -83,12 +77,13 @@ def free_directions(table, pool, r, u, v, e, gx, gy, slack):
     e is E^-1 of `own_frame`, (gx, gy) the gradient over tangent lengths, `slack` what of it is rounding. Along an end
     the direction is that of the end: S_v at an end of u.
     """
+    patch = surface_at(table, r)
     if e[0] == 0.0:
         # At a pole.
         return 1.0, 0.0, 0.0, 1.0, 2
-    poles = table[r + POLES]
-    end_u = end_of(pool, table[r + BREAKS_U], table[r + SPANS_U], table[r + CLOSED_U], poles & 1, poles & 2, u)
-    end_v = end_of(pool, table[r + BREAKS_V], table[r + SPANS_V], table[r + CLOSED_V], poles & 4, poles & 8, v)
+    poles = patch.poles
+    end_u = end_of(pool, patch.breaks_u, patch.spans_u, patch.closed_u, poles & 1, poles & 2, u)
+    end_v = end_of(pool, patch.breaks_v, patch.spans_v, patch.closed_v, poles & 4, poles & 8, v)
     # S_v = (e12, e22) in the tangent frame, up to a positive factor; S_u = (1, 0).
     scale_v = 1.0 if e[2] > 0.0 else -1.0
     vx = -scale_v * e[1]

@@ -23,14 +23,8 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly.geometry.splines.domain import into_domain
 from assembly.geometry.splines.evaluate import (
-    BREAKS_U,
-    BREAKS_V,
-    CELL_COUNT,
     CELL_SIZE,
-    CELLS,
-    SIGN,
-    SPANS_U,
-    SPANS_V,
+    surface_at,
     surface_point,
 )
 from assembly.geometry.vec import add, cross, dot, matvec, matvec_t, scale, sub
@@ -61,14 +55,15 @@ ALIGNMENT = 0.1
 @kernel(inner=True)
 def cell_samples(table, pool, r, turn, shift, samples):
     """Points and outward normals of the cells' samples, moved by a pose, (count, 6). Returns their extent."""
+    patch = surface_at(table, r)
     lo = (math.inf, math.inf, math.inf)
     hi = (-math.inf, -math.inf, -math.inf)
-    for i in range(table[r + CELL_COUNT]):
-        o = table[r + CELLS] + CELL_SIZE * i
+    for i in range(patch.cell_count):
+        o = patch.cells + CELL_SIZE * i
         p, su, sv, _uu, _uv, _vv = surface_point(table, pool, r, pool[o], pool[o + 1])
         normal = cross(su, sv)
         length = math.sqrt(dot(normal, normal))
-        n = matvec(turn, scale(float(table[r + SIGN]) / length if length > 0.0 else 0.0, normal))
+        n = matvec(turn, scale(float(patch.sign) / length if length > 0.0 else 0.0, normal))
         p = add(matvec(turn, p), shift)
         samples[i, 0], samples[i, 1], samples[i, 2] = p
         samples[i, 3], samples[i, 4], samples[i, 5] = n
@@ -114,10 +109,12 @@ def opposed(frame, rotation, table, pool, g, x):
 @kernel(inner=True, allocates=True)
 def approach(table, pool, f, g, rotation, shift, x):
     """Parameters with a smaller distance, and it, by direct search: nine points of each surface around the best."""
-    fu = 0.03125 * (pool[table[f + BREAKS_U] + table[f + SPANS_U]] - pool[table[f + BREAKS_U]])
-    fv = 0.03125 * (pool[table[f + BREAKS_V] + table[f + SPANS_V]] - pool[table[f + BREAKS_V]])
-    gu = 0.03125 * (pool[table[g + BREAKS_U] + table[g + SPANS_U]] - pool[table[g + BREAKS_U]])
-    gv = 0.03125 * (pool[table[g + BREAKS_V] + table[g + SPANS_V]] - pool[table[g + BREAKS_V]])
+    patch = surface_at(table, f)
+    surface_record = surface_at(table, g)
+    fu = 0.03125 * (pool[patch.breaks_u + patch.spans_u] - pool[patch.breaks_u])
+    fv = 0.03125 * (pool[patch.breaks_v + patch.spans_v] - pool[patch.breaks_v])
+    gu = 0.03125 * (pool[surface_record.breaks_u + surface_record.spans_u] - pool[surface_record.breaks_u])
+    gv = 0.03125 * (pool[surface_record.breaks_v + surface_record.spans_v] - pool[surface_record.breaks_v])
     finest = 1e-5 * fu
     points = np.empty((9, 3))
     at = np.empty((9, 2))
@@ -179,12 +176,13 @@ def take(table, pool, g, rotation, status, x, frame, best):
 @kernel(inner=True)
 def next_candidate(table, pool, f, a, nearest, score, i):
     """The cell with the best score, after the neighbors of cell i, which lead to the same extremum, are struck out."""
-    o = table[f + CELLS] + CELL_SIZE * i
+    patch = surface_at(table, f)
+    o = patch.cells + CELL_SIZE * i
     for k in range(a.shape[0]):
         dx = a[k, 0] - a[i, 0]
         dy = a[k, 1] - a[i, 1]
         dz = a[k, 2] - a[i, 2]
-        reach = pool[o + 8] + pool[table[f + CELLS] + CELL_SIZE * k + 8]
+        reach = pool[o + 8] + pool[patch.cells + CELL_SIZE * k + 8]
         if dx * dx + dy * dy + dz * dz <= reach * reach:
             score[k] = math.inf
     return lowest(score)
@@ -203,9 +201,11 @@ def lowest(score):
 @kernel(inner=True, allocates=True)
 def global_start(table, pool, f, g, rotation, shift, size):
     """Status, parameters and gap of the best extremal pair found; where there is none, the nearest points known."""
-    nf = table[f + CELL_COUNT]
+    patch = surface_at(table, f)
+    surface_record = surface_at(table, g)
+    nf = patch.cell_count
     a = np.empty((nf, 6))
-    b = np.empty((table[g + CELL_COUNT], 6))
+    b = np.empty((surface_record.cell_count, 6))
     same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
     extent = cell_samples(table, pool, f, same, (0.0, 0.0, 0.0), a)
     extent = min(extent, cell_samples(table, pool, g, rotation, shift, b))
@@ -219,8 +219,8 @@ def global_start(table, pool, f, g, rotation, shift, size):
     for attempt in range(NEAREST):
         if score[i] == math.inf:
             break
-        o = table[f + CELLS] + CELL_SIZE * i
-        p = table[g + CELLS] + CELL_SIZE * nearest[i]
+        o = patch.cells + CELL_SIZE * i
+        p = surface_record.cells + CELL_SIZE * nearest[i]
         # Cells whose spheres are farther apart than the best pair hold no nearer one.
         if score[i] - 1.5 * (pool[o + 8] + pool[p + 8]) > min(abs(best[1]), upper):
             break
@@ -262,8 +262,8 @@ def global_start(table, pool, f, g, rotation, shift, size):
         for _ in range(ALIGNED):
             if score[i] == math.inf:
                 break
-            o = table[f + CELLS] + CELL_SIZE * i
-            p = table[g + CELLS] + CELL_SIZE * nearest[i]
+            o = patch.cells + CELL_SIZE * i
+            p = surface_record.cells + CELL_SIZE * nearest[i]
             start = (pool[o], pool[o + 1], pool[p], pool[p + 1])
             status, x, _count, frame, _h = solve_pair(
                 table, pool, f, g, rotation, shift, start, size, math.inf, 0.0, False

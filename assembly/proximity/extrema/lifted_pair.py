@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly.geometry.splines.evaluate import SIGN, surface_point, third_derivatives
+from assembly.geometry.splines.evaluate import surface_at, surface_point, third_derivatives
 from assembly.geometry.vec import add, blend, cross, dot, matvec, scale, sub
 from assembly.kinematics.motion import position, relative_pose, rotation
 from assembly.proximity.extrema.face_face import pair_frame
@@ -101,6 +101,7 @@ def has_stayed(table, pool, f, g, tracked, was, r, most):
 @kernel(inner=True)
 def variations(table, pool, f, g, i, j, q, x, s, out):
     """First variations of d, f_u, f_v, g_u, g_v, N and n over the 16 variables, and the vectors themselves."""
+    patch = surface_at(table, f)
     turn_f = rotation(q, i)
     turn_g = rotation(q, j)
     a, b, c, d_, e, h = surface_point(table, pool, f, x[0], x[1])
@@ -108,7 +109,7 @@ def variations(table, pool, f, g, i, j, q, x, s, out):
     a, b, c, d_, e, h = surface_point(table, pool, g, x[2], x[3])
     pg, gu, gv, guu, guv, gvv = place(turn_g, a, b, c, d_, e, h)
     d = add(sub(position(q, j), position(q, i)), sub(pg, pf))
-    normal = scale(float(table[f + SIGN]), cross(fu, fv))
+    normal = scale(float(patch.sign), cross(fu, fv))
     length = math.sqrt(dot(normal, normal))
     n = scale(1.0 / length, normal)
     for m in range(VECTORS):
@@ -136,7 +137,7 @@ def variations(table, pool, f, g, i, j, q, x, s, out):
     put_turn(out[GV], 9, gv)
     put_column(out[GV], 14, scale(1.0 / s[2], guv))
     put_column(out[GV], 15, scale(1.0 / s[3], gvv))
-    sign = float(table[f + SIGN])
+    sign = float(patch.sign)
     for k in range(VARIABLES):
         change = scale(sign, add(cross(column(out[FU], k), fv), cross(fu, column(out[FV], k))))
         put_column(out[NN], k, change)
@@ -189,7 +190,7 @@ def add_second(y, a, a1, a2, a11, a12, a22, w, u, s1, s2, out):
 def free_hessian(table, pool, f, g, i, j, q, x, s, y, work, out):
     """Second derivative (16, 16) of y . rows, overwriting out."""
     d, n, length, pf, fu, fv, pg, gu, gv = variations(table, pool, f, g, i, j, q, x, s, work)
-    sign = float(table[f + SIGN])
+    sign = float(surface_at(table, f).sign)
     turn_f = rotation(q, i)
     turn_g = rotation(q, j)
     beta = dot(n, d)

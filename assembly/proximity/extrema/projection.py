@@ -6,7 +6,7 @@ import math
 
 from assembly._kernel import kernel
 from assembly.geometry.splines.domain import into_domain, is_within
-from assembly.geometry.splines.evaluate import SIGN, surface_point
+from assembly.geometry.splines.evaluate import surface_at, surface_point
 from assembly.geometry.vec import cross, dot, matvec, matvec_t, scale, sub
 from assembly.proximity.extrema.singular import BESIDE
 
@@ -31,7 +31,7 @@ def foot_of(table, pool, g, y, s, t):
         length = math.sqrt(dot(n, n))
         if not length > 0.0:
             break
-        n = scale(float(table[g + SIGN]) / length, n)
+        n = scale(float(surface_at(table, g).sign) / length, n)
         distance = dot(n, d)
         a = dot(su, su)
         b = dot(su, sv)

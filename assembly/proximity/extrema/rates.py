@@ -20,6 +20,7 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly._record import place_of, record_dtype, record_view, size_of
 from assembly.geometry.vec import cross, dot, matvec, scale, sub
 from assembly.kinematics.motion import quaternion_columns, relative_pose, rotation
 from assembly.proximity.extrema.face_face import pair_frame
@@ -28,7 +29,25 @@ from assembly.proximity.extrema.pair_matrix import pair_matrix
 # A record holds what the derivatives of one gap need, all in world axes: the gap, the normal, the arms from the bodies'
 # origins to the point of g, the (4, 4) map from z to parameter rates, the (4, 4) form of beta'', and z as (4, 12)
 # over the twists of f, then g.
-GAP, NORMAL, ARM_F, ARM_G, RATES, FORM, ZED, RECORD = 0, 1, 4, 7, 10, 26, 42, 90
+GAP_DERIVATIVES = record_dtype(
+    "f8",
+    gap=1,
+    normal=3,
+    arm_f=3,
+    arm_g=3,
+    rates=(4, 4),
+    form=(4, 4),
+    zed=(4, 12),
+)
+derivatives_at = record_view(GAP_DERIVATIVES)
+GAP = place_of(GAP_DERIVATIVES, "gap")
+NORMAL = place_of(GAP_DERIVATIVES, "normal")
+ARM_F = place_of(GAP_DERIVATIVES, "arm_f")
+ARM_G = place_of(GAP_DERIVATIVES, "arm_g")
+RATES = place_of(GAP_DERIVATIVES, "rates")
+FORM = place_of(GAP_DERIVATIVES, "form")
+ZED = place_of(GAP_DERIVATIVES, "zed")
+RECORD = size_of(GAP_DERIVATIVES)
 
 
 @kernel(inline=True)
@@ -46,6 +65,7 @@ def put(array, row, o, a):
 @kernel(inner=True)
 def store_record(turn, shift, frame, curvature, records, row):
     """Fill a record from a pair's frame in the axes of body f, whose rotation is `turn`; g's origin is at `shift`."""
+    derivatives = derivatives_at(records, row)
     n, tx, ty, _pf, pg, e, t, a, c, _r, beta, _regular = frame
     k, _h, i, _isolated = curvature
     normal = matvec(turn, n)
@@ -53,7 +73,7 @@ def store_record(turn, shift, frame, curvature, records, row):
     y = matvec(turn, ty)
     arm_f = matvec(turn, pg)
     arm_g = matvec(turn, sub(pg, shift))
-    records[row, GAP] = beta
+    derivatives.gap = beta
     put(records, row, NORMAL, normal)
     put(records, row, ARM_F, arm_f)
     put(records, row, ARM_G, arm_g)
@@ -67,11 +87,11 @@ def store_record(turn, shift, frame, curvature, records, row):
     put(records, row, ZED + 18, y)
     put(records, row, ZED + 21, cross(arm_g, y))
     for j in range(3):
-        records[row, ZED + 24 + j] = 0.0
+        derivatives.zed[2, j] = 0.0
         records[row, ZED + 27 + j] = -y[j]
         records[row, ZED + 30 + j] = 0.0
         records[row, ZED + 33 + j] = y[j]
-        records[row, ZED + 36 + j] = 0.0
+        derivatives.zed[3, j] = 0.0
         records[row, ZED + 39 + j] = x[j]
         records[row, ZED + 42 + j] = 0.0
         records[row, ZED + 45 + j] = -x[j]
@@ -92,14 +112,14 @@ def store_record(turn, shift, frame, curvature, records, row):
         ay = m[4 + j]
         bx = k[0] * ax + k[1] * ay - (1.0 if j == 0 else 0.0)
         by = k[1] * ax + k[2] * ay - (1.0 if j == 1 else 0.0)
-        records[row, RATES + j] = e[0] * ax + e[1] * ay
-        records[row, RATES + 4 + j] = e[2] * ay
-        records[row, RATES + 8 + j] = t[0] * bx + t[1] * by
-        records[row, RATES + 12 + j] = t[2] * bx + t[3] * by
+        derivatives.rates[0, j] = e[0] * ax + e[1] * ay
+        derivatives.rates[1, j] = e[2] * ay
+        derivatives.rates[2, j] = t[0] * bx + t[1] * by
+        derivatives.rates[3, j] = t[2] * bx + t[3] * by
         for l in range(4):
             # a.(A z_12 - (I + beta A) z_34), made symmetric; z_12.z_34 adds a half off the diagonal.
             value = 0.5 * (ax * w[l] + ay * w[4 + l] + m[l] * w[j] + m[4 + l] * w[4 + j])
-            records[row, FORM + 4 * j + l] = value + (0.5 if l == j + 2 or j == l + 2 else 0.0)
+            derivatives.form[j, l] = value + (0.5 if l == j + 2 or j == l + 2 else 0.0)
 
 
 @kernel(inline=True)
@@ -141,6 +161,7 @@ def add_gap_terms(records, row, jacobian, r, factor, weight, out, f, g):
 
     A negative f or g is a body that does not move: its block is left out.
     """
+    derivatives = derivatives_at(records, row)
     for i in range(12):
         if (f if i < 6 else g) < 0:
             continue
@@ -149,18 +170,18 @@ def add_gap_terms(records, row, jacobian, r, factor, weight, out, f, g):
         p2 = 0.0
         p3 = 0.0
         for k in range(4 if factor != 0.0 else 0):
-            s = factor * records[row, ZED + 12 * k + i]
+            s = factor * derivatives.zed[k, i]
             p0 += s * records[row, FORM + 4 * k]
-            p1 += s * records[row, FORM + 4 * k + 1]
-            p2 += s * records[row, FORM + 4 * k + 2]
-            p3 += s * records[row, FORM + 4 * k + 3]
+            p1 += s * derivatives.form[k, 1]
+            p2 += s * derivatives.form[k, 2]
+            p3 += s * derivatives.form[k, 3]
         w = weight * jacobian[r, i]
         for j in range(i, 12 if g >= 0 else 6):
             value = (
-                p0 * records[row, ZED + j]
-                + p1 * records[row, ZED + 12 + j]
-                + p2 * records[row, ZED + 24 + j]
-                + p3 * records[row, ZED + 36 + j]
+                p0 * derivatives.zed[0, j]
+                + p1 * derivatives.zed[1, j]
+                + p2 * derivatives.zed[2, j]
+                + p3 * derivatives.zed[3, j]
                 + w * jacobian[r, j]
             )
             if i >= 6:
@@ -218,6 +239,7 @@ def pair_derivatives(table, pool, f, g, q, x, size, first, hessian):
         return error, False
     curvature = pair_matrix(frame[7], frame[8], frame[10], 1e-9 / size)
     records = np.empty((1, RECORD))
+    derivatives = derivatives_at(records, 0)
     gradient = np.empty((1, 12))
     row = np.empty(12)
     store_record(turn, shift, frame, curvature, records, 0)
@@ -231,7 +253,7 @@ def pair_derivatives(table, pool, f, g, q, x, size, first, hessian):
             at_pole = frame[5][0] == 0.0 if i < 2 else frame[6][0] == 0.0 and frame[6][1] == 0.0
             row[j] = math.nan if at_pole else 0.0
             for l in range(4):
-                row[j] += records[0, RATES + 4 * i + l] * records[0, ZED + 12 * l + j]
+                row[j] += derivatives.rates[i, l] * derivatives.zed[l, j]
         into_quaternions(row, q, first, i)
     for i in range(12):
         for j in range(12):

@@ -9,59 +9,61 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
+from assembly._record import place_of, record_dtype, record_view, size_of
 from assembly.geometry.splines.evaluate import (
-    BREAKS_U,
-    BREAKS_V,
-    CELL_COUNT,
     CELL_SIZE,
-    CELLS,
-    CURVE_BREAKS,
-    CURVE_SPANS,
-    SPANS_U,
-    SPANS_V,
+    spline_curve_at,
+    surface_at,
 )
 from assembly.geometry.vec import add, dot, matvec, scale, sub
 from assembly.proximity.brep.records import (
     EDGE,
-    EDGE_CELL_COUNT,
     EDGE_CELL_SIZE,
-    EDGE_CELLS,
-    EDGE_CURVE,
     EDGE_RECORD,
-    EDGE_TABLE,
-    EDGES,
     FACE,
-    FACE_CELL_FLAGS,
     FACE_RECORD,
-    FACE_SURFACE,
-    FACE_TABLE,
-    FACE_TRIM,
-    FACES,
     VERTEX,
-    VERTEX_POINT,
     VERTEX_RECORD,
-    VERTEX_TABLE,
-    VERTICES,
+    edge_at,
+    face_at,
+    shell_at,
+    vertex_at,
 )
 from assembly.proximity.features.edge_model import edge_model
 from assembly.proximity.features.quadratic_model import (
     CENTER,
-    HALF_U,
-    HALF_V,
     LINEAR_U,
     LINEAR_V,
-    RADIUS,
-    U0,
-    V0,
     face_model,
     get,
+    model_at,
     put,
     vertex_model,
 )
 
 # Integers of a node: what it is, its feature's kind, number and record, its children (-1: none yet), how many; of a
 # face's cell where it is from the trim; whether it has its model.
-LEVEL, KIND, FEATURE, RECORD, CHILD, CHILDREN, SIDE, HAS_MODEL, INFO = 0, 1, 2, 3, 4, 5, 6, 7, 8
+CELL_NODE = record_dtype(
+    "i8",
+    level=1,
+    kind=1,
+    feature=1,
+    record=1,
+    child=1,
+    children=1,
+    side=1,
+    has_model=1,
+)
+cell_node_at = record_view(CELL_NODE)
+LEVEL = place_of(CELL_NODE, "level")
+KIND = place_of(CELL_NODE, "kind")
+FEATURE = place_of(CELL_NODE, "feature")
+RECORD = place_of(CELL_NODE, "record")
+CHILD = place_of(CELL_NODE, "child")
+CHILDREN = place_of(CELL_NODE, "children")
+SIDE = place_of(CELL_NODE, "side")
+HAS_MODEL = place_of(CELL_NODE, "has_model")
+INFO = size_of(CELL_NODE)
 # Levels.
 WHOLE, PART, GROUP, CELL = 0, 1, 2, 3
 # Where a cell is: not asked, all of it inside, all of it outside, neither.
@@ -79,23 +81,25 @@ PARTS = 8192
 @kernel(inner=True)
 def feature_cells(table, shell, k):
     """Kind and record of feature k, how many cells it has, where in the pool, how long a row, and where its ball is."""
-    faces = table[shell + FACES]
-    edges = table[shell + EDGES]
+    solid = shell_at(table, shell)
+    faces = solid.faces
+    edges = solid.edges
     if k < faces:
-        record = table[shell + FACE_TABLE] + FACE_RECORD * k
-        surface = table[record + FACE_SURFACE]
-        return FACE, record, table[surface + CELL_COUNT], table[surface + CELLS], CELL_SIZE, 5
+        record = solid.face_table + FACE_RECORD * k
+        surface = surface_at(table, face_at(table, record).surface)
+        return FACE, record, surface.cell_count, surface.cells, CELL_SIZE, 5
     if k < faces + edges:
-        record = table[shell + EDGE_TABLE] + EDGE_RECORD * (k - faces)
-        return EDGE, record, table[record + EDGE_CELL_COUNT], table[record + EDGE_CELLS], EDGE_CELL_SIZE, 2
-    record = table[shell + VERTEX_TABLE] + VERTEX_RECORD * (k - faces - edges)
-    return VERTEX, record, 1, table[record + VERTEX_POINT], 3, 0
+        record = solid.edge_table + EDGE_RECORD * (k - faces)
+        return EDGE, record, edge_at(table, record).cell_count, edge_at(table, record).cells, EDGE_CELL_SIZE, 2
+    record = solid.vertex_table + VERTEX_RECORD * (k - faces - edges)
+    return VERTEX, record, 1, vertex_at(table, record).point, 3, 0
 
 
 @kernel(inner=True)
 def room(table, pool, shell):
     """How many nodes a shell's tree may need."""
-    features = table[shell + FACES] + table[shell + EDGES] + table[shell + VERTICES]
+    solid = shell_at(table, shell)
+    features = solid.faces + solid.edges + solid.vertices
     count = 1 + features + PARTS
     for k in range(features):
         cells = feature_cells(table, shell, k)[2]
@@ -105,14 +109,15 @@ def room(table, pool, shell):
 
 @kernel(inline=True)
 def new_node(info, i, level, kind, feature, record):
-    info[i, LEVEL] = level
-    info[i, KIND] = kind
-    info[i, FEATURE] = feature
-    info[i, RECORD] = record
-    info[i, CHILD] = -1
-    info[i, CHILDREN] = 0
-    info[i, SIDE] = UNKNOWN
-    info[i, HAS_MODEL] = 0
+    cell = cell_node_at(info, i)
+    cell.level = level
+    cell.kind = kind
+    cell.feature = feature
+    cell.record = record
+    cell.child = -1
+    cell.children = 0
+    cell.side = UNKNOWN
+    cell.has_model = 0
 
 
 @kernel(inner=True)
@@ -122,42 +127,46 @@ def ball_around(nodes, i, first, last):
     hi = (-math.inf, -math.inf, -math.inf)
     for k in range(first, last):
         c = get(nodes, k, CENTER)
-        r = nodes[k, RADIUS]
+        r = model_at(nodes, k).radius
         lo = (min(lo[0], c[0] - r), min(lo[1], c[1] - r), min(lo[2], c[2] - r))
         hi = (max(hi[0], c[0] + r), max(hi[1], c[1] + r), max(hi[2], c[2] + r))
     center = scale(0.5, add(lo, hi))
     reach = 0.0
     for k in range(first, last):
         d = sub(get(nodes, k, CENTER), center)
-        reach = max(reach, math.sqrt(dot(d, d)) + nodes[k, RADIUS])
+        reach = max(reach, math.sqrt(dot(d, d)) + model_at(nodes, k).radius)
     put(nodes, i, CENTER, center)
-    nodes[i, RADIUS] = reach + 4e-16 * (reach + abs(center[0]) + abs(center[1]) + abs(center[2]))
+    model_at(nodes, i).radius = reach + 4e-16 * (reach + abs(center[0]) + abs(center[1]) + abs(center[2]))
 
 
 @kernel(inner=True)
 def used_cell(table, pool, record, kind, c):
     """Whether a cell is worth a look: not a face's outside of its trim."""
-    if kind != FACE or table[record + FACE_TRIM] < 0:
+    face = face_at(table, record)
+    if kind != FACE or face.trim < 0:
         return True
-    return pool[table[record + FACE_CELL_FLAGS] + c] != 0.0
+    return pool[face.cell_flags + c] != 0.0
 
 
 @kernel(inner=True)
 def plant(table, pool, shell, turn, shift, nodes, info):
     """The nodes of the shell and of its features. Returns the number of nodes."""
-    features = table[shell + FACES] + table[shell + EDGES] + table[shell + VERTICES]
+    cell = cell_node_at(info, 0)
+    solid = shell_at(table, shell)
+    features = solid.faces + solid.edges + solid.vertices
     new_node(info, 0, WHOLE, -1, -1, shell)
-    info[0, CHILD] = 1
-    info[0, CHILDREN] = features
+    cell.child = 1
+    cell.children = features
     for k in range(features):
         kind, record, cells, at, size, ball = feature_cells(table, shell, k)
         i = 1 + k
+        model = model_at(nodes, i)
         new_node(info, i, PART, kind, k, record)
         if kind == VERTEX:
-            info[i, LEVEL] = CELL
+            cell_node_at(info, i).level = CELL
             point = add(matvec(turn, (pool[at], pool[at + 1], pool[at + 2])), shift)
             put(nodes, i, CENTER, point)
-            nodes[i, RADIUS] = 0.0
+            model.radius = 0.0
             continue
         lo = (math.inf, math.inf, math.inf)
         hi = (-math.inf, -math.inf, -math.inf)
@@ -182,10 +191,10 @@ def plant(table, pool, shell, turn, shift, nodes, info):
                 r = pool[o + 3]
                 lo = (min(lo[0], pool[o] - r), min(lo[1], pool[o + 1] - r), min(lo[2], pool[o + 2] - r))
                 hi = (max(hi[0], pool[o] + r), max(hi[1], pool[o + 1] + r), max(hi[2], pool[o + 2] + r))
-        nodes[i, U0] = 0.5 * (low_u + high_u)
-        nodes[i, V0] = 0.5 * (low_v + high_v)
-        nodes[i, HALF_U] = 0.5 * (high_u - low_u)
-        nodes[i, HALF_V] = 0.5 * (high_v - low_v)
+        model.u0 = 0.5 * (low_u + high_u)
+        model.v0 = 0.5 * (low_v + high_v)
+        model.half_u = 0.5 * (high_u - low_u)
+        model.half_v = 0.5 * (high_v - low_v)
         x, y, z = scale(0.5, add(lo, hi))
         reach = 0.0
         for c in range(cells):
@@ -195,7 +204,7 @@ def plant(table, pool, shell, turn, shift, nodes, info):
                 reach = max(reach, math.sqrt(d) + pool[o + 3])
         center = add(matvec(turn, (x, y, z)), shift)
         put(nodes, i, CENTER, center)
-        nodes[i, RADIUS] = reach + 4e-16 * (reach + abs(center[0]) + abs(center[1]) + abs(center[2]))
+        model.radius = reach + 4e-16 * (reach + abs(center[0]) + abs(center[1]) + abs(center[2]))
     ball_around(nodes, 0, 1, 1 + features)
     return 1 + features
 
@@ -203,18 +212,21 @@ def plant(table, pool, shell, turn, shift, nodes, info):
 @kernel(inner=True)
 def open_spans(table, pool, nodes, info, i, count):
     """Pieces of one span each as cells of a feature that has few spans. Returns the number of nodes."""
-    kind = info[i, KIND]
-    record = info[i, RECORD]
-    info[i, CHILD] = count
-    low_u = nodes[i, U0] - nodes[i, HALF_U]
-    high_u = nodes[i, U0] + nodes[i, HALF_U]
-    low_v = nodes[i, V0] - nodes[i, HALF_V]
-    high_v = nodes[i, V0] + nodes[i, HALF_V]
-    curve = table[record + EDGE_CURVE] if kind == EDGE else -1
-    r = table[record + FACE_SURFACE] if kind == FACE else -1
-    breaks_u = table[curve + CURVE_BREAKS] if kind == EDGE else table[r + BREAKS_U]
-    spans_u = table[curve + CURVE_SPANS] if kind == EDGE else table[r + SPANS_U]
-    spans_v = 1 if kind == EDGE else table[r + SPANS_V]
+    cell = cell_node_at(info, i)
+    model = model_at(nodes, i)
+    kind = cell.kind
+    record = cell.record
+    face = face_at(table, record)
+    cell.child = count
+    low_u = model.u0 - model.half_u
+    high_u = model.u0 + model.half_u
+    low_v = model.v0 - model.half_v
+    high_v = model.v0 + model.half_v
+    curve = spline_curve_at(table, edge_at(table, record).curve if kind == EDGE else -1)
+    r = surface_at(table, face.surface if kind == FACE else -1)
+    breaks_u = curve.breaks if kind == EDGE else r.breaks_u
+    spans_u = curve.spans if kind == EDGE else r.spans_u
+    spans_v = 1 if kind == EDGE else r.spans_v
     for iu in range(spans_u):
         u0 = max(pool[breaks_u + iu], low_u)
         u1 = min(pool[breaks_u + iu + 1], high_u)
@@ -224,21 +236,21 @@ def open_spans(table, pool, nodes, info, i, count):
             v0 = 0.0
             v1 = 0.0
             if kind == FACE:
-                at = table[r + BREAKS_V] + iv
+                at = r.breaks_v + iv
                 v0 = max(pool[at], low_v)
                 v1 = min(pool[at + 1], high_v)
                 if not v0 < v1:
                     continue
-            new_node(info, count, CELL, kind, info[i, FEATURE], record)
-            info[count, SIDE] = UNKNOWN if kind == FACE and table[record + FACE_TRIM] >= 0 else INSIDE
-            nodes[count, U0] = 0.5 * (u0 + u1)
-            nodes[count, V0] = 0.5 * (v0 + v1)
-            nodes[count, HALF_U] = 0.5 * (u1 - u0)
-            nodes[count, HALF_V] = 0.5 * (v1 - v0)
+            new_node(info, count, CELL, kind, cell.feature, record)
+            cell_node_at(info, count).side = UNKNOWN if kind == FACE and face.trim >= 0 else INSIDE
+            model_at(nodes, count).u0 = 0.5 * (u0 + u1)
+            model_at(nodes, count).v0 = 0.5 * (v0 + v1)
+            model_at(nodes, count).half_u = 0.5 * (u1 - u0)
+            model_at(nodes, count).half_v = 0.5 * (v1 - v0)
             put(nodes, count, CENTER, get(nodes, i, CENTER))
-            nodes[count, RADIUS] = nodes[i, RADIUS]
+            model_at(nodes, count).radius = model.radius
             count += 1
-    info[i, CHILDREN] = count - info[i, CHILD]
+    cell.children = count - cell.child
     return count
 
 
@@ -246,15 +258,16 @@ def open_spans(table, pool, nodes, info, i, count):
 def span_count(table, kind, record):
     """How many spans a face or an edge has."""
     if kind == FACE:
-        r = table[record + FACE_SURFACE]
-        return table[r + SPANS_U] * table[r + SPANS_V]
-    return table[table[record + EDGE_CURVE] + CURVE_SPANS]
+        r = surface_at(table, face_at(table, record).surface)
+        return r.spans_u * r.spans_v
+    return spline_curve_at(table, edge_at(table, record).curve).spans
 
 
 @kernel(inner=True)
 def open_feature(table, pool, shell, turn, shift, nodes, info, i, count):
     """Groups and cells of a feature. Returns the number of nodes."""
-    kind, record, cells, at, size, ball = feature_cells(table, shell, info[i, FEATURE])
+    cell = cell_node_at(info, i)
+    kind, record, cells, at, size, ball = feature_cells(table, shell, cell.feature)
     used = 0
     for c in range(cells):
         if used_cell(table, pool, record, kind, c):
@@ -266,86 +279,91 @@ def open_feature(table, pool, shell, turn, shift, nodes, info, i, count):
         if not used_cell(table, pool, record, kind, c):
             continue
         o = at + size * c
-        new_node(info, j, CELL, kind, info[i, FEATURE], record)
+        new_node(info, j, CELL, kind, cell.feature, record)
         put(nodes, j, CENTER, add(matvec(turn, (pool[o + ball], pool[o + ball + 1], pool[o + ball + 2])), shift))
-        nodes[j, RADIUS] = pool[o + ball + 3]
+        model_at(nodes, j).radius = pool[o + ball + 3]
         if kind == FACE:
-            nodes[j, U0] = pool[o]
-            nodes[j, V0] = pool[o + 1]
-            nodes[j, HALF_U] = pool[o + 9]
-            nodes[j, HALF_V] = pool[o + 10]
-            if table[record + FACE_TRIM] < 0:
-                info[j, SIDE] = INSIDE
+            model_at(nodes, j).u0 = pool[o]
+            model_at(nodes, j).v0 = pool[o + 1]
+            model_at(nodes, j).half_u = pool[o + 9]
+            model_at(nodes, j).half_v = pool[o + 10]
+            if face_at(table, record).trim < 0:
+                cell_node_at(info, j).side = INSIDE
         else:
-            nodes[j, U0] = 0.5 * (pool[o] + pool[o + 1])
-            nodes[j, V0] = 0.0
-            nodes[j, HALF_U] = 0.5 * (pool[o + 1] - pool[o])
-            nodes[j, HALF_V] = 0.0
-            info[j, SIDE] = INSIDE
+            model_at(nodes, j).u0 = 0.5 * (pool[o] + pool[o + 1])
+            model_at(nodes, j).v0 = 0.0
+            model_at(nodes, j).half_u = 0.5 * (pool[o + 1] - pool[o])
+            model_at(nodes, j).half_v = 0.0
+            cell_node_at(info, j).side = INSIDE
         j += 1
     for k in range(groups):
         g = count + k
-        new_node(info, g, GROUP, kind, info[i, FEATURE], record)
-        info[g, CHILD] = first + TOGETHER * k
-        info[g, CHILDREN] = min(TOGETHER, used - TOGETHER * k)
-        ball_around(nodes, g, info[g, CHILD], info[g, CHILD] + info[g, CHILDREN])
-    info[i, CHILD] = count
-    info[i, CHILDREN] = groups
+        cell_node = cell_node_at(info, g)
+        new_node(info, g, GROUP, kind, cell.feature, record)
+        cell_node.child = first + TOGETHER * k
+        cell_node.children = min(TOGETHER, used - TOGETHER * k)
+        ball_around(nodes, g, cell_node.child, cell_node.child + cell_node.children)
+    cell.child = count
+    cell.children = groups
     return first + used
 
 
 @kernel(inner=True)
 def give_model(table, pool, turn, shift, nodes, info, i, work):
     """See to it that a cell has its model."""
-    if info[i, HAS_MODEL] == 1:
+    cell = cell_node_at(info, i)
+    if cell.has_model == 1:
         return
-    info[i, HAS_MODEL] = 1
-    record = info[i, RECORD]
-    if info[i, KIND] == FACE:
-        face_model(table, pool, table[record + FACE_SURFACE], turn, shift, nodes, i, work)
-    elif info[i, KIND] == EDGE:
+    cell.has_model = 1
+    record = cell.record
+    if cell.kind == FACE:
+        face_model(table, pool, face_at(table, record).surface, turn, shift, nodes, i, work)
+    elif cell.kind == EDGE:
         edge_model(table, pool, record, turn, shift, nodes, i, work)
     else:
-        vertex_model(pool, table[record + VERTEX_POINT], turn, shift, nodes, i)
+        vertex_model(pool, vertex_at(table, record).point, turn, shift, nodes, i)
 
 
 @kernel(inner=True)
 def split_cell(nodes, info, i, count):
     """Two or four parts of a cell that has its model. Returns the number of nodes."""
+    cell = cell_node_at(info, i)
+    model = model_at(nodes, i)
     p = get(nodes, i, LINEAR_U)
     q = get(nodes, i, LINEAR_V)
     uu = dot(p, p)
     vv = dot(q, q)
-    is_edge = info[i, KIND] == EDGE
+    is_edge = cell.kind == EDGE
     in_u = is_edge or SLENDER * SLENDER * uu >= vv
     in_v = not is_edge and SLENDER * SLENDER * vv >= uu
-    info[i, CHILD] = count
+    cell.child = count
     parts_u = 2 if in_u else 1
     parts_v = 2 if in_v else 1
-    half_u = nodes[i, HALF_U] / parts_u
-    half_v = nodes[i, HALF_V] / parts_v
+    half_u = model.half_u / parts_u
+    half_v = model.half_v / parts_v
     for a in range(parts_u):
         for b in range(parts_v):
-            new_node(info, count, CELL, info[i, KIND], info[i, FEATURE], info[i, RECORD])
-            info[count, SIDE] = UNKNOWN if info[i, SIDE] == MIXED_SIDE else info[i, SIDE]
-            nodes[count, U0] = nodes[i, U0] + (2 * a + 1 - parts_u) * half_u
-            nodes[count, V0] = nodes[i, V0] + (2 * b + 1 - parts_v) * half_v
-            nodes[count, HALF_U] = half_u
-            nodes[count, HALF_V] = half_v
+            new_node(info, count, CELL, cell.kind, cell.feature, cell.record)
+            cell_node_at(info, count).side = UNKNOWN if cell.side == MIXED_SIDE else cell.side
+            model_at(nodes, count).u0 = model.u0 + (2 * a + 1 - parts_u) * half_u
+            model_at(nodes, count).v0 = model.v0 + (2 * b + 1 - parts_v) * half_v
+            model_at(nodes, count).half_u = half_u
+            model_at(nodes, count).half_v = half_v
             put(nodes, count, CENTER, get(nodes, i, CENTER))
-            nodes[count, RADIUS] = nodes[i, RADIUS]
+            model_at(nodes, count).radius = model.radius
             count += 1
-    info[i, CHILDREN] = parts_u * parts_v
+    cell.children = parts_u * parts_v
     return count
 
 
 @kernel(inner=True)
 def grow(table, pool, shell, turn, shift, nodes, info, i, count):
     """See to it that a node has children, cells yet without their models. Returns the number of nodes."""
-    if info[i, CHILD] >= 0 or info[i, KIND] == VERTEX:
+    cell = cell_node_at(info, i)
+    if cell.child >= 0 or cell.kind == VERTEX:
         return count
-    if info[i, LEVEL] == PART:
-        if span_count(table, info[i, KIND], info[i, RECORD]) <= SPANS:
+    if cell.level == PART:
+        if span_count(table, cell.kind, cell.record) <= SPANS:
             return open_spans(table, pool, nodes, info, i, count)
         return open_feature(table, pool, shell, turn, shift, nodes, info, i, count)
     return split_cell(nodes, info, i, count)

@@ -17,21 +17,15 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
-from assembly.geometry.splines.evaluate import SIGN
+from assembly.geometry.splines.evaluate import surface_at
 from assembly.geometry.vec import add, dot, matvec, scale, sub
 from assembly.proximity.brep.apexes import unit
 from assembly.proximity.brep.borders import feature_at, feature_kind, on_surface, other_parameter
 from assembly.proximity.brep.records import (
     EDGE,
-    EDGE_CURVE,
-    EDGE_CURVE_B,
-    EDGE_FACE_A,
-    EDGE_FACE_B,
     EDGE_RECORD,
-    EDGE_SURFACE,
-    EDGE_SURFACE_B,
-    EDGE_TABLE,
-    FACES,
+    edge_at,
+    shell_at,
 )
 from assembly.proximity.extrema.crossing import tangents
 from assembly.proximity.extrema.face_face import CONVERGED, SINGULAR
@@ -54,7 +48,7 @@ def middle_of(table, pool, shell):
     reach = 0.0
     center = (0.0, 0.0, 0.0)
     for step in range(2):
-        for k in range(table[shell + FACES]):
+        for k in range(shell_at(table, shell).faces):
             kind, record, count, cells, stride, ball = feature_cells(table, shell, k)
             for i in range(count):
                 if not used_cell(table, pool, record, kind, i):
@@ -102,19 +96,21 @@ def leans(table, pool, shell, code, u, v, turn, n, size, ways):
 @kernel(inner=True)
 def face_beside(table, pool, shell, code, u, v, turn, n):
     """The face that leans most along n at a point of an edge, and the point on it; what is no edge stays as it is."""
+    solid = shell_at(table, shell)
     if feature_kind(table, shell, code) != EDGE:
         return code, u, v
-    edge = table[shell + EDGE_TABLE] + EDGE_RECORD * (code - table[shell + FACES])
-    surface = table[edge + EDGE_SURFACE]
-    face = table[edge + EDGE_FACE_A]
-    a, b, p, _along, m = on_surface(table, pool, surface, table[edge + EDGE_CURVE], u)
-    if table[edge + EDGE_FACE_B] >= 0:
-        other = table[edge + EDGE_SURFACE_B]
+    edge = solid.edge_table + EDGE_RECORD * (code - solid.faces)
+    edge_record = edge_at(table, edge)
+    surface = edge_record.surface
+    face = edge_record.face_a
+    a, b, p, _along, m = on_surface(table, pool, surface, edge_record.curve, u)
+    if edge_record.face_b >= 0:
+        other = edge_record.surface_b
         s = other_parameter(table, pool, edge, u, p)
-        c, d, _p, _along, k = on_surface(table, pool, other, table[edge + EDGE_CURVE_B], s)
-        lean = float(table[surface + SIGN]) * dot(unit(matvec(turn, m)), n)
-        if float(table[other + SIGN]) * dot(unit(matvec(turn, k)), n) > lean:
-            return table[edge + EDGE_FACE_B], c, d
+        c, d, _p, _along, k = on_surface(table, pool, other, edge_record.curve_b, s)
+        lean = float(surface_at(table, surface).sign) * dot(unit(matvec(turn, m)), n)
+        if float(surface_at(table, other).sign) * dot(unit(matvec(turn, k)), n) > lean:
+            return edge_record.face_b, c, d
     return face, a, b
 
 

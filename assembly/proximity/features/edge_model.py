@@ -11,33 +11,32 @@ import math
 from assembly._kernel import kernel
 from assembly.geometry.splines.domain import into_domain
 from assembly.geometry.splines.evaluate import (
-    BREAKS_U,
-    BREAKS_V,
-    CLOSED_U,
-    CLOSED_V,
-    CURVE_BREAKS,
-    CURVE_COEFFICIENTS,
-    CURVE_DEGREE,
-    CURVE_SPANS,
-    SPANS_U,
-    SPANS_V,
     curve_point,
     find_span,
+    spline_curve_at,
+    surface_at,
     surface_point,
 )
 from assembly.geometry.vec import add, blend, dot, scale
-from assembly.proximity.brep.records import EDGE_CURVE, EDGE_SURFACE
-from assembly.proximity.features.quadratic_model import HALF_U, LEAST_WEIGHT, ROUNDING, U0, place_model, remainder
+from assembly.proximity.brep.records import edge_at
+from assembly.proximity.features.quadratic_model import (
+    LEAST_WEIGHT,
+    ROUNDING,
+    model_at,
+    place_model,
+    remainder,
+)
 
 
 @kernel(inner=True)
 def curve_remainder(table, pool, curve, t0, h, c0, c1, c2, work):
     """Bounds of |x|, |y|, |z| of what the quadratic leaves of a curve over one part of a span."""
-    span = find_span(pool, table[curve + CURVE_BREAKS], table[curve + CURVE_SPANS], t0)
-    at = table[curve + CURVE_BREAKS] + span
+    arc = spline_curve_at(table, curve)
+    span = find_span(pool, arc.breaks, arc.spans, t0)
+    at = arc.breaks + span
     s = t0 - 0.5 * (pool[at] + pool[at + 1])
-    n = table[curve + CURVE_DEGREE]
-    o = table[curve + CURVE_COEFFICIENTS] + 4 * (n + 1) * span
+    n = arc.degree
+    o = arc.coefficients + 4 * (n + 1) * span
     for i in range(n + 1):
         w = pool[o + 4 * i + 3]
         for c in range(3):
@@ -93,14 +92,15 @@ def meets(pool, breaks, k, move, u, a):
 @kernel(inner=True)
 def wide_remainder(table, pool, r, u0, v0, a, b, s0, p, q, l, m, k, work):
     """`remainder` over a box that may lie over several spans, and over seams."""
-    bu = table[r + BREAKS_U]
-    bv = table[r + BREAKS_V]
-    nu = table[r + SPANS_U]
-    nv = table[r + SPANS_V]
+    patch = surface_at(table, r)
+    bu = patch.breaks_u
+    bv = patch.breaks_v
+    nu = patch.spans_u
+    nv = patch.spans_v
     period_u = pool[bu + nu] - pool[bu]
     period_v = pool[bv + nv] - pool[bv]
-    around_u = 1 if table[r + CLOSED_U] == 1 else 0
-    around_v = 1 if table[r + CLOSED_V] == 1 else 0
+    around_u = 1 if patch.closed_u == 1 else 0
+    around_v = 1 if patch.closed_v == 1 else 0
     if (around_u == 1 and a >= 0.5 * period_u) or (around_v == 1 and b >= 0.5 * period_v):
         return math.inf
     most = 0.0
@@ -129,15 +129,17 @@ def length(a):
 @kernel(inner=True)
 def edge_model(table, pool, edge, turn, shift, nodes, i, work):
     """Fill in a node of an edge, whose interval stands in it already, moved by a pose."""
-    t0 = nodes[i, U0]
-    h = nodes[i, HALF_U]
-    curve = table[edge + EDGE_CURVE]
+    model = model_at(nodes, i)
+    edge_record = edge_at(table, edge)
+    t0 = model.u0
+    h = model.half_u
+    curve = edge_record.curve
     zero = (0.0, 0.0, 0.0)
     c0, d, w = curve_point(table, pool, curve, t0)
     c1 = scale(h, d)
     c2 = scale(0.5 * h * h, w)
     left = curve_remainder(table, pool, curve, t0, h, c0, c1, c2, work)
-    r = table[edge + EDGE_SURFACE]
+    r = edge_record.surface
     far = abs(shift[0]) + abs(shift[1]) + abs(shift[2])
     if r < 0:
         e = length(left) + ROUNDING * (far + abs(c0[0]) + abs(c0[1]) + abs(c0[2]))

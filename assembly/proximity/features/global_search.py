@@ -22,35 +22,26 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly.geometry.vec import dot, sub
-from assembly.proximity.brep.records import FACE, FACE_SURFACE, VERTEX
+from assembly.proximity.brep.records import FACE, VERTEX, face_at
 from assembly.proximity.extrema.crossing import crossing_point
 from assembly.proximity.extrema.face_face import CONVERGED, SINGULAR, solve_pair
 from assembly.proximity.extrema.feature_pair import solve_features
 from assembly.proximity.features.ball_tree import (
     CELL,
-    CHILD,
-    CHILDREN,
-    FEATURE,
     INFO,
-    KIND,
-    LEVEL,
     OUTSIDE,
-    RECORD,
+    cell_node_at,
     give_model,
     grow,
     plant,
     room,
 )
 from assembly.proximity.features.quadratic_model import (
-    BEND,
     CENTER,
     NODE,
     POINT,
-    RADIUS,
-    REST,
-    U0,
-    V0,
     get,
+    model_at,
     pair_bound,
 )
 from assembly.proximity.features.region_tests import FAR, excluded, is_feasible, is_known, relative_curvature, side_of
@@ -107,14 +98,16 @@ def drop_first(keys, slots, count):
 @kernel(inner=True)
 def extremum_near(table, pool, kind_f, f, kind_g, g, turn, shift, x, n, size):
     """Newton from x: whether it led to an extremum, its coordinates, gap, least relative curvature, stretch of f's."""
+    face = face_at(table, f)
+    face_record = face_at(table, g)
     if kind_f == FACE and kind_g == FACE:
         status, y, _count, frame, curvature = solve_pair(
-            table, pool, table[f + FACE_SURFACE], table[g + FACE_SURFACE], turn, shift, x, size, 1.5, 0.0, False
+            table, pool, face.surface, face_record.surface, turn, shift, x, size, 1.5, 0.0, False
         )
         least, stretch = relative_curvature(curvature[0], curvature[1], frame[10])
         return status, y, frame[10], least, stretch
-    af = table[f + FACE_SURFACE] if kind_f == FACE else f
-    ag = table[g + FACE_SURFACE] if kind_g == FACE else g
+    af = face.surface if kind_f == FACE else f
+    ag = face_record.surface if kind_g == FACE else g
     status, y, frame = solve_features(table, pool, kind_f, af, kind_g, ag, turn, shift, x, n, size, 1.5)
     return status, y, frame[5], 0.0, 1.0
 
@@ -122,22 +115,26 @@ def extremum_near(table, pool, kind_f, f, kind_g, g, turn, shift, x, n, size):
 @kernel(inner=True)
 def larger_first(a, ai, i, b, bi, j):
     """Whether to go down on the side of f: what is not a cell first, then what is larger."""
-    if ai[i, LEVEL] == CELL and bi[j, LEVEL] != CELL:
+    model = model_at(a, i)
+    model_record = model_at(b, j)
+    cell = cell_node_at(ai, i)
+    cell_node = cell_node_at(bi, j)
+    if cell.level == CELL and cell_node.level != CELL:
         return False
-    if bi[j, LEVEL] == CELL and ai[i, LEVEL] != CELL:
+    if cell_node.level == CELL and cell.level != CELL:
         return True
-    if ai[i, KIND] == VERTEX or bi[j, KIND] == VERTEX:
-        return bi[j, KIND] == VERTEX
-    if ai[i, LEVEL] == CELL:
+    if cell.kind == VERTEX or cell_node.kind == VERTEX:
+        return cell_node.kind == VERTEX
+    if cell.level == CELL:
         # What keeps the bound from the distance, or else the extent.
-        return a[i, REST] + 0.02 * a[i, RADIUS] >= b[j, REST] + 0.02 * b[j, RADIUS]
-    return a[i, RADIUS] >= b[j, RADIUS]
+        return model.rest + 0.02 * model.radius >= model_record.rest + 0.02 * model_record.radius
+    return model.radius >= model_record.radius
 
 
 @kernel(inner=True)
 def ball_bound(a, i, b, j):
     d = sub(get(b, j, CENTER), get(a, i, CENTER))
-    return math.sqrt(dot(d, d)) - a[i, RADIUS] - b[j, RADIUS]
+    return math.sqrt(dot(d, d)) - model_at(a, i).radius - model_at(b, j).radius
 
 
 @kernel(inner=True, allocates=True)
@@ -194,12 +191,12 @@ def search(table, pool, shell_f, shell_g, turn, shift, size, rough):
     # A first guess, by going down where balls are nearest.
     i = 0
     j = 0
-    while ai[i, LEVEL] != CELL or bi[j, LEVEL] != CELL:
+    while cell_node_at(ai, i).level != CELL or cell_node_at(bi, j).level != CELL:
         if larger_first(a, ai, i, b, bi, j):
             count_f = grow(table, pool, shell_f, same, origin, a, ai, i, count_f)
             nearest = math.inf
-            first = ai[i, CHILD]
-            for k in range(first, first + ai[i, CHILDREN]):
+            first = cell_node_at(ai, i).child
+            for k in range(first, first + cell_node_at(ai, i).children):
                 d = sub(get(b, j, CENTER), get(a, k, CENTER))
                 if dot(d, d) < nearest:
                     nearest = dot(d, d)
@@ -207,14 +204,16 @@ def search(table, pool, shell_f, shell_g, turn, shift, size, rough):
         else:
             count_g = grow(table, pool, shell_g, turn, shift, b, bi, j, count_g)
             nearest = math.inf
-            first = bi[j, CHILD]
-            for k in range(first, first + bi[j, CHILDREN]):
+            first = cell_node_at(bi, j).child
+            for k in range(first, first + cell_node_at(bi, j).children):
                 d = sub(get(b, k, CENTER), get(a, i, CENTER))
                 if dot(d, d) < nearest:
                     nearest = dot(d, d)
                     j = k
     first_f = i
+    model = model_at(a, first_f)
     first_g = j
+    model_record = model_at(b, first_g)
     pairs[0, 0] = i
     pairs[0, 1] = j
     pairs[0, 2] = 2
@@ -245,14 +244,14 @@ def search(table, pool, shell_f, shell_g, turn, shift, size, rough):
         if count_f + 160 > most_f or count_g + 160 > most_g or waiting + 160 > WAITING:
             status = UNPROVEN
             break
-        are_cells = ai[i, LEVEL] == CELL and bi[j, LEVEL] == CELL
+        are_cells = cell_node_at(ai, i).level == CELL and cell_node_at(bi, j).level == CELL
         if are_cells:
             give_model(table, pool, same, origin, a, ai, i, work)
             give_model(table, pool, turn, shift, b, bi, j, work)
-            kind_f = ai[i, KIND]
-            kind_g = bi[j, KIND]
-            f = ai[i, RECORD]
-            g = bi[j, RECORD]
+            kind_f = cell_node_at(ai, i).kind
+            kind_g = cell_node_at(bi, j).kind
+            f = cell_node_at(ai, i).record
+            g = cell_node_at(bi, j).record
             if ready == 0:
                 key, n = pair_bound(a, i, b, j, n, upper)
                 if key >= (1.0 - rough) * upper - tolerance:
@@ -269,14 +268,14 @@ def search(table, pool, shell_f, shell_g, turn, shift, size, rough):
                     continue
             d = sub(get(b, j, POINT), get(a, i, POINT))
             apart = math.sqrt(dot(d, d))
-            start = (a[i, U0], a[i, V0], b[j, U0], b[j, V0])
+            start = (model_at(a, i).u0, model_at(a, i).v0, model_at(b, j).u0, model_at(b, j).v0)
             if (
                 apart < upper
                 and is_feasible(table, pool, kind_f, f, start[0], start[1])
                 and is_feasible(table, pool, kind_g, g, start[2], start[3])
             ):
                 upper = apart
-                best = (ai[i, FEATURE], bi[j, FEATURE])
+                best = (cell_node_at(ai, i).feature, cell_node_at(bi, j).feature)
                 at = start
                 gap = apart
             if ready != 2 and excluded(a, i, kind_f, b, j, kind_g, key > 0.0):
@@ -285,7 +284,7 @@ def search(table, pool, shell_f, shell_g, turn, shift, size, rough):
             if settled:
                 continue
             # Beside an extremum Newton's method would find that one again.
-            if ready == 2 or (max(a[i, BEND], b[j, BEND]) < SMOOTH and beside > FAR):
+            if ready == 2 or (max(model_at(a, i).bend, model_at(b, j).bend) < SMOOTH and beside > FAR):
                 found, x, beta, least, stretch = extremum_near(
                     table, pool, kind_f, f, kind_g, g, turn, shift, start, n, size
                 )
@@ -296,19 +295,19 @@ def search(table, pool, shell_f, shell_g, turn, shift, size, rough):
                         and is_feasible(table, pool, kind_g, g, x[2], x[3])
                     ):
                         upper = abs(beta)
-                        best = (ai[i, FEATURE], bi[j, FEATURE])
+                        best = (cell_node_at(ai, i).feature, cell_node_at(bi, j).feature)
                         at = x
                         gap = beta
                     if known < EXTREMA:
                         extrema[known, 0], extrema[known, 1], extrema[known, 2], extrema[known, 3] = x
                         extrema[known, 4] = least
                         extrema[known, 5] = stretch
-                        owners[known, 0] = ai[i, FEATURE]
-                        owners[known, 1] = bi[j, FEATURE]
+                        owners[known, 0] = cell_node_at(ai, i).feature
+                        owners[known, 1] = cell_node_at(bi, j).feature
                         known += 1
                         if is_known(table, pool, a, ai, i, b, bi, j, extrema[known - 1 :], owners[known - 1 :], 1)[0]:
                             continue
-            if key <= 0.0 and a[i, BEND] + b[j, BEND] < SMOOTH:
+            if key <= 0.0 and model_at(a, i).bend + model_at(b, j).bend < SMOOTH:
                 x, crosses = crossing_point(table, pool, kind_f, f, kind_g, g, turn, shift, start, size)
                 if (
                     crosses
@@ -316,7 +315,7 @@ def search(table, pool, shell_f, shell_g, turn, shift, size, rough):
                     and is_feasible(table, pool, kind_g, g, x[2], x[3])
                 ):
                     status = CROSSING
-                    best = (ai[i, FEATURE], bi[j, FEATURE])
+                    best = (cell_node_at(ai, i).feature, cell_node_at(bi, j).feature)
                     at = x
                     gap = 0.0
                     lower = 0.0
@@ -326,18 +325,18 @@ def search(table, pool, shell_f, shell_g, turn, shift, size, rough):
                 continue
             if side_of(table, pool, a, ai, i) == OUTSIDE or side_of(table, pool, b, bi, j) == OUTSIDE:
                 continue
-            if max(a[i, RADIUS], b[j, RADIUS]) < TINY * size:
+            if max(model_at(a, i).radius, model_at(b, j).radius) < TINY * size:
                 uncut = min(uncut, key)
                 continue
         if larger_first(a, ai, i, b, bi, j):
             count_f = grow(table, pool, shell_f, same, origin, a, ai, i, count_f)
-            first = ai[i, CHILD]
-            last = first + ai[i, CHILDREN]
+            first = cell_node_at(ai, i).child
+            last = first + cell_node_at(ai, i).children
             down_f = True
         else:
             count_g = grow(table, pool, shell_g, turn, shift, b, bi, j, count_g)
-            first = bi[j, CHILD]
-            last = first + bi[j, CHILDREN]
+            first = cell_node_at(bi, j).child
+            last = first + cell_node_at(bi, j).children
             down_f = False
         for k in range(first, last):
             p = k if down_f else i
@@ -371,6 +370,6 @@ def search(table, pool, shell_f, shell_g, turn, shift, size, rough):
         lower = (1.0 - rough) * upper - tolerance
     elif best[0] < 0 and upper == math.inf:
         # Out of room before any point inside the trims: where the search began.
-        best = (ai[first_f, FEATURE], bi[first_g, FEATURE])
-        at = (a[first_f, U0], a[first_f, V0], b[first_g, U0], b[first_g, V0])
+        best = (cell_node_at(ai, first_f).feature, cell_node_at(bi, first_g).feature)
+        at = (model.u0, model.v0, model_record.u0, model_record.v0)
     return status, best[0], best[1], at, gap, max(min(lower, uncut), 0.0), effort

@@ -13,14 +13,13 @@ from assembly.proximity.brep.apexes import unit
 from assembly.proximity.brep.borders import feature_at, feature_kind, on_surface
 from assembly.proximity.brep.records import (
     EDGE,
-    EDGE_CURVE,
     EDGE_POINT,
-    EDGE_SURFACE,
     FACE,
     FACE_POINT,
     FACE_RECORD,
-    FACE_TABLE,
     VERTEX,
+    edge_at,
+    shell_at,
 )
 from assembly.proximity.extrema.face_face import CONVERGED, LEFT_PATCH, SINGULAR, own_frame
 from assembly.proximity.extrema.feature_pair import solve_features
@@ -43,8 +42,8 @@ def lean_of(table, pool, shell, kind, code, t, s, n):
         lean = from_edge(table, pool, shell, code, t, n)[0]
         if kind == EDGE:
             return lean
-        edge = feature_at(table, shell, code)
-        along = on_surface(table, pool, table[edge + EDGE_SURFACE], table[edge + EDGE_CURVE], t)[3]
+        edge = edge_at(table, feature_at(table, shell, code))
+        along = on_surface(table, pool, edge.surface, edge.curve, t)[3]
         return max(lean, abs(dot(n, unit(along))))
     return from_vertex(table, pool, shell, code, n)[2] if kind == VERTEX else 0.0
 
@@ -74,9 +73,9 @@ def hold_features(table, pool, shell_f, shell_g, rotation, shift, code_f, code_g
     status, x, frame = solve_features(table, pool, kind_f, f, kind_g, g, rotation, shift, x, n, size, turn)
     inside = True
     if kind_f == FACE:
-        inside = is_feasible(table, pool, FACE, table[shell_f + FACE_TABLE] + FACE_RECORD * code_f, x[0], x[1])
+        inside = is_feasible(table, pool, FACE, shell_at(table, shell_f).face_table + FACE_RECORD * code_f, x[0], x[1])
     elif kind_g == FACE:
-        inside = is_feasible(table, pool, FACE, table[shell_g + FACE_TABLE] + FACE_RECORD * code_g, x[2], x[3])
+        inside = is_feasible(table, pool, FACE, shell_at(table, shell_g).face_table + FACE_RECORD * code_g, x[2], x[3])
     if status == CONVERGED and not inside:
         status = LEFT_PATCH
     if status == CONVERGED or status == SINGULAR:

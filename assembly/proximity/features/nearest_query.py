@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly._record import place_of, record_dtype, record_view, size_of
 from assembly.geometry.vec import add, dot, matvec, matvec_t, scale, sub
 from assembly.kinematics.motion import position, relative_pose, rotation
 from assembly.proximity.brep.borders import feature_at, feature_kind
@@ -22,7 +23,25 @@ from assembly.proximity.features.switching import track_features
 
 # What is written of a pair: parameters (4), point of f, point of g, normal, gap, lower bound, pairs of cells looked
 # at, switches.
-PARAMETERS, POINT_F, POINT_G, NORMAL, GAP, LOWER, EFFORT, SWITCHES, PAIR = 0, 4, 7, 10, 13, 14, 15, 16, 17
+FEATURE_ANSWER = record_dtype(
+    "f8",
+    parameters=4,
+    point_f=3,
+    point_g=3,
+    normal=3,
+    gap=1,
+    lower=1,
+    effort=1,
+    switches=1,
+)
+answer_at = record_view(FEATURE_ANSWER)
+PARAMETERS = place_of(FEATURE_ANSWER, "parameters")
+POINT_F = place_of(FEATURE_ANSWER, "point_f")
+NORMAL = place_of(FEATURE_ANSWER, "normal")
+GAP = place_of(FEATURE_ANSWER, "gap")
+LOWER = place_of(FEATURE_ANSWER, "lower")
+SWITCHES = place_of(FEATURE_ANSWER, "switches")
+PAIR = size_of(FEATURE_ANSWER)
 # Where no pair is nearer than the one found by more than this part of the size, it counts as the nearest one: in a
 # continuum, or beside a tip, a search has no room to prove more.
 PROVEN = 1e-9
@@ -33,17 +52,18 @@ TRACKED, LOST = 4, 5
 @kernel(inner=True)
 def write_pair(q, turn_f, x, pf, pg, n, gap, out):
     """A pair in the axes of body f into `out`, in world axes."""
+    answer = answer_at(out, 0)
     origin = position(q, 0)
     a = add(matvec(turn_f, pf), origin)
     b = add(matvec(turn_f, pg), origin)
     normal = matvec(turn_f, n)
     for k in range(4):
-        out[PARAMETERS + k] = x[k]
+        answer.parameters[k] = x[k]
     for k in range(3):
-        out[POINT_F + k] = a[k]
-        out[POINT_G + k] = b[k]
-        out[NORMAL + k] = normal[k]
-    out[GAP] = gap
+        answer.point_f[k] = a[k]
+        answer.point_g[k] = b[k]
+        answer.normal[k] = normal[k]
+    answer.gap = gap
 
 
 @kernel(inner=True)
@@ -72,6 +92,7 @@ def write_features(table, pool, shell_f, shell_g, q, turn_f, turn, shift, f, g, 
 @kernel(signatures="(i8[::1], f8[::1], i8, i8, f8[:, ::1], f8, i8[::1], f8[::1])")
 def find_nearest(table, pool, shell_f, shell_g, q, size, codes, out):
     """The nearest pair at the poses q (2, 7); its features into codes (2,), the pair into out. Returns the status."""
+    answer = answer_at(out, 0)
     turn_f = rotation(q, 0)
     turn, shift = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
     status, f, g, x, gap, lower, effort = search(table, pool, shell_f, shell_g, turn, shift, size, 0.0)
@@ -90,8 +111,8 @@ def find_nearest(table, pool, shell_f, shell_g, q, size, codes, out):
         if overlap_at(table, pool, shell_f, shell_g, turn, f, g, x, size, np.empty((WAYS, 3))):
             status = CROSSING
     write_features(table, pool, shell_f, shell_g, q, turn_f, turn, shift, f, g, x, none, gap, size, codes, out)
-    out[LOWER] = lower
-    out[EFFORT] = effort
+    answer.lower = lower
+    answer.effort = effort
     return status
 
 
@@ -119,9 +140,10 @@ def find_deepest(table, pool, shell_f, shell_g, q, size, codes, out):
 @kernel(signatures="(i8[::1], f8[::1], i8, i8, f8[:, ::1], f8, i8[::1], f8[::1])")
 def follow_nearest(table, pool, shell_f, shell_g, q, size, codes, out):
     """The pair in codes and out carried to the poses q. Returns TRACKED, or LOST and leaves the pair."""
+    answer = answer_at(out, 0)
     turn_f = rotation(q, 0)
     turn, shift = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
-    n = matvec_t(turn_f, (out[NORMAL], out[NORMAL + 1], out[NORMAL + 2]))
+    n = matvec_t(turn_f, (answer.normal[0], answer.normal[1], answer.normal[2]))
     x = (out[0], out[1], out[2], out[3])
     status, f, g, y, frame, switches = track_features(
         table, pool, shell_f, shell_g, turn, shift, codes[0], codes[1], x, n, size, 1.0
@@ -133,6 +155,6 @@ def follow_nearest(table, pool, shell_f, shell_g, q, size, codes, out):
     codes[0] = f
     codes[1] = g
     write_pair(q, turn_f, y, frame[3], frame[4], frame[0], frame[5], out)
-    out[LOWER] = math.nan
-    out[SWITCHES] += switches
+    answer.lower = math.nan
+    answer.switches += switches
     return TRACKED

@@ -16,7 +16,7 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly.geometry.vec import add, blend, dot, scale
 from assembly.proximity.brep.borders import feature_at
-from assembly.proximity.brep.records import EDGES, FACE_TABLE, FACE_TRIM, FACES, VERTICES
+from assembly.proximity.brep.records import face_at, shell_at
 from assembly.proximity.extrema.face_face import CONVERGED, NOT_CONVERGED, SINGULAR
 from assembly.proximity.extrema.global_start import global_start
 from assembly.proximity.features.global_search import CROSSING, search
@@ -40,9 +40,10 @@ PARTED = 1e-6
 @kernel(inner=True)
 def has_one_face(table, shell):
     """Whether a shell is one face without a boundary."""
-    if table[shell + FACES] != 1 or table[shell + EDGES] != 0 or table[shell + VERTICES] != 0:
+    solid = shell_at(table, shell)
+    if solid.faces != 1 or solid.edges != 0 or solid.vertices != 0:
         return False
-    return table[table[shell + FACE_TABLE] + FACE_TRIM] < 0
+    return face_at(table, solid.face_table).trim < 0
 
 
 @kernel(inner=True)

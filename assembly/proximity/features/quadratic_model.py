@@ -18,25 +18,58 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
+from assembly._record import place_of, record_dtype, record_view, size_of
 from assembly.geometry.splines.evaluate import (
-    BREAKS_U,
-    BREAKS_V,
-    COEFFICIENTS,
-    DEGREE_U,
-    DEGREE_V,
-    SPANS_U,
-    SPANS_V,
     find_span,
+    surface_at,
     surface_point,
 )
 from assembly.geometry.vec import add, cross, dot, matvec, scale, sub
 
 # A node: box, model (S0, then the vectors p, q, l, m, k and e), sphere, unit normal of the linear part.
-U0, V0, HALF_U, HALF_V, POINT, LINEAR_U, LINEAR_V = 0, 1, 2, 3, 4, 7, 10
-SQUARE_U, MIXED, SQUARE_V, REST, CENTER, RADIUS, NORMAL = 13, 16, 19, 22, 23, 26, 27
 # What of e is along that normal; the length of all terms but the linear ones; how much the normal turns over the box,
 # in radians, and how much curvatures change.
-REST_N, CURVED, BEND, CHANGE, NODE = 30, 31, 32, 33, 34
+QUADRATIC_MODEL = record_dtype(
+    "f8",
+    u0=1,
+    v0=1,
+    half_u=1,
+    half_v=1,
+    point=3,
+    linear_u=3,
+    linear_v=3,
+    square_u=3,
+    mixed=3,
+    square_v=3,
+    rest=1,
+    center=3,
+    radius=1,
+    normal=3,
+    rest_n=1,
+    curved=1,
+    bend=1,
+    change=1,
+)
+model_at = record_view(QUADRATIC_MODEL)
+U0 = place_of(QUADRATIC_MODEL, "u0")
+V0 = place_of(QUADRATIC_MODEL, "v0")
+HALF_U = place_of(QUADRATIC_MODEL, "half_u")
+HALF_V = place_of(QUADRATIC_MODEL, "half_v")
+POINT = place_of(QUADRATIC_MODEL, "point")
+LINEAR_U = place_of(QUADRATIC_MODEL, "linear_u")
+LINEAR_V = place_of(QUADRATIC_MODEL, "linear_v")
+SQUARE_U = place_of(QUADRATIC_MODEL, "square_u")
+MIXED = place_of(QUADRATIC_MODEL, "mixed")
+SQUARE_V = place_of(QUADRATIC_MODEL, "square_v")
+REST = place_of(QUADRATIC_MODEL, "rest")
+CENTER = place_of(QUADRATIC_MODEL, "center")
+RADIUS = place_of(QUADRATIC_MODEL, "radius")
+NORMAL = place_of(QUADRATIC_MODEL, "normal")
+REST_N = place_of(QUADRATIC_MODEL, "rest_n")
+CURVED = place_of(QUADRATIC_MODEL, "curved")
+BEND = place_of(QUADRATIC_MODEL, "bend")
+CHANGE = place_of(QUADRATIC_MODEL, "change")
+NODE = size_of(QUADRATIC_MODEL)
 # Where weights vary by more than this over a box it has no model: e is infinite and its sphere is what bounds it.
 LEAST_WEIGHT = 0.1
 # Roundings of coordinates in points and coefficients.
@@ -73,13 +106,14 @@ def remainder(table, pool, r, iu, iv, u0, v0, a, b, origin, p, q, l, m, k, n, wo
     and a bound of the others along n. The piece may be one beside the middle of the box: then terms of low order
     remain too.
     """
-    ou = table[r + BREAKS_U] + iu
-    ov = table[r + BREAKS_V] + iv
+    patch = surface_at(table, r)
+    ou = patch.breaks_u + iu
+    ov = patch.breaks_v + iv
     s = u0 - 0.5 * (pool[ou] + pool[ou + 1])
     t = v0 - 0.5 * (pool[ov] + pool[ov + 1])
-    nu = table[r + DEGREE_U]
-    nv = table[r + DEGREE_V]
-    o = table[r + COEFFICIENTS] + 4 * (nu + 1) * (nv + 1) * (iu * table[r + SPANS_V] + iv)
+    nu = patch.degree_u
+    nv = patch.degree_v
+    o = patch.coefficients + 4 * (nu + 1) * (nv + 1) * (iu * patch.spans_v + iv)
     # Missing powers of low degrees cost nothing.
     top = nv
     while nu > 0 and vanish(pool, o + 4 * nu * (top + 1), 4, top + 1):
@@ -184,29 +218,31 @@ def remainder(table, pool, r, iu, iv, u0, v0, a, b, origin, p, q, l, m, k, n, wo
 @kernel(inner=True)
 def face_model(table, pool, r, turn, shift, nodes, i, work):
     """Fill in a node of a surface, whose box stands in it already, moved by a pose."""
-    u0 = nodes[i, U0]
-    v0 = nodes[i, V0]
-    a = nodes[i, HALF_U]
-    b = nodes[i, HALF_V]
+    model = model_at(nodes, i)
+    patch = surface_at(table, r)
+    u0 = model.u0
+    v0 = model.v0
+    a = model.half_u
+    b = model.half_v
     s0, su, sv, suu, suv, svv = surface_point(table, pool, r, u0, v0)
     p = scale(a, su)
     q = scale(b, sv)
     l = scale(0.5 * a * a, suu)
     m = scale(a * b, suv)
     k = scale(0.5 * b * b, svv)
-    iu = find_span(pool, table[r + BREAKS_U], table[r + SPANS_U], u0)
-    iv = find_span(pool, table[r + BREAKS_V], table[r + SPANS_V], v0)
+    iu = find_span(pool, patch.breaks_u, patch.spans_u, u0)
+    iv = find_span(pool, patch.breaks_v, patch.spans_v, v0)
     n = cross(p, q)
     nn = dot(n, n)
     n = scale(1.0 / math.sqrt(nn), n) if nn > 1e-20 * dot(p, p) * dot(q, q) and nn > 0.0 else (0.0, 0.0, 0.0)
     e, along, c30, c21, c12, c03, beyond = remainder(table, pool, r, iu, iv, u0, v0, a, b, s0, p, q, l, m, k, n, work)
     noise = ROUNDING * (abs(s0[0]) + abs(s0[1]) + abs(s0[2]) + abs(shift[0]) + abs(shift[1]) + abs(shift[2]))
     place_model(turn, shift, s0, p, q, l, m, k, e + noise, nodes, i)
-    if nn > 0.0 and nodes[i, BEND] < math.inf:
-        nodes[i, REST_N] = along + noise
+    if nn > 0.0 and model.bend < math.inf:
+        model.rest_n = along + noise
         change = curvature_change(p, q, l, m, k, n, c30, c21, c12, c03)
         across = nn / max(dot(p, p), dot(q, q))
-        nodes[i, CHANGE] = (change + 12.0 * beyond) / across
+        model.change = (change + 12.0 * beyond) / across
 
 
 @kernel(inner=True)
@@ -246,6 +282,7 @@ def curvature_change(p, q, l, m, k, n, c30, c21, c12, c03):
 @kernel(inner=True)
 def place_model(turn, shift, s0, p, q, l, m, k, e, nodes, i):
     """Write a model, moved by a pose, with what follows from it."""
+    model = model_at(nodes, i)
     put(nodes, i, POINT, add(matvec(turn, s0), shift))
     p = matvec(turn, p)
     q = matvec(turn, q)
@@ -254,17 +291,17 @@ def place_model(turn, shift, s0, p, q, l, m, k, e, nodes, i):
     put(nodes, i, SQUARE_U, matvec(turn, l))
     put(nodes, i, MIXED, matvec(turn, m))
     put(nodes, i, SQUARE_V, matvec(turn, k))
-    nodes[i, REST] = e
-    nodes[i, REST_N] = e
+    model.rest = e
+    model.rest_n = e
     uu = dot(p, p)
     vv = dot(q, q)
     uv = dot(p, q)
     curved = math.sqrt(dot(l, l)) + math.sqrt(dot(m, m)) + math.sqrt(dot(k, k))
-    nodes[i, CURVED] = curved + e
+    model.curved = curved + e
     # The parallelogram of the linear part reaches as far as its longer diagonal; or as the ball known.
     radius = math.sqrt(max(uu + vv + 2.0 * abs(uv), 0.0)) + curved + e
     d = sub(get(nodes, i, CENTER), get(nodes, i, POINT))
-    nodes[i, RADIUS] = min(radius, nodes[i, RADIUS] + math.sqrt(dot(d, d)))
+    model.radius = min(radius, model.radius + math.sqrt(dot(d, d)))
     put(nodes, i, CENTER, get(nodes, i, POINT))
     normal = cross(p, q)
     nn = dot(normal, normal)
@@ -273,14 +310,14 @@ def place_model(turn, shift, s0, p, q, l, m, k, e, nodes, i):
         put(nodes, i, NORMAL, scale(1.0 / nn, normal))
         # The height of the parallelogram over its longer side: the shortest way across the box.
         across = nn / math.sqrt(max(uu, vv))
-        nodes[i, BEND] = (2.0 * curved + 3.0 * e) / across
-        nodes[i, CHANGE] = 6.0 * e / (across * across)
+        model.bend = (2.0 * curved + 3.0 * e) / across
+        model.change = 6.0 * e / (across * across)
     else:
         put(nodes, i, NORMAL, (0.0, 0.0, 0.0))
         length = math.sqrt(max(uu, vv))
         is_curve = min(uu, vv) == 0.0 and length > 0.0
-        nodes[i, BEND] = (2.0 * curved + 3.0 * e) / length if is_curve else math.inf
-        nodes[i, CHANGE] = 6.0 * e / (length * length) if is_curve else math.inf
+        model.bend = (2.0 * curved + 3.0 * e) / length if is_curve else math.inf
+        model.change = 6.0 * e / (length * length) if is_curve else math.inf
 
 
 @kernel(inline=True)
@@ -295,24 +332,27 @@ def crest(l, k):
 @kernel(inline=True)
 def support(nodes, i, x, y, z):
     """The most of n.(S - S0) over a node; n = (x, y, z) is a unit vector."""
-    lu = x * nodes[i, LINEAR_U] + y * nodes[i, LINEAR_U + 1] + z * nodes[i, LINEAR_U + 2]
-    lv = x * nodes[i, LINEAR_V] + y * nodes[i, LINEAR_V + 1] + z * nodes[i, LINEAR_V + 2]
-    ku = x * nodes[i, SQUARE_U] + y * nodes[i, SQUARE_U + 1] + z * nodes[i, SQUARE_U + 2]
-    kv = x * nodes[i, SQUARE_V] + y * nodes[i, SQUARE_V + 1] + z * nodes[i, SQUARE_V + 2]
-    m = x * nodes[i, MIXED] + y * nodes[i, MIXED + 1] + z * nodes[i, MIXED + 2]
-    c = x * nodes[i, NORMAL] + y * nodes[i, NORMAL + 1] + z * nodes[i, NORMAL + 2]
-    rest = abs(c) * nodes[i, REST_N] + math.sqrt(max(1.0 - c * c, 0.0)) * nodes[i, REST]
+    model = model_at(nodes, i)
+    lu = x * model.linear_u[0] + y * model.linear_u[1] + z * model.linear_u[2]
+    lv = x * model.linear_v[0] + y * model.linear_v[1] + z * model.linear_v[2]
+    ku = x * model.square_u[0] + y * model.square_u[1] + z * model.square_u[2]
+    kv = x * model.square_v[0] + y * model.square_v[1] + z * model.square_v[2]
+    m = x * model.mixed[0] + y * model.mixed[1] + z * model.mixed[2]
+    c = x * model.normal[0] + y * model.normal[1] + z * model.normal[2]
+    rest = abs(c) * model.rest_n + math.sqrt(max(1.0 - c * c, 0.0)) * model.rest
     return crest(lu, ku) + crest(lv, kv) + abs(m) + rest
 
 
 @kernel(inner=True)
 def bound_along(a, i, b, j, n):
     """A lower bound of the distance of two nodes from the unit direction n."""
+    model = model_at(b, j)
+    model_record = model_at(a, i)
     x, y, z = n
     apart = (
-        x * (b[j, POINT] - a[i, POINT])
-        + y * (b[j, POINT + 1] - a[i, POINT + 1])
-        + z * (b[j, POINT + 2] - a[i, POINT + 2])
+        x * (model.point[0] - model_record.point[0])
+        + y * (model.point[1] - model_record.point[1])
+        + z * (model.point[2] - model_record.point[2])
     )
     return apart - support(a, i, x, y, z) - support(b, j, -x, -y, -z)
 
@@ -320,10 +360,12 @@ def bound_along(a, i, b, j, n):
 @kernel(inner=True)
 def pair_bound(a, i, b, j, n, enough):
     """The best bound found for two nodes and its direction, beginning with n (zero: none); done at `enough`."""
+    model = model_at(a, i)
+    model_record = model_at(b, j)
     d = sub(get(b, j, CENTER), get(a, i, CENTER))
     length = math.sqrt(dot(d, d))
-    best = length - a[i, RADIUS] - b[j, RADIUS]
-    if best >= enough or not a[i, REST] + b[j, REST] < math.inf:
+    best = length - model.radius - model_record.radius
+    if best >= enough or not model.rest + model_record.rest < math.inf:
         return best, n
     if dot(n, n) > 0.5:
         value = bound_along(a, i, b, j, n)
@@ -356,13 +398,14 @@ def pair_bound(a, i, b, j, n, enough):
 @kernel(inner=True)
 def vertex_model(pool, at, turn, shift, nodes, i):
     """Fill in a node of a vertex."""
+    model = model_at(nodes, i)
     zero = (0.0, 0.0, 0.0)
     point = (pool[at], pool[at + 1], pool[at + 2])
     for k in range(4):
         nodes[i, k] = 0.0
     put(nodes, i, CENTER, (0.0, 0.0, 0.0))
-    nodes[i, RADIUS] = math.inf
+    model.radius = math.inf
     place_model(turn, shift, point, zero, zero, zero, zero, zero, 0.0, nodes, i)
-    nodes[i, RADIUS] = 0.0
-    nodes[i, BEND] = 0.0
-    nodes[i, CHANGE] = 0.0
+    model.radius = 0.0
+    model.bend = 0.0
+    model.change = 0.0

@@ -12,47 +12,36 @@ import math
 from assembly._kernel import kernel
 from assembly.geometry.faces.trim import trim_side
 from assembly.geometry.faces.trim_nearest import trim_nearest
-from assembly.geometry.faces.trim_pieces import TRIM_CURVES
+from assembly.geometry.faces.trim_pieces import trim_at
 from assembly.geometry.splines.evaluate import (
-    BREAKS_U,
-    BREAKS_V,
-    CLOSED_U,
-    CLOSED_V,
-    CURVE_BREAKS,
-    CURVE_SPANS,
-    SPANS_U,
-    SPANS_V,
+    spline_curve_at,
+    surface_at,
 )
 from assembly.geometry.vec import cross, dot, sub
-from assembly.proximity.brep.records import EDGE, EDGE_CURVE, EDGE_START, FACE, FACE_SURFACE, FACE_TRIM, VERTEX
+from assembly.proximity.brep.records import (
+    EDGE,
+    FACE,
+    VERTEX,
+    edge_at,
+    face_at,
+)
 from assembly.proximity.features.ball_tree import (
-    FEATURE,
     INSIDE,
-    KIND,
     MIXED_SIDE,
     OUTSIDE,
-    RECORD,
-    SIDE,
     UNKNOWN,
+    cell_node_at,
 )
 from assembly.proximity.features.quadratic_model import (
-    BEND,
-    CHANGE,
-    CURVED,
-    HALF_U,
-    HALF_V,
     LINEAR_U,
     LINEAR_V,
     MIXED,
     NORMAL,
     POINT,
-    RADIUS,
-    REST,
     SQUARE_U,
     SQUARE_V,
-    U0,
-    V0,
     get,
+    model_at,
 )
 
 # Boxes whose normals turn by less hold at most one extremum.
@@ -65,21 +54,24 @@ FAR = 6.0
 @kernel(inner=True)
 def is_feasible(table, pool, kind, record, u, v):
     """Whether a point of a feature is one of the shell."""
-    if kind != FACE or table[record + FACE_TRIM] < 0:
+    face = face_at(table, record)
+    if kind != FACE or face.trim < 0:
         return True
-    return trim_side(table, pool, table[record + FACE_TRIM], u, v) >= 0
+    return trim_side(table, pool, face.trim, u, v) >= 0
 
 
 @kernel(inner=True)
 def side_of(table, pool, nodes, info, i):
     """Where a cell is from the trim of its face."""
-    if info[i, KIND] != FACE or info[i, SIDE] != UNKNOWN:
-        return info[i, SIDE]
-    trim = table[info[i, RECORD] + FACE_TRIM]
-    s = trim_nearest(table, pool, trim, 0, table[trim + TRIM_CURVES], nodes[i, U0], nodes[i, V0])[0]
-    reach = math.sqrt(nodes[i, HALF_U] ** 2 + nodes[i, HALF_V] ** 2)
+    cell = cell_node_at(info, i)
+    model = model_at(nodes, i)
+    if cell.kind != FACE or cell.side != UNKNOWN:
+        return cell.side
+    trim = face_at(table, cell.record).trim
+    s = trim_nearest(table, pool, trim, 0, trim_at(table, trim).curves, model.u0, model.v0)[0]
+    reach = math.sqrt(model.half_u**2 + model.half_v**2)
     side = INSIDE if s >= reach else (OUTSIDE if s < -1.000001 * reach else MIXED_SIDE)
-    info[i, SIDE] = side
+    cell.side = side
     return side
 
 
@@ -89,13 +81,18 @@ def grows(a, i, p, q, first, second, b, j, d, length):
 
     `first` and `second` are half the derivatives of p along both directions.
     """
+    model = model_at(a, i)
+    model_record = model_at(b, j)
     pp = dot(p, p)
     if pp == 0.0:
         return False
     long = math.sqrt(pp)
     moves = pp + abs(dot(p, q)) + abs(dot(p, get(b, j, LINEAR_U))) + abs(dot(p, get(b, j, LINEAR_V)))
-    turn = 2.0 * math.sqrt(dot(first, first)) + math.sqrt(dot(second, second)) + 6.0 * a[i, REST]
-    return abs(dot(d, p)) > moves + long * (a[i, CURVED] + b[j, CURVED]) + (length + a[i, RADIUS] + b[j, RADIUS]) * turn
+    turn = 2.0 * math.sqrt(dot(first, first)) + math.sqrt(dot(second, second)) + 6.0 * model.rest
+    return (
+        abs(dot(d, p))
+        > moves + long * (model.curved + model_record.curved) + (length + model.radius + model_record.radius) * turn
+    )
 
 
 @kernel(inner=True)
@@ -118,7 +115,7 @@ def excluded(a, i, kind_f, b, j, kind_g, are_apart):
     length = math.sqrt(dot(d, d))
     if monotone(a, i, kind_f, b, j, d, length) or monotone(b, j, kind_g, a, i, d, length):
         return True
-    bend = a[i, BEND] + b[j, BEND]
+    bend = model_at(a, i).bend + model_at(b, j).bend
     # Where features cross, their normals need not be parallel.
     if not (are_apart and bend < 1.5):
         return False
@@ -164,45 +161,52 @@ def off_middle(x, middle, half, period):
 @kernel(inner=True)
 def periods(table, pool, kind, record):
     """Periods of a feature's coordinates; 0 where there is none."""
+    edge = edge_at(table, record)
     if kind == FACE:
-        r = table[record + FACE_SURFACE]
-        bu = table[r + BREAKS_U]
-        bv = table[r + BREAKS_V]
-        u = pool[bu + table[r + SPANS_U]] - pool[bu] if table[r + CLOSED_U] == 1 else 0.0
-        v = pool[bv + table[r + SPANS_V]] - pool[bv] if table[r + CLOSED_V] == 1 else 0.0
+        r = surface_at(table, face_at(table, record).surface)
+        bu = r.breaks_u
+        bv = r.breaks_v
+        u = pool[bu + r.spans_u] - pool[bu] if r.closed_u == 1 else 0.0
+        v = pool[bv + r.spans_v] - pool[bv] if r.closed_v == 1 else 0.0
         return u, v
-    if kind == EDGE and table[record + EDGE_START] < 0:
-        c = table[record + EDGE_CURVE]
-        o = table[c + CURVE_BREAKS]
-        return pool[o + table[c + CURVE_SPANS]] - pool[o], 0.0
+    if kind == EDGE and edge.start < 0:
+        c = spline_curve_at(table, edge.curve)
+        o = c.breaks
+        return pool[o + c.spans] - pool[o], 0.0
     return 0.0, 0.0
 
 
 @kernel(inner=True)
 def from_middles(table, pool, a, ai, i, b, bi, j, x):
     """The most half widths that coordinates x are from the middles of two cells."""
-    pu, pv = periods(table, pool, ai[i, KIND], ai[i, RECORD])
-    s = off_middle(x[0], a[i, U0], a[i, HALF_U], pu)
-    s = max(s, off_middle(x[1], a[i, V0], a[i, HALF_V], pv))
-    pu, pv = periods(table, pool, bi[j, KIND], bi[j, RECORD])
-    s = max(s, off_middle(x[2], b[j, U0], b[j, HALF_U], pu))
-    return max(s, off_middle(x[3], b[j, V0], b[j, HALF_V], pv))
+    model = model_at(a, i)
+    model_record = model_at(b, j)
+    cell = cell_node_at(ai, i)
+    cell_node = cell_node_at(bi, j)
+    pu, pv = periods(table, pool, cell.kind, cell.record)
+    s = off_middle(x[0], model.u0, model.half_u, pu)
+    s = max(s, off_middle(x[1], model.v0, model.half_v, pv))
+    pu, pv = periods(table, pool, cell_node.kind, cell_node.record)
+    s = max(s, off_middle(x[2], model_record.u0, model_record.half_u, pu))
+    return max(s, off_middle(x[3], model_record.v0, model_record.half_v, pv))
 
 
 @kernel(inner=True)
 def is_known(table, pool, a, ai, i, b, bi, j, extrema, owners, count):
     """Whether the only extremum that two cells may hold is one that is known; half widths from the nearest one."""
-    bend = max(a[i, BEND], b[j, BEND])
+    model = model_at(a, i)
+    model_record = model_at(b, j)
+    bend = max(model.bend, model_record.bend)
     nearest = math.inf
     for k in range(count):
-        if owners[k, 0] != ai[i, FEATURE] or owners[k, 1] != bi[j, FEATURE]:
+        if owners[k, 0] != cell_node_at(ai, i).feature or owners[k, 1] != cell_node_at(bi, j).feature:
             continue
         s = from_middles(table, pool, a, ai, i, b, bi, j, (extrema[k, 0], extrema[k, 1], extrema[k, 2], extrema[k, 3]))
         nearest = min(nearest, s)
         if s <= BESIDE and bend <= TRUSTED:
             return True, s
         if s <= FAR:
-            change = a[i, CHANGE] * extrema[k, 5] * extrema[k, 5] + b[j, CHANGE]
+            change = model.change * extrema[k, 5] * extrema[k, 5] + model_record.change
             if extrema[k, 4] > 1.5 * max(s, 1.0) * change:
                 return True, s
     return False, nearest

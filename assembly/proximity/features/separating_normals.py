@@ -8,32 +8,20 @@ solids overlap there.
 from __future__ import annotations
 
 from assembly._kernel import kernel
-from assembly.geometry.splines.evaluate import SIGN
+from assembly.geometry.splines.evaluate import surface_at
 from assembly.geometry.vec import add, cross, dot, matvec, scale, sub
 from assembly.proximity.brep.apexes import unit
 from assembly.proximity.brep.borders import edge_end, feature_kind, nearest_edge, on_surface, other_parameter
 from assembly.proximity.brep.records import (
     EDGE,
-    EDGE_CURVE,
-    EDGE_CURVE_B,
-    EDGE_END,
-    EDGE_FACE_B,
     EDGE_RECORD,
-    EDGE_START,
-    EDGE_SURFACE,
-    EDGE_SURFACE_B,
-    EDGE_TABLE,
-    EDGES,
     FACE,
     FACE_RECORD,
-    FACE_SURFACE,
-    FACE_TABLE,
-    FACE_TRIM,
-    FACES,
-    VERTEX_EDGE_LIST,
-    VERTEX_EDGES,
     VERTEX_RECORD,
-    VERTEX_TABLE,
+    edge_at,
+    face_at,
+    shell_at,
+    vertex_at,
 )
 from assembly.proximity.extrema.crossing import tangents
 from assembly.proximity.extrema.feature_jets import edge_jet
@@ -62,43 +50,46 @@ def add_way(n, ways, count):
 @kernel(inner=True)
 def add_edge_ways(table, pool, edge, t, turn, side, ways, count):
     """The normals of the faces that meet in an edge, at t; turned, times `side`."""
-    surface = table[edge + EDGE_SURFACE]
+    edge_record = edge_at(table, edge)
+    surface = edge_record.surface
     if surface < 0:
         return count
-    _u, _v, p, _along, n = on_surface(table, pool, surface, table[edge + EDGE_CURVE], t)
-    count = add_way(scale(side * float(table[surface + SIGN]), matvec(turn, n)), ways, count)
-    if table[edge + EDGE_FACE_B] >= 0:
-        surface = table[edge + EDGE_SURFACE_B]
+    _u, _v, p, _along, n = on_surface(table, pool, surface, edge_record.curve, t)
+    count = add_way(scale(side * float(surface_at(table, surface).sign), matvec(turn, n)), ways, count)
+    if edge_record.face_b >= 0:
+        surface = edge_record.surface_b
         s = other_parameter(table, pool, edge, t, p)
-        _u, _v, _p, _along, n = on_surface(table, pool, surface, table[edge + EDGE_CURVE_B], s)
-        count = add_way(scale(side * float(table[surface + SIGN]), matvec(turn, n)), ways, count)
+        _u, _v, _p, _along, n = on_surface(table, pool, surface, edge_record.curve_b, s)
+        count = add_way(scale(side * float(surface_at(table, surface).sign), matvec(turn, n)), ways, count)
     return count
 
 
 @kernel(inner=True)
 def add_ways(table, pool, shell, code, u, v, turn, side, size, ways, count):
     """The normals of the faces at a point (u, v) of a feature; turned, times `side`. How many ways there are then."""
+    solid = shell_at(table, shell)
     kind = feature_kind(table, shell, code)
-    faces, edges = table[shell + FACES], table[shell + EDGES]
+    faces, edges = solid.faces, solid.edges
     if kind == FACE:
-        record = table[shell + FACE_TABLE] + FACE_RECORD * code
+        record = solid.face_table + FACE_RECORD * code
+        face = face_at(table, record)
         p, su, sv = tangents(table, pool, FACE, record, turn, (0.0, 0.0, 0.0), u, v)
-        sign = float(table[table[record + FACE_SURFACE] + SIGN])
+        sign = float(surface_at(table, face.surface).sign)
         count = add_way(scale(side * sign, cross(su, sv)), ways, count)
-        if table[record + FACE_TRIM] >= 0:
+        if face.trim >= 0:
             code, at = nearest_edge(table, pool, shell, code, u, v)
-            edge = table[shell + EDGE_TABLE] + EDGE_RECORD * (code - faces)
+            edge = solid.edge_table + EDGE_RECORD * (code - faces)
             d = sub(matvec(turn, edge_jet(table, pool, edge, at[0])[0]), p)
             if dot(d, d) <= BORDER * BORDER * size * size:
                 count = add_edge_ways(table, pool, edge, at[0], turn, side, ways, count)
         return count
     if kind == EDGE:
-        edge = table[shell + EDGE_TABLE] + EDGE_RECORD * (code - faces)
+        edge = solid.edge_table + EDGE_RECORD * (code - faces)
         return add_edge_ways(table, pool, edge, u, turn, side, ways, count)
-    vertex = table[shell + VERTEX_TABLE] + VERTEX_RECORD * (code - faces - edges)
-    for k in range(table[vertex + VERTEX_EDGES]):
-        at = table[vertex + VERTEX_EDGE_LIST] + 2 * k
-        edge = table[shell + EDGE_TABLE] + EDGE_RECORD * table[at]
+    vertex = vertex_at(table, solid.vertex_table + VERTEX_RECORD * (code - faces - edges))
+    for k in range(vertex.edges):
+        at = vertex.edge_list + 2 * k
+        edge = solid.edge_table + EDGE_RECORD * table[at]
         t = edge_end(table, pool, edge, table[at + 1])
         count = add_edge_ways(table, pool, edge, t, turn, side, ways, count)
     return count
@@ -107,14 +98,15 @@ def add_ways(table, pool, shell, code, u, v, turn, side, size, ways, count):
 @kernel(inner=True)
 def add_end_ways(table, pool, shell, code, u, v, turn, side, size, ways, count):
     """The normals of the faces at both ends of an edge, or of the edge of a face that is nearest to (u, v)."""
+    solid = shell_at(table, shell)
     kind = feature_kind(table, shell, code)
-    faces, edges = table[shell + FACES], table[shell + EDGES]
-    if kind == FACE and table[table[shell + FACE_TABLE] + FACE_RECORD * code + FACE_TRIM] >= 0:
+    faces, edges = solid.faces, solid.edges
+    if kind == FACE and face_at(table, solid.face_table + FACE_RECORD * code).trim >= 0:
         code = nearest_edge(table, pool, shell, code, u, v)[0]
         kind = EDGE
     if kind == EDGE:
-        edge = table[shell + EDGE_TABLE] + EDGE_RECORD * (code - faces)
-        for end in (table[edge + EDGE_START], table[edge + EDGE_END]):
+        edge = edge_at(table, solid.edge_table + EDGE_RECORD * (code - faces))
+        for end in (edge.start, edge.end):
             if end >= 0:
                 count = add_ways(table, pool, shell, faces + edges + end, 0.0, 0.0, turn, side, size, ways, count)
     return count
@@ -123,8 +115,9 @@ def add_end_ways(table, pool, shell, code, u, v, turn, side, size, ways, count):
 @kernel(inner=True)
 def is_open(table, shell):
     """Whether a shell has edges of one face: it has no inside."""
-    for k in range(table[shell + EDGES]):
-        if table[table[shell + EDGE_TABLE] + EDGE_RECORD * k + EDGE_FACE_B] < 0:
+    solid = shell_at(table, shell)
+    for k in range(solid.edges):
+        if edge_at(table, solid.edge_table + EDGE_RECORD * k).face_b < 0:
             return True
     return False
 

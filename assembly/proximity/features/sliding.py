@@ -14,11 +14,9 @@ from assembly.geometry.vec import add, blend, dot, matvec
 from assembly.proximity.brep.borders import feature_at, nearest_edge
 from assembly.proximity.brep.records import (
     EDGE_RECORD,
-    EDGE_TABLE,
     FACE_RECORD,
-    FACE_TABLE,
-    FACE_TRIM,
-    FACES,
+    face_at,
+    shell_at,
 )
 from assembly.proximity.extrema.face_face import own_frame, pair_frame
 from assembly.proximity.extrema.feature_jets import edge_jet
@@ -39,10 +37,11 @@ def border_ahead(table, pool, shell, code, at, move, pose, way):
     -------
     code, (t, 0), and how far that is along a unit way; infinitely far where the face has no border.
     """
-    if table[table[shell + FACE_TABLE] + FACE_RECORD * code + FACE_TRIM] < 0:
+    solid = shell_at(table, shell)
+    if face_at(table, solid.face_table + FACE_RECORD * code).trim < 0:
         return code, at, math.inf
     code, found = nearest_edge(table, pool, shell, code, at[0] + move[0], at[1] + move[1])
-    edge = table[shell + EDGE_TABLE] + EDGE_RECORD * (code - table[shell + FACES])
+    edge = solid.edge_table + EDGE_RECORD * (code - solid.faces)
     p = add(matvec(pose[0], edge_jet(table, pool, edge, found[0])[0]), pose[1])
     return code, found, dot(way, p)
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from assembly._address import call_address
 from assembly._kernel import kernel
+from assembly._record import place_of, record_dtype, record_view, size_of
 from assembly.geometry.vec import matvec_t
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.extrema.face_face import CONVERGED, SINGULAR
@@ -23,13 +24,43 @@ from assembly.proximity.extrema.feature_pair import conforms, feature_record
 from assembly.proximity.extrema.rates import RECORD
 from assembly.proximity.features.global_search import CROSSING
 from assembly.proximity.features.holding import hold_features
-from assembly.proximity.features.nearest_query import NORMAL, PAIR
+from assembly.proximity.features.nearest_query import PAIR, answer_at
 from assembly.proximity.features.switching import track_features
 
-FEATURE_F, FEATURE_G, PAIR_NORMAL, PAIR_GAP, STAYS, IDLE, ALLOWED, TRACK = 4, 5, 6, 9, 10, 11, 12, 13
+TRACKED_PAIR = record_dtype(
+    "f8",
+    before=4,
+    feature_f=1,
+    feature_g=1,
+    normal=3,
+    gap=1,
+    stays=1,
+    idle=1,
+    allowed=1,
+)
+tracked_at = record_view(TRACKED_PAIR)
+FEATURE_F = place_of(TRACKED_PAIR, "feature_f")
+FEATURE_G = place_of(TRACKED_PAIR, "feature_g")
+PAIR_NORMAL = place_of(TRACKED_PAIR, "normal")
+PAIR_GAP = place_of(TRACKED_PAIR, "gap")
+STAYS = place_of(TRACKED_PAIR, "stays")
+IDLE = place_of(TRACKED_PAIR, "idle")
+ALLOWED = place_of(TRACKED_PAIR, "allowed")
+TRACK = size_of(TRACKED_PAIR)
 # Behind a record: whether surfaces do not cross at the pair, how far it is from a fold, and how far the bodies may move
 # until a row that is open needs its pair again.
-PROPER, FOLD, SLACK, CONTACT_RECORD = RECORD, RECORD + 1, RECORD + 2, RECORD + 3
+CONTACT_RECORD = RECORD + 3
+CONTACT_DERIVATIVES = record_dtype(
+    "f8",
+    before=90,
+    proper=1,
+    fold=1,
+    slack=1,
+)
+contact_record_at = record_view(CONTACT_DERIVATIVES)
+PROPER = place_of(CONTACT_DERIVATIVES, "proper")
+FOLD = place_of(CONTACT_DERIVATIVES, "fold")
+SLACK = place_of(CONTACT_DERIVATIVES, "slack")
 # What `PROPER` is, beside 1 and 0, where the surfaces are equally near all around: then no point is that of a minimum.
 CONFORMING = 2.0
 
@@ -37,23 +68,25 @@ CONFORMING = 2.0
 @kernel(inline=True)
 def write_tracked(x, feature_f, feature_g, n, tracked, r):
     """Parameters, features and normal of a pair."""
+    pair = tracked_at(tracked, r)
     tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3] = x
-    tracked[r, FEATURE_F] = float(feature_f)
-    tracked[r, FEATURE_G] = float(feature_g)
+    pair.feature_f = float(feature_f)
+    pair.feature_g = float(feature_g)
     for i in range(3):
-        tracked[r, PAIR_NORMAL + i] = n[i]
+        pair.normal[i] = n[i]
 
 
 @kernel(inner=True)
 def track_row(table, pool, shell_f, shell_g, relative, shift, start, r, patience):
     """`track_features` from the tracked values start[r], or `hold_features`."""
-    code_f = np.int64(start[r, FEATURE_F])
-    code_g = np.int64(start[r, FEATURE_G])
+    pair = tracked_at(start, r)
+    code_f = np.int64(pair.feature_f)
+    code_g = np.int64(pair.feature_g)
     x = (start[r, 0], start[r, 1], start[r, 2], start[r, 3])
-    n = (start[r, PAIR_NORMAL], start[r, PAIR_NORMAL + 1], start[r, PAIR_NORMAL + 2])
-    if start[r, STAYS] > 0.0:
+    n = (pair.normal[0], pair.normal[1], pair.normal[2])
+    if pair.stays > 0.0:
         status, x, frame = hold_features(
-            table, pool, shell_f, shell_g, relative, shift, code_f, code_g, x, n, 1.0, patience, start[r, STAYS]
+            table, pool, shell_f, shell_g, relative, shift, code_f, code_g, x, n, 1.0, patience, pair.stays
         )
         return status, code_f, code_g, x, frame, 0
     return track_features(table, pool, shell_f, shell_g, relative, shift, code_f, code_g, x, n, 1.0, patience)
@@ -65,6 +98,7 @@ def track_solids(table, pool, shell_f, shell_g, i, j, q, start, patience, record
 
     Bodies i and j stand as q says; no step turns a normal by more than `patience`.
     """
+    contact = contact_record_at(records, r)
     turn = rotation(q, i)
     relative, shift = relative_pose(q, i, turn, j, rotation(q, j))
     status, feature_f, feature_g, x, frame, _switches = track_row(
@@ -72,10 +106,10 @@ def track_solids(table, pool, shell_f, shell_g, i, j, q, start, patience, record
     )
     if status == CONVERGED or status == SINGULAR:
         feature_record(turn, shift, frame, records, r)
-        records[r, PROPER] = CONFORMING if conforms(frame) else (1.0 if frame[14] else 0.0)
-        records[r, FOLD] = frame[15]
+        contact.proper = CONFORMING if conforms(frame) else (1.0 if frame[14] else 0.0)
+        contact.fold = frame[15]
         write_tracked(x, feature_f, feature_g, frame[0], tracked, r)
-        tracked[r, STAYS] = start[r, STAYS]
+        tracked_at(tracked, r).stays = tracked_at(start, r).stays
     return status
 
 
@@ -92,6 +126,7 @@ def search_solids(table, pool, shell_f, shell_g, i, j, q, nearest_at, deepest_at
         poses[1, k] = q[j, k]
     codes = np.zeros(2, np.int64)
     out = np.zeros(PAIR)
+    answer = answer_at(out, 0)
     status = call_address(nearest_at, (table, pool, shell_f, shell_g, poses, 1.0, codes, out))
     if codes[0] < 0:
         return 0
@@ -102,7 +137,7 @@ def search_solids(table, pool, shell_f, shell_g, i, j, q, nearest_at, deepest_at
         status = call_address(deepest_at, (table, pool, shell_f, shell_g, poses, 1.0, codes, out))
         # Solids that only touch have no depth: their crossing point is where the pair is.
         if status != CROSSING:
-            n = matvec_t(rotation(q, i), (out[NORMAL], out[NORMAL + 1], out[NORMAL + 2]))
+            n = matvec_t(rotation(q, i), (answer.normal[0], answer.normal[1], answer.normal[2]))
     write_tracked((out[0], out[1], out[2], out[3]), codes[0], codes[1], n, tracked, r)
-    tracked[r, STAYS] = 0.0
+    tracked_at(tracked, r).stays = 0.0
     return 1

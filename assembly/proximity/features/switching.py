@@ -30,26 +30,14 @@ from assembly.proximity.brep.borders import (
 )
 from assembly.proximity.brep.records import (
     EDGE,
-    EDGE_CURVE,
-    EDGE_CURVE_B,
-    EDGE_END,
-    EDGE_FACE_A,
-    EDGE_FACE_B,
     EDGE_RECORD,
-    EDGE_START,
-    EDGE_SURFACE,
-    EDGE_SURFACE_B,
-    EDGE_TABLE,
-    EDGES,
     FACE,
     FACE_RECORD,
-    FACE_TABLE,
-    FACE_TRIM,
-    FACES,
-    VERTEX_EDGE_LIST,
-    VERTEX_EDGES,
     VERTEX_RECORD,
-    VERTEX_TABLE,
+    edge_at,
+    face_at,
+    shell_at,
+    vertex_at,
 )
 from assembly.proximity.extrema.face_face import LEFT_PATCH, NOT_CONVERGED, own_frame
 from assembly.proximity.extrema.feature_pair import solve_features
@@ -71,20 +59,22 @@ def lean_into(table, pool, surface, curve, t, n):
 @kernel(inner=True)
 def from_edge(table, pool, shell, code, t, n):
     """The face over which the normal leans most at a point of an edge: how much, code and (u, v) of the point on it."""
-    edge = table[shell + EDGE_TABLE] + EDGE_RECORD * (code - table[shell + FACES])
-    face = table[edge + EDGE_FACE_A]
-    surface = table[edge + EDGE_SURFACE]
-    curve = table[edge + EDGE_CURVE]
+    solid = shell_at(table, shell)
+    edge = solid.edge_table + EDGE_RECORD * (code - solid.faces)
+    edge_record = edge_at(table, edge)
+    face = edge_record.face_a
+    surface = edge_record.surface
+    curve = edge_record.curve
     lean = lean_into(table, pool, surface, curve, t, n)
-    if table[edge + EDGE_FACE_B] >= 0:
+    if edge_record.face_b >= 0:
         _u, _v, p, _along, _normal = on_surface(table, pool, surface, curve, t)
         s = other_parameter(table, pool, edge, t, p)
-        other = lean_into(table, pool, table[edge + EDGE_SURFACE_B], table[edge + EDGE_CURVE_B], s, n)
+        other = lean_into(table, pool, edge_record.surface_b, edge_record.curve_b, s, n)
         if other > lean:
             lean = other
-            face = table[edge + EDGE_FACE_B]
-            surface = table[edge + EDGE_SURFACE_B]
-            curve = table[edge + EDGE_CURVE_B]
+            face = edge_record.face_b
+            surface = edge_record.surface_b
+            curve = edge_record.curve_b
             t = s
     u, v, _p, _along, _normal = on_surface(table, pool, surface, curve, t)
     return lean, face, (u, v)
@@ -93,10 +83,12 @@ def from_edge(table, pool, shell, code, t, n):
 @kernel(inner=True)
 def between_edges(table, pool, shell_f, shell_g, rotation, code_f, code_g, t_f, t_g):
     """The normal of two edges that leans least over their faces: it tells the outside where edges touch."""
-    edge_f = table[shell_f + EDGE_TABLE] + EDGE_RECORD * (code_f - table[shell_f + FACES])
-    edge_g = table[shell_g + EDGE_TABLE] + EDGE_RECORD * (code_g - table[shell_g + FACES])
-    along_f = on_surface(table, pool, table[edge_f + EDGE_SURFACE], table[edge_f + EDGE_CURVE], t_f)[3]
-    along_g = on_surface(table, pool, table[edge_g + EDGE_SURFACE], table[edge_g + EDGE_CURVE], t_g)[3]
+    solid = shell_at(table, shell_f)
+    shell_record = shell_at(table, shell_g)
+    edge_f = edge_at(table, solid.edge_table + EDGE_RECORD * (code_f - solid.faces))
+    edge_g = edge_at(table, shell_record.edge_table + EDGE_RECORD * (code_g - shell_record.faces))
+    along_f = on_surface(table, pool, edge_f.surface, edge_f.curve, t_f)[3]
+    along_g = on_surface(table, pool, edge_g.surface, edge_g.curve, t_g)[3]
     n = unit(cross(along_f, matvec(rotation, along_g)))
     m = matvec_t(rotation, n)
     there = max(
@@ -111,15 +103,18 @@ def between_edges(table, pool, shell_f, shell_g, rotation, code_f, code_g, t_f, 
 @kernel(inner=True)
 def from_vertex(table, pool, shell, code, n):
     """The edge along which the normal leans most at a vertex: code, (t, 0) and how much; or the vertex itself."""
-    faces = table[shell + FACES]
-    vertex = table[shell + VERTEX_TABLE] + VERTEX_RECORD * (code - faces - table[shell + EDGES])
+    solid = shell_at(table, shell)
+    faces = solid.faces
+    vertex = solid.vertex_table + VERTEX_RECORD * (code - faces - solid.edges)
+    vertex_record = vertex_at(table, vertex)
     best = LEAN
     found = (0.0, 0.0)
-    for k in range(table[vertex + VERTEX_EDGES]):
-        at = table[vertex + VERTEX_EDGE_LIST] + 2 * k
-        edge = table[shell + EDGE_TABLE] + EDGE_RECORD * table[at]
+    for k in range(vertex_record.edges):
+        at = vertex_record.edge_list + 2 * k
+        edge = solid.edge_table + EDGE_RECORD * table[at]
+        edge_record = edge_at(table, edge)
         t = edge_end(table, pool, edge, table[at + 1])
-        _u, _v, _p, along, _normal = on_surface(table, pool, table[edge + EDGE_SURFACE], table[edge + EDGE_CURVE], t)
+        _u, _v, _p, along, _normal = on_surface(table, pool, edge_record.surface, edge_record.curve, t)
         lean = dot(n, unit(along))
         if table[at + 1] == 1:
             lean = -lean
@@ -127,7 +122,7 @@ def from_vertex(table, pool, shell, code, n):
             best = lean
             code = faces + table[at]
             found = (t, 0.0)
-    if table[vertex + VERTEX_EDGES] == 0:
+    if vertex_record.edges == 0:
         code, found = from_tip(table, pool, shell, vertex, code, n)
     return code, found, best
 
@@ -138,9 +133,10 @@ def checked(table, pool, shell, code, a, b, held, n):
 
     `held` says that Newton's method was stopped at an end. Returns the code, the coordinates, and whether it changed.
     """
+    solid = shell_at(table, shell)
     kind = feature_kind(table, shell, code)
     if kind == FACE:
-        trim = table[table[shell + FACE_TABLE] + FACE_RECORD * code + FACE_TRIM]
+        trim = face_at(table, solid.face_table + FACE_RECORD * code).trim
         if trim < 0:
             return code, (a, b), False
         side = trim_side(table, pool, trim, a, b)
@@ -149,13 +145,14 @@ def checked(table, pool, shell, code, a, b, held, n):
         code, found = nearest_edge(table, pool, shell, code, a, b)
         return code, found, True
     if kind == EDGE:
-        edge = table[shell + EDGE_TABLE] + EDGE_RECORD * (code - table[shell + FACES])
-        if table[edge + EDGE_START] >= 0 and held:
-            vertices = table[shell + FACES] + table[shell + EDGES]
+        edge = solid.edge_table + EDGE_RECORD * (code - solid.faces)
+        edge_record = edge_at(table, edge)
+        if edge_record.start >= 0 and held:
+            vertices = solid.faces + solid.edges
             if a <= edge_end(table, pool, edge, 0):
-                return vertices + table[edge + EDGE_START], (0.0, 0.0), True
+                return vertices + edge_record.start, (0.0, 0.0), True
             if a >= edge_end(table, pool, edge, 1):
-                return vertices + table[edge + EDGE_END], (0.0, 0.0), True
+                return vertices + edge_record.end, (0.0, 0.0), True
         if held:
             return code, (a, b), False
         lean, face, found = from_edge(table, pool, shell, code, a, n)

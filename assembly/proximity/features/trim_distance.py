@@ -13,7 +13,7 @@ import math
 
 from assembly._kernel import kernel
 from assembly.geometry.faces.trim_nearest import trim_nearest
-from assembly.geometry.faces.trim_pieces import TRIM_CURVES, TRIM_FIRST
+from assembly.geometry.faces.trim_pieces import trim_at
 from assembly.geometry.splines.evaluate import CURVE_RECORD, curve_point
 
 # Cosine between n and the tangent at the foot above which the foot is a corner.
@@ -23,8 +23,9 @@ CORNER = 1e-6
 @kernel(inner=True)
 def trim_distance(table, pool, trim, u, v):
     """s, s_u (2), and the one number b of s_uu = b (I - n n^T)."""
-    s, k, t, _cu, _cv, nu, nv = trim_nearest(table, pool, trim, 0, table[trim + TRIM_CURVES], u, v)
-    _c, rate, bend = curve_point(table, pool, table[trim + TRIM_FIRST] + CURVE_RECORD * k, t)
+    trim_record = trim_at(table, trim)
+    s, k, t, _cu, _cv, nu, nv = trim_nearest(table, pool, trim, 0, trim_record.curves, u, v)
+    _c, rate, bend = curve_point(table, pool, trim_record.first + CURVE_RECORD * k, t)
     square = rate[0] * rate[0] + rate[1] * rate[1]
     along = rate[0] * nu + rate[1] * nv
     if along * along > CORNER * CORNER * square:

@@ -17,31 +17,25 @@ from assembly.proximity.bvh.neighbor_list import LIST_INTS, listed_pairs
 from assembly.proximity.bvh.tree import (
     AXIS,
     CENTER,
-    COS,
     ELEMENT,
-    ELEMENT_NODE,
-    ELEMENT_POOL,
     NODE,
-    NODE_POOL,
-    RADIUS,
-    SIN,
     box_distance,
+    element_at,
     magnitudes,
+    node_at,
     pairs_within,
     seen_from,
     three,
+    tree_at,
 )
 from assembly.proximity.manager.motion_bounds import LEAST_ALLOWANCE
 from assembly.proximity.manager.state import (
-    CROWDED,
-    FIRST_REACH,
-    LENGTHS,
-    LIST_TABLE,
-    LISTS,
-    PAIR_MINIMUM,
     PAIR_RECORD,
-    PAIR_TABLE,
     TAKE,
+    lengths_at,
+    manager_at,
+    memory_header_at,
+    pair_at,
 )
 
 # Lists of patches that face each other are for motions up to so many first reaches.
@@ -54,8 +48,9 @@ FEW, CROWDED_PART = 40, 0.5
 @kernel(inline=True)
 def element_ball(table, pool, tree, e):
     """Center and radius of a ball around an element, in the axes of its body."""
-    o = table[tree + NODE_POOL] + NODE * np.int64(pool[table[tree + ELEMENT_POOL] + ELEMENT * e + ELEMENT_NODE])
-    return three(pool, o + CENTER), pool[o + RADIUS]
+    tree_record = tree_at(table, tree)
+    o = tree_record.node_pool + NODE * np.int64(element_at(pool, tree_record.element_pool + ELEMENT * e).node)
+    return three(pool, o + CENTER), node_at(pool, o).radius
 
 
 @kernel(inline=True)
@@ -64,10 +59,12 @@ def along_normal(pool, o, p, axis_g, apart, n):
 
     A patch leaves its plane by no more than its radius times the sine of the angle by which its normals turn.
     """
+    node = node_at(pool, o)
+    node_bounds = node_at(pool, p)
     off_f = sub(n, three(pool, o + AXIS))
     off_g = add(n, axis_g)
-    thick = pool[o + RADIUS] * (pool[o + SIN] + math.sqrt(dot(off_f, off_f)))
-    thick += pool[p + RADIUS] * (pool[p + SIN] + math.sqrt(dot(off_g, off_g)))
+    thick = node.radius * (node.sine + math.sqrt(dot(off_f, off_f)))
+    thick += node_bounds.radius * (node_bounds.sine + math.sqrt(dot(off_g, off_g)))
     return dot(n, apart), thick
 
 
@@ -78,11 +75,13 @@ def element_distance(table, pool, trees, turn, shift, bulk, e, d):
     Where they are in the wrong order along one by more than they are thick, the bodies are in each other, or these are
     far sides: -inf. The normals are those of their middles, and the mean: a large flat patch is thin along its own.
     """
-    o = table[trees[0] + NODE_POOL] + NODE * np.int64(pool[table[trees[0] + ELEMENT_POOL] + ELEMENT * e + ELEMENT_NODE])
-    p = table[trees[1] + NODE_POOL] + NODE * np.int64(pool[table[trees[1] + ELEMENT_POOL] + ELEMENT * d + ELEMENT_NODE])
+    tree = tree_at(table, trees[0])
+    tree_record = tree_at(table, trees[1])
+    o = tree.node_pool + NODE * np.int64(element_at(pool, tree.element_pool + ELEMENT * e).node)
+    p = tree_record.node_pool + NODE * np.int64(element_at(pool, tree_record.element_pool + ELEMENT * d).node)
     seen = seen_from(pool, p, turn, bulk, shift)
     distance = math.sqrt(box_distance(pool, o, p, seen, turn, bulk))
-    if pool[o + COS] <= 0.0 or pool[p + COS] <= 0.0:
+    if node_at(pool, o).cosine <= 0.0 or node_at(pool, p).cosine <= 0.0:
         return distance
     apart = sub(seen[0], three(pool, o + CENTER))
     axis = three(pool, o + AXIS)
@@ -104,14 +103,15 @@ def facing_pairs(table, pool, watch, memory, p, scene, moving, reach, stack, can
 
     Returns how many pairs there are, and the reach: it is less where there is no room for all.
     """
-    pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
+    manager = manager_at(table, watch)
+    pair = manager.pair_table + PAIR_RECORD * p
     turn, shift, trees = scene[0], scene[1], scene[3]
-    least = pool[table[pair + PAIR_MINIMUM]]
+    least = pool[pair_at(table, pair).minimum]
     found = np.int64(-1)
-    lists = table[watch + LISTS]
-    ring = RINGS * pool[table[watch + LENGTHS] + FIRST_REACH]
+    lists = manager.lists
+    ring = RINGS * lengths_at(pool, manager.lengths).first_reach
     if lists > 0 and reach <= ring:
-        at_list = table[watch + LIST_TABLE] + LIST_INTS * (p % lists)
+        at_list = manager.list_table + LIST_INTS * (p % lists)
         found = listed_pairs(
             table, pool, at_list, p, trees, turn, shift, moving, reach + least, ring, stack, candidates
         )
@@ -122,7 +122,7 @@ def facing_pairs(table, pool, watch, memory, p, scene, moving, reach, stack, can
         if reach < LEAST_ALLOWANCE:
             # There is no room for what is as near as it should not be.
             found = candidates.shape[0] if found > 0 else 0
-            memory[CROWDED] = 1.0
+            memory_header_at(memory, 0).crowded = 1.0
             break
         # Out of room: what is nearer is looked at more often.
         reach *= 0.5

@@ -19,54 +19,32 @@ from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.brep.borders import feature_at, feature_kind
 from assembly.proximity.brep.records import EDGE, VERTEX
 from assembly.proximity.bvh.tree import (
-    CENTER,
-    CHILD,
     ELEMENT,
-    ELEMENT_FEATURE,
-    ELEMENT_POOL,
-    HALF,
     NODE,
     NODE_INTS,
-    NODE_POOL,
-    NODE_TABLE,
+    element_at,
+    node_at,
+    node_links_at,
+    tree_at,
 )
 from assembly.proximity.extrema.feature_jets import edge_jet, vertex_point
-from assembly.proximity.features.solid_contact import FEATURE_F, FEATURE_G, PAIR_GAP
+from assembly.proximity.features.solid_contact import tracked_at
 from assembly.proximity.manager.extrema import (
     BESIDE_CONTACT,
     ELSEWHERE,
-    GAP,
     GIVEN_RECORD,
-    GIVEN_ROW,
-    GIVEN_SHELL,
-    GIVEN_SURFACE,
     LISTED,
     NEW,
     OF_CONTACT,
-    OPENS,
-    ORIGIN,
-    POINT_F,
-    POINT_G,
-    ROOT_PLACE,
-    SWAPPED,
+    extremum_at,
+    given_at,
 )
 from assembly.proximity.manager.overlap import DEPTH, foot_at, surface_of, with_children
 from assembly.proximity.manager.state import (
-    GIVEN,
-    GIVEN_COUNT,
-    LENGTHS,
-    NEGLECT,
-    PAIR_F,
-    PAIR_G,
-    PAIR_MINIMUM,
     PAIR_RECORD,
-    PAIR_SHELL_F,
-    PAIR_SHELL_G,
-    PAIR_SURFACE_F,
-    PAIR_SURFACE_G,
-    PAIR_TABLE,
-    TREE_F,
-    TREE_G,
+    lengths_at,
+    manager_at,
+    pair_at,
 )
 
 # A way from one pair to another one has so many strides, were it straight; so many it may have at most.
@@ -110,6 +88,7 @@ def point_on_edge(table, pool, edge, low, high, y):
 @kernel(inner=True)
 def nearest_point(table, pool, tree, surface, shell, y, reach, stack):
     """The nearest point of a body to y, in its axes, and whether one is within reach."""
+    tree_record = tree_at(table, tree)
     stack[0] = 0
     used = 1
     least = reach
@@ -118,20 +97,20 @@ def nearest_point(table, pool, tree, surface, shell, y, reach, stack):
     while used > 0:
         used -= 1
         i = stack[used]
-        o = table[tree + NODE_POOL] + NODE * i
+        o = node_at(pool, tree_record.node_pool + NODE * i)
         square = 0.0
         for k in range(3):
-            off = max(abs(y[k] - pool[o + CENTER + k]) - pool[o + HALF + k], 0.0)
+            off = max(abs(y[k] - o.center[k]) - o.half[k], 0.0)
             square += off * off
         if square > least * least:
             continue
-        child = table[table[tree + NODE_TABLE] + NODE_INTS * i + CHILD]
+        child = node_links_at(table, tree_record.node_table + NODE_INTS * i).child
         if child >= 0:
             used = with_children(stack, used, child)
             continue
         e = -1 - child
-        at = table[tree + ELEMENT_POOL] + ELEMENT * e
-        code = np.int64(pool[at + ELEMENT_FEATURE])
+        at = tree_record.element_pool + ELEMENT * e
+        code = np.int64(element_at(pool, at).feature)
         if surface_of(table, shell, surface, code) >= 0:
             distance, n, found = foot_at(table, pool, tree, surface, shell, e, y)
             p = sub(y, scale(distance, n))
@@ -193,16 +172,18 @@ def leads_to(table, pool, scene, begin, end, level, stack):
 @kernel(inner=True)
 def contact_points(table, pool, scene, given, tracked):
     """The pair of points of a given contact, in the axes of body f of its pair of bodies."""
-    r = table[given + GIVEN_ROW]
+    given_record = given_at(table, given)
+    r = given_record.row
+    pair = tracked_at(tracked, r)
     a = point_of(
-        table, pool, table[given + GIVEN_SURFACE], table[given + GIVEN_SHELL], np.int64(tracked[r, FEATURE_F]),
+        table, pool, given_record.surface[0], given_record.shell[0], np.int64(pair.feature_f),
         tracked[r, 0], tracked[r, 1],
     )  # fmt: skip
     b = point_of(
-        table, pool, table[given + GIVEN_SURFACE + 1], table[given + GIVEN_SHELL + 1],
-        np.int64(tracked[r, FEATURE_G]), tracked[r, 2], tracked[r, 3],
+        table, pool, given_record.surface[1], given_record.shell[1],
+        np.int64(pair.feature_g), tracked[r, 2], tracked[r, 3],
     )  # fmt: skip
-    if table[given + SWAPPED] == 1:
+    if given_record.swapped == 1:
         a, b = b, a
     return a, add(matvec(scene[0], b), scene[1])
 
@@ -210,9 +191,10 @@ def contact_points(table, pool, scene, given, tracked):
 @kernel(inline=True)
 def root_points(roots, k):
     """The pair of points of a root."""
+    extremum = extremum_at(roots, k)
     return (
-        (roots[k, POINT_F], roots[k, POINT_F + 1], roots[k, POINT_F + 2]),
-        (roots[k, POINT_G], roots[k, POINT_G + 1], roots[k, POINT_G + 2]),
+        (extremum.point_f[0], extremum.point_f[1], extremum.point_f[2]),
+        (extremum.point_g[0], extremum.point_g[1], extremum.point_g[2]),
     )
 
 
@@ -243,8 +225,8 @@ def spread(table, pool, scene, roots, count, begin, limits, stack):
         middles[k, 0], middles[k, 1], middles[k, 2] = c
         source[k, 0], source[k, 1], source[k, 2] = begin
         nearest[k] = apart(c, begin)
-        may = roots[k, ORIGIN] == NEW or roots[k, ORIGIN] >= LISTED
-        eligible[k] = may and roots[k, ROOT_PLACE] == ELSEWHERE and lowest <= roots[k, GAP] < level
+        may = extremum_at(roots, k).origin == NEW or extremum_at(roots, k).origin >= LISTED
+        eligible[k] = may and extremum_at(roots, k).place == ELSEWHERE and lowest <= extremum_at(roots, k).gap < level
     while True:
         best = -1
         for k in range(count):
@@ -257,7 +239,7 @@ def spread(table, pool, scene, roots, count, begin, limits, stack):
         end = (middles[best, 0], middles[best, 1], middles[best, 2])
         if not leads_to(table, pool, scene, start, end, level, stack):
             continue
-        roots[best, ROOT_PLACE] = BESIDE_CONTACT
+        extremum_at(roots, best).place = BESIDE_CONTACT
         eligible[best] = False
         for k in range(count):
             away = apart((middles[k, 0], middles[k, 1], middles[k, 2]), end)
@@ -269,23 +251,25 @@ def spread(table, pool, scene, roots, count, begin, limits, stack):
 @kernel(signatures="(i8[::1], f8[::1], i8, i8, f8[:, ::1], f8[:, ::1], f8[:, ::1], i8)")
 def mark_places(table, pool, watch, p, q, tracked, roots, count):
     """Mark the roots of pair p that are a given contact's pair, or in its place; how many contacts have one."""
-    pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
-    i, j = table[pair + PAIR_F], table[pair + PAIR_G]
+    manager = manager_at(table, watch)
+    pair = pair_at(table, manager.pair_table + PAIR_RECORD * p)
+    i, j = pair.body_f, pair.body_g
     turn, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
     surfaces = (
-        table[pair + PAIR_SURFACE_F],
-        table[pair + PAIR_SURFACE_G],
-        table[pair + PAIR_SHELL_F],
-        table[pair + PAIR_SHELL_G],
+        pair.surface_f,
+        pair.surface_g,
+        pair.shell_f,
+        pair.shell_g,
     )
-    scene = (turn, shift, surfaces, (table[pair + TREE_F], table[pair + TREE_G]))
-    least = pool[table[pair + PAIR_MINIMUM]]
-    neglect = pool[table[watch + LENGTHS] + NEGLECT]
+    scene = (turn, shift, surfaces, (pair.tree_f, pair.tree_g))
+    least = pool[pair.minimum]
+    neglect = lengths_at(pool, manager.lengths).neglect
     stack = np.empty(DEPTH, np.int64)
     known = 0
-    for c in range(table[pair + GIVEN_COUNT]):
-        given = table[pair + GIVEN] + GIVEN_RECORD * c
-        r = table[given + GIVEN_ROW]
+    for c in range(pair.given_count):
+        given = pair.given + GIVEN_RECORD * c
+        given_record = given_at(table, given)
+        r = given_record.row
         if math.isnan(tracked[r, 0]):
             continue
         known += 1
@@ -293,10 +277,10 @@ def mark_places(table, pool, watch, p, q, tracked, roots, count):
         for k in range(count):
             p_f, p_g = root_points(roots, k)
             if max(apart(p_f, a), apart(p_g, b)) <= neglect:
-                roots[k, ROOT_PLACE] = OF_CONTACT
-        gap = apart(a, b) if tracked[r, PAIR_GAP] > 0.0 else 0.0
+                extremum_at(roots, k).place = OF_CONTACT
+        gap = apart(a, b) if tracked_at(tracked, r).gap > 0.0 else 0.0
         # A contact that may stay open, and is by more than the least gap, excuses nothing that is nearer.
-        lowest = least if table[given + OPENS] == 1 and gap >= least else -math.inf
+        lowest = least if given_record.opens == 1 and gap >= least else -math.inf
         limits = (gap + least, lowest)
         spread(table, pool, scene, roots, count, scale(0.5, add(a, b)), limits, stack)
     return known

@@ -17,8 +17,14 @@ from assembly.geometry.faces.trim import trim_side
 from assembly.geometry.splines.evaluate import surface_point
 from assembly.geometry.vec import add, cross, dot, matvec, matvec_t, scale, sub
 from assembly.proximity.brep.borders import feature_at, feature_kind
-from assembly.proximity.brep.records import EDGE, FACE, FACE_RECORD, FACE_TABLE, FACE_TRIM
-from assembly.proximity.bvh.tree import COS, ELEMENT, ELEMENT_FEATURE, ELEMENT_POOL, SIN, node_of
+from assembly.proximity.brep.records import EDGE, FACE, FACE_RECORD, face_at, shell_at
+from assembly.proximity.bvh.tree import (
+    ELEMENT,
+    element_at,
+    node_at,
+    node_of,
+    tree_at,
+)
 from assembly.proximity.extrema.feature_jets import edge_jet, edge_limits
 
 # A part of an edge is looked at with so much of its neighbors, in half widths: what goes through where two meet counts.
@@ -92,12 +98,12 @@ def patch_corners(table, pool, surface, e):
 @kernel(inner=True)
 def goes_through(table, pool, tree, shell, e, a, b, margin):
     """Whether what is within a margin of a chord goes through the face of a body at a flat patch; body axes."""
-    node = node_of(table, pool, tree, e)
-    if pool[node + COS] <= 0.0 or pool[node + SIN] > FLAT:
+    node = node_at(pool, node_of(table, pool, tree, e))
+    if node.cosine <= 0.0 or node.sine > FLAT:
         return False
-    o = table[tree + ELEMENT_POOL] + ELEMENT * e
-    code = np.int64(pool[o + ELEMENT_FEATURE])
-    face = table[shell + FACE_TABLE] + FACE_RECORD * code
+    o = tree_at(table, tree).element_pool + ELEMENT * e
+    code = np.int64(element_at(pool, o).feature)
+    face = face_at(table, shell_at(table, shell).face_table + FACE_RECORD * code)
     r = feature_at(table, shell, code)
     (u, v, wide, high), (p, q, s, t) = patch_corners(table, pool, r, o)
     for k in range(2):
@@ -107,7 +113,7 @@ def goes_through(table, pool, tree, shell, e, a, b, margin):
         away = margin * math.sqrt(dot(n, n))
         if not hit or min(abs(dot(n, sub(a, p))), abs(dot(n, sub(b, p)))) <= away:
             continue
-        if table[face + FACE_TRIM] < 0:
+        if face.trim < 0:
             return True
         # A chord that leans over the plane is near to more of it.
         beside = margin * math.sqrt(dot(n, n) * dot(sub(b, a), sub(b, a))) / abs(dot(n, sub(b, a)))
@@ -115,7 +121,7 @@ def goes_through(table, pool, tree, shell, e, a, b, margin):
         dv = beside * high / max(math.sqrt(dot(sub(s, q), sub(s, q))), 1e-300)
         here_u = u + (x + y if k == 0 else x) * wide
         here_v = v + (y if k == 0 else x + y) * high
-        if is_well_inside(table, pool, table[face + FACE_TRIM], here_u, here_v, du, dv):
+        if is_well_inside(table, pool, face.trim, here_u, here_v, du, dv):
             return True
     return False
 
@@ -126,10 +132,10 @@ def pierces(table, pool, scene, pair, margin, offsets):
     for side in range(2):
         tree, shell = scene[3][side], scene[2][2 + side]
         other, other_shell = scene[3][1 - side], scene[2][3 - side]
-        o = table[tree + ELEMENT_POOL] + ELEMENT * pair[side]
-        p = table[other + ELEMENT_POOL] + ELEMENT * pair[1 - side]
-        code = np.int64(pool[o + ELEMENT_FEATURE])
-        patch = np.int64(pool[p + ELEMENT_FEATURE])
+        o = tree_at(table, tree).element_pool + ELEMENT * pair[side]
+        p = tree_at(table, other).element_pool + ELEMENT * pair[1 - side]
+        code = np.int64(element_at(pool, o).feature)
+        patch = np.int64(element_at(pool, p).feature)
         if feature_kind(table, shell, code) != EDGE or feature_kind(table, other_shell, patch) != FACE:
             continue
         a, b, bent = chord_of(table, pool, feature_at(table, shell, code), pool[o], pool[o + 2])

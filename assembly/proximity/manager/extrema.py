@@ -14,31 +14,76 @@ import numpy as np
 
 from assembly._address import call_address
 from assembly._kernel import kernel
-from assembly.geometry.splines.evaluate import BREAKS_U, BREAKS_V, CLOSED_U, CLOSED_V, SPANS_U, SPANS_V, surface_point
+from assembly._record import place_of, record_dtype, record_view, size_of
+from assembly.geometry.splines.evaluate import (
+    surface_at,
+    surface_point,
+)
 from assembly.geometry.vec import add, dot, matvec, matvec_t, scale, sub
 from assembly.kinematics.motion import rotation
 from assembly.proximity.brep.borders import feature_at
-from assembly.proximity.brep.records import FACES
+from assembly.proximity.brep.records import shell_at
 from assembly.proximity.extrema.face_face import CONVERGED, NOT_CONVERGED, SINGULAR, pair_frame, solve_pair
 from assembly.proximity.extrema.feedback import descend_pair
 from assembly.proximity.extrema.global_start import opposed
-from assembly.proximity.extrema.rates import ARM_F
-from assembly.proximity.extrema.rates import GAP as RECORD_GAP
+from assembly.proximity.extrema.rates import derivatives_at
 from assembly.proximity.extrema.singular import ALONE, fold_of
-from assembly.proximity.features.solid_contact import FEATURE_F, FEATURE_G, FOLD, PAIR_NORMAL, PROPER, STAYS
+from assembly.proximity.features.solid_contact import (
+    contact_record_at,
+    tracked_at,
+)
 
 # A root: parameters, features, normal in the axes of f, gap, where it is from, its points in the axes of f, how far it
 # is from a fold (det H / |H|^2), how far so beyond the knot lines beside it (NaN: not looked at), what it holds on to
 # if it is no root, but a corner (`proximity/manager/vertex_contacts.py`), and whether it is in the place of a contact
 # (`contact_place.py`).
-CODE_F, CODE_G, ROOT_NORMAL, GAP, ORIGIN, POINT_F, POINT_G, ROOT_FOLD, ROOT_BEYOND, CORNER, ROOT_PLACE, ROOT = (
-    4, 5, 6, 9, 10, 11, 14, 17, 18, 19, 20, 21
-)  # fmt: skip
+EXTREMUM = record_dtype(
+    "f8",
+    before=4,
+    code_f=1,
+    code_g=1,
+    normal=3,
+    gap=1,
+    origin=1,
+    point_f=3,
+    point_g=3,
+    fold=1,
+    beyond=1,
+    corner=1,
+    place=1,
+)
+extremum_at = record_view(EXTREMUM)
+CODE_F = place_of(EXTREMUM, "code_f")
+CODE_G = place_of(EXTREMUM, "code_g")
+ROOT_NORMAL = place_of(EXTREMUM, "normal")
+GAP = place_of(EXTREMUM, "gap")
+ORIGIN = place_of(EXTREMUM, "origin")
+POINT_F = place_of(EXTREMUM, "point_f")
+POINT_G = place_of(EXTREMUM, "point_g")
+ROOT_FOLD = place_of(EXTREMUM, "fold")
+ROOT_BEYOND = place_of(EXTREMUM, "beyond")
+CORNER = place_of(EXTREMUM, "corner")
+ROOT_PLACE = place_of(EXTREMUM, "place")
+ROOT = size_of(EXTREMUM)
 # Where it is from: of no use, new, from LISTED on the place it has, down from GIVEN_CONTACT which given contact it is.
 USELESS, NEW, LISTED, GIVEN_CONTACT = -2.0, -1.0, 0, -3.0
 # A given contact of two bodies: its row, 1 if the bodies are the other way round there, 1 if its gap may be open, and
 # the surfaces of its sides, or else (-1) their shells.
-GIVEN_ROW, SWAPPED, OPENS, GIVEN_SURFACE, GIVEN_SHELL, GIVEN_RECORD = 0, 1, 2, 3, 5, 7
+GIVEN_FIELDS = record_dtype(
+    "i8",
+    row=1,
+    swapped=1,
+    opens=1,
+    surface=2,
+    shell=2,
+)
+given_at = record_view(GIVEN_FIELDS)
+GIVEN_ROW = place_of(GIVEN_FIELDS, "row")
+SWAPPED = place_of(GIVEN_FIELDS, "swapped")
+OPENS = place_of(GIVEN_FIELDS, "opens")
+GIVEN_SURFACE = place_of(GIVEN_FIELDS, "surface")
+GIVEN_SHELL = place_of(GIVEN_FIELDS, "shell")
+GIVEN_RECORD = size_of(GIVEN_FIELDS)
 # Of a root: in no contact's place, in one beside the contact's own pair, that pair.
 ELSEWHERE, BESIDE_CONTACT, OF_CONTACT = 0.0, 1.0, 2.0
 # What became of a start: nothing there, a root that is known, a saddle, a minimum.
@@ -52,16 +97,17 @@ DESCENTS = 40
 @kernel(inline=True)
 def between(table, pool, r, u, v, s, t):
     """The middle of two pairs of parameters, the shorter way around."""
+    patch = surface_at(table, r)
     a = 0.5 * (u + s)
     b = 0.5 * (v + t)
-    if table[r + CLOSED_U] == 1:
-        period = pool[table[r + BREAKS_U] + table[r + SPANS_U]] - pool[table[r + BREAKS_U]]
+    if patch.closed_u == 1:
+        period = pool[patch.breaks_u + patch.spans_u] - pool[patch.breaks_u]
         if abs(u - s) > 0.5 * period:
-            a += 0.5 * period if a < pool[table[r + BREAKS_U]] + 0.5 * period else -0.5 * period
-    if table[r + CLOSED_V] == 1:
-        period = pool[table[r + BREAKS_V] + table[r + SPANS_V]] - pool[table[r + BREAKS_V]]
+            a += 0.5 * period if a < pool[patch.breaks_u] + 0.5 * period else -0.5 * period
+    if patch.closed_v == 1:
+        period = pool[patch.breaks_v + patch.spans_v] - pool[patch.breaks_v]
         if abs(v - t) > 0.5 * period:
-            b += 0.5 * period if b < pool[table[r + BREAKS_V]] + 0.5 * period else -0.5 * period
+            b += 0.5 * period if b < pool[patch.breaks_v] + 0.5 * period else -0.5 * period
     return a, b
 
 
@@ -85,7 +131,7 @@ def are_one(table, pool, scene, roots, i, k, neglect):
         surface = scene[2][side]
         if surface < 0:
             shell = scene[2][2 + side]
-            if roots[i, CODE_F + side] >= table[shell + FACES]:
+            if roots[i, CODE_F + side] >= shell_at(table, shell).faces:
                 continue
             surface = feature_at(table, shell, np.int64(roots[i, CODE_F + side]))
         u, v = between(
@@ -127,12 +173,15 @@ def solids_root(table, pool, scene, codes, start, n, roots, k, work, corner):
     """Switching and Newton on the features of two solids, or Newton alone for a corner; fills root k."""
     i, j, q, track_at = scene[4]
     records, tracked = work
+    pair = tracked_at(tracked, 0)
+    derivatives = derivatives_at(records, 0)
+    contact = contact_record_at(records, 0)
     tracked[0, 0], tracked[0, 1], tracked[0, 2], tracked[0, 3] = start
-    tracked[0, FEATURE_F] = float(codes[0])
-    tracked[0, FEATURE_G] = float(codes[1])
-    tracked[0, STAYS] = corner
+    pair.feature_f = float(codes[0])
+    pair.feature_g = float(codes[1])
+    pair.stays = corner
     for l in range(3):
-        tracked[0, PAIR_NORMAL + l] = n[l]
+        pair.normal[l] = n[l]
     status = call_address(
         track_at, (table, pool, scene[2][2], scene[2][3], i, j, q, tracked, math.inf, records, tracked, 0)
     )
@@ -140,31 +189,30 @@ def solids_root(table, pool, scene, codes, start, n, roots, k, work, corner):
         # An edge along another one, or along a face, is no corner: its ends are.
         return NOTHING
     turn = rotation(q, i)
-    m = (tracked[0, PAIR_NORMAL], tracked[0, PAIR_NORMAL + 1], tracked[0, PAIR_NORMAL + 2])
-    pg = matvec_t(turn, (records[0, ARM_F], records[0, ARM_F + 1], records[0, ARM_F + 2]))
-    gap = records[0, RECORD_GAP]
+    m = (pair.normal[0], pair.normal[1], pair.normal[2])
+    pg = matvec_t(turn, (derivatives.arm_f[0], derivatives.arm_f[1], derivatives.arm_f[2]))
+    gap = derivatives.gap
     x = (tracked[0, 0], tracked[0, 1], tracked[0, 2], tracked[0, 3])
-    write(
-        roots, k, x, tracked[0, FEATURE_F], tracked[0, FEATURE_G], m, gap, sub(pg, scale(gap, m)), pg, records[0, FOLD]
-    )
-    roots[k, CORNER] = corner
-    return MINIMUM_FOUND if records[0, PROPER] == 1.0 else SADDLE
+    write(roots, k, x, pair.feature_f, pair.feature_g, m, gap, sub(pg, scale(gap, m)), pg, contact.fold)
+    extremum_at(roots, k).corner = corner
+    return MINIMUM_FOUND if contact.proper == 1.0 else SADDLE
 
 
 @kernel(inline=True)
 def write(roots, k, x, code_f, code_g, n, gap, pf, pg, fold):
+    extremum = extremum_at(roots, k)
     roots[k, 0], roots[k, 1], roots[k, 2], roots[k, 3] = x
-    roots[k, CODE_F] = float(code_f)
-    roots[k, CODE_G] = float(code_g)
-    roots[k, ROOT_NORMAL], roots[k, ROOT_NORMAL + 1], roots[k, ROOT_NORMAL + 2] = n
-    roots[k, GAP] = gap
-    roots[k, ORIGIN] = USELESS
-    roots[k, POINT_F], roots[k, POINT_F + 1], roots[k, POINT_F + 2] = pf
-    roots[k, POINT_G], roots[k, POINT_G + 1], roots[k, POINT_G + 2] = pg
-    roots[k, ROOT_FOLD] = fold
-    roots[k, ROOT_BEYOND] = math.nan
-    roots[k, CORNER] = 0.0
-    roots[k, ROOT_PLACE] = ELSEWHERE
+    extremum.code_f = float(code_f)
+    extremum.code_g = float(code_g)
+    extremum.normal[0], extremum.normal[1], extremum.normal[2] = n
+    extremum.gap = gap
+    extremum.origin = USELESS
+    extremum.point_f[0], extremum.point_f[1], extremum.point_f[2] = pf
+    extremum.point_g[0], extremum.point_g[1], extremum.point_g[2] = pg
+    extremum.fold = fold
+    extremum.beyond = math.nan
+    extremum.corner = 0.0
+    extremum.place = ELSEWHERE
 
 
 @kernel(inner=True)
@@ -182,7 +230,7 @@ def add_root(table, pool, scene, codes, start, n, neglect, roots, count, work, c
         return count, found
     for k in range(count):
         # One of far sides, or a saddle, hides no contact beside it.
-        radius = min(neglect, SAME) if roots[k, ORIGIN] == USELESS else neglect
+        radius = min(neglect, SAME) if extremum_at(roots, k).origin == USELESS else neglect
         if are_one(table, pool, scene, roots, count, k, radius):
             return count, ALIKE
     return count + 1, found
@@ -197,12 +245,12 @@ def add_given(table, pool, scene, tracked, listed, many, neglect, roots, work):
     """
     count = 0
     for c in range(many):
-        given = listed + GIVEN_RECORD * c
-        r = table[given + GIVEN_ROW]
+        given = given_at(table, listed + GIVEN_RECORD * c)
+        r = given.row
         x = (tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3])
         if math.isnan(x[0]) or count == roots.shape[0]:
             continue
-        if table[given + SWAPPED] == 1:
+        if given.swapped == 1:
             x = (x[2], x[3], x[0], x[1])
         before = count
         count, found = add_root(table, pool, scene, (0, 0), x, (0.0, 0.0, 0.0), 0.0, roots, count, work, 0.0)
@@ -217,11 +265,12 @@ def add_given(table, pool, scene, tracked, listed, many, neglect, roots, work):
                 # At a fold Newton's method may find nothing: there the contact still is.
                 count += 1
         if count > before:
-            roots[before, ORIGIN] = GIVEN_CONTACT - c
+            extremum_at(roots, before).origin = GIVEN_CONTACT - c
     return count
 
 
 @kernel(inline=True)
 def is_alone(roots, k):
     """Whether root k is far from a fold, beyond knot lines too as far as it is known."""
-    return roots[k, ROOT_FOLD] > ALONE and not roots[k, ROOT_BEYOND] <= ALONE
+    extremum = extremum_at(roots, k)
+    return extremum.fold > ALONE and not extremum.beyond <= ALONE

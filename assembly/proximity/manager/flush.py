@@ -12,16 +12,22 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly.geometry.vec import add, dot, matvec, matvec_t, scale, sub
-from assembly.proximity.bvh.tree import CENTER, CHILD, HALF, NODE, NODE_INTS, NODE_POOL, NODE_TABLE
-from assembly.proximity.manager.extrema import GAP, LISTED, NEW, ORIGIN, POINT_F, POINT_G, USELESS
+from assembly.proximity.bvh.tree import (
+    NODE,
+    NODE_INTS,
+    node_at,
+    node_links_at,
+    tree_at,
+)
+from assembly.proximity.manager.extrema import LISTED, NEW, USELESS, extremum_at
 from assembly.proximity.manager.overlap import DEPTH, foot_at, with_children
 from assembly.proximity.manager.state import (
     HANDED_OFF,
     LOST,
     PLACE_MEMORY,
-    PLACE_NUMBER,
     memory_places,
     note,
+    place_at,
     release,
 )
 
@@ -36,20 +42,21 @@ ROUNDING, FACES_ABOUT = 1e-9, 16
 @kernel(inner=True)
 def faces_about(table, pool, tree, shell, y, reach, stack, normals):
     """Write the normals of a body's faces that are within reach of a point; how many there are. In its axes."""
+    tree_record = tree_at(table, tree)
     stack[0] = 0
     used = 1
     count = 0
     while used > 0 and count < normals.shape[0]:
         used -= 1
         i = stack[used]
-        o = table[tree + NODE_POOL] + NODE * i
+        o = node_at(pool, tree_record.node_pool + NODE * i)
         square = 0.0
         for k in range(3):
-            off = max(abs(y[k] - pool[o + CENTER + k]) - pool[o + HALF + k], 0.0)
+            off = max(abs(y[k] - o.center[k]) - o.half[k], 0.0)
             square += off * off
         if square > reach * reach:
             continue
-        child = table[table[tree + NODE_TABLE] + NODE_INTS * i + CHILD]
+        child = node_links_at(table, tree_record.node_table + NODE_INTS * i).child
         if child >= 0:
             used = with_children(stack, used, child)
             continue
@@ -63,11 +70,12 @@ def faces_about(table, pool, tree, shell, y, reach, stack, normals):
 @kernel(inner=True)
 def is_between_flush_faces(table, pool, scene, roots, k, stack, normals):
     """Whether the middle of root k, with a negative gap, is between two faces that all but touch there."""
+    extremum = extremum_at(roots, k)
     turn, shift = scene[0], scene[1]
-    a = (roots[k, POINT_F], roots[k, POINT_F + 1], roots[k, POINT_F + 2])
-    b = (roots[k, POINT_G], roots[k, POINT_G + 1], roots[k, POINT_G + 2])
+    a = (extremum.point_f[0], extremum.point_f[1], extremum.point_f[2])
+    b = (extremum.point_g[0], extremum.point_g[1], extremum.point_g[2])
     c = scale(0.5, add(a, b))
-    reach = -SHORT * roots[k, GAP]
+    reach = -SHORT * extremum.gap
     many = faces_about(table, pool, scene[3][0], scene[2][2], c, reach, stack, normals[0])
     if many == 0:
         return False
@@ -87,22 +95,24 @@ def drop_flush(table, pool, watch, memory, p, scene, roots, count, tracked):
     normals = np.empty((2, FACES_ABOUT, 3))
     places = memory_places(table, watch)[1]
     for k in range(count):
-        origin = np.int64(roots[k, ORIGIN])
-        if not roots[k, GAP] < -ROUNDING or not (roots[k, ORIGIN] == NEW or origin >= LISTED):
+        extremum = extremum_at(roots, k)
+        origin = np.int64(extremum.origin)
+        if not extremum.gap < -ROUNDING or not (extremum.origin == NEW or origin >= LISTED):
             continue
         if not is_between_flush_faces(table, pool, scene, roots, k, stack, normals):
             continue
         if origin >= LISTED:
-            number = memory[places + PLACE_MEMORY * (origin - LISTED) + PLACE_NUMBER]
-            note(table, watch, memory, HANDED_OFF, LOST, p, number, roots[k, GAP])
+            number = place_at(memory, places + PLACE_MEMORY * (origin - LISTED)).number
+            note(table, watch, memory, HANDED_OFF, LOST, p, number, extremum.gap)
             release(table, watch, memory, origin - LISTED, tracked)
-        roots[k, ORIGIN] = USELESS
+        extremum.origin = USELESS
 
 
 @kernel(inner=True)
 def any_deep(roots, count):
     """Whether any root is deeper than rounding."""
     for k in range(count):
-        if roots[k, GAP] < -ROUNDING and roots[k, ORIGIN] != USELESS:
+        extremum = extremum_at(roots, k)
+        if extremum.gap < -ROUNDING and extremum.origin != USELESS:
             return True
     return False

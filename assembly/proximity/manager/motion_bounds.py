@@ -13,35 +13,22 @@ import math
 from assembly._kernel import kernel
 from assembly.geometry.vec import add, dot, matvec, matvec_t, quaternion_matrix, quaternion_product, sub
 from assembly.kinematics.motion import rotation
-from assembly.proximity.bvh.tree import CENTER, NODE_POOL, RADIUS, three
+from assembly.proximity.bvh.tree import CENTER, node_at, three, tree_at
 from assembly.proximity.manager.state import (
-    ALLOWANCE,
     BALL,
-    BALL_ALLOWANCE,
     BALL_PLACE,
-    BALL_RADIUS,
-    CALLED,
-    CALLS,
-    CUT_SHORT,
-    DOUBT,
-    FIRST_REACH,
-    LAST_REACH,
-    LENGTHS,
     PAIR_F,
     PAIR_MEMORY,
-    PAIR_MINIMUM,
     PAIR_RECORD,
-    PAIR_TABLE,
-    PAIRS,
     PART,
     PLACE,
-    REACH,
-    SMALLER,
-    SPINE_F,
-    SURE,
     TREE_F,
-    TURN,
+    lengths_at,
+    manager_at,
+    memory_header_at,
     memory_places,
+    pair_at,
+    pair_state_at,
 )
 
 # Where nothing may move a pair is looked at after every step.
@@ -64,8 +51,8 @@ def mover(table, watch, p, q):
 
     The pose is a quaternion, and the same as a rotation and a shift.
     """
-    pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
-    side = table[pair + SMALLER]
+    pair = manager_at(table, watch).pair_table + PAIR_RECORD * p
+    side = pair_at(table, pair).smaller
     i = table[pair + PAIR_F + 1 - side]
     j = table[pair + PAIR_F + side]
     e = quaternion_from(q, i, j)
@@ -87,7 +74,8 @@ def apart(e, f):
 @kernel(inline=True)
 def turned_by(memory, o, e):
     """The same of the turn e of a pair and that of its last look, in the memory at o."""
-    return apart(e, (memory[o + TURN], memory[o + TURN + 1], memory[o + TURN + 2], memory[o + TURN + 3]))
+    known = pair_state_at(memory, o)
+    return apart(e, (known.turn[0], known.turn[1], known.turn[2], known.turn[3]))
 
 
 @kernel(inline=True)
@@ -101,27 +89,30 @@ def moved_from(pool_or_memory, at, memory, was, turn, shift):
 @kernel(inner=True)
 def reach_now(table, pool, watch, memory, p, moving):
     """Keep where the bodies of pair p stand at this look. Returns its reach: for some moves as since the last one."""
+    state = memory_header_at(memory, 0)
+    manager = manager_at(table, watch)
     _side, tree, e, turn, shift = moving
     at = memory_places(table, watch)[0] + PAIR_MEMORY * p
-    lengths = table[watch + LENGTHS]
-    reach = memory[at + REACH]
-    pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
-    root = table[tree + NODE_POOL]
-    if not math.isnan(memory[at + TURN]):
+    known = pair_state_at(memory, at)
+    lengths = lengths_at(pool, manager.lengths)
+    reach = known.reach
+    pair = pair_at(table, manager.pair_table + PAIR_RECORD * p)
+    root = tree_at(table, tree).node_pool
+    if not math.isnan(known.turn[0]):
         pace = moved_from(pool, root + CENTER, memory, at + PLACE, turn, shift)
-        pace += 2.0 * pool[root + RADIUS] * turned_by(memory, at, e)
-        pace /= max(memory[CALLS] - memory[at + CALLED], 1.0)
+        pace += 2.0 * node_at(pool, root).radius * turned_by(memory, at, e)
+        pace /= max(state.calls - known.called, 1.0)
         # After a step that was cut, as far as it was to go; but it goes no farther where contacts may be born.
-        moves = MOVES if table[pair + SPINE_F] < 0 else MOVES_OF_WIRES
-        asked = max(moves * pace, min(memory[at + CUT_SHORT], pool[table[pair + PAIR_MINIMUM] + 1]))
-        reach = min(max(asked, pool[lengths + FIRST_REACH]), pool[lengths + LAST_REACH])
-    memory[at + CUT_SHORT] = 0.0
-    memory[at + CALLED] = memory[CALLS]
+        moves = MOVES if pair.spine_f < 0 else MOVES_OF_WIRES
+        asked = max(moves * pace, min(known.cut_short, pool[pair.minimum + 1]))
+        reach = min(max(asked, lengths.first_reach), lengths.last_reach)
+    known.cut_short = 0.0
+    known.called = state.calls
     center = add(matvec(turn, three(pool, root + CENTER)), shift)
     for k in range(4):
-        memory[at + TURN + k] = e[k]
+        known.turn[k] = e[k]
     for k in range(3):
-        memory[at + PLACE + k] = center[k]
+        known.place[k] = center[k]
     return reach
 
 
@@ -131,13 +122,14 @@ def allow_ball(memory, at, ball, allowance, sure):
 
     Infinite: there is no ball. What is `sure` is how far, until a pose that stays is looked at; 0 if any that moved is.
     """
-    memory[at + BALL_ALLOWANCE] = allowance
-    memory[at + SURE] = sure
+    known = pair_state_at(memory, at)
+    known.ball_allowance = allowance
+    known.sure = sure
     if allowance < math.inf:
-        center, place, memory[at + BALL_RADIUS] = ball
+        center, place, known.ball_radius = ball
         for k in range(3):
-            memory[at + BALL + k] = center[k]
-            memory[at + BALL_PLACE + k] = place[k]
+            known.ball[k] = center[k]
+            known.ball_place[k] = place[k]
 
 
 @kernel(inner=True)
@@ -148,25 +140,24 @@ def part_used(table, pool, watch, memory, p, q):
     at a distance r from it by 2 r sin(a / 2), and |e - e'| is 2 sin(a / 4).
     """
     o = memory_places(table, watch)[0] + PAIR_MEMORY * p
-    memory[o + DOUBT] = 0.0
-    if math.isnan(memory[o + TURN]):
+    known = pair_state_at(memory, o)
+    known.doubt = 0.0
+    if math.isnan(known.turn[0]):
         return math.inf
     _side, tree, e, turn, shift = mover(table, watch, p, q)
-    root = table[tree + NODE_POOL]
+    root = tree_at(table, tree).node_pool
     angle = turned_by(memory, o, e)
-    moved = moved_from(pool, root + CENTER, memory, o + PLACE, turn, shift) + 2.0 * pool[root + RADIUS] * angle
+    moved = moved_from(pool, root + CENTER, memory, o + PLACE, turn, shift) + 2.0 * node_at(pool, root).radius * angle
     if not moved > 0.0:
         return 0.0
-    part = moved / memory[o + ALLOWANCE]
-    if memory[o + BALL_ALLOWANCE] < memory[o + ALLOWANCE] or 0.0 < memory[o + SURE] < math.inf:
-        moved = (
-            moved_from(memory, o + BALL, memory, o + BALL_PLACE, turn, shift) + 2.0 * memory[o + BALL_RADIUS] * angle
-        )
-        part = max(part, moved / memory[o + BALL_ALLOWANCE])
-        if memory[o + SURE] > 0.0:
-            memory[o + DOUBT] = moved / memory[o + SURE]
-    if memory[o + SURE] == 0.0:
-        memory[o + DOUBT] = part / STILL
+    part = moved / known.allowance
+    if known.ball_allowance < known.allowance or 0.0 < known.sure < math.inf:
+        moved = moved_from(memory, o + BALL, memory, o + BALL_PLACE, turn, shift) + 2.0 * known.ball_radius * angle
+        part = max(part, moved / known.ball_allowance)
+        if known.sure > 0.0:
+            known.doubt = moved / known.sure
+    if known.sure == 0.0:
+        known.doubt = part / STILL
     return part
 
 
@@ -175,10 +166,10 @@ def went(table, pool, watch, p, before, after):
     """How far a point of one body of pair p went at most, seen from the other one, between two poses of a scene."""
     _side, tree, e, turn, shift = mover(table, watch, p, before)
     _side, _tree, f, turned, shifted = mover(table, watch, p, after)
-    root = table[tree + NODE_POOL]
+    root = tree_at(table, tree).node_pool
     center = three(pool, root + CENTER)
     d = sub(add(matvec(turned, center), shifted), add(matvec(turn, center), shift))
-    return math.sqrt(dot(d, d)) + 2.0 * pool[root + RADIUS] * apart(e, f)
+    return math.sqrt(dot(d, d)) + 2.0 * node_at(pool, root).radius * apart(e, f)
 
 
 @kernel(inner=True)
@@ -186,7 +177,7 @@ def used_most(table, watch, memory):
     """The pair that had used the largest part of its allowances when that was last measured."""
     at = memory_places(table, watch)[0] + PART
     best = 0
-    for p in range(1, table[watch + PAIRS]):
+    for p in range(1, manager_at(table, watch).pairs):
         if memory[at + PAIR_MEMORY * p] > memory[at + PAIR_MEMORY * best]:
             best = p
     return best
@@ -196,7 +187,7 @@ def used_most(table, watch, memory):
 def largest_part(table, pool, watch, memory, q):
     """The pair that used the largest part of its allowances at poses q, and that part."""
     at = memory_places(table, watch)[0] + PART
-    for p in range(table[watch + PAIRS]):
+    for p in range(manager_at(table, watch).pairs):
         memory[at + PAIR_MEMORY * p] = part_used(table, pool, watch, memory, p, q)
     best = used_most(table, watch, memory)
     return best, memory[at + PAIR_MEMORY * best]

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly.geometry.splines.evaluate import BREAKS_U, BREAKS_V, SPANS_U, SPANS_V
+from assembly.geometry.splines.evaluate import surface_at
 from assembly.geometry.vec import blend
 from assembly.proximity.extrema.face_face import bent_at_most, move_pair, pair_frame
 from assembly.proximity.extrema.pair_matrix import curvature_bound, pair_matrix
@@ -27,8 +27,9 @@ FAR = 1e300
 @kernel(inline=True)
 def toward_end(table, pool, r, du, dv):
     """1 where rates (du, dv) of the parameters of a surface lead toward its end in the faster one, else -1."""
-    du /= pool[table[r + BREAKS_U] + table[r + SPANS_U]] - pool[table[r + BREAKS_U]]
-    dv /= pool[table[r + BREAKS_V] + table[r + SPANS_V]] - pool[table[r + BREAKS_V]]
+    patch = surface_at(table, r)
+    du /= pool[patch.breaks_u + patch.spans_u] - pool[patch.breaks_u]
+    dv /= pool[patch.breaks_v + patch.spans_v] - pool[patch.breaks_v]
     return math.copysign(1.0, du if abs(du) >= abs(dv) else dv)
 
 

@@ -12,10 +12,15 @@ from assembly._kernel import kernel
 from assembly.geometry.splines.evaluate import surface_point
 from assembly.geometry.vec import dot, sub
 from assembly.proximity.brep.borders import feature_at, feature_kind
-from assembly.proximity.brep.records import FACE, FACE_RECORD, FACE_TABLE
+from assembly.proximity.brep.records import FACE, FACE_RECORD, shell_at
 from assembly.proximity.features.holding import HELD_F, HELD_G
 from assembly.proximity.features.region_tests import is_feasible
-from assembly.proximity.manager.extrema import CODE_F, CODE_G, CORNER, NEW, ORIGIN, ROOT, ROOT_FOLD, USELESS
+from assembly.proximity.manager.extrema import (
+    NEW,
+    ROOT,
+    USELESS,
+    extremum_at,
+)
 from assembly.proximity.manager.near_singular import across_valley, into_valley
 
 # Cosine of the angle by which a valley turns from one of its points that are held to the next.
@@ -35,7 +40,8 @@ def is_of_faces(table, scene, code_f, code_g):
 @kernel(inner=True)
 def is_loose(roots, k):
     """Whether a root is any one of a continuum, where it is by chance."""
-    return roots[k, CORNER] == 0.0 and abs(roots[k, ROOT_FOLD]) <= CONTINUUM
+    extremum = extremum_at(roots, k)
+    return extremum.corner == 0.0 and abs(extremum.fold) <= CONTINUUM
 
 
 @kernel(inner=True)
@@ -47,8 +53,9 @@ def is_next_in_valley(table, pool, scene, codes, surfaces, x, along, roots, coun
     """
     p = surface_point(table, pool, surfaces[0], x[0], x[1])[0]
     for k in range(count):
-        alike = roots[k, CODE_F] == codes[0] and roots[k, CODE_G] == codes[1]
-        if alike and roots[k, ORIGIN] != USELESS and not is_loose(roots, k):
+        extremum = extremum_at(roots, k)
+        alike = extremum.code_f == codes[0] and extremum.code_g == codes[1]
+        if alike and extremum.origin != USELESS and not is_loose(roots, k):
             y = (roots[k, 0], roots[k, 1], roots[k, 2], roots[k, 3])
             found, _there, _bend, _on_f, other = across_valley(
                 table, pool, surfaces[0], surfaces[1], scene[0], scene[1], y
@@ -64,17 +71,18 @@ def is_next_in_valley(table, pool, scene, codes, surfaces, x, along, roots, coun
 @kernel(inner=True)
 def is_left_out(table, pool, scene, roots, k):
     """Whether root k, behind all that stay, is of a continuum and next to what is held; if not, it is held."""
-    codes = (np.int64(roots[k, CODE_F]), np.int64(roots[k, CODE_G]))
-    if roots[k, ORIGIN] == USELESS or not is_loose(roots, k) or not is_of_faces(table, scene, codes[0], codes[1]):
+    extremum = extremum_at(roots, k)
+    codes = (np.int64(extremum.code_f), np.int64(extremum.code_g))
+    if extremum.origin == USELESS or not is_loose(roots, k) or not is_of_faces(table, scene, codes[0], codes[1]):
         return False
     surfaces = (feature_at(table, scene[2][2], codes[0]), feature_at(table, scene[2][3], codes[1]))
     x = (roots[k, 0], roots[k, 1], roots[k, 2], roots[k, 3])
     found, _there, _bend, on_f, along = across_valley(table, pool, surfaces[0], surfaces[1], scene[0], scene[1], x)
     if not found:
         return False
-    if roots[k, ORIGIN] == NEW and not is_next_in_valley(table, pool, scene, codes, surfaces, x, along, roots, k):
+    if extremum.origin == NEW and not is_next_in_valley(table, pool, scene, codes, surfaces, x, along, roots, k):
         return True
-    roots[k, CORNER] = HELD_F if on_f else HELD_G
+    extremum.corner = HELD_F if on_f else HELD_G
     return False
 
 
@@ -98,7 +106,7 @@ def hold_continua(table, pool, scene, roots, count):
 @kernel(inner=True)
 def is_on_face(table, pool, scene, codes, side, x):
     """Whether the point at x of the face of one side is one of the body, within its boundary."""
-    face = table[scene[2][2 + side] + FACE_TABLE] + FACE_RECORD * codes[side]
+    face = shell_at(table, scene[2][2 + side]).face_table + FACE_RECORD * codes[side]
     return is_feasible(table, pool, FACE, face, x[2 * side], x[2 * side + 1])
 
 

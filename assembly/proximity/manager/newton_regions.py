@@ -12,12 +12,12 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly.geometry.splines.domain import is_within
-from assembly.proximity.bvh.tree import ELEMENT, ELEMENT_FEATURE, ELEMENT_POOL
+from assembly.proximity.bvh.tree import ELEMENT, element_at, tree_at
 from assembly.proximity.extrema.face_face import bent_at_most, move_pair, pair_frame, pair_step
 from assembly.proximity.extrema.pair_matrix import across_first, pair_matrix
 from assembly.proximity.extrema.singular import ALONE, BESIDE, fold_beyond
 from assembly.proximity.features.holding import POINT
-from assembly.proximity.manager.extrema import CODE_F, CODE_G, CORNER, ROOT_BEYOND, ROOT_FOLD, is_alone
+from assembly.proximity.manager.extrema import extremum_at, is_alone
 
 # Steps; and below so many radians, that a step turns a normal, it is as good as there.
 STEPS, CLOSE = 6, 0.02
@@ -33,8 +33,8 @@ TOGETHER, BARREN, PASSED = 0.25, 4, 5
 @kernel(inline=True)
 def half_widths(table, pool, trees, pair):
     """Half the widths, in parameters, of the patches of a pair of elements."""
-    o = table[trees[0] + ELEMENT_POOL] + ELEMENT * pair[0]
-    p = table[trees[1] + ELEMENT_POOL] + ELEMENT * pair[1]
+    o = tree_at(table, trees[0]).element_pool + ELEMENT * pair[0]
+    p = tree_at(table, trees[1]).element_pool + ELEMENT * pair[1]
     return (pool[o + 2], pool[o + 3], pool[p + 2], pool[p + 3])
 
 
@@ -53,24 +53,25 @@ def is_known(table, pool, scene, e, d, roots, count):
 
     And whether one is there that is near a fold, on this side of a knot line or beyond: a second root may be beside it.
     """
-    o = table[scene[3][0] + ELEMENT_POOL] + ELEMENT * e
-    p = table[scene[3][1] + ELEMENT_POOL] + ELEMENT * d
-    codes = (np.int64(pool[o + ELEMENT_FEATURE]), np.int64(pool[p + ELEMENT_FEATURE]))
+    o = tree_at(table, scene[3][0]).element_pool + ELEMENT * e
+    p = tree_at(table, scene[3][1]).element_pool + ELEMENT * d
+    codes = (np.int64(element_at(pool, o).feature), np.int64(element_at(pool, p).feature))
     start = (pool[o], pool[o + 1], pool[p], pool[p + 1])
     half = half_widths(table, pool, scene[3], (e, d))
     folds = False
     for k in range(count):
-        if roots[k, CODE_F] != codes[0] or roots[k, CODE_G] != codes[1]:
+        extremum = extremum_at(roots, k)
+        if extremum.code_f != codes[0] or extremum.code_g != codes[1]:
             continue
-        if not roots[k, ROOT_FOLD] > ALONE or roots[k, CORNER] >= POINT:
+        if not extremum.fold > ALONE or extremum.corner >= POINT:
             # A point that stays where it is is no root: where the edge, or the face, is nearest may be beside it.
             continue
         x = (roots[k, 0], roots[k, 1], roots[k, 2], roots[k, 3])
         if not is_beside(table, pool, scene[2], x, start, half, BESIDE):
             continue
-        if scene[2][0] >= 0 and math.isnan(roots[k, ROOT_BEYOND]):
+        if scene[2][0] >= 0 and math.isnan(extremum.beyond):
             # Beyond a knot line curvatures may be others.
-            roots[k, ROOT_BEYOND] = fold_beyond(table, pool, scene, x, half)
+            extremum.beyond = fold_beyond(table, pool, scene, x, half)
         if is_alone(roots, k):
             return codes, start, True, False
         folds = True

@@ -14,31 +14,26 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly.geometry.faces.trim import trim_side
 from assembly.geometry.splines.domain import is_within
-from assembly.geometry.splines.evaluate import SIGN, surface_point
+from assembly.geometry.splines.evaluate import surface_at, surface_point
 from assembly.geometry.vec import add, cross, matvec, matvec_t, scale, sub
 from assembly.proximity.brep.apexes import unit
 from assembly.proximity.brep.borders import feature_at
-from assembly.proximity.brep.records import FACE_RECORD, FACE_TABLE, FACE_TRIM, FACES
+from assembly.proximity.brep.records import FACE_RECORD, face_at, shell_at
 from assembly.proximity.bvh.tree import (
-    CENTER,
-    CHILD,
     ELEMENT,
     ELEMENT_FEATURE,
-    ELEMENT_POOL,
-    ELEMENTS,
-    FEATURE,
-    HALF,
     NODE,
     NODE_INTS,
-    NODE_POOL,
-    NODE_TABLE,
-    RADIUS,
+    element_at,
+    node_at,
+    node_links_at,
     overlapping,
+    tree_at,
 )
 from assembly.proximity.extrema.projection import foot_of
 from assembly.proximity.extrema.singular import BESIDE
 from assembly.proximity.manager.edge_piercing import cut_at, patch_corners, pierces
-from assembly.proximity.manager.extrema import GAP, POINT_F, POINT_G
+from assembly.proximity.manager.extrema import extremum_at
 
 # Room for the descent of a segment.
 DEPTH = 256
@@ -55,11 +50,12 @@ BELOW = 1e-6
 @kernel(inline=True)
 def meets_box(pool, o, a, d):
     """Whether the segment from a to a + d meets the box of the node at o."""
+    node = node_at(pool, o)
     lo = 0.0
     hi = 1.0
     for i in range(3):
-        low = pool[o + CENTER + i] - pool[o + HALF + i] - a[i]
-        high = pool[o + CENTER + i] + pool[o + HALF + i] - a[i]
+        low = node.center[i] - node.half[i] - a[i]
+        high = node.center[i] + node.half[i] - a[i]
         if abs(d[i]) < 1e-300:
             if low > 0.0 or high < 0.0:
                 return False
@@ -76,7 +72,7 @@ def surface_of(table, shell, surface, code):
     """The surface record of an element's feature, or -1 where it is no face."""
     if surface >= 0:
         return surface
-    return feature_at(table, shell, code) if code < table[shell + FACES] else -1
+    return feature_at(table, shell, code) if code < shell_at(table, shell).faces else -1
 
 
 @kernel(inner=True)
@@ -84,7 +80,7 @@ def in_trim(table, pool, shell, code, u, v):
     """Whether parameters are within the boundary of a face or on it; of a surface without one they always are."""
     if shell < 0:
         return True
-    trim = table[table[shell + FACE_TABLE] + FACE_RECORD * code + FACE_TRIM]
+    trim = face_at(table, shell_at(table, shell).face_table + FACE_RECORD * code).trim
     return trim < 0 or trim_side(table, pool, trim, u, v) >= 0
 
 
@@ -104,6 +100,7 @@ def facets_cut(table, pool, tree, surface, shell, a, d, end, beside):
 
     Or are beside it, by that part of their sides. And whether the first of them leads out of the body.
     """
+    tree_record = tree_at(table, tree)
     stack = np.empty(DEPTH, np.int64)
     stack[0] = 0
     used = 1
@@ -113,18 +110,18 @@ def facets_cut(table, pool, tree, surface, shell, a, d, end, beside):
     while used > 0:
         used -= 1
         i = stack[used]
-        if not meets_box(pool, table[tree + NODE_POOL] + NODE * i, a, d):
+        if not meets_box(pool, tree_record.node_pool + NODE * i, a, d):
             continue
-        at = table[tree + NODE_TABLE] + NODE_INTS * i
-        child = table[at + CHILD]
+        at = node_links_at(table, tree_record.node_table + NODE_INTS * i)
+        child = at.child
         if child >= 0:
             used = with_children(stack, used, child)
             continue
-        code = table[at + FEATURE]
+        code = at.feature
         r = surface_of(table, shell, surface, code)
         if r < 0:
             continue
-        e = table[tree + ELEMENT_POOL] + ELEMENT * (-1 - child)
+        e = tree_record.element_pool + ELEMENT * (-1 - child)
         (u, v, wide, high), (p, q, s, t) = patch_corners(table, pool, r, e)
         for k in range(2):
             hit, way, x, y, along = cut_at(a, d, p, q if k == 0 else s, s if k == 0 else t, end, beside)
@@ -133,7 +130,7 @@ def facets_cut(table, pool, tree, surface, shell, a, d, end, beside):
                 count += 1
                 if way < first:
                     first = way
-                    leaves = along == (table[r + SIGN] > 0)
+                    leaves = along == (surface_at(table, r).sign > 0)
     return count, leaves
 
 
@@ -144,8 +141,8 @@ def foot_at(table, pool, tree, surface, shell, e, y):
     A foot that Newton's method did not reach is none: off the foot of a point outside, the tangent plane of a bulge has
     it inside. One farther off than BESIDE may be on the far side.
     """
-    o = table[tree + ELEMENT_POOL] + ELEMENT * e
-    code = np.int64(pool[o + ELEMENT_FEATURE])
+    o = tree_at(table, tree).element_pool + ELEMENT * e
+    code = np.int64(element_at(pool, o).feature)
     f = surface_of(table, shell, surface, code)
     if f < 0:
         return 0.0, y, False
@@ -161,6 +158,7 @@ def foot_at(table, pool, tree, surface, shell, e, y):
 @kernel(inner=True, allocates=True)
 def nearest_foot(table, pool, tree, surface, shell, y, reach):
     """The signed distance of a point from its nearest foot on a body; minus the reach if none is nearer than that."""
+    tree_record = tree_at(table, tree)
     stack = np.empty(DEPTH, np.int64)
     stack[0] = 0
     used = 1
@@ -168,14 +166,14 @@ def nearest_foot(table, pool, tree, surface, shell, y, reach):
     while used > 0:
         used -= 1
         i = stack[used]
-        o = table[tree + NODE_POOL] + NODE * i
+        o = node_at(pool, tree_record.node_pool + NODE * i)
         square = 0.0
         for k in range(3):
-            off = max(abs(y[k] - pool[o + CENTER + k]) - pool[o + HALF + k], 0.0)
+            off = max(abs(y[k] - o.center[k]) - o.half[k], 0.0)
             square += off * off
         if square > nearest * nearest:
             continue
-        child = table[table[tree + NODE_TABLE] + NODE_INTS * i + CHILD]
+        child = node_links_at(table, tree_record.node_table + NODE_INTS * i).child
         if child >= 0:
             used = with_children(stack, used, child)
             continue
@@ -220,8 +218,8 @@ def is_deep(table, pool, scene, e, d, margin, offsets):
 @kernel(inner=True)
 def middle(table, pool, tree, surface, shell, e):
     """The middle of a patch, in the axes of its body, and whether it is one of a face and within its boundary."""
-    o = table[tree + ELEMENT_POOL] + ELEMENT * e
-    code = np.int64(pool[o + ELEMENT_FEATURE])
+    o = tree_at(table, tree).element_pool + ELEMENT * e
+    code = np.int64(element_at(pool, o).feature)
     f = surface_of(table, shell, surface, code)
     if f < 0 or not in_trim(table, pool, shell, code, pool[o], pool[o + 1]):
         return (0.0, 0.0, 0.0), False
@@ -234,21 +232,23 @@ def below_part(table, pool, tree, surface, shell, k, below):
 
     The parts are of different faces, if there are some: a point of a face that touches may be taken for inside.
     """
-    first = table[tree + ELEMENT_POOL] + ELEMENT_FEATURE
-    elements = table[tree + ELEMENTS]
+    tree_record = tree_at(table, tree)
+    solid = shell_at(table, shell)
+    first = tree_record.element_pool + ELEMENT_FEATURE
+    elements = tree_record.elements
     patches = 0
     for e in range(elements):
-        patches += int(shell < 0 or pool[first + ELEMENT * e] < table[shell + FACES])
+        patches += int(shell < 0 or pool[first + ELEMENT * e] < solid.faces)
     passed = 0
     for e in range(elements):
-        if shell < 0 or pool[first + ELEMENT * e] < table[shell + FACES]:
+        if shell < 0 or pool[first + ELEMENT * e] < solid.faces:
             if passed >= patches * k // 3:
                 a, some = middle(table, pool, tree, surface, shell, e)
                 if some:
-                    o = table[tree + ELEMENT_POOL] + ELEMENT * e
-                    f = surface_of(table, shell, surface, np.int64(pool[o + ELEMENT_FEATURE]))
+                    o = tree_record.element_pool + ELEMENT * e
+                    f = surface_of(table, shell, surface, np.int64(element_at(pool, o).feature))
                     _p, su, sv, _uu, _uv, _vv = surface_point(table, pool, f, pool[o], pool[o + 1])
-                    return sub(a, scale(float(table[f + SIGN]) * below, unit(cross(su, sv)))), True
+                    return sub(a, scale(float(surface_at(table, f).sign) * below, unit(cross(su, sv)))), True
             passed += 1
     return (0.0, 0.0, 0.0), False
 
@@ -260,7 +260,9 @@ def is_wholly_inside(table, pool, scene, side, below):
     tree, other = scene[3][side], scene[3][1 - side]
     surface, shell = scene[2][side], scene[2][2 + side]
     # Some direction that no face is likely to lie along, and far enough.
-    far = 10.0 * (pool[table[tree + NODE_POOL] + RADIUS] + pool[table[other + NODE_POOL] + RADIUS])
+    far = 10.0 * (
+        node_at(pool, tree_at(table, tree).node_pool).radius + node_at(pool, tree_at(table, other).node_pool).radius
+    )
     for k in range(3):
         a, some = below_part(table, pool, tree, surface, shell, k, below)
         if not some:
@@ -301,10 +303,11 @@ def is_outside(table, pool, scene, roots, k, offsets):
 
     Facets of f and of g are up to `offsets` beside their surfaces; gaps of no more are taken for true.
     """
-    depth = -roots[k, GAP]
+    extremum = extremum_at(roots, k)
+    depth = -extremum.gap
     turn, shift = scene[0], scene[1]
-    a = (roots[k, POINT_F], roots[k, POINT_F + 1], roots[k, POINT_F + 2])
-    b = (roots[k, POINT_G], roots[k, POINT_G + 1], roots[k, POINT_G + 2])
+    a = (extremum.point_f[0], extremum.point_f[1], extremum.point_f[2])
+    b = (extremum.point_g[0], extremum.point_g[1], extremum.point_g[2])
     end = offsets[0] / depth
     if end < 0.5 and facets_cut(table, pool, scene[3][0], scene[2][0], scene[2][2], a, sub(b, a), end, BETWEEN)[0] > 0:
         return True

@@ -15,14 +15,12 @@ from assembly.proximity.extrema.projection import slide_down
 from assembly.proximity.manager.candidates import around, element_ball
 from assembly.proximity.manager.extrema import (
     ALIKE,
-    GAP,
     MINIMUM_FOUND,
     NEW,
     NOTHING,
-    ORIGIN,
-    ROOT_FOLD,
     USELESS,
     add_root,
+    extremum_at,
     is_alone,
 )
 from assembly.proximity.manager.newton_regions import BARREN, LEFT, half_widths, is_known, stays
@@ -59,7 +57,7 @@ def look_into(table, pool, scene, e, d, neglect, roots, count, work, passed, sta
         count, result = add_root(table, pool, scene, codes, near, (0.0, 0.0, 0.0), neglect, roots, count, work, 0.0)
     if count > before:
         folding = folding or not is_alone(roots, before)
-    minimum = result == MINIMUM_FOUND or (result == ALIKE and roots[count, ROOT_FOLD] > 0.0)
+    minimum = result == MINIMUM_FOUND or (result == ALIKE and extremum_at(roots, count).fold > 0.0)
     if folding and smooth and stayed and not minimum and slides < SLIDES_A_LOOK:
         # Near a fold Newton's method may go to the saddle, past the minimum beside it.
         if count > before:
@@ -123,11 +121,11 @@ def search_patches(
             fertile = min(fertile, bound)
             lo, hi = around(table, pool, tree, candidates[c, side], lo, hi)
         if new >= 0:
-            gap = roots[new, GAP]
+            gap = extremum_at(roots, new).gap
             # The far sides of two bodies oppose each other, too.
             alien = gap > span[1] or gap < span[0]
             alien = alien or (gap < 0.0 and is_outside(table, pool, scene, roots, new, offsets))
-            roots[new, ORIGIN] = USELESS if alien else NEW
+            extremum_at(roots, new).origin = USELESS if alien else NEW
     d = sub(hi, lo)
     center = scale(0.5, add(lo, hi))
     ball = (center, add(matvec(turn, center), shift), 0.5 * math.sqrt(dot(d, d)))

@@ -13,32 +13,26 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly._record import place_of, record_dtype, record_view, size_of
 from assembly.proximity.features.holding import HELD_F
-from assembly.proximity.features.solid_contact import ALLOWED, FEATURE_F, FEATURE_G, IDLE, PAIR_GAP, PAIR_NORMAL, STAYS
+from assembly.proximity.features.solid_contact import (
+    tracked_at,
+)
 from assembly.proximity.manager.centerlines.curve import both_radii
 from assembly.proximity.manager.extrema import (
     ALIKE,
     BESIDE_CONTACT,
-    CODE_F,
-    CODE_G,
-    CORNER,
-    GAP,
     GIVEN_CONTACT,
     GIVEN_RECORD,
-    GIVEN_ROW,
     LISTED,
     MINIMUM_FOUND,
     NEW,
     OF_CONTACT,
-    ORIGIN,
-    POINT_F,
-    ROOT_FOLD,
-    ROOT_NORMAL,
-    ROOT_PLACE,
-    SWAPPED,
     USELESS,
     add_given,
     add_root,
+    extremum_at,
+    given_at,
 )
 from assembly.proximity.manager.near_singular_points import sunk
 from assembly.proximity.manager.overlap import is_outside
@@ -49,29 +43,120 @@ from assembly.proximity.manager.overlap import is_outside
 # need; address of
 # `mark_places` (`contact_place.py`), 0 where no contact's bodies have a least gap above zero; address of what says
 # between two parts of a long look whether it is to go on, 0 where nobody is asked.
-PAIRS, PLACES, PAIR_TABLE, FIRST, TRACK_SOLIDS, LENGTHS, LISTS, LIST_TABLE = 0, 1, 2, 3, 4, 5, 6, 7
-CORNERS, CLOCK, MARK_AT, GO_ON_AT, WATCH_RECORD = 8, 9, 10, 11, 12
+GO_ON_AT = 11
+MANAGER_RECORD = record_dtype(
+    "i8",
+    pairs=1,
+    places=1,
+    pair_table=1,
+    first=1,
+    track_solids=1,
+    lengths=1,
+    lists=1,
+    list_table=1,
+    corners=1,
+    clock=1,
+    mark_address=2,
+)
+manager_at = record_view(MANAGER_RECORD)
+PAIRS = place_of(MANAGER_RECORD, "pairs")
+PLACES = place_of(MANAGER_RECORD, "places")
+PAIR_TABLE = place_of(MANAGER_RECORD, "pair_table")
+FIRST = place_of(MANAGER_RECORD, "first")
+TRACK_SOLIDS = place_of(MANAGER_RECORD, "track_solids")
+LENGTHS = place_of(MANAGER_RECORD, "lengths")
+LISTS = place_of(MANAGER_RECORD, "lists")
+LIST_TABLE = place_of(MANAGER_RECORD, "list_table")
+CORNERS = place_of(MANAGER_RECORD, "corners")
+CLOCK = place_of(MANAGER_RECORD, "clock")
+MARK_AT = place_of(MANAGER_RECORD, "mark_address")
+WATCH_RECORD = size_of(MANAGER_RECORD)
 # Nanoseconds between two questions whether to go on, and answers: on, to an end with what there is, or nowhere, because
 # an exception throws all away.
 SLICE = 50_000_000
 GOES_ON, ENDS, ABORTED = 0, 1, 2
 # Its lengths: roots nearer to each other than the first, and along the surfaces, are one; the reach of a first look;
 # the largest.
-NEGLECT, FIRST_REACH, LAST_REACH, LENGTH_COUNT = 0, 1, 2, 3
+LENGTHS_RECORD = record_dtype(
+    "f8",
+    neglect=1,
+    first_reach=1,
+    last_reach=1,
+)
+lengths_at = record_view(LENGTHS_RECORD)
+NEGLECT = place_of(LENGTHS_RECORD, "neglect")
+FIRST_REACH = place_of(LENGTHS_RECORD, "first_reach")
+LAST_REACH = place_of(LENGTHS_RECORD, "last_reach")
+LENGTH_COUNT = size_of(LENGTHS_RECORD)
 # A pair: bodies, trees, surfaces or else (-1) shells, where its least gap is in the pool (behind it how far it may
 # go between looks where contacts may be born, how far facets of either are from their surfaces, and how far either
 # reaches from its origin; behind these the same with a least gap of zero, for what is in the place of a contact), its
 # places from and to, given contacts between the two (`extrema.py`), whether it is f (0) or g (1) that is the smaller
 # one, and the spines of two round wires (-1: others).
-PAIR_F, PAIR_G, TREE_F, TREE_G, PAIR_SURFACE_F, PAIR_SURFACE_G, PAIR_SHELL_F, PAIR_SHELL_G = 0, 1, 2, 3, 4, 5, 6, 7
-PAIR_MINIMUM, LOW, HIGH, GIVEN, GIVEN_COUNT, SMALLER, SPINE_F, SPINE_G, PAIR_RECORD = 8, 9, 10, 11, 12, 13, 14, 15, 16
+PAIR_FIELDS = record_dtype(
+    "i8",
+    body_f=1,
+    body_g=1,
+    tree_f=1,
+    tree_g=1,
+    surface_f=1,
+    surface_g=1,
+    shell_f=1,
+    shell_g=1,
+    minimum=1,
+    low=1,
+    high=1,
+    given=1,
+    given_count=1,
+    smaller=1,
+    spine_f=1,
+    spine_g=1,
+)
+pair_at = record_view(PAIR_FIELDS)
+PAIR_F = place_of(PAIR_FIELDS, "body_f")
+PAIR_G = place_of(PAIR_FIELDS, "body_g")
+TREE_F = place_of(PAIR_FIELDS, "tree_f")
+TREE_G = place_of(PAIR_FIELDS, "tree_g")
+PAIR_SURFACE_F = place_of(PAIR_FIELDS, "surface_f")
+PAIR_SURFACE_G = place_of(PAIR_FIELDS, "surface_g")
+PAIR_SHELL_F = place_of(PAIR_FIELDS, "shell_f")
+PAIR_SHELL_G = place_of(PAIR_FIELDS, "shell_g")
+PAIR_MINIMUM = place_of(PAIR_FIELDS, "minimum")
+LOW = place_of(PAIR_FIELDS, "low")
+HIGH = place_of(PAIR_FIELDS, "high")
+GIVEN = place_of(PAIR_FIELDS, "given")
+GIVEN_COUNT = place_of(PAIR_FIELDS, "given_count")
+SMALLER = place_of(PAIR_FIELDS, "smaller")
+SPINE_F = place_of(PAIR_FIELDS, "spine_f")
+SPINE_G = place_of(PAIR_FIELDS, "spine_g")
+PAIR_RECORD = size_of(PAIR_FIELDS)
 # How far behind a pair's least gap that of zero is.
 IN_PLACE = 6
 # Memory. Header: events, looks and contacts so far, the time of the caller, whether a near root ever found no place,
 # calls so far; of a tick with a budget, when a look is to end after the pair that it is at, and how many looks there
 # were before it; what bodies may be in each other and still touch: by so much less than the least gap a new contact may
 # stay, as where a solve begins.
-EVENT_COUNT, LOOKS, BORN, TIME, CROWDED, CALLS, DEADLINE, EARLIER, OVERLAP, MEMORY_HEADER = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9
+MEMORY_HEADER_RECORD = record_dtype(
+    "f8",
+    event_count=1,
+    looks=1,
+    born=1,
+    time=1,
+    crowded=1,
+    calls=1,
+    deadline=1,
+    earlier=1,
+    overlap=1,
+)
+memory_header_at = record_view(MEMORY_HEADER_RECORD)
+EVENT_COUNT = place_of(MEMORY_HEADER_RECORD, "event_count")
+LOOKS = place_of(MEMORY_HEADER_RECORD, "looks")
+CROWDED = place_of(MEMORY_HEADER_RECORD, "crowded")
+CALLS = place_of(MEMORY_HEADER_RECORD, "calls")
+DEADLINE = place_of(MEMORY_HEADER_RECORD, "deadline")
+EARLIER = place_of(MEMORY_HEADER_RECORD, "earlier")
+OVERLAP = place_of(MEMORY_HEADER_RECORD, "overlap")
+MEMORY_HEADER = size_of(MEMORY_HEADER_RECORD)
 # Of a pair: how the smaller body was turned, seen from the other, at its last look (a quaternion, NaN before there was
 # one), and where the middle of its tree was; how far it may go from there, its reach, its state, calls at its last
 # look; a ball on it, where its middle was, and how far what is in it may go; which part of its allowances is used;
@@ -79,13 +164,55 @@ EVENT_COUNT, LOOKS, BORN, TIME, CROWDED, CALLS, DEADLINE, EARLIER, OVERLAP, MEMO
 # beside one that touches; whether the bodies are in each other where no contact says so (NaN: its last look did not
 # ask); whether a near root found no place at the last look; how far a step was to go that was cut since; which part of
 # what poses that stay may go is used.
-TURN, PLACE, ALLOWANCE, REACH, STATE, CALLED = 0, 4, 7, 8, 9, 10
-BALL, BALL_RADIUS, BALL_PLACE, BALL_ALLOWANCE, PART, SURE, CROSSED, WANTING, CUT_SHORT, DOUBT, PAIR_MEMORY = (
-    11, 14, 15, 18, 19, 20, 21, 22, 23, 24, 25
-)  # fmt: skip
+PAIR_STATE = record_dtype(
+    "f8",
+    turn=4,
+    place=3,
+    allowance=1,
+    reach=1,
+    state=1,
+    called=1,
+    ball=3,
+    ball_radius=1,
+    ball_place=3,
+    ball_allowance=1,
+    part=1,
+    sure=1,
+    crossed=1,
+    wanting=1,
+    cut_short=1,
+    doubt=1,
+)
+pair_state_at = record_view(PAIR_STATE)
+TURN = place_of(PAIR_STATE, "turn")
+PLACE = place_of(PAIR_STATE, "place")
+ALLOWANCE = place_of(PAIR_STATE, "allowance")
+REACH = place_of(PAIR_STATE, "reach")
+STATE = place_of(PAIR_STATE, "state")
+CALLED = place_of(PAIR_STATE, "called")
+BALL = place_of(PAIR_STATE, "ball")
+BALL_RADIUS = place_of(PAIR_STATE, "ball_radius")
+BALL_PLACE = place_of(PAIR_STATE, "ball_place")
+BALL_ALLOWANCE = place_of(PAIR_STATE, "ball_allowance")
+PART = place_of(PAIR_STATE, "part")
+SURE = place_of(PAIR_STATE, "sure")
+CROSSED = place_of(PAIR_STATE, "crossed")
+CUT_SHORT = place_of(PAIR_STATE, "cut_short")
+DOUBT = place_of(PAIR_STATE, "doubt")
+PAIR_MEMORY = size_of(PAIR_STATE)
 FAR, NEAR, TRACKING = 0, 1, 2
 # Of a place: its pair (-1: none), the number of its contact, and 1 where that is in the place of a given contact.
-PLACE_PAIR, PLACE_NUMBER, PLACE_GIVEN, PLACE_MEMORY = 0, 1, 2, 3
+PLACE_STATE = record_dtype(
+    "f8",
+    pair=1,
+    number=1,
+    given=1,
+)
+place_at = record_view(PLACE_STATE)
+PLACE_PAIR = place_of(PLACE_STATE, "pair")
+PLACE_NUMBER = place_of(PLACE_STATE, "number")
+PLACE_GIVEN = place_of(PLACE_STATE, "given")
+PLACE_MEMORY = size_of(PLACE_STATE)
 # An event: kind, reason, pair, number of the contact, gap, time. The last so many are kept.
 EVENT, EVENTS = 6, 64
 ADDED, REMOVED, HANDED_OFF, MERGED, REFUSED = 0, 1, 2, 3, 4
@@ -103,29 +230,31 @@ SHALLOW = 1e-7
 @kernel(inline=True)
 def memory_places(table, watch):
     """Where pairs, places and events begin in the memory."""
-    places = MEMORY_HEADER + PAIR_MEMORY * table[watch + PAIRS]
-    return MEMORY_HEADER, places, places + PLACE_MEMORY * table[watch + PLACES]
+    manager = manager_at(table, watch)
+    places = MEMORY_HEADER + PAIR_MEMORY * manager.pairs
+    return MEMORY_HEADER, places, places + PLACE_MEMORY * manager.places
 
 
 @kernel(inner=True)
 def note(table, watch, memory, kind, reason, p, number, gap):
     """Write an event into the log."""
-    at = memory_places(table, watch)[2] + EVENT * (np.int64(memory[EVENT_COUNT]) % EVENTS)
+    state = memory_header_at(memory, 0)
+    at = memory_places(table, watch)[2] + EVENT * (np.int64(state.event_count) % EVENTS)
     memory[at] = float(kind)
     memory[at + 1] = float(reason)
     memory[at + 2] = float(p)
     memory[at + 3] = number
     memory[at + 4] = gap
-    memory[at + 5] = memory[TIME]
-    memory[EVENT_COUNT] += 1.0
+    memory[at + 5] = state.time
+    state.event_count += 1.0
 
 
 @kernel(inner=True)
 def any_listed(table, watch, memory, p):
     """Whether pair p has a listed contact."""
-    pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
+    pair = pair_at(table, manager_at(table, watch).pair_table + PAIR_RECORD * p)
     places = memory_places(table, watch)[1]
-    for k in range(table[pair + LOW], table[pair + HIGH]):
+    for k in range(pair.low, pair.high):
         if memory[places + PLACE_MEMORY * k] == p:
             return True
     return False
@@ -134,10 +263,11 @@ def any_listed(table, watch, memory, p):
 @kernel(inner=True)
 def any_lost(table, watch, memory, p, tracked):
     """Whether a listed contact of pair p has lost its root."""
-    pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
+    manager = manager_at(table, watch)
+    pair = pair_at(table, manager.pair_table + PAIR_RECORD * p)
     places = memory_places(table, watch)[1]
-    for k in range(table[pair + LOW], table[pair + HIGH]):
-        if memory[places + PLACE_MEMORY * k] == p and math.isnan(tracked[table[watch + FIRST] + k, 0]):
+    for k in range(pair.low, pair.high):
+        if memory[places + PLACE_MEMORY * k] == p and math.isnan(tracked[manager.first + k, 0]):
             return True
     return False
 
@@ -146,15 +276,16 @@ def any_lost(table, watch, memory, p, tracked):
 def release(table, watch, memory, k, tracked):
     """Make place k free."""
     o = memory_places(table, watch)[1] + PLACE_MEMORY * k
-    memory[o + PLACE_PAIR] = -1.0
-    tracked[table[watch + FIRST] + k, 0] = math.nan
+    place_at(memory, o).pair = -1.0
+    tracked[manager_at(table, watch).first + k, 0] = math.nan
 
 
 @kernel(inner=True)
 def free_place(table, watch, memory, pair):
     """A place without a contact among those of a pair, or -1."""
+    pair_record = pair_at(table, pair)
     places = memory_places(table, watch)[1]
-    for k in range(table[pair + LOW], table[pair + HIGH]):
+    for k in range(pair_record.low, pair_record.high):
         if memory[places + PLACE_MEMORY * k] < 0.0:
             return k
     return -1
@@ -163,22 +294,24 @@ def free_place(table, watch, memory, pair):
 @kernel(inner=True)
 def write_root(roots, i, tracked, r):
     """Track root i in row r."""
+    extremum = extremum_at(roots, i)
+    pair = tracked_at(tracked, r)
     for k in range(4):
         tracked[r, k] = roots[i, k]
-    tracked[r, FEATURE_F] = roots[i, CODE_F]
-    tracked[r, FEATURE_G] = roots[i, CODE_G]
+    pair.feature_f = extremum.code_f
+    pair.feature_g = extremum.code_g
     for k in range(3):
-        tracked[r, PAIR_NORMAL + k] = roots[i, ROOT_NORMAL + k]
-    tracked[r, PAIR_GAP] = roots[i, GAP]
-    tracked[r, STAYS] = roots[i, CORNER]
-    tracked[r, IDLE] = 0.0
+        pair.normal[k] = extremum.normal[k]
+    pair.gap = extremum.gap
+    pair.stays = extremum.corner
+    pair.idle = 0.0
 
 
 @kernel(inner=True)
 def is_of_far_sides(table, pool, scene, roots, k, offsets):
     """Whether root k, with a negative gap, is of sides that are turned away from each other."""
     if scene[5][0] >= 0:
-        return roots[k, GAP] < -both_radii(table, pool, scene[5])
+        return extremum_at(roots, k).gap < -both_radii(table, pool, scene[5])
     return is_outside(table, pool, scene, roots, k, offsets)
 
 
@@ -189,46 +322,50 @@ def known_roots(table, pool, watch, memory, p, scene, offsets, tracked, roots, w
     A listed contact that lost its root, or came to that of another one or to the far sides, gives up its place. Returns
     how many roots there are, and whether any was lost.
     """
-    pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
+    manager = manager_at(table, watch)
+    pair = pair_at(table, manager.pair_table + PAIR_RECORD * p)
     places = memory_places(table, watch)[1]
-    neglect = pool[table[watch + LENGTHS] + NEGLECT]
+    neglect = lengths_at(pool, manager.lengths).neglect
     # A contact that is to close a gap would contradict a clearance that asks for one, where both stood for one root.
-    radius = neglect if pool[table[pair + PAIR_MINIMUM]] == 0.0 else math.inf
-    many = table[pair + GIVEN_COUNT] if scene[2][0] >= 0 else 0
-    count = add_given(table, pool, scene, tracked, table[pair + GIVEN], many, radius, roots, work)
-    first, last = table[pair + LOW], table[pair + HIGH]
+    radius = neglect if pool[pair.minimum] == 0.0 else math.inf
+    many = pair.given_count if scene[2][0] >= 0 else 0
+    count = add_given(table, pool, scene, tracked, pair.given, many, radius, roots, work)
+    first, last = pair.low, pair.high
     any_gone = False
     # Roots first, then corners, which give way to them.
     for step in range(2 * (last - first)):
         k = first + step % (last - first)
         o = places + PLACE_MEMORY * k
-        r = table[watch + FIRST] + k
-        corner = tracked[r, STAYS] if tracked[r, STAYS] > 0.0 else 0.0
+        slot = place_at(memory, o)
+        r = manager.first + k
+        tracked_pair = tracked_at(tracked, r)
+        corner = tracked_pair.stays if tracked_pair.stays > 0.0 else 0.0
         if memory[o] != p or (corner > 0.0) != (step >= last - first):
             continue
         lost = math.isnan(tracked[r, 0])
         before = count
+        extremum = extremum_at(roots, before)
         if not lost and count < ROOTS:
             start = (tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3])
-            codes = (np.int64(tracked[r, FEATURE_F]), np.int64(tracked[r, FEATURE_G]))
-            n = (tracked[r, PAIR_NORMAL], tracked[r, PAIR_NORMAL + 1], tracked[r, PAIR_NORMAL + 2])
+            codes = (np.int64(tracked_pair.feature_f), np.int64(tracked_pair.feature_g))
+            n = (tracked_pair.normal[0], tracked_pair.normal[1], tracked_pair.normal[2])
             if corner >= HELD_F:
                 start = sunk(table, pool, scene, codes, corner, start)
             count, found = add_root(table, pool, scene, codes, start, n, neglect, roots, count, work, corner)
             lost = found != ALIKE and found != MINIMUM_FOUND
-            if count > before and corner == 0.0 and roots[before, GAP] < 0.0:
+            if count > before and corner == 0.0 and extremum.gap < 0.0:
                 lost = lost or is_of_far_sides(table, pool, scene, roots, before, offsets)
         if count > before and not lost:
-            roots[before, ORIGIN] = LISTED + k
-            if corner >= HELD_F and roots[before, GAP] < tracked[r, PAIR_GAP] - SUNK:
+            extremum.origin = LISTED + k
+            if corner >= HELD_F and extremum.gap < tracked_pair.gap - SUNK:
                 # The same contact elsewhere: who solves has to know.
-                note(table, watch, memory, HANDED_OFF, SAME_ROOT, p, memory[o + PLACE_NUMBER], roots[before, GAP])
+                note(table, watch, memory, HANDED_OFF, SAME_ROOT, p, slot.number, extremum.gap)
             write_root(roots, before, tracked, r)
         else:
             # A corner that went past its face is none of these.
             any_gone = any_gone or (lost and corner == 0.0)
             kind, reason = (HANDED_OFF, LOST) if lost else (MERGED, SAME_ROOT)
-            note(table, watch, memory, kind, reason, p, memory[o + PLACE_NUMBER], tracked[r, PAIR_GAP])
+            note(table, watch, memory, kind, reason, p, slot.number, tracked_pair.gap)
             release(table, watch, memory, k, tracked)
     return count, any_gone
 
@@ -236,7 +373,8 @@ def known_roots(table, pool, watch, memory, p, scene, offsets, tracked, roots, w
 @kernel(inline=True)
 def gap_beyond(roots, i, least):
     """By how much root i is farther than its row asks for: in the place of a contact that is nothing."""
-    return roots[i, GAP] - (0.0 if roots[i, ROOT_PLACE] == BESIDE_CONTACT else least)
+    extremum = extremum_at(roots, i)
+    return extremum.gap - (0.0 if extremum.place == BESIDE_CONTACT else least)
 
 
 @kernel(inner=True)
@@ -247,17 +385,18 @@ def release_given(table, watch, memory, p, roots, count, tracked):
     """
     places = memory_places(table, watch)[1]
     for i in range(count):
-        origin = np.int64(roots[i, ORIGIN])
-        own = roots[i, ROOT_PLACE] == OF_CONTACT
+        extremum = extremum_at(roots, i)
+        origin = np.int64(extremum.origin)
+        own = extremum.place == OF_CONTACT
         if origin >= LISTED:
-            o = places + PLACE_MEMORY * (origin - LISTED)
-            if own or (roots[i, ROOT_PLACE] == BESIDE_CONTACT) != (memory[o + PLACE_GIVEN] == 1.0):
+            o = place_at(memory, places + PLACE_MEMORY * (origin - LISTED))
+            if own or (extremum.place == BESIDE_CONTACT) != (o.given == 1.0):
                 kind, reason = (MERGED, SAME_ROOT) if own else (HANDED_OFF, SAME_ROOT)
-                note(table, watch, memory, kind, reason, p, memory[o + PLACE_NUMBER], roots[i, GAP])
+                note(table, watch, memory, kind, reason, p, o.number, extremum.gap)
                 release(table, watch, memory, origin - LISTED, tracked)
-                roots[i, ORIGIN] = NEW
-        if own and roots[i, ORIGIN] == NEW:
-            roots[i, ORIGIN] = USELESS
+                extremum.origin = NEW
+        if own and extremum.origin == NEW:
+            extremum.origin = USELESS
 
 
 @kernel(inner=True)
@@ -267,66 +406,72 @@ def list_roots(table, pool, watch, memory, p, roots, count, tracked):
     Returns by how much the nearest one that is not listed is farther than it has to be, its gap, and whether a place
     was wanting.
     """
+    state = memory_header_at(memory, 0)
+    manager = manager_at(table, watch)
     wanting = False
-    pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
-    at = memory_places(table, watch)[0] + PAIR_MEMORY * p
-    places, reach = memory_places(table, watch)[1], memory[at + REACH]
-    least = pool[table[pair + PAIR_MINIMUM]]
+    pair = manager.pair_table + PAIR_RECORD * p
+    at = pair_state_at(memory, memory_places(table, watch)[0] + PAIR_MEMORY * p)
+    places, reach = memory_places(table, watch)[1], at.reach
+    least = pool[pair_at(table, pair).minimum]
     rest = math.inf
     lowest = math.inf
     for i in range(count):
-        origin = np.int64(roots[i, ORIGIN])
+        origin = np.int64(extremum_at(roots, i).origin)
         if origin >= LISTED and gap_beyond(roots, i, least) > KEEP * reach:
             k = origin - LISTED
-            number = memory[places + PLACE_MEMORY * k + PLACE_NUMBER]
-            note(table, watch, memory, REMOVED, WENT_AWAY, p, number, roots[i, GAP])
+            number = place_at(memory, places + PLACE_MEMORY * k).number
+            note(table, watch, memory, REMOVED, WENT_AWAY, p, number, extremum_at(roots, i).gap)
             release(table, watch, memory, k, tracked)
             rest = min(rest, gap_beyond(roots, i, least))
-            lowest = min(lowest, roots[i, GAP])
+            lowest = min(lowest, extremum_at(roots, i).gap)
     # The nearest first, so that it is the far ones for which places may be wanting.
     while True:
         best = -1
         for i in range(count):
-            if roots[i, ORIGIN] == NEW and (best < 0 or gap_beyond(roots, i, least) < gap_beyond(roots, best, least)):
+            if extremum_at(roots, i).origin == NEW and (
+                best < 0 or gap_beyond(roots, i, least) < gap_beyond(roots, best, least)
+            ):
                 best = i
         if best < 0:
             break
         gap = gap_beyond(roots, best, least)
-        roots[best, ORIGIN] = USELESS
+        extremum_at(roots, best).origin = USELESS
         k = free_place(table, watch, memory, pair) if gap <= TAKE * reach else -1
         if k < 0:
             rest = min(rest, gap)
-            lowest = min(lowest, roots[best, GAP])
+            lowest = min(lowest, extremum_at(roots, best).gap)
             if gap <= TAKE * reach and not wanting:
                 wanting = True
-                if memory[at + WANTING] == 0.0:
-                    note(table, watch, memory, REFUSED, NO_PLACE, p, 0.0, roots[best, GAP])
+                if at.wanting == 0.0:
+                    note(table, watch, memory, REFUSED, NO_PLACE, p, 0.0, extremum_at(roots, best).gap)
             continue
-        o = places + PLACE_MEMORY * k
-        memory[o + PLACE_PAIR] = float(p)
-        memory[BORN] += 1.0
-        memory[o + PLACE_NUMBER] = memory[BORN]
-        memory[o + PLACE_GIVEN] = 1.0 if roots[best, ROOT_PLACE] == BESIDE_CONTACT else 0.0
-        write_root(roots, best, tracked, table[watch + FIRST] + k)
-        tracked[table[watch + FIRST] + k, ALLOWED] = -gap if -memory[OVERLAP] <= gap < 0.0 else 0.0
-        note(table, watch, memory, ADDED, CAME_NEAR, p, memory[BORN], roots[best, GAP])
-    memory[at + WANTING] = 1.0 if wanting else 0.0
+        o = place_at(memory, places + PLACE_MEMORY * k)
+        o.pair = float(p)
+        state.born += 1.0
+        o.number = state.born
+        o.given = 1.0 if extremum_at(roots, best).place == BESIDE_CONTACT else 0.0
+        write_root(roots, best, tracked, manager.first + k)
+        tracked_at(tracked, manager.first + k).allowed = -gap if -state.overlap <= gap < 0.0 else 0.0
+        note(table, watch, memory, ADDED, CAME_NEAR, p, state.born, extremum_at(roots, best).gap)
+    at.wanting = 1.0 if wanting else 0.0
     return rest, lowest, wanting
 
 
 @kernel(inner=True)
 def minimum_beside(roots, count, i):
     """The minimum nearest to root i, a saddle, that is hardly lower, or -1."""
+    root_record = extremum_at(roots, i)
     best = -1
     least = math.inf
     for k in range(count):
-        origin = roots[k, ORIGIN]
-        lower = roots[i, GAP] - roots[k, GAP]
-        if not (origin == NEW or origin >= LISTED) or not roots[k, ROOT_FOLD] > 0.0 or not 0.0 <= lower <= SHALLOW:
+        extremum = extremum_at(roots, k)
+        origin = extremum.origin
+        lower = root_record.gap - extremum.gap
+        if not (origin == NEW or origin >= LISTED) or not extremum.fold > 0.0 or not 0.0 <= lower <= SHALLOW:
             continue
         square = 0.0
         for l in range(3):
-            d = roots[i, POINT_F + l] - roots[k, POINT_F + l]
+            d = root_record.point_f[l] - extremum.point_f[l]
             square += d * d
         if square < least:
             best = k
@@ -340,26 +485,29 @@ def seat_given(table, watch, memory, p, roots, count, tracked):
 
     A contact that stayed would hold the surfaces at the saddle, and they would cross beside it.
     """
-    given = table[table[watch + PAIR_TABLE] + PAIR_RECORD * p + GIVEN]
+    given = pair_at(table, manager_at(table, watch).pair_table + PAIR_RECORD * p).given
     places = memory_places(table, watch)[1]
     for i in range(count):
-        if roots[i, ORIGIN] > GIVEN_CONTACT or not roots[i, ROOT_FOLD] < 0.0:
+        extremum = extremum_at(roots, i)
+        if extremum.origin > GIVEN_CONTACT or not extremum.fold < 0.0:
             continue
         k = minimum_beside(roots, count, i)
+        root_record = extremum_at(roots, k)
         if k < 0:
             continue
-        c = np.int64(GIVEN_CONTACT - roots[i, ORIGIN])
-        r = table[given + GIVEN_RECORD * c + GIVEN_ROW]
-        swap = 2 * table[given + GIVEN_RECORD * c + SWAPPED]
+        c = np.int64(GIVEN_CONTACT - extremum.origin)
+        given_record = given_at(table, given + GIVEN_RECORD * c)
+        r = given_record.row
+        swap = 2 * given_record.swapped
         for l in range(4):
             tracked[r, l] = roots[k, (l + swap) % 4]
-        tracked[r, PAIR_GAP] = roots[k, GAP]
-        if roots[k, ORIGIN] == NEW:
-            note(table, watch, memory, HANDED_OFF, LOST, p, 0.0, roots[k, GAP])
+        tracked_at(tracked, r).gap = root_record.gap
+        if root_record.origin == NEW:
+            note(table, watch, memory, HANDED_OFF, LOST, p, 0.0, root_record.gap)
         else:
-            place = np.int64(roots[k, ORIGIN]) - LISTED
-            number = memory[places + PLACE_MEMORY * place + PLACE_NUMBER]
-            note(table, watch, memory, MERGED, SAME_ROOT, p, number, roots[k, GAP])
+            place = np.int64(root_record.origin) - LISTED
+            number = place_at(memory, places + PLACE_MEMORY * place).number
+            note(table, watch, memory, MERGED, SAME_ROOT, p, number, root_record.gap)
             release(table, watch, memory, place, tracked)
-        roots[k, ORIGIN] = roots[i, ORIGIN]
-        roots[i, ORIGIN] = USELESS
+        root_record.origin = extremum.origin
+        extremum.origin = USELESS

@@ -21,23 +21,20 @@ from assembly._address import call_address
 from assembly._kernel import kernel
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.bvh.neighbor_list import LIST_INTS
-from assembly.proximity.bvh.tree import NODE_POOL, RADIUS, least_distance
-from assembly.proximity.features.solid_contact import CONTACT_RECORD, PAIR_GAP, STAYS, TRACK
+from assembly.proximity.bvh.tree import least_distance, node_at, tree_at
+from assembly.proximity.features.solid_contact import CONTACT_RECORD, TRACK, tracked_at
 from assembly.proximity.manager.candidates import facing_pairs, near_enough
 from assembly.proximity.manager.centerlines.curve import both_radii
 from assembly.proximity.manager.centerlines.minima import MINIMA
 from assembly.proximity.manager.centerlines.parts import near_parts, parts_beyond
 from assembly.proximity.manager.centerlines.search import BOX, BOXES, search_spines
 from assembly.proximity.manager.extrema import (
-    CORNER,
     ELSEWHERE,
-    GAP,
     GIVEN_CONTACT,
     LISTED,
-    ORIGIN,
     ROOT,
-    ROOT_PLACE,
     USELESS,
+    extremum_at,
     is_alone,
 )
 from assembly.proximity.manager.flush import any_deep, drop_flush
@@ -55,62 +52,26 @@ from assembly.proximity.manager.overlap import crosses
 from assembly.proximity.manager.search import search_patches
 from assembly.proximity.manager.state import (
     ABORTED,
-    ALLOWANCE,
-    CALLS,
-    CLOCK,
-    CORNERS,
-    CROSSED,
-    CROWDED,
-    CUT_SHORT,
-    DEADLINE,
-    DOUBT,
-    EVENT_COUNT,
     FAR,
-    FIRST,
-    FIRST_REACH,
-    GIVEN_COUNT,
     GO_ON_AT,
-    HIGH,
-    LAST_REACH,
-    LENGTHS,
-    LIST_TABLE,
-    LISTS,
-    LOOKS,
-    LOW,
-    MARK_AT,
     NEAR,
-    NEGLECT,
-    OVERLAP,
-    PAIR_F,
-    PAIR_G,
     PAIR_MEMORY,
-    PAIR_MINIMUM,
     PAIR_RECORD,
-    PAIR_SHELL_F,
-    PAIR_SHELL_G,
-    PAIR_SURFACE_F,
-    PAIR_SURFACE_G,
-    PAIR_TABLE,
-    PAIRS,
-    PART,
     PLACE_MEMORY,
-    REACH,
     ROOTS,
     SLICE,
-    SPINE_F,
-    SPINE_G,
-    STATE,
     TAKE,
-    TRACK_SOLIDS,
     TRACKING,
-    TREE_F,
-    TREE_G,
-    TURN,
     any_listed,
     any_lost,
     known_roots,
+    lengths_at,
     list_roots,
+    manager_at,
+    memory_header_at,
     memory_places,
+    pair_at,
+    pair_state_at,
     release_given,
     seat_given,
 )
@@ -146,14 +107,16 @@ def list_corners(table, pool, watch, scene, reach, least, offsets, stack, candid
 
     A listed contact whose root is at one stays there.
     """
-    lengths = table[watch + LENGTHS]
-    span = (-pool[lengths + FIRST_REACH], reach + least)
-    neglect = pool[lengths + NEGLECT]
+    manager = manager_at(table, watch)
+    lengths = lengths_at(pool, manager.lengths)
+    span = (-lengths.first_reach, reach + least)
+    neglect = lengths.neglect
     count = add_corners(table, pool, scene, span, offsets, neglect, stack, candidates, roots, count, work)
     for k in range(count):
-        place = np.int64(roots[k, ORIGIN])
+        extremum = extremum_at(roots, k)
+        place = np.int64(extremum.origin)
         if place >= LISTED:
-            tracked[table[watch + FIRST] + place - LISTED, STAYS] = roots[k, CORNER]
+            tracked_at(tracked, manager.first + place - LISTED).stays = extremum.corner
     return count
 
 
@@ -162,24 +125,28 @@ def nearest_fold(roots, count, least, reach):
     """How far away what is born at a fold may be: about as far as the nearest root beside one. Corners have none."""
     low = math.inf
     for k in range(count):
-        if roots[k, CORNER] == 0.0 and not is_alone(roots, k) and abs(roots[k, GAP] - least) <= reach:
-            low = min(low, max(roots[k, GAP] - least, 0.0))
+        extremum = extremum_at(roots, k)
+        if extremum.corner == 0.0 and not is_alone(roots, k) and abs(extremum.gap - least) <= reach:
+            low = min(low, max(extremum.gap - least, 0.0))
     return low
 
 
 @kernel(inner=True)
 def crosses_elsewhere(table, pool, watch, memory, p, scene, roots, count, least, offsets, stack, candidates, tracked):
     """Whether the bodies of pair p are in each other where no contact says so."""
-    pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
+    manager = manager_at(table, watch)
+    pair = pair_at(table, manager.pair_table + PAIR_RECORD * p)
     places = memory_places(table, watch)[1]
-    margin = max(CROSSING, memory[OVERLAP])
+    margin = max(CROSSING, memory_header_at(memory, 0).overlap)
     deep = False
     for k in range(count):
-        asked = least if roots[k, ORIGIN] > GIVEN_CONTACT and roots[k, ROOT_PLACE] == ELSEWHERE else 0.0
-        deep = deep or (roots[k, GAP] < asked - margin and roots[k, ORIGIN] != USELESS)
-    for k in range(table[pair + LOW], table[pair + HIGH]):
+        asked = (
+            least if extremum_at(roots, k).origin > GIVEN_CONTACT and extremum_at(roots, k).place == ELSEWHERE else 0.0
+        )
+        deep = deep or (extremum_at(roots, k).gap < asked - margin and extremum_at(roots, k).origin != USELESS)
+    for k in range(pair.low, pair.high):
         if memory[places + PLACE_MEMORY * k] == p:
-            deep = deep or tracked[table[watch + FIRST] + k, PAIR_GAP] < -margin
+            deep = deep or tracked_at(tracked, manager.first + k).gap < -margin
     return not deep and crosses(table, pool, scene, stack, candidates, margin, offsets)
 
 
@@ -193,17 +160,18 @@ def search_by_patches(table, pool, watch, memory, p, scene, moving, reach, offse
     how far what is in a ball may go, and that ball; how far, until a pose that stays is looked at; whether there is
     anything within reach.
     """
+    manager = manager_at(table, watch)
     stack, candidates, distances, passed, work, _pairs, _boxes, _marks = rooms
-    lengths = table[watch + LENGTHS]
-    minimum = table[table[watch + PAIR_TABLE] + PAIR_RECORD * p + PAIR_MINIMUM]
+    lengths = lengths_at(pool, manager.lengths)
+    minimum = pair_at(table, manager.pair_table + PAIR_RECORD * p).minimum
     least, flank = pool[minimum], pool[minimum + 1]
     at = memory_places(table, watch)[0] + PAIR_MEMORY * p
     found, reach = facing_pairs(table, pool, watch, memory, p, scene, moving, reach, stack, candidates)
-    memory[at + REACH] = reach
+    pair_state_at(memory, at).reach = reach
     count, any_gone = known_roots(table, pool, watch, memory, p, scene, offsets, tracked, roots, work)
     enough = near_enough(table, pool, scene, least, reach, flank, candidates, found, distances)
-    span = (-pool[lengths + LAST_REACH], reach + least)
-    neglect = pool[lengths + NEGLECT]
+    span = (-lengths.last_reach, reach + least)
+    neglect = lengths.neglect
     facing = (candidates, distances)
     count, free, fertile, ball = search_patches(
         table, pool, scene, moving, (flank, enough), span, offsets, neglect, facing, found, roots, count, work, passed
@@ -219,31 +187,32 @@ def search_by_patches(table, pool, watch, memory, p, scene, moving, reach, offse
 @kernel(inner=True)
 def search_by_spines(table, pool, watch, memory, p, scene, moving, reach, offsets, tracked, rooms, roots):
     """The same for two round wires, by their spines."""
+    manager = manager_at(table, watch)
     stack, _candidates, _distances, _passed, work, pairs, boxes, marks = rooms
-    lengths = table[watch + LENGTHS]
-    minimum = table[table[watch + PAIR_TABLE] + PAIR_RECORD * p + PAIR_MINIMUM]
+    lengths = lengths_at(pool, manager.lengths)
+    minimum = pair_at(table, manager.pair_table + PAIR_RECORD * p).minimum
     least, flank = pool[minimum], pool[minimum + 1]
     radii = both_radii(table, pool, scene[5]) + least
-    ring = SPINE_RINGS * pool[lengths + FIRST_REACH]
-    at_list = table[watch + LIST_TABLE] + LIST_INTS * (p % table[watch + LISTS])
+    ring = SPINE_RINGS * lengths.first_reach
+    at_list = manager.list_table + LIST_INTS * (p % manager.lists)
     waiting = near_parts(table, pool, at_list, p, scene, moving, radii + reach, ring, stack, pairs, boxes)
     while waiting < 0 and reach > LEAST_ALLOWANCE:
         # Out of room: what is nearer is looked at more often.
         reach *= 0.5
         waiting = near_parts(table, pool, at_list, p, scene, moving, radii + reach, ring, stack, pairs, boxes)
-    memory[memory_places(table, watch)[0] + PAIR_MEMORY * p + REACH] = reach
+    pair_state_at(memory, memory_places(table, watch)[0] + PAIR_MEMORY * p).reach = reach
     count, any_gone = known_roots(table, pool, watch, memory, p, scene, offsets, tracked, roots, work)
     if waiting < 0:
         # There is no room for what is as near as it should not be.
-        memory[CROWDED] = 1.0
+        memory_header_at(memory, 0).crowded = 1.0
         return count, any_gone, 0.0, math.inf, NO_BALL, math.inf, True
     if waiting == 0:
         beyond = parts_beyond(table, pool, scene, radii + reach, stack, pairs) - radii
         return count, any_gone, beyond, math.inf, NO_BALL, math.inf, False
     # No tangent turns by more than a motion over this.
-    rho = min(2.0 * (radii + reach), 0.99 * pool[table[moving[1] + NODE_POOL] + RADIUS])
+    rho = min(2.0 * (radii + reach), 0.99 * node_at(pool, tree_at(table, moving[1]).node_pool).radius)
     count, free, fertile, ball, sure = search_spines(
-        table, pool, scene, moving, rho, (least, TAKE * reach, reach, flank), pool[lengths + NEGLECT], boxes, waiting,
+        table, pool, scene, moving, rho, (least, TAKE * reach, reach, flank), lengths.neglect, boxes, waiting,
         marks, roots, count, work,
     )  # fmt: skip
     return count, any_gone, free, fertile, ball, sure, True
@@ -252,26 +221,29 @@ def search_by_spines(table, pool, watch, memory, p, scene, moving, reach, offset
 @kernel(inner=True)
 def look_at_pair(table, pool, watch, memory, p, q, tracked, rooms, roots, asks):
     """Find and list the roots of pair p; `asks` says whether it tells if the bodies cross elsewhere."""
-    pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
+    state = memory_header_at(memory, 0)
+    manager = manager_at(table, watch)
+    pair = pair_at(table, manager.pair_table + PAIR_RECORD * p)
     at = memory_places(table, watch)[0] + PAIR_MEMORY * p
-    i = table[pair + PAIR_F]
-    j = table[pair + PAIR_G]
+    known = pair_state_at(memory, at)
+    i = pair.body_f
+    j = pair.body_g
     turn, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
     scene = (
         turn,
         shift,
         (
-            table[pair + PAIR_SURFACE_F],
-            table[pair + PAIR_SURFACE_G],
-            table[pair + PAIR_SHELL_F],
-            table[pair + PAIR_SHELL_G],
+            pair.surface_f,
+            pair.surface_g,
+            pair.shell_f,
+            pair.shell_g,
         ),
-        (table[pair + TREE_F], table[pair + TREE_G]),
-        (i, j, q, table[watch + TRACK_SOLIDS]),
-        (table[pair + SPINE_F], table[pair + SPINE_G]),
+        (pair.tree_f, pair.tree_g),
+        (i, j, q, manager.track_solids),
+        (pair.spine_f, pair.spine_g),
     )
-    memory[LOOKS] += 1.0
-    minimum = table[pair + PAIR_MINIMUM]
+    state.looks += 1.0
+    minimum = pair.minimum
     least = pool[minimum]
     offsets = (pool[minimum + 2], pool[minimum + 3])
     moving = mover(table, watch, p, q)
@@ -287,48 +259,48 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, rooms, roots, asks):
         )
     if scene[2][0] >= 0:
         seat_given(table, watch, memory, p, roots, count, tracked)
-    elif table[watch + CORNERS] == 1:
+    elif manager.corners == 1:
         count = list_corners(
-            table, pool, watch, scene, memory[at + REACH], least, offsets, rooms[0], rooms[1], roots, count, rooms[4],
+            table, pool, watch, scene, known.reach, least, offsets, rooms[0], rooms[1], roots, count, rooms[4],
             tracked,
         )  # fmt: skip
     if scene[2][0] < 0 and any_deep(roots, count):
         drop_flush(table, pool, watch, memory, p, scene, roots, count, tracked)
-    if table[watch + MARK_AT] != 0 and least > 0.0 and table[pair + GIVEN_COUNT] > 0:
-        call_address(table[watch + MARK_AT], (table, pool, watch, p, q, tracked, roots, count))
+    if manager.mark_address[0] != 0 and least > 0.0 and pair.given_count > 0:
+        call_address(manager.mark_address[0], (table, pool, watch, p, q, tracked, roots, count))
         release_given(table, watch, memory, p, roots, count, tracked)
     rest, lowest, wanting = list_roots(table, pool, watch, memory, p, roots, count, tracked)
-    memory[at + CROSSED] = math.nan
+    known.crossed = math.nan
     if wires and asks != NEVER:
         # All that is as near as this is known, and most of it is listed.
-        memory[at + CROSSED] = 1.0 if lowest < -max(CROSSING, memory[OVERLAP]) else 0.0
+        known.crossed = 1.0 if lowest < -max(CROSSING, state.overlap) else 0.0
     elif asks == ALWAYS or (asks == WHERE_LOST and any_gone):
         crossed = crosses_elsewhere(
             table, pool, watch, memory, p, scene, roots, count, least, offsets, rooms[0], rooms[1], tracked
         )
-        memory[at + CROSSED] = 1.0 if crossed else 0.0
-    memory[at + ALLOWANCE] = max(min(rest, free), LEAST_ALLOWANCE)
-    memory[at + PART] = 0.0
-    memory[at + DOUBT] = 0.0
+        known.crossed = 1.0 if crossed else 0.0
+    known.allowance = max(min(rest, free), LEAST_ALLOWANCE)
+    known.part = 0.0
+    known.doubt = 0.0
     if wires:
-        sure = max(sure, STILL * memory[at + ALLOWANCE])
+        sure = max(sure, STILL * known.allowance)
     elif fertile < math.inf:
-        low = nearest_fold(roots, count, least, memory[at + REACH])
-        sure = 0.0 if low <= FLAT * pool[table[watch + LENGTHS] + FIRST_REACH] else math.inf
+        low = nearest_fold(roots, count, least, known.reach)
+        sure = 0.0 if low <= FLAT * lengths_at(pool, manager.lengths).first_reach else math.inf
         fertile = fertile if sure == 0.0 else min(fertile, low)
     allow_ball(memory, at, ball, fertile, sure)
     listed = any_listed(table, watch, memory, p)
-    memory[at + STATE] = float(TRACKING if listed else (NEAR if found else FAR))
+    known.state = float(TRACKING if listed else (NEAR if found else FAR))
     if wanting:
-        memory[CROWDED] = 1.0
+        state.crowded = 1.0
 
 
 @kernel(inner=True)
 def any_crossed(table, watch, memory):
     """Whether bodies were in each other at their last thorough look, where no contact says so."""
     at = memory_places(table, watch)[0]
-    for p in range(table[watch + PAIRS]):
-        if memory[at + PAIR_MEMORY * p + CROSSED] == 1.0:
+    for p in range(manager_at(table, watch).pairs):
+        if pair_state_at(memory, at + PAIR_MEMORY * p).crossed == 1.0:
             return True
     return False
 
@@ -336,29 +308,31 @@ def any_crossed(table, watch, memory):
 @kernel(inline=True)
 def is_by_patches(table, watch, p):
     """Whether pair p is looked at by patches, and not by the spines of two round wires."""
-    return table[table[watch + PAIR_TABLE] + PAIR_RECORD * p + SPINE_F] < 0
+    return pair_at(table, manager_at(table, watch).pair_table + PAIR_RECORD * p).spine_f < 0
 
 
 @kernel(inner=True)
 def is_due(table, watch, memory, p, tracked, how, most):
     """Whether pair p is to be looked at, now that it is known which parts of allowances are used; `most` used most."""
-    o = memory_places(table, watch)[0] + PAIR_MEMORY * p
-    part = memory[o + PART]
+    o = pair_state_at(memory, memory_places(table, watch)[0] + PAIR_MEMORY * p)
+    part = o.part
     if how & ~MEASURED == EVERYTHING:
-        due = part > 0.0 or math.isnan(memory[o + CROSSED])
+        due = part > 0.0 or math.isnan(o.crossed)
     else:
         much = SPENT if is_by_patches(table, watch, p) else USED
         due = part > (1.0 if how & SPARING != 0 else much)
         if how & IN_TURNS != 0:
             due = due or (p == most and part > USED)
-            due = due or (part > BRIEF and memory[o + CUT_SHORT] > memory[o + ALLOWANCE])
-        due = due or (how & CAREFUL != 0 and memory[o + DOUBT] > 1.0)
+            due = due or (part > BRIEF and o.cut_short > o.allowance)
+        due = due or (how & CAREFUL != 0 and o.doubt > 1.0)
     return due or any_lost(table, watch, memory, p, tracked)
 
 
 @kernel(inner=True, allocates=True)
 def look_at_due(table, pool, watch, memory, q, tracked, how, first, most):
     """Look at the pairs that are due, of which `first` is the first one."""
+    state = memory_header_at(memory, 0)
+    manager = manager_at(table, watch)
     stack = np.empty((STACK, 2), np.int64)
     roots = np.empty((ROOTS, ROOT))
     pairs = np.empty((BOXES, 2), np.int64)
@@ -370,22 +344,22 @@ def look_at_due(table, pool, watch, memory, q, tracked, how, first, most):
     distances = boxes[0]
     passed = boxes
     at = memory_places(table, watch)[0]
-    for p in range(first, table[watch + PAIRS]):
+    for p in range(first, manager.pairs):
         if p != first and not is_due(table, watch, memory, p, tracked, how, most):
             continue
-        if p != first and table[watch + CLOCK] != 0 and call_address(table[watch + CLOCK], ()) > memory[DEADLINE]:
+        if p != first and manager.clock != 0 and call_address(manager.clock, ()) > state.deadline:
             if table[watch + GO_ON_AT] == 0 or call_address(table[watch + GO_ON_AT], ()) == ABORTED:
                 # Who set it is told, and goes on in another call.
-                memory[DEADLINE] = -1.0
+                state.deadline = -1.0
                 break
-            memory[DEADLINE] = call_address(table[watch + CLOCK], ()) + SLICE
+            state.deadline = call_address(manager.clock, ()) + SLICE
         if is_by_patches(table, watch, p) and not with_patches:
             with_patches = True
             candidates = np.empty((CANDIDATES, 2), np.int64)
             distances = np.empty(CANDIDATES)
             passed = np.empty((WAYS, PASSED))
         asks = WHERE_LOST if how & DOUBTFUL != 0 else NEVER
-        if how & ~MEASURED == EVERYTHING or math.isnan(memory[at + PAIR_MEMORY * p + TURN]):
+        if how & ~MEASURED == EVERYTHING or math.isnan(pair_state_at(memory, at + PAIR_MEMORY * p).turn[0]):
             asks = ALWAYS
         rooms = (stack, candidates, distances, passed, work, pairs, boxes, marks)
         look_at_pair(table, pool, watch, memory, p, q, tracked, rooms, roots, asks)
@@ -398,15 +372,16 @@ def look(table, pool, watch, memory, q, tracked, how):
     Returns how many events that made. `tracked` has a row for every place (`proximity/features/solid_contact.py`), at
     the roots of the poses q or close by.
     """
-    before = memory[EVENT_COUNT]
-    memory[CALLS] += 1.0
+    state = memory_header_at(memory, 0)
+    before = state.event_count
+    state.calls += 1.0
     most = -1
     if how & MEASURED == 0:
         most = largest_part(table, pool, watch, memory, q)[0]
     else:
         most = used_most(table, watch, memory)
-    for p in range(table[watch + PAIRS]):
+    for p in range(manager_at(table, watch).pairs):
         if is_due(table, watch, memory, p, tracked, how, most):
             look_at_due(table, pool, watch, memory, q, tracked, how, p, most)
             break
-    return np.int64(memory[EVENT_COUNT] - before)
+    return np.int64(state.event_count - before)

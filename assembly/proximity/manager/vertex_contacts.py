@@ -17,19 +17,14 @@ from assembly.geometry.vec import cross, dot
 from assembly.proximity.brep.apexes import unit
 from assembly.proximity.brep.borders import feature_at, feature_kind
 from assembly.proximity.brep.records import EDGE, FACE
-from assembly.proximity.bvh.tree import ELEMENT, ELEMENT_FEATURE, ELEMENT_POOL, pairs_about
+from assembly.proximity.bvh.tree import ELEMENT, element_at, pairs_about, tree_at
 from assembly.proximity.extrema.feature_jets import edge_jet
 from assembly.proximity.features.holding import FEATURES, HELD_F, HELD_G, POINT, TILT
 from assembly.proximity.manager.extrema import (
-    CODE_F,
-    CODE_G,
-    CORNER,
-    GAP,
     NEW,
     NOTHING,
-    ORIGIN,
-    ROOT_NORMAL,
     add_root,
+    extremum_at,
     solids_root,
 )
 from assembly.proximity.manager.near_singular import into_valley
@@ -57,13 +52,14 @@ def hold_roots(table, pool, scene, roots, count, work):
     if count == roots.shape[0]:
         return
     for k in range(count):
-        codes = (np.int64(roots[k, CODE_F]), np.int64(roots[k, CODE_G]))
-        if roots[k, CORNER] > 0.0 or roots[k, GAP] < -SLACK or not is_corner(table, scene, codes[0], codes[1]):
+        extremum = extremum_at(roots, k)
+        codes = (np.int64(extremum.code_f), np.int64(extremum.code_g))
+        if extremum.corner > 0.0 or extremum.gap < -SLACK or not is_corner(table, scene, codes[0], codes[1]):
             continue
         x = (roots[k, 0], roots[k, 1], roots[k, 2], roots[k, 3])
-        n = (roots[k, ROOT_NORMAL], roots[k, ROOT_NORMAL + 1], roots[k, ROOT_NORMAL + 2])
+        n = (extremum.normal[0], extremum.normal[1], extremum.normal[2])
         found = solids_root(table, pool, scene, codes, x, n, roots, count, work, FEATURES)
-        roots[k, CORNER] = 0.0 if found == NOTHING else FEATURES
+        extremum.corner = 0.0 if found == NOTHING else FEATURES
 
 
 @kernel(inner=True)
@@ -79,7 +75,8 @@ def is_next(table, pool, scene, codes, side, start, width, roots, count):
         return False
     along = unit(along)
     for k in range(count):
-        if roots[k, CODE_F] == codes[0] and roots[k, CODE_G] == codes[1]:
+        extremum = extremum_at(roots, k)
+        if extremum.code_f == codes[0] and extremum.code_g == codes[1]:
             _p, other, _bent = edge_jet(table, pool, edge, roots[k, 2 * side])
             if dot(along, unit(other)) > NEXT:
                 return False
@@ -90,15 +87,16 @@ def is_next(table, pool, scene, codes, side, start, width, roots, count):
 def add_corner(table, pool, scene, codes, start, span, offsets, neglect, roots, count, work, holds):
     """Add the corner that holds on to two features, or to a point of an edge; how many roots there are then."""
     before = count
+    extremum = extremum_at(roots, before)
     count, _result = add_root(table, pool, scene, codes, start, (0.0, 0.0, 0.0), neglect, roots, count, work, holds)
     if count == before:
         return count
-    gap = roots[before, GAP]
+    gap = extremum.gap
     of_edges = feature_kind(table, scene[2][2], codes[0]) == feature_kind(table, scene[2][3], codes[1]) == EDGE
     stays = (-SLACK if of_edges else span[0]) <= gap <= span[1]
     if not stays or (gap < -SLACK and is_outside(table, pool, scene, roots, before, offsets)):
         return before
-    roots[before, ORIGIN] = NEW
+    extremum.origin = NEW
     return count
 
 
@@ -129,9 +127,9 @@ def add_corners(table, pool, scene, span, offsets, neglect, stack, candidates, r
     for c in range(min(found, candidates.shape[0])):
         if count == roots.shape[0]:
             break
-        o = table[tree_f + ELEMENT_POOL] + ELEMENT * candidates[c, 0]
-        p = table[tree_g + ELEMENT_POOL] + ELEMENT * candidates[c, 1]
-        codes = (np.int64(pool[o + ELEMENT_FEATURE]), np.int64(pool[p + ELEMENT_FEATURE]))
+        o = tree_at(table, tree_f).element_pool + ELEMENT * candidates[c, 0]
+        p = tree_at(table, tree_g).element_pool + ELEMENT * candidates[c, 1]
+        codes = (np.int64(element_at(pool, o).feature), np.int64(element_at(pool, p).feature))
         start = (pool[o], pool[o + 1], pool[p], pool[p + 1])
         if is_of_faces(table, scene, codes[0], codes[1]):
             half = (pool[o + 2], pool[o + 3], pool[p + 2], pool[p + 3])

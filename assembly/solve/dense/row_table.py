@@ -15,36 +15,18 @@ from assembly._kernel import kernel
 from assembly.constraints.program.evaluate import evaluate
 from assembly.constraints.program.objective_terms import objective
 from assembly.constraints.program.records import (
-    BODIES,
-    BODY_F,
-    BODY_G,
-    CONTACTS,
-    EXTRA,
     EXTRA_COLUMN,
     FREE_COLUMN,
     JOINT_ROW,
-    JOINTS,
-    KIND,
-    MOVING,
     ROW,
-    ROW_TABLE,
-    ROWS,
-    SECOND,
     SECOND_BODY_F,
     SECOND_BODY_G,
-    SLOTS,
-    TAPE_BODIES,
-    TAPE_LIST,
     TAPE_RECORD,
-    TAPE_ROOM,
-    TAPE_ROW_AT,
-    TAPE_TABLE,
-    TAPE_VALUES,
-    TAPES,
-    TRACKED,
-    TRIM_PAIR,
-    TRIMS,
-    VECTOR_TRIMS,
+    header_at,
+    joint_row_at,
+    row_at,
+    tape_at,
+    trim_row_at,
 )
 from assembly.proximity.extrema.lifted_pair import VARIABLES, VECTORS
 from assembly.proximity.features.solid_contact import CONTACT_RECORD, TRACK
@@ -66,50 +48,52 @@ def spread_block(packed, r, column, body, out):
 @kernel(inner=True)
 def spread_rows(table, free, count, packed, out):
     """All rows of the program's Jacobian, from the twists of their own bodies to all columns."""
-    m = table[ROWS]
+    header = header_at(table, 0)
+    m = header.rows
     for r in range(m + 4 * count):
         for j in range(out.shape[1]):
             out[r, j] = 0.0
     for r in range(m):
-        row = table[ROW_TABLE] + ROW * r
-        spread_block(packed, r, 0, table[row + BODY_F], out)
-        spread_block(packed, r, 6, table[row + BODY_G], out)
-        second = table[row + SECOND]
-        if table[row + KIND] == JOINT_ROW and second >= 0:
+        row = header.row_table + ROW * r
+        spread_block(packed, r, 0, row_at(table, row).body_f, out)
+        spread_block(packed, r, 6, row_at(table, row).body_g, out)
+        second = joint_row_at(table, row).second
+        if row_at(table, row).kind == JOINT_ROW and second >= 0:
             spread_block(packed, r, EXTRA_COLUMN, table[second + SECOND_BODY_F], out)
             spread_block(packed, r, EXTRA_COLUMN + 6, table[second + SECOND_BODY_G], out)
-    for k in range(table[CONTACTS]):
+    for k in range(header.contacts):
         if free[k] >= 0:
-            row = table[ROW_TABLE] + ROW * k
+            row = header.row_table + ROW * k
             e = m + 4 * free[k]
-            at = 6 * table[BODIES] + 4 * free[k]
+            at = 6 * header.bodies + 4 * free[k]
             for i in range(4):
-                spread_block(packed, e + i, 0, table[row + BODY_F], out)
-                spread_block(packed, e + i, 6, table[row + BODY_G], out)
+                spread_block(packed, e + i, 0, row_at(table, row).body_f, out)
+                spread_block(packed, e + i, 6, row_at(table, row).body_g, out)
                 out[k, at + i] = packed[k, FREE_COLUMN + i]
                 for j in range(4):
                     out[e + i, at + j] = packed[e + i, FREE_COLUMN + j]
-    for r in range(table[CONTACTS], table[CONTACTS] + table[TRIMS]):
-        k = table[table[ROW_TABLE] + ROW * r + TRIM_PAIR]
+    for r in range(header.contacts, header.contacts + header.trims):
+        k = trim_row_at(table, header.row_table + ROW * r).contact
         if free[k] >= 0:
             for j in range(4):
-                out[r, 6 * table[BODIES] + 4 * free[k] + j] = packed[r, FREE_COLUMN + j]
-    for t in range(table[TAPES]):
-        tape = table[TAPE_TABLE] + TAPE_RECORD * t
-        for v in range(table[tape + TAPE_VALUES]):
-            for b in range(2, table[tape + TAPE_BODIES]):
-                body = table[table[tape + TAPE_LIST] + b]
-                spread_block(packed, table[tape + TAPE_ROW_AT] + v, EXTRA_COLUMN + 6 * (b - 2), body, out)
+                out[r, 6 * header.bodies + 4 * free[k] + j] = packed[r, FREE_COLUMN + j]
+    for t in range(header.tapes):
+        tape = tape_at(table, header.tape_table + TAPE_RECORD * t)
+        for v in range(tape.values):
+            for b in range(2, tape.bodies):
+                body = table[tape.body_list + b]
+                spread_block(packed, tape.first_row + v, EXTRA_COLUMN + 6 * (b - 2), body, out)
 
 
 @kernel(inner=True, allocates=True)
 def new_point(table):
     """Room for a point of the loop, with as many rows as there can be."""
-    pairs = table[CONTACTS]
-    most = table[ROWS] + 4 * pairs
-    records = np.ones((pairs + table[JOINTS] + table[VECTOR_TRIMS], CONTACT_RECORD))
-    packed = np.zeros((most, EXTRA_COLUMN + 6 * table[EXTRA]))
-    return np.empty((table[BODIES], 7)), np.empty((table[TRACKED], TRACK)), records, np.zeros(most), packed
+    header = header_at(table, 0)
+    pairs = header.contacts
+    most = header.rows + 4 * pairs
+    records = np.ones((pairs + header.joints + header.vector_trims, CONTACT_RECORD))
+    packed = np.zeros((most, EXTRA_COLUMN + 6 * header.extra))
+    return np.empty((header.bodies, 7)), np.empty((header.tracked, TRACK)), records, np.zeros(most), packed
 
 
 @kernel(inner=True, allocates=True)
@@ -119,12 +103,13 @@ def point_at(table, pool, state, free):
 
     Parameters of contacts that are NaN are found by a global start, pairs at folds are freed, as the loop does.
     """
-    pairs = table[CONTACTS]
-    tracks = table[TRACKED]
+    header = header_at(table, 0)
+    pairs = header.contacts
+    tracks = header.tracked
     start = np.empty((tracks, TRACK))
     point = new_point(table)
     q, tracked, records, residual, _packed = point
-    o = table[TAPE_ROOM]
+    o = header.tape_room
     room = (np.empty(table[o]), np.empty(table[o + 1]), np.empty(table[o + 2]))
     loose = (
         free,
@@ -137,7 +122,7 @@ def point_at(table, pool, state, free):
     scaled_poses(table, pool, state, q)
     for k in range(tracks):
         for i in range(TRACK):
-            tracked[k, i] = state[7 * table[BODIES] + TRACK * k + i]
+            tracked[k, i] = state[7 * header.bodies + TRACK * k + i]
     for k in range(pairs):
         free[k] = -1
     count = 0
@@ -166,12 +151,13 @@ def rows_at(table, pool, state, free, residual, jacobian):
     residual (m + 4 contacts), jacobian (m + 4 contacts, 6 bodies + 4 contacts) : as many rows and columns are written
     as there are folds
     """
+    header = header_at(table, 0)
     lost, count, point, _loose, _room = point_at(table, pool, state, free)
     _q, tracked, _records, values, packed = point
-    for k in range(table[TRACKED]):
+    for k in range(header.tracked):
         for i in range(TRACK):
-            state[7 * table[BODIES] + TRACK * k + i] = tracked[k, i]
-    for r in range(table[ROWS] + 4 * count):
+            state[7 * header.bodies + TRACK * k + i] = tracked[k, i]
+    for r in range(header.rows + 4 * count):
         residual[r] = values[r]
     if lost < 0:
         spread_rows(table, free, count, packed, jacobian)
@@ -184,8 +170,9 @@ def gradient_at(table, pool, state, free, gradient, tips):
 
     `tips` is None where no term is a dexterity. Dexterities are left out where a contact has no pair.
     """
+    header = header_at(table, 0)
     found = point_at(table, pool, state, free)
-    integers, doubles = size_of_shape(table, table[ROWS] + 4 * found[1], 6 * table[MOVING] + 4 * found[1])
+    integers, doubles = size_of_shape(table, header.rows + 4 * found[1], 6 * header.moving + 4 * found[1])
     # The blocks outlive what is carved from them: they are arguments of the kernel that carves.
     return slopes_at(table, pool, free, found, tips, gradient, np.empty(integers, np.int64), np.empty(doubles))
 
@@ -193,9 +180,10 @@ def gradient_at(table, pool, state, free, gradient, tips):
 @kernel(inner=True, allocates=True)
 def slopes_at(table, pool, free, found, tips, gradient, integers, doubles):
     """The same at a point that `point_at` found, with what it works in."""
+    header = header_at(table, 0)
     lost, count, point, loose, room = found
-    rows = table[ROWS] + 4 * count
-    n = 6 * table[MOVING] + 4 * count
+    rows = header.rows + 4 * count
+    n = 6 * header.moving + 4 * count
     shape = shape_of(table, rows, n, table[:0], integers, doubles)
     arrange(table, free, shape, rows, n)
     slopes = np.empty(n)
@@ -204,8 +192,8 @@ def slopes_at(table, pool, free, found, tips, gradient, integers, doubles):
         value = goal(table, pool, shape, rows, loose, room, tips, point, 1, slopes, curves)
     else:
         value = objective(table, pool, point[0], 1, room, shape[2], slopes, curves)
-    for b in range(table[BODIES]):
-        s = table[table[SLOTS] + b]
+    for b in range(header.bodies):
+        s = table[header.slots + b]
         for k in range(6):
             gradient[6 * b + k] = slopes[6 * s + k] if s >= 0 else 0.0
     return value

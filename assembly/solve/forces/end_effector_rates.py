@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from assembly._kernel import kernel
-from assembly.constraints.program.objective_terms import TERM_PARAMETERS, TERM_TAPE
-from assembly.constraints.program.records import EXTRA, MOVING, ROWS
+from assembly.constraints.program.objective_terms import term_at
+from assembly.constraints.program.records import header_at
 from assembly.solve.dense.row_table import point_at
 from assembly.solve.linear_algebra.singular_values import measure_jacobian
-from assembly.solve.loop.dexterity import DEPENDENT, DIRECTION, MEASURE, tip_map
+from assembly.solve.loop.dexterity import DEPENDENT, DIRECTION, dexterity_at, tip_map
 from assembly.solve.loop.residuals import place_rows
 
 
@@ -19,16 +19,18 @@ def tip_at(table, pool, term, state, free, jacobian):
 
     Returns a contact that has no pair there or -1, an outcome of `dexterity.tip_map`, and the measure.
     """
+    header = header_at(table, 0)
+    term_record = term_at(table, term)
     lost, count, point, _loose, _room = point_at(table, pool, state, free)
     if lost >= 0:
         return lost, DEPENDENT, 0.0
-    rows = table[ROWS] + 4 * count
-    bases = np.empty((rows, 3 + table[EXTRA]), np.int64)
+    rows = header.rows + 4 * count
+    bases = np.empty((rows, 3 + header.extra), np.int64)
     place_rows(table, free, bases, np.empty(rows, np.int64))
     outcome, found, _used, _inputs, _adjoint = tip_map(
-        table, pool, term, bases, rows, 6 * table[MOVING] + 4 * count, point, 1
+        table, pool, term, bases, rows, 6 * header.moving + 4 * count, point, 1
     )
     jacobian[:] = found
-    measure = table[table[term + TERM_TAPE] + MEASURE]
-    value = measure_jacobian(measure, pool, table[term + TERM_PARAMETERS] + DIRECTION, found, np.empty(found.shape))
+    measure = dexterity_at(table, term_record.tape).measure
+    value = measure_jacobian(measure, pool, term_record.parameters + DIRECTION, found, np.empty(found.shape))
     return lost, outcome, value

@@ -15,7 +15,7 @@ from assembly._address import call_address
 from assembly._kernel import kernel
 from assembly.constraints.program.block_factor import greatest_diagonal
 from assembly.constraints.program.envelope import listed_folds, place_upper
-from assembly.constraints.program.hessian_blocks import FACTORIZE_AT, SOLVE_AT, is_blocked
+from assembly.constraints.program.hessian_blocks import blocks_at, is_blocked
 
 
 @kernel(inline=True)
@@ -92,7 +92,7 @@ def forward_step(matrix, n, order, b):
     places, vector, blocks = order[0], order[2][0], order[3]
     place, ends = places[1], places[2]
     if is_blocked(order):
-        call_address(blocks[SOLVE_AT], (blocks, matrix[0], b, vector, 1))
+        call_address(blocks_at(blocks, 0).solve_address, (blocks, matrix[0], b, vector, 1))
         return
     if listed_folds(order) == 0:
         forward(matrix, n, ends, b)
@@ -110,7 +110,7 @@ def solve_step(matrix, n, order, b):
     places, vector, blocks = order[0], order[2][0], order[3]
     place, ends = places[1], places[2]
     if is_blocked(order):
-        call_address(blocks[SOLVE_AT], (blocks, matrix[0], b, vector, 0))
+        call_address(blocks_at(blocks, 0).solve_address, (blocks, matrix[0], b, vector, 0))
         return
     if listed_folds(order) == 0:
         substitute(matrix, n, ends, b)
@@ -144,7 +144,7 @@ def factorize_shifted(lagrangian, n, order, shift, matrix):
         if blocked:
             # What says where unknowns of pairs stand, and the vector, are free here.
             parts = (lagrangian, order[3], shift, matrix[0], order[0][1], order[2][0])
-            if call_address(order[3][FACTORIZE_AT], parts) == 1:
+            if call_address(blocks_at(order[3], 0).factorize_address, parts) == 1:
                 return shift
             shift = max(8.0 * shift, 1e-6)
             continue

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from assembly._kernel import kernel
-from assembly.constraints.program.records import BODIES, IMPLICIT, REFERENCE, SCALE
+from assembly.constraints.program.records import header_at, pool_header_at
 from assembly.solve.linear_algebra.factorize import greatest_on_diagonal
 from assembly.solve.loop.inertia import DOWNWARD
 from assembly.solve.loop.multipliers import strongest
 from assembly.solve.loop.residuals import turned
 from assembly.solve.loop.settings import (
-    CURVED,
-    FEASIBILITY,
     MOST_ROUNDING,
     ROUNDING,
-    SECOND_ORDER,
-    STATIONARITY,
     TESTED,
-    TICK,
+    results_at,
+    settings_at,
 )
 
 # A saddle is left from where the dual residual and the violation are no more.
@@ -28,10 +25,11 @@ GAIN = 0.5
 @kernel(inner=True)
 def reach_of(table, pool, q):
     """How far out the user's coordinates are, over the size."""
+    units = pool_header_at(pool, 0)
     reach = 0.0
-    for b in range(table[BODIES]):
+    for b in range(header_at(table, 0).bodies):
         for k in range(3):
-            reach = max(reach, abs(q[b, k] + pool[REFERENCE + k] / pool[SCALE]))
+            reach = max(reach, abs(q[b, k] + units.reference[k] / units.scale))
     return reach
 
 
@@ -39,7 +37,7 @@ def reach_of(table, pool, q):
 def rounding_at(table, pool, settings, here):
     """The violation that is none: what is asked for, or what rounding of coordinates and of whole turns violates."""
     reach = max(reach_of(table, pool, here[0]), turned(table, pool, here[1]))
-    return max(settings[FEASIBILITY], min(ROUNDING * reach, MOST_ROUNDING))
+    return max(settings_at(settings, 0).feasibility, min(ROUNDING * reach, MOST_ROUNDING))
 
 
 @kernel(inner=True)
@@ -53,9 +51,10 @@ def slope_rounding(program, here, lagrangian, n, rows, y):
 @kernel(inner=True)
 def is_near_saddle(table, settings, results, violation, dual):
     """Whether a solve is near a saddle that is to be left: steps toward one gain little, and are of no use."""
-    if settings[SECOND_ORDER] != TESTED or settings[TICK] == 1.0 or table[IMPLICIT] == 1:
+    limits = settings_at(settings, 0)
+    if limits.second_order != TESTED or limits.tick == 1.0 or header_at(table, 0).implicit == 1:
         return False
-    return results[CURVED] == DOWNWARD and violation <= OFF_SADDLE and dual <= NEAR_SADDLE
+    return results_at(results, 0).curved == DOWNWARD and violation <= OFF_SADDLE and dual <= NEAR_SADDLE
 
 
 @kernel(inner=True)
@@ -65,10 +64,11 @@ def has_arrived(program, settings, results, here, violation, last_violation, fea
     Of a start that was far out rows held to its rounding. They are to hold to that of where bodies are now, unless
     steps gain nothing more.
     """
+    limits = settings_at(settings, 0)
     table, pool = program[0], program[1]
     if is_near_saddle(table, settings, results, violation, dual):
         return True
-    if not (violation <= feasible and dual <= settings[STATIONARITY]):
+    if not (violation <= feasible and dual <= limits.stationarity):
         return False
-    gains = violation > settings[FEASIBILITY] and not violation > GAIN * last_violation
+    gains = violation > limits.feasibility and not violation > GAIN * last_violation
     return not gains or violation <= rounding_at(table, pool, settings, here)

@@ -28,16 +28,11 @@ from assembly._kernel import kernel
 from assembly.constraints.program.contact import TOUCHING
 from assembly.constraints.program.objective_terms import objective
 from assembly.constraints.program.records import (
-    CONTACTS,
-    IMPLICIT,
-    MOVING,
     RESULTS,
-    ROWS,
-    SCALE,
-    VECTOR_TRIMS,
-    WATCH,
+    header_at,
+    pool_header_at,
 )
-from assembly.proximity.features.solid_contact import FOLD
+from assembly.proximity.features.solid_contact import contact_record_at
 from assembly.proximity.manager.update import (
     AS_NEEDED,
     CAREFUL,
@@ -67,41 +62,20 @@ from assembly.solve.loop.multipliers import (
 from assembly.solve.loop.pauses import SHORT, pause
 from assembly.solve.loop.report import is_clear, keep, log
 from assembly.solve.loop.residuals import violation_of
-from assembly.solve.loop.restoration import LEAST_SHARE, SHARE, SOFTNESS, begin_way, step_back
+from assembly.solve.loop.restoration import LEAST_SHARE, begin_way, restoration_at, step_back
 from assembly.solve.loop.rollback import BEGINNINGS, LEFT, LONGER, SHORTER, begin_again, has_sunk
 from assembly.solve.loop.settings import (
-    ANY_POSE,
-    CARRIED,
-    CARRIES,
     CONTACT_LOST,
-    COUNT,
-    CULPRIT,
-    DUAL,
-    FIRST_SHIFT,
     FREE_BELOW,
-    FREE_TRIMS,
-    GATHER,
     INFEASIBLE,
     ITERATION_LIMIT,
-    ITERATIONS,
-    LAST_LOOK,
-    OBJECTIVE,
     OUT_OF_TIME,
-    PENALTY,
-    PENALTY_FLOOR,
-    RADIUS,
     RUNNING,
-    SCATTER,
     SOLVED,
     STALLED,
-    STATIONARITY,
-    STATUS,
     STRAYS,
-    TICK,
-    VIOLATION,
-)
-from assembly.solve.loop.settings import (
-    TOUCHING as TOUCHING_AT,
+    results_at,
+    settings_at,
 )
 from assembly.solve.loop.standstill import (
     bound_nearby,
@@ -149,17 +123,21 @@ def solve_program(table, pool, settings, state, history, tips):
 @kernel(inner=True, allocates=True)
 def run(table, pool, settings, state, history, tips, doubles, integers):
     """The same, with what it works in."""
-    pairs = table[CONTACTS]
-    m = table[ROWS]
+    header = header_at(table, 0)
+    limits = settings_at(settings, 0)
+    pairs = header.contacts
+    m = header.rows
     results = results_of(table, state)
     # What the watch of clearances knows, and whether there is one.
+    result = results_at(results, 0)
     memory = results[RESULTS:]
-    watched = table[WATCH] >= 0
+    watched = header.watch >= 0
     # Rows and variables grow by four for every free pair.
     rows = m
-    n = 6 * table[MOVING]
+    n = 6 * header.moving
     # The last pose that held is none yet.
     points, by_row, shape, loose, numbers, room, gram, way, system = carve_all(table, memory, doubles, integers)
+    progress = restoration_at(way, 0)
     here, trial, held = points
     y, better_y, active, forces, foreseen = by_row[2], by_row[3], by_row[4], by_row[5], by_row[6]
     weights = (active, forces, foreseen)
@@ -172,19 +150,19 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
 
     feasible = rounding_at(table, pool, settings, here)
     farthest = FAR * (1.0 + reach_of(table, pool, here[0])) if settings[STRAYS] == 1.0 else math.inf
-    tick = settings[TICK] == 1.0
+    tick = limits.tick == 1.0
     # A tick goes on with the last one, if that one's time was spent.
     begin, done, looks = begin_tick(table, settings, results, memory)
     clock = (begin, looks)
-    limit = int(settings[ITERATIONS]) - done
-    longest_tick = EXTRA_TIME * int(settings[ITERATIONS]) - done
-    mu = settings[PENALTY]
-    floor, asked = settings[PENALTY_FLOOR], 0
-    way[SOFTNESS] = 1e-2
+    limit = int(limits.iterations) - done
+    longest_tick = EXTRA_TIME * int(limits.iterations) - done
+    mu = limits.penalty
+    floor, asked = limits.penalty_floor, 0
+    progress.softness = 1e-2
     begin_way(way)
     # The first step of a tick needs about what that of the last one did; half of it is tried first.
-    shift = 2.0 * results[FIRST_SHIFT] if tick else 0.0
-    radius = settings[RADIUS]
+    shift = 2.0 * result.first_shift if tick else 0.0
+    radius = limits.radius
     violation = math.inf
     dual = math.inf
     value = math.inf
@@ -204,8 +182,8 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
     check_violation = math.inf
     iteration = 0
     alpha, cut = 0.0, 1.0
-    free_trims = settings[FREE_TRIMS] == 1.0
-    any_pose = settings[ANY_POSE] == 1.0
+    free_trims = limits.free_trims == 1.0
+    any_pose = limits.any_pose == 1.0
     # Whether what fails is led back onto its rows at the end.
     settles = not tick and (watched or any_pose)
     lingers = 0
@@ -224,7 +202,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
     looked_at = -1
     begun = 0
     # Whether other contacts are near than rows are placed for.
-    changed = watched and settings[GATHER] > 0.0 and results[SCATTER] == 1.0
+    changed = watched and limits.gather > 0.0 and result.scatter == 1.0
     # Whether it is known which parts of allowances are used here.
     measured = True
     while True:
@@ -236,7 +214,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             iteration += 1
             status = ended = RUNNING
             rows = m
-            mu, radius, leash, shift, last_dual = settings[PENALTY], settings[RADIUS], math.inf, 0.0, math.inf
+            mu, radius, leash, shift, last_dual = limits.penalty, limits.radius, math.inf, 0.0, math.inf
             restoring, restorations, cuts, room_left = False, 0, 0, math.inf
             check_at, check_violation = iteration + PATIENCE, math.inf
             lost, below, changed = np.int64(-1), FREE_BELOW, True
@@ -266,11 +244,11 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             changed = False
             rows, n, system, lost = rearrange(program, count, rows, here, y, better_y, active)
             if iteration == 0 and lost < 0:
-                let_touch(table, here, settings[TOUCHING_AT])
+                let_touch(table, here, limits.touching)
             gradient, lines, lagrangian, _factor = system
             kept = False
             # What was hard for other rows need not be for these.
-            floor, mu = settings[PENALTY_FLOOR], max(mu, settings[PENALTY_FLOOR])
+            floor, mu = limits.penalty_floor, max(mu, limits.penalty_floor)
             begin_way(way)
             if folded:
                 # Perhaps another one is lost.
@@ -281,19 +259,19 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         below = FREE_BELOW
         if lost >= 0 and free[lost] < 0:
             # A pair that is lost and cannot be freed (an idle row, a pole): nothing moves any more.
-            results[CULPRIT] = float(lost)
+            result.culprit = float(lost)
             status = CONTACT_LOST if folded else STALLED
         lost = np.int64(-1)
         residual = here[3]
         violation = off_rows(table, loose, one_sided, here, tick)
         value = goal(table, pool, shape, rows, loose, room, tips, here, 1, gradient, lagrangian)
         # Rows of vectors depend on one another: their multipliers drift where nothing keeps them short.
-        vectors = table[VECTOR_TRIMS] == 1
+        vectors = header.vector_trims == 1
         shortened = iteration > 0 and (alpha < 1.0 or vectors)
         # Which rows push is not known at a first start, nor of contacts, and a least move has none where all holds.
-        first = iteration == 0 and violation <= feasible and (mu > floor or table[IMPLICIT] == 1)
+        first = iteration == 0 and violation <= feasible and (mu > floor or header.implicit == 1)
         touches = first or (watched and not tick and violation <= TOUCHING)
-        good = max(0.0 if first else 0.1 * last_dual, settings[STATIONARITY] if touches else 0.0)
+        good = max(0.0 if first else 0.1 * last_dual, limits.stationarity if touches else 0.0)
         dual = choose_multipliers(
             shape, rows, here, shortened, vectors, touches, good, active, gradient, lines[0], gram, y, better_y
         )
@@ -315,9 +293,9 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             # Bodies were in each other there too, and nothing had asked: that is no place to return to.
             holds, leash = False, math.inf
         retreats = sunk and holds and ended == RUNNING and iteration < limit
-        looks_last = watched and settings[LAST_LOOK] == 1.0
+        looks_last = watched and limits.last_look == 1.0
         # What a whole step gains nothing of may be rounding.
-        stands = alpha * cut == 1.0 and dual > max(GAIN * last_dual, settings[STATIONARITY]) and violation <= feasible
+        stands = alpha * cut == 1.0 and dual > max(GAIN * last_dual, limits.stationarity) and violation <= feasible
         rounded = stands and dual <= slope_rounding(program, here, lagrangian, n, rows, y)
         unbalanced = 0.0 if rounded else dual
         arrived = has_arrived(program, settings, results, here, violation, last_violation, feasible, unbalanced)
@@ -330,7 +308,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
                     looked_at = iteration = iteration + 1
                     continue
             # Deeper than looks reach no row tells of a crossing.
-            status = STALLED if looks_last and any_crossed(table, table[WATCH], memory) else SOLVED
+            status = STALLED if looks_last and any_crossed(table, header.watch, memory) else SOLVED
             if status == SOLVED:
                 dual = least_multipliers(shape, rows, here, active, gradient, lines[0], gram, dual, y, better_y)
             break
@@ -385,7 +363,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
                 here, trial = trial, here
                 for r in range(rows):
                     better_y[r] = y[r]
-            elif way[SHARE] < LEAST_SHARE:
+            elif progress.share < LEAST_SHARE:
                 status = STALLED if ended == RUNNING else ended
                 continue
             kept = False
@@ -423,8 +401,8 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             mu = 1.0
             forget_objective(order, rows, y, gradient, lagrangian)
         # Where the last step gained so much that a second one by its factor will do, that is cheaper.
-        gain = 2.0 * max(violation / max(last_violation, feasible), dual / max(last_dual, settings[STATIONARITY]))
-        is_fresh = not (kept and gain * violation <= feasible and gain * dual <= settings[STATIONARITY])
+        gain = 2.0 * max(violation / max(last_violation, feasible), dual / max(last_dual, limits.stationarity))
+        is_fresh = not (kept and gain * violation <= feasible and gain * dual <= limits.stationarity)
         reach = min(radius, leash)
         if restoring:
             reach = min(reach, bound_nearby(way, violation, restored))
@@ -498,7 +476,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
                 # Perhaps a fold is near enough to matter; else nothing moves any more.
                 below = 0.3
                 for k in range(pairs):
-                    if free[k] < 0 and abs(here[2][k, FOLD]) < below and is_of_surfaces(table, k):
+                    if free[k] < 0 and abs(contact_record_at(here[2], k).fold) < below and is_of_surfaces(table, k):
                         lost = np.int64(k)
             if lost >= 0 and free[lost] < 0 and is_of_surfaces(table, lost):
                 # A look may put another contact in its place, time and again.
@@ -533,15 +511,15 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
 
     if folded and status == CONTACT_LOST:
         violation = math.inf
-    if settings[CARRIES] == 1.0 and status == OUT_OF_TIME and not violation <= feasible:
-        results[CARRIED] = float(1 + done + iteration)
+    if limits.carries == 1.0 and status == OUT_OF_TIME and not violation <= feasible:
+        result.carried = float(1 + done + iteration)
     at_end = (status, value, violation, dual, feasible, rows, holds)
     status, value, violation, dual = finish(
         program, settings, state, tips, here, trial, by_row, at_end, held, numbers, system, gram
     )
-    results[STATUS] = float(status)
-    results[COUNT] = float(min(iteration, limit) if ended != RUNNING else iteration)
-    results[OBJECTIVE] = value
-    results[VIOLATION] = violation * pool[SCALE]
-    results[DUAL] = dual
+    result.status = float(status)
+    result.count = float(min(iteration, limit) if ended != RUNNING else iteration)
+    result.objective = value
+    result.violation = violation * pool_header_at(pool, 0).scale
+    result.dual = dual
     return status

@@ -11,19 +11,11 @@ from assembly.constraints.program.contact import is_guard
 from assembly.constraints.program.evaluate import evaluate
 from assembly.constraints.program.objective_terms import recenter
 from assembly.constraints.program.records import (
-    BODIES,
-    CONTACTS,
-    IMPLICIT,
-    MOVING,
-    REFERENCE,
-    ROWS,
-    SCALE,
-    SLOTS,
-    TRACKED,
-    WATCH,
+    header_at,
+    pool_header_at,
 )
-from assembly.proximity.features.solid_contact import ALLOWED, FOLD, TRACK
-from assembly.proximity.manager.state import OVERLAP
+from assembly.proximity.features.solid_contact import TRACK, contact_record_at, tracked_at
+from assembly.proximity.manager.state import memory_header_at
 from assembly.proximity.manager.update import AS_NEEDED, SPARING
 from assembly.solve.loop.clearances import forget_guards, look_around, place_guards
 from assembly.solve.loop.contacts import free_folds, is_of_surfaces, start_contacts
@@ -32,17 +24,10 @@ from assembly.solve.loop.residuals import arrange
 from assembly.solve.loop.settings import (
     ASSEMBLES,
     CONTACT_LOST,
-    CULPRIT,
-    CURVED,
-    FREE_TRIMS,
-    GATHER,
     GATHERED,
-    HELD,
-    RECALL,
     RUNNING,
-    SCATTER,
-    TICK,
-    TOUCHING,
+    results_at,
+    settings_at,
 )
 from assembly.solve.loop.warm_start import recall
 from assembly.solve.loop.workspace import results_of, unknowns
@@ -51,25 +36,27 @@ from assembly.solve.loop.workspace import results_of, unknowns
 @kernel(inline=True)
 def read_state(table, pool, state, here, trial, y, better_y):
     """Poses, tracked values and multipliers of a state, scaled."""
-    size = pool[SCALE]
-    tracks = table[TRACKED]
-    o_tracked = 7 * table[BODIES]
+    units = pool_header_at(pool, 0)
+    header = header_at(table, 0)
+    size = units.scale
+    tracks = header.tracked
+    o_tracked = 7 * header.bodies
     o_y = o_tracked + TRACK * tracks
-    for b in range(table[BODIES]):
+    for b in range(header.bodies):
         for k in range(7):
             value = state[7 * b + k]
             if k < 3:
-                value = (value - pool[REFERENCE + k]) / size
+                value = (value - units.reference[k]) / size
             here[0][b, k] = value
             trial[0][b, k] = value
     recenter(table, pool, here[0])
     for k in range(tracks):
         for i in range(TRACK):
             here[1][k, i] = state[o_tracked + TRACK * k + i]
-    for k in range(table[CONTACTS]):
+    for k in range(header.contacts):
         # Before anything is evaluated no pair is near a fold.
-        here[2][k, FOLD] = 1.0
-    for r in range(table[ROWS]):
+        contact_record_at(here[2], k).fold = 1.0
+    for r in range(header.rows):
         here[3][r] = math.inf
         y[r] = state[o_y + r]
         better_y[r] = y[r]
@@ -78,12 +65,13 @@ def read_state(table, pool, state, here, trial, y, better_y):
 @kernel(inner=True)
 def let_touch(table, here, touching):
     """Let contacts of bodies that are in each other by no more than `touching` stay so: their rows hold."""
-    for k in range(table[CONTACTS]):
+    for k in range(header_at(table, 0).contacts):
+        pair = tracked_at(here[1], k)
         if is_guard(table, k) or not here[3][k] < 0.0:
             continue
-        allowed = here[1][k, ALLOWED] - here[3][k]
+        allowed = pair.allowed - here[3][k]
         if allowed <= touching:
-            here[1][k, ALLOWED] = allowed
+            pair.allowed = allowed
             here[3][k] = 0.0
 
 
@@ -96,23 +84,25 @@ def find_contacts(program, state, recalled, here, by_row, n, free_trims, sparing
     evaluated yet where a contact has no pair to begin with, or is at a fold.
     """
     table, pool, shape, loose, room = program
+    header = header_at(table, 0)
     free, lengths, memory = loose[0], loose[1], loose[5]
+    memory_header = memory_header_at(memory, 0)
     y, better_y, active = by_row[2], by_row[3], by_row[4]
-    watched = table[WATCH] >= 0
+    watched = header.watch >= 0
     came = False
     if watched:
         place_guards(table, memory, here, y, better_y, free, True)
     lost = start_contacts(table, pool, here[0], here[1], free, lengths)
     if watched and lost < 0:
-        memory[OVERLAP] = touching
+        memory_header.overlap = touching
         came = look_around(table, pool, memory, here, SPARING if sparing else AS_NEEDED)
-        memory[OVERLAP] = 0.0
+        memory_header.overlap = 0.0
         place_guards(table, memory, here, y, better_y, free, False)
     count = free_folds(table, pool, here[2], here[1], active, free, lengths, -1.0, -1, free_trims)
     if lost >= 0 or count > 0:
         return lost, False
     if watched:
-        arrange(table, free, shape, table[ROWS], n)
+        arrange(table, free, shape, header.rows, n)
     if recalled == 0 or came or not recall(table, state, recalled, here):
         lost = evaluate(table, pool, here[1], math.inf, loose, room, here)
         if lost < 0:
@@ -124,11 +114,12 @@ def find_contacts(program, state, recalled, here, by_row, n, free_trims, sparing
 def put_together(program, here, by_row):
     """Gather scattered bodies, and begin again from there; returns the contact that has no pair, or -1."""
     table, pool, shape, loose, room = program
+    header = header_at(table, 0)
     free, lengths, memory = loose[0], loose[1], loose[5]
     y, better_y = by_row[2], by_row[3]
-    watched = table[WATCH] >= 0
-    gather(table, pool, shape[0], table[SLOTS], here)
-    for k in range(table[CONTACTS]):
+    watched = header.watch >= 0
+    gather(table, pool, shape[0], header.slots, here)
+    for k in range(header.contacts):
         here[1][k, 0] = math.nan
     if watched:
         forget_guards(table, memory)
@@ -137,9 +128,9 @@ def put_together(program, here, by_row):
     if watched:
         look_around(table, pool, memory, here, AS_NEEDED)
         place_guards(table, memory, here, y, better_y, free, False)
-    if table[IMPLICIT] == 1:
+    if header.implicit == 1:
         recenter(table, pool, here[0])
-    for r in range(table[ROWS]):
+    for r in range(header.rows):
         y[r] = 0.0
         better_y[r] = 0.0
     return evaluate(table, pool, here[1], math.inf, loose, room, here)
@@ -152,27 +143,29 @@ def set_out(program, settings, state, here, by_row, n):
     Returns CONTACT_LOST, GATHERED or RUNNING, the contact that is lost or -1, and whether that one is at a fold, to be
     freed.
     """
+    limits = settings_at(settings, 0)
     table, _pool, shape, _loose, _room = program
     results = results_of(table, state)
-    results[CULPRIT] = -1.0
-    results[HELD] = 0.0
-    results[CURVED] = 0.0
-    free_trims = settings[FREE_TRIMS] == 1.0
-    tick = settings[TICK] == 1.0
+    result = results_at(results, 0)
+    result.culprit = -1.0
+    result.held = 0.0
+    result.curved = 0.0
+    free_trims = limits.free_trims == 1.0
+    tick = limits.tick == 1.0
     lost, evaluated = find_contacts(
-        program, state, int(settings[RECALL]), here, by_row, n, free_trims, tick, settings[TOUCHING]
+        program, state, int(limits.recall), here, by_row, n, free_trims, tick, limits.touching
     )
     # A tick begins where the last one ended: there a pair that Newton's method loses is at a fold.
     folded = lost >= 0 and evaluated and tick and is_of_surfaces(table, lost)
     status = CONTACT_LOST if lost >= 0 and not folded else RUNNING
-    results[SCATTER] = 1.0 if status == RUNNING and scattered(table, here[3], shape[1]) else 0.0
-    if settings[GATHER] > 0.0 and results[SCATTER] == 1.0:
+    result.scatter = 1.0 if status == RUNNING and scattered(table, here[3], shape[1]) else 0.0
+    if limits.gather > 0.0 and result.scatter == 1.0:
         lost = put_together(program, here, by_row)
         folded = False
-        status = GATHERED if settings[GATHER] == ASSEMBLES else RUNNING
+        status = GATHERED if limits.gather == ASSEMBLES else RUNNING
         status = CONTACT_LOST if lost >= 0 else status
     if status == CONTACT_LOST:
-        results[CULPRIT] = float(lost)
+        result.culprit = float(lost)
     return status, np.int64(lost if folded else -1), folded
 
 
@@ -183,13 +176,14 @@ def rearrange(program, count, before, here, y, better_y, active):
     Returns how many rows and unknowns there are, room for these, and which contact is lost at this point, or -1.
     """
     table, pool, shape, loose, room = program
+    header = header_at(table, 0)
     for r in range(before, y.size):
         # New rows of tangency say nothing yet: least squares leave them out.
         y[r] = 0.0
         better_y[r] = 0.0
         active[r] = 0.0
-    rows = table[ROWS] + 4 * count
-    n = 6 * table[MOVING] + 4 * count
+    rows = header.rows + 4 * count
+    n = 6 * header.moving + 4 * count
     arrange(table, loose[0], shape, rows, n)
     system = unknowns(n, shape[2])
     return rows, n, system, evaluate(table, pool, here[1], math.inf, loose, room, here)

@@ -10,52 +10,31 @@ from assembly._address import call_address
 from assembly._kernel import kernel
 from assembly.constraints.program.contact import is_of_solids
 from assembly.constraints.program.records import (
-    BODY_F,
-    BODY_G,
-    FIRST_GUARD,
-    GUARD_NUMBER,
-    GUARDS,
-    LOOK_AT,
-    MINIMUM,
-    PARTS_AT,
     ROW,
-    ROW_TABLE,
     SHELL_F,
-    STAYED_AT,
     SURFACE_F,
-    SURFACE_G,
-    WATCH,
-    WENT_AT,
+    contact_row_at,
+    header_at,
+    row_at,
 )
-from assembly.proximity.features.solid_contact import FOLD, SLACK, TRACK
+from assembly.proximity.features.solid_contact import TRACK, contact_record_at
 from assembly.proximity.manager.motion_bounds import STILL
 from assembly.proximity.manager.state import (
-    ALLOWANCE,
-    CLOCK,
-    CUT_SHORT,
-    DEADLINE,
     GO_ON_AT,
     IN_PLACE,
-    LAST_REACH,
-    LENGTHS,
-    NEGLECT,
-    PAIR_F,
-    PAIR_G,
     PAIR_MEMORY,
-    PAIR_MINIMUM,
     PAIR_RECORD,
     PAIR_SHELL_F,
     PAIR_SURFACE_F,
-    PAIR_TABLE,
-    PAIRS,
-    PART,
-    PLACE_GIVEN,
     PLACE_MEMORY,
-    PLACE_NUMBER,
-    REACH,
     SLICE,
-    TURN,
+    lengths_at,
+    manager_at,
+    memory_header_at,
     memory_places,
+    pair_at,
+    pair_state_at,
+    place_at,
 )
 from assembly.proximity.manager.update import USED
 from assembly.solve.loop.residuals import move
@@ -67,21 +46,24 @@ SLIGHTLY = 1e-5
 @kernel(inner=True)
 def clear_guards(table):
     """No row has a contact: so a packed scene is left, whose solutions have contacts of their own."""
-    for k in range(table[FIRST_GUARD], table[FIRST_GUARD] + table[GUARDS]):
-        row = table[ROW_TABLE] + ROW * k
-        table[row + BODY_F] = -1
-        table[row + BODY_G] = -1
-        table[row + GUARD_NUMBER] = 0
+    header = header_at(table, 0)
+    for k in range(header.first_guard, header.first_guard + header.guards):
+        row = header.row_table + ROW * k
+        fields = row_at(table, row)
+        fields.body_f = -1
+        fields.body_g = -1
+        contact_row_at(table, row).guard_number = 0
 
 
 @kernel(inner=True)
 def forget_guards(table, memory):
     """Begin again: nothing has been looked at, and no contact has a place."""
-    watch = table[WATCH]
+    header = header_at(table, 0)
+    watch = header.watch
     pairs, places, _events = memory_places(table, watch)
-    for p in range(table[watch + PAIRS]):
-        memory[pairs + PAIR_MEMORY * p + TURN] = math.nan
-    for k in range(table[GUARDS]):
+    for p in range(manager_at(table, watch).pairs):
+        pair_state_at(memory, pairs + PAIR_MEMORY * p).turn[0] = math.nan
+    for k in range(header.guards):
         memory[places + PLACE_MEMORY * k] = -1.0
 
 
@@ -91,33 +73,39 @@ def place_guards(table, memory, here, y, better_y, free, begins):
 
     Where a solve begins, rows know no contacts yet, and multipliers are those of the places.
     """
-    watch = table[WATCH]
+    header = header_at(table, 0)
+    watch = header.watch
     places = memory_places(table, watch)[1]
-    for k in range(table[GUARDS]):
-        r = table[FIRST_GUARD] + k
-        row = table[ROW_TABLE] + ROW * r
+    for k in range(header.guards):
+        slot = place_at(memory, places + PLACE_MEMORY * k)
+        r = header.first_guard + k
+        contact_record = contact_record_at(here[2], r)
+        row = header.row_table + ROW * r
+        contact = contact_row_at(table, row)
+        fields = row_at(table, row)
         p = np.int64(memory[places + PLACE_MEMORY * k])
-        number = np.int64(memory[places + PLACE_MEMORY * k + PLACE_NUMBER]) if p >= 0 else 0
-        if number == table[row + GUARD_NUMBER]:
+        number = np.int64(slot.number) if p >= 0 else 0
+        if number == contact.guard_number:
             continue
-        table[row + GUARD_NUMBER] = number
+        contact.guard_number = number
         if not begins:
             y[r] = 0.0
             better_y[r] = 0.0
         free[r] = -1
         # Nothing is known of it yet.
-        here[2][r, FOLD] = 1.0
-        here[2][r, SLACK] = 0.0
+        contact_record.fold = 1.0
+        contact_record.slack = 0.0
         here[3][r] = 1.0
         if p < 0:
-            table[row + BODY_F] = -1
-            table[row + BODY_G] = -1
+            fields.body_f = -1
+            fields.body_g = -1
             continue
-        pair = table[watch + PAIR_TABLE] + PAIR_RECORD * p
-        table[row + BODY_F] = table[pair + PAIR_F]
-        table[row + BODY_G] = table[pair + PAIR_G]
-        in_place = memory[places + PLACE_MEMORY * k + PLACE_GIVEN] == 1.0
-        table[row + MINIMUM] = table[pair + PAIR_MINIMUM] + (IN_PLACE if in_place else 0)
+        pair = manager_at(table, watch).pair_table + PAIR_RECORD * p
+        pair_record = pair_at(table, pair)
+        fields.body_f = pair_record.body_f
+        fields.body_g = pair_record.body_g
+        in_place = slot.given == 1.0
+        contact.minimum = pair_record.minimum + (IN_PLACE if in_place else 0)
         for i in range(2):
             table[row + SURFACE_F + i] = table[pair + PAIR_SURFACE_F + i]
             table[row + SHELL_F + i] = table[pair + PAIR_SHELL_F + i]
@@ -131,16 +119,19 @@ def look_around(table, pool, memory, point, how):
     is cut (`solve/loop/deadline.py`), and so do those that come after it; they say that rows changed: nothing is known
     to hold.
     """
-    watch = table[WATCH]
-    asks = table[watch + GO_ON_AT] != 0 and table[watch + CLOCK] != 0
-    if asks and memory[DEADLINE] < 0.0:
+    header = header_at(table, 0)
+    state = memory_header_at(memory, 0)
+    watch = header.watch
+    manager = manager_at(table, watch)
+    asks = table[watch + GO_ON_AT] != 0 and manager.clock != 0
+    if asks and state.deadline < 0.0:
         return True
     if asks:
-        memory[DEADLINE] = call_address(table[watch + CLOCK], ()) + SLICE
-    changed = call_address(table[LOOK_AT], (table, pool, watch, memory, point[0], point[1], how)) > 0
-    aborted = asks and memory[DEADLINE] < 0.0
+        state.deadline = call_address(manager.clock, ()) + SLICE
+    changed = call_address(header.look_address, (table, pool, watch, memory, point[0], point[1], how)) > 0
+    aborted = asks and state.deadline < 0.0
     if asks and not aborted:
-        memory[DEADLINE] = math.inf
+        state.deadline = math.inf
     return changed or aborted
 
 
@@ -152,22 +143,23 @@ def look_again(table, pool, memory, point, how, free, scratch):
     been evaluated where they are, and they stay. One that is as far from the extremum that it stands for as two
     contacts are from each other may be on its way to a saddle, and goes there.
     """
+    header = header_at(table, 0)
     tracked = point[1]
-    first = table[FIRST_GUARD]
-    for r in range(first, first + table[GUARDS]):
+    first = header.first_guard
+    for r in range(first, first + header.guards):
         if free[r] >= 0:
             for i in range(TRACK):
                 scratch[r, i] = tracked[r, i]
     changed = look_around(table, pool, memory, point, how)
-    places = memory_places(table, table[WATCH])[1]
-    neglect = pool[table[table[WATCH] + LENGTHS] + NEGLECT]
-    for r in range(first, first + table[GUARDS]):
+    places = memory_places(table, header.watch)[1]
+    neglect = lengths_at(pool, manager_at(table, header.watch).lengths).neglect
+    for r in range(first, first + header.guards):
         place = places + PLACE_MEMORY * (r - first)
-        number = np.int64(memory[place + PLACE_NUMBER]) if memory[place] >= 0.0 else 0
-        if free[r] >= 0 and number == table[table[ROW_TABLE] + ROW * r + GUARD_NUMBER]:
-            row = table[ROW_TABLE] + ROW * r
-            f, g = table[row + SURFACE_F], table[row + SURFACE_G]
-            if call_address(table[STAYED_AT], (table, pool, f, g, tracked, scratch, r, neglect)) == 1:
+        number = np.int64(place_at(memory, place).number) if memory[place] >= 0.0 else 0
+        if free[r] >= 0 and number == contact_row_at(table, header.row_table + ROW * r).guard_number:
+            row = contact_row_at(table, header.row_table + ROW * r)
+            f, g = row.surface_f, row.surface_g
+            if call_address(header.stayed_address, (table, pool, f, g, tracked, scratch, r, neglect)) == 1:
                 for i in range(TRACK):
                     tracked[r, i] = scratch[r, i]
             else:
@@ -178,32 +170,35 @@ def look_again(table, pool, memory, point, how, free, scratch):
 @kernel(inner=True)
 def numbers_of(table, out):
     """The numbers of the contacts that rows have now."""
-    for k in range(table[GUARDS]):
-        out[k] = table[table[ROW_TABLE] + ROW * (table[FIRST_GUARD] + k) + GUARD_NUMBER]
+    header = header_at(table, 0)
+    for k in range(header.guards):
+        out[k] = contact_row_at(table, header.row_table + ROW * (header.first_guard + k)).guard_number
 
 
 @kernel(inner=True)
 def go_back(table, memory, numbers):
     """Keep the contacts that rows had with these numbers; where others came or went, everything is looked at again."""
-    watch = table[WATCH]
+    header = header_at(table, 0)
+    watch = header.watch
     pairs, places, _events = memory_places(table, watch)
     same = True
-    for k in range(table[GUARDS]):
-        number = table[table[ROW_TABLE] + ROW * (table[FIRST_GUARD] + k) + GUARD_NUMBER]
+    for k in range(header.guards):
+        number = contact_row_at(table, header.row_table + ROW * (header.first_guard + k)).guard_number
         if number != numbers[k]:
             same = False
             memory[places + PLACE_MEMORY * k] = -1.0
     if not same:
-        for p in range(table[watch + PAIRS]):
-            memory[pairs + PAIR_MEMORY * p + TURN] = math.nan
+        for p in range(manager_at(table, watch).pairs):
+            pair_state_at(memory, pairs + PAIR_MEMORY * p).turn[0] = math.nan
 
 
 @kernel(inner=True)
 def measure(table, pool, memory, first, end, q):
     """Measure what pairs from first to before `end` used of their allowances. The largest part that is known."""
-    watch = table[WATCH]
-    most = call_address(table[PARTS_AT], (table, pool, watch, memory, first, end, q))
-    return memory[memory_places(table, watch)[0] + PAIR_MEMORY * most + PART]
+    header = header_at(table, 0)
+    watch = header.watch
+    most = call_address(header.parts_address, (table, pool, watch, memory, first, end, q))
+    return pair_state_at(memory, memory_places(table, watch)[0] + PAIR_MEMORY * most).part
 
 
 @kernel(inner=True)
@@ -214,35 +209,36 @@ def allowed_share(table, pool, memory, here, trial, step, share):
     of which pairs more is known by another look.
     """
     move(table, here[0], step, share, trial[0])
-    watch = table[WATCH]
-    if measure(table, pool, memory, 0, table[watch + PAIRS], trial[0]) <= 1.0:
+    watch = header_at(table, 0).watch
+    manager = manager_at(table, watch)
+    if measure(table, pool, memory, 0, manager.pairs, trial[0]) <= 1.0:
         return share, True
     at = memory_places(table, watch)[0]
     allowed = 1.0
-    for p in range(table[watch + PAIRS]):
+    for p in range(manager.pairs):
         # Of every pair by itself: one that is nearly spent, but hardly moves, is not in the way.
-        o = at + PAIR_MEMORY * p
-        end = memory[o + PART]
-        memory[o + CUT_SHORT] = end * memory[o + ALLOWANCE]
+        o = pair_state_at(memory, at + PAIR_MEMORY * p)
+        end = o.part
+        o.cut_short = end * o.allowance
         begin = end
         if end > USED:
             measure(table, pool, memory, p, p + 1, here[0])
-            begin = memory[o + PART]
-            memory[o + PART] = end
+            begin = o.part
+            o.part = end
         if end > max(begin, 1.0):
             allowed = min(allowed, max(0.95 - begin, 0.05) / (end - begin))
-        flank = pool[table[table[watch + PAIR_TABLE] + PAIR_RECORD * p + PAIR_MINIMUM] + 1]
-        most = min(flank, pool[table[watch + LENGTHS] + LAST_REACH])
-        if begin <= STILL and memory[o + REACH] >= min(memory[o + CUT_SHORT], most):
+        flank = pool[pair_at(table, manager.pair_table + PAIR_RECORD * p).minimum + 1]
+        most = min(flank, lengths_at(pool, manager.lengths).last_reach)
+        if begin <= STILL and o.reach >= min(o.cut_short, most):
             # It was looked at right here, as far as another look would.
-            memory[o + PART] = begin
+            o.part = begin
     return share * allowed, False
 
 
 @kernel(inner=True)
 def is_too_far(table, pool, memory, point):
     """Whether the poses of a point are farther than the watch allows."""
-    return measure(table, pool, memory, 0, table[table[WATCH] + PAIRS], point[0]) > 1.0
+    return measure(table, pool, memory, 0, manager_at(table, header_at(table, 0).watch).pairs, point[0]) > 1.0
 
 
 @kernel(inner=True)
@@ -252,13 +248,14 @@ def ends_unseen(table, pool, memory, before, after):
     What takes its place, where features meet, is not listed yet, and was no nearer: over such a step it could pass
     through, and be found at the far side, or nowhere.
     """
-    watch = table[WATCH]
+    header = header_at(table, 0)
+    watch = header.watch
     places = memory_places(table, watch)[1]
-    for k in range(table[GUARDS]):
-        r = table[FIRST_GUARD] + k
+    for k in range(header.guards):
+        r = header.first_guard + k
         p = np.int64(memory[places + PLACE_MEMORY * k])
         if p >= 0 and math.isnan(after[1][r, 0]) and not math.isnan(before[1][r, 0]) and is_of_solids(table, r):
             most = max(before[3][r], SLIGHTLY)
-            if call_address(table[WENT_AT], (table, pool, watch, p, before[0], after[0], most)) == 1:
+            if call_address(header.went_address, (table, pool, watch, p, before[0], after[0], most)) == 1:
                 return True
     return False

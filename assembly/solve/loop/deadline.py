@@ -11,9 +11,13 @@ import math
 
 from assembly._address import call_address
 from assembly._kernel import kernel
-from assembly.constraints.program.records import CLOCK_AT, WATCH
-from assembly.proximity.manager.state import CLOCK, DEADLINE, EARLIER, GO_ON_AT, LOOKS, PAIRS
-from assembly.solve.loop.settings import ASK_AT, BUDGET, CARRIED, CARRIES, TICK
+from assembly.constraints.program.records import header_at
+from assembly.proximity.manager.state import (
+    GO_ON_AT,
+    manager_at,
+    memory_header_at,
+)
+from assembly.solve.loop.settings import results_at, settings_at
 
 # No look begins, and no step from a pose that holds, where so much of a budget is spent: either may take as long as the
 # rest of it.
@@ -25,13 +29,14 @@ LOOKS_ALONE = 4
 @kernel(inline=True)
 def is_spent(table, settings, begin, part):
     """Whether so much of a tick's budget is spent."""
-    return settings[BUDGET] > 0.0 and call_address(table[CLOCK_AT], ()) - begin > part * settings[BUDGET]
+    limits = settings_at(settings, 0)
+    return limits.budget > 0.0 and call_address(header_at(table, 0).clock_address, ()) - begin > part * limits.budget
 
 
 @kernel(inline=True)
 def is_cut(table, memory):
     """Whether a look left out pairs that were due: then this call ends."""
-    return table[WATCH] >= 0 and memory[DEADLINE] < 0.0
+    return header_at(table, 0).watch >= 0 and memory_header_at(memory, 0).deadline < 0.0
 
 
 @kernel(inner=True)
@@ -41,23 +46,28 @@ def begin_tick(table, settings, results, memory):
     These are infinitely many where there is no budget, or a tick has to make a step: then looks take their time. Those
     of solves ask whether they are to go on (`solve/loop/clearances.py`).
     """
-    begin = call_address(table[CLOCK_AT], ()) if settings[BUDGET] > 0.0 else 0
-    is_new = results[CARRIED] == 0.0
-    done = 0 if is_new else int(results[CARRIED]) - 1
-    results[CARRIED] = 0.0
+    header = header_at(table, 0)
+    state = memory_header_at(memory, 0)
+    result = results_at(results, 0)
+    limits = settings_at(settings, 0)
+    manager = manager_at(table, header.watch)
+    begin = call_address(header.clock_address, ()) if limits.budget > 0.0 else 0
+    is_new = result.carried == 0.0
+    done = 0 if is_new else int(result.carried) - 1
+    result.carried = 0.0
     looks = math.inf
-    if table[WATCH] >= 0:
-        memory[DEADLINE] = math.inf
+    if header.watch >= 0:
+        state.deadline = math.inf
         # Looks of ticks are short, and with a budget end by it.
-        asks = settings[TICK] == 0.0
-        table[table[WATCH] + GO_ON_AT] = int(settings[ASK_AT]) if asks else 0
+        asks = limits.tick == 0.0
+        table[header.watch + GO_ON_AT] = int(limits.ask_address[0]) if asks else 0
         if asks:
-            table[table[WATCH] + CLOCK] = table[CLOCK_AT]
+            manager.clock = header.clock_address
         if is_new:
-            memory[EARLIER] = memory[LOOKS]
-        if settings[CARRIES] == 1.0 and memory[LOOKS] - memory[EARLIER] < LOOKS_ALONE * table[table[WATCH] + PAIRS]:
-            looks = memory[LOOKS]
-            memory[DEADLINE] = begin + HALF * settings[BUDGET]
+            state.earlier = state.looks
+        if limits.carries == 1.0 and state.looks - state.earlier < LOOKS_ALONE * manager.pairs:
+            looks = state.looks
+            state.deadline = begin + HALF * limits.budget
     return begin, done, looks
 
 
@@ -68,9 +78,9 @@ def may_end(table, settings, memory, clock, iteration, part):
     What it is to go on from after a step is as good as at its begin; without one, there has to be a look.
     """
     begin, looks = clock
-    if settings[CARRIES] == 0.0:
+    if settings_at(settings, 0).carries == 0.0:
         return False
-    if iteration == 0 and not (looks < math.inf and memory[LOOKS] > looks):
+    if iteration == 0 and not (looks < math.inf and memory_header_at(memory, 0).looks > looks):
         return False
     return is_cut(table, memory) or is_spent(table, settings, begin, part)
 
@@ -78,5 +88,6 @@ def may_end(table, settings, memory, clock, iteration, part):
 @kernel(inline=True)
 def set_deadline(table, settings, memory, begin):
     """After a step looks may end early."""
-    if settings[CARRIES] == 1.0 and table[WATCH] >= 0 and not is_cut(table, memory):
-        memory[DEADLINE] = begin + HALF * settings[BUDGET]
+    limits = settings_at(settings, 0)
+    if limits.carries == 1.0 and header_at(table, 0).watch >= 0 and not is_cut(table, memory):
+        memory_header_at(memory, 0).deadline = begin + HALF * limits.budget

@@ -22,26 +22,19 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly._record import place_of, record_dtype, record_view, size_of
 from assembly.constraints.program.evaluate import evaluate
 from assembly.constraints.program.objective_terms import (
     DEXTERITY,
     TERM,
-    TERM_BODY,
-    TERM_KIND,
-    TERM_PARAMETERS,
-    TERM_TAPE,
     load,
+    term_at,
 )
 from assembly.constraints.program.primitives import add_coordinate_hessian, coordinate
 from assembly.constraints.program.records import (
-    CONTACTS,
-    DRIVE,
-    ONE_SIDED,
     ROW,
-    ROW_TABLE,
-    ROWS,
-    TERM_TABLE,
-    TERMS,
+    header_at,
+    row_at,
 )
 from assembly.constraints.program.row_terms import add_row_terms
 from assembly.geometry.vec import add, cross, matvec, scale
@@ -53,11 +46,31 @@ from assembly.solve.loop.residuals import move, slot, times
 
 # The record of a term in the table: measure, task, number of inputs; then for each: kind, component, joint, angle,
 # bodies f and g.
-MEASURE, TASK, INPUTS, INPUT_LIST, INPUT = 0, 1, 2, 3, 6
+INPUT = 6
+DEXTERITY_TERM = record_dtype(
+    "i8",
+    measure=1,
+    task=1,
+    inputs=1,
+)
+dexterity_at = record_view(DEXTERITY_TERM)
+MEASURE = place_of(DEXTERITY_TERM, "measure")
+INPUT_LIST = size_of(DEXTERITY_TERM)
 POSITION, ROTATION, POSE = 0, 1, 2
 # Its parameters in the pool: weight, the tip on its body, factors of lengths and of turns, direction (6), then a factor
 # for every input.
-WEIGHT, ARM, LINEAR, ANGULAR, DIRECTION, FACTORS = 0, 1, 4, 5, 6, 12
+DEXTERITY_WEIGHTS = record_dtype(
+    "f8",
+    weight=1,
+    arm=3,
+    linear=1,
+    angular=1,
+    direction=6,
+)
+dexterity_weights_at = record_view(DEXTERITY_WEIGHTS)
+ARM = place_of(DEXTERITY_WEIGHTS, "arm")
+DIRECTION = place_of(DEXTERITY_WEIGHTS, "direction")
+FACTORS = size_of(DEXTERITY_WEIGHTS)
 # Outcomes of `tip_map`.
 DETERMINED, DEPENDENT, OPEN = 0, 1, 2
 # What rows may change by unit rates of the inputs, and how much of the tip's motion may be left open.
@@ -73,7 +86,7 @@ def input_row(table, at, records, tracked, b, r):
     """Row r of b: the gradient of an input's coordinate."""
     angle = table[at + 3]
     near = tracked[angle, 0] if angle >= 0 else 0.0
-    k = table[CONTACTS] + table[at + 2]
+    k = header_at(table, 0).contacts + table[at + 2]
     _value, n, arm_f, arm_g, h = coordinate(table[at], table[at + 1], records, k, near)
     for side in range(2):
         s = slot(table, table[at + 4 + side])
@@ -94,6 +107,7 @@ def task_rows(task):
 @kernel(inner=True)
 def tip_velocity(pool, o, task, p, v, s, out, column):
     """Column of out: the tip's velocity for rates v; s is the place of its body's twist, p its arm."""
+    weights = dexterity_weights_at(pool, o)
     for i in range(task_rows(task)):
         out[i, column] = 0.0
     if s < 0:
@@ -102,20 +116,21 @@ def tip_velocity(pool, o, task, p, v, s, out, column):
     swept = cross(w, p)
     if task != ROTATION:
         for i in range(3):
-            out[i, column] = pool[o + LINEAR] * (v[s + i] + swept[i])
+            out[i, column] = weights.linear * (v[s + i] + swept[i])
     if task != POSITION:
         first = 0 if task == ROTATION else 3
         for i in range(3):
-            out[first + i, column] = pool[o + ANGULAR] * w[i]
+            out[first + i, column] = weights.angular * w[i]
 
 
 @kernel(inner=True)
 def add_tip_force(pool, o, task, p, w, column, s, out):
     """out += T^T w, with w a column over the task."""
+    weights = dexterity_weights_at(pool, o)
     if s < 0:
         return
     if task != ROTATION:
-        f = (pool[o + LINEAR] * w[0, column], pool[o + LINEAR] * w[1, column], pool[o + LINEAR] * w[2, column])
+        f = (weights.linear * w[0, column], weights.linear * w[1, column], weights.linear * w[2, column])
         turn = cross(p, f)
         for i in range(3):
             out[s + i] += f[i]
@@ -123,19 +138,20 @@ def add_tip_force(pool, o, task, p, w, column, s, out):
     if task != POSITION:
         first = 0 if task == ROTATION else 3
         for i in range(3):
-            out[s + 3 + i] += pool[o + ANGULAR] * w[first + i, column]
+            out[s + 3 + i] += weights.angular * w[first + i, column]
 
 
 @kernel(inner=True)
 def add_tip_bend(pool, o, task, p, w, column, v, s, gradient):
     """gradient += w . (dT v), less half of what turns do not commute by."""
+    weights = dexterity_weights_at(pool, o)
     f = (0.0, 0.0, 0.0)
     moment = (0.0, 0.0, 0.0)
     if task != ROTATION:
-        f = scale(pool[o + LINEAR], (w[0, column], w[1, column], w[2, column]))
+        f = scale(weights.linear, (w[0, column], w[1, column], w[2, column]))
     if task != POSITION:
         first = 0 if task == ROTATION else 3
-        moment = scale(pool[o + ANGULAR], (w[first, column], w[first + 1, column], w[first + 2, column]))
+        moment = scale(weights.angular, (w[first, column], w[first + 1, column], w[first + 2, column]))
     spin = (v[s + 3], v[s + 4], v[s + 5])
     bent = cross(p, cross(f, spin))
     turn = cross(add(moment, cross(p, f)), spin)
@@ -146,11 +162,12 @@ def add_tip_bend(pool, o, task, p, w, column, v, s, gradient):
 @kernel(inner=True, allocates=True)
 def used_rows(table, rows):
     """The rows that hold the mechanism together: neither drives nor one-sided; with those of free pairs."""
+    header = header_at(table, 0)
     used = np.empty(rows, np.int64)
     count = 0
     for r in range(rows):
-        row = table[ROW_TABLE] + ROW * r
-        if r >= table[ROWS] or (table[row + ONE_SIDED] == 0 and table[row + DRIVE] == 0):
+        row = row_at(table, header.row_table + ROW * r)
+        if r >= header.rows or (row.one_sided == 0 and row.drive == 0):
             used[count] = r
             count += 1
     return used[:count]
@@ -184,12 +201,14 @@ def tip_map(table, pool, term, bases, rows, n, point, order):
     tip needs (P, Y, A P), vectors in rows. What the tip needs, and so whether its motion is open, is found from order 1
     on.
     """
+    term_record = term_at(table, term)
     q, tracked, records, residual, jacobian = point
-    record = table[term + TERM_TAPE]
-    o = table[term + TERM_PARAMETERS]
-    body = table[term + TERM_BODY]
-    k = table[record + INPUTS]
-    task = table[record + TASK]
+    record = term_record.tape
+    dexterity_record = dexterity_at(table, record)
+    o = term_record.parameters
+    body = term_record.body
+    k = dexterity_record.inputs
+    task = dexterity_record.task
     m = task_rows(task)
     s = slot(table, body)
     arm = matvec(rotation(q, body), load(pool, o + ARM))
@@ -251,7 +270,7 @@ def bend(table, pool, record, shape, loose, room, point, forces, inputs, rates, 
             table[at],
             table[at + 1],
             point[2],
-            table[CONTACTS] + table[at + 2],
+            header_at(table, 0).contacts + table[at + 2],
             inputs[j],
             hessian,
             slot(table, table[at + 4]),
@@ -267,22 +286,24 @@ def bend(table, pool, record, shape, loose, room, point, forces, inputs, rates, 
 @kernel(inner=True, allocates=True)
 def dexterity(table, pool, term, shape, rows, loose, room, point, order, gradient):
     """Value of the term at a point whose rows are evaluated; from order 1 on its gradient is added."""
+    term_record = term_at(table, term)
     bases = shape[0]
     n = gradient.size
-    record = table[term + TERM_TAPE]
-    o = table[term + TERM_PARAMETERS]
-    task = table[record + TASK]
-    weight = pool[o + WEIGHT]
+    record = term_record.tape
+    dexterity_record = dexterity_at(table, record)
+    o = term_record.parameters
+    task = dexterity_record.task
+    weight = dexterity_weights_at(pool, o).weight
     outcome, jacobian, used, (v, z, changes), (p, y, loads) = tip_map(table, pool, term, bases, rows, n, point, order)
     if outcome != DETERMINED:
         return math.inf
     slopes = np.empty(jacobian.shape)
-    value = measure_jacobian(table[record + MEASURE], pool, o + DIRECTION, jacobian, slopes)
+    value = measure_jacobian(dexterity_record.measure, pool, o + DIRECTION, jacobian, slopes)
     if not math.isfinite(value):
         return math.inf
     if order == 0:
         return weight * value
-    body = table[term + TERM_BODY]
+    body = term_record.body
     s = slot(table, body)
     arm = matvec(rotation(point[0], body), load(pool, o + ARM))
     m, k = jacobian.shape
@@ -321,11 +342,12 @@ def dexterity(table, pool, term, shape, rows, loose, room, point, order, gradien
 @kernel(inner=True, allocates=True)
 def add_dexterities(table, pool, shape, rows, loose, room, here, order, gradient, hessian):
     """Values of all terms of this kind; from order 1 on gradients, and Hessians by differences of these."""
+    header = header_at(table, 0)
     value = 0.0
     n = gradient.size
-    for t in range(table[TERMS]):
-        term = table[TERM_TABLE] + TERM * t
-        if table[term + TERM_KIND] != DEXTERITY:
+    for t in range(header.terms):
+        term = header.term_table + TERM * t
+        if term_at(table, term).kind != DEXTERITY:
             continue
         slope = np.zeros(n)
         value += dexterity(table, pool, term, shape, rows, loose, room, here, order, slope)

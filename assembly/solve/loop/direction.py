@@ -6,7 +6,7 @@ import math
 
 from assembly._kernel import kernel
 from assembly.constraints.program.evaluate import evaluate
-from assembly.constraints.program.records import CONTACTS, MOVING, WATCH
+from assembly.constraints.program.records import header_at
 from assembly.constraints.program.row_terms import add_row_terms
 from assembly.solve.linear_algebra.factorize import factorize_shifted
 from assembly.solve.loop.line_search import damped_step
@@ -38,6 +38,7 @@ def aim(program, here, rows, y, mu, shift, radius, cuts, dual, violation, restor
     component and turn.
     """
     table, pool, shape, loose, room = program
+    header = header_at(table, 0)
     active, forces, foreseen = weights
     gradient, lines, lagrangian, matrix = system
     bases, one_sided, order, _of_rows = shape
@@ -56,12 +57,12 @@ def aim(program, here, rows, y, mu, shift, radius, cuts, dual, violation, restor
         # What the inertia needs falls with the distance to the solution. Where rows alone count and depend on each
         # other there, the squares of their slopes do, too; contacts of a clearance come and go instead.
         least, off = LEAST_SHIFT, dual
-        if restoring and violation < CLOSE and table[WATCH] < 0:
+        if restoring and violation < CLOSE and header.watch < 0:
             least, off = max(min(SHIFT * violation, least), TINIEST_SHIFT), violation
         shift = factorize_shifted(lagrangian, n, order, max(min(0.25 * shift, off), least), matrix)
         if shift < 0.0:
             return shift, shift, 0.0, 0.0
-    damps = table[CONTACTS] == 0 or cuts >= OFTEN
+    damps = header.contacts == 0 or cuts >= OFTEN
     used, longest, turn = damped_step(
         table, lagrangian, n, order, shift, radius, damps, matrix, descent, step, straight
     )
@@ -137,7 +138,7 @@ def leave_saddle(program, here, trial, number, system):
     if not factorize_shifted(lagrangian, n, shape[2], LEAST_SHIFT, matrix) > SADDLE:
         return False
     for i in range(n):
-        step[i] = KICK * math.sin(number + 1 + i) if i < 6 * table[MOVING] else 0.0
+        step[i] = KICK * math.sin(number + 1 + i) if i < 6 * header_at(table, 0).moving else 0.0
     move(table, here[0], step, 1.0, trial[0])
     carry(table, pool, shape[0], loose, here, trial, step, 1.0)
     return evaluate(table, pool, loose[4], math.inf, loose, room, trial) < 0

@@ -7,7 +7,7 @@ import math
 from assembly._kernel import kernel
 from assembly.constraints.program.evaluate import evaluate
 from assembly.constraints.program.objective_terms import recenter
-from assembly.constraints.program.records import IMPLICIT, ROWS, SCALE, WATCH
+from assembly.constraints.program.records import header_at, pool_header_at
 from assembly.proximity.manager.update import EVERYTHING, any_crossed
 from assembly.solve.loop.arrival import is_near_saddle
 from assembly.solve.loop.clearances import clear_guards, go_back, look_around, place_guards
@@ -16,22 +16,15 @@ from assembly.solve.loop.line_search import goal
 from assembly.solve.loop.multipliers import multipliers_at
 from assembly.solve.loop.report import bring_back, is_clear, judge, scaled_poses, write_pose, write_rows
 from assembly.solve.loop.settings import (
-    ANY_POSE,
-    CARRIED,
     CONTACT_LOST,
-    GATHER,
-    HELD,
-    IMPROPER,
     INFEASIBLE,
     ITERATION_LIMIT,
     OUT_OF_TIME,
-    RECALL,
-    SCATTER,
-    SECOND_ORDER,
     SOLVED,
     STALLED,
-    TICK,
     UNSURE,
+    results_at,
+    settings_at,
 )
 from assembly.solve.loop.warm_start import leave
 from assembly.solve.loop.workspace import results_of
@@ -44,7 +37,7 @@ def tells_crossing(table, pool, loose, room, here, y, better_y):
     look_around(table, pool, memory, here, EVERYTHING)
     place_guards(table, memory, here, y, better_y, free, False)
     lost = evaluate(table, pool, here[1], math.inf, loose, room, here)
-    return lost >= 0 or not is_clear(table, here[3]) or any_crossed(table, table[WATCH], memory)
+    return lost >= 0 or not is_clear(table, here[3]) or any_crossed(table, header_at(table, 0).watch, memory)
 
 
 @kernel(inner=True)
@@ -52,7 +45,7 @@ def return_to(table, pool, held, numbers, loose, rows, here, y, better_y, tick):
     """Back to the last pose that held; what is near there is looked for again."""
     memory, free = loose[5], loose[0]
     bring_back(held, rows, here, y)
-    if table[WATCH] >= 0:
+    if header_at(table, 0).watch >= 0:
         go_back(table, memory, numbers)
         if not tick:
             look_around(table, pool, memory, here, EVERYTHING)
@@ -66,37 +59,40 @@ def finish(program, settings, state, tips, here, trial, by_row, at_end, held, nu
     `at_end`: these where the loop ended, what of a violation is none, how many rows there are, whether `held` has a
     pose.
     """
+    limits = settings_at(settings, 0)
     table, pool, shape, loose, room = program
+    header = header_at(table, 0)
     gradient, lines, lagrangian, _matrix = system
     y, better_y, active, forces = by_row[2], by_row[3], by_row[4], by_row[5]
     status, value, violation, dual, feasible, rows, holds = at_end
     results = results_of(table, state)
-    tick = settings[TICK] == 1.0
-    watched = table[WATCH] >= 0
+    result = results_at(results, 0)
+    tick = limits.tick == 1.0
+    watched = header.watch >= 0
     tells = watched and not tick and status != SOLVED and status != CONTACT_LOST
     crosses = tells and tells_crossing(table, pool, loose, room, here, y, better_y)
     fails = status == STALLED or status == ITERATION_LIMIT or status == INFEASIBLE
-    is_wish = settings[ANY_POSE] == 1.0 and (fails or status == SOLVED) and not crosses
-    if holds and ((tick and not violation <= feasible and results[CARRIED] == 0.0) or crosses):
+    is_wish = limits.any_pose == 1.0 and (fails or status == SOLVED) and not crosses
+    if holds and ((tick and not violation <= feasible and result.carried == 0.0) or crosses):
         return_to(table, pool, held, numbers, loose, rows, here, y, better_y, tick)
-        results[HELD] = 1.0
-    gathered = table[IMPLICIT] == 1 and settings[GATHER] > 0.0 and results[SCATTER] == 1.0
+        result.held = 1.0
+    gathered = header.implicit == 1 and limits.gather > 0.0 and result.scatter == 1.0
     if gathered:
         # The way from where bodies were gathered was as short as could be; it is measured from where they were given.
         scaled_poses(table, pool, state, trial[0])
         recenter(table, pool, trial[0])
     write_pose(table, pool, here[0], state)
-    if status != CONTACT_LOST and not (tick and results[HELD] == 0.0):
+    if status != CONTACT_LOST and not (tick and result.held == 0.0):
         # A tick that went well ends at a pose that was just evaluated.
         bound = 1.25 * feasible
         good, violation = judge(table, pool, state, loose, room, shape, rows, here, trial, bound, tick)
         is_cut_short = status == OUT_OF_TIME and not tick
         if (is_wish or is_cut_short) and holds and not good and not watched:
             return_to(table, pool, held, numbers, loose, rows, here, y, better_y, tick)
-            results[HELD] = 1.0
+            result.held = 1.0
             write_pose(table, pool, here[0], state)
             good, violation = judge(table, pool, state, loose, room, shape, rows, here, trial, bound, tick)
-        if is_wish and good and (fails or results[HELD] == 1.0):
+        if is_wish and good and (fails or result.held == 1.0):
             status = SOLVED
             value = goal(table, pool, shape, rows, loose, room, tips, trial, 1, gradient, lagrangian)
             dual = multipliers_at(shape, rows, trial, active, gradient, lines[0], gram, y)
@@ -104,13 +100,13 @@ def finish(program, settings, state, tips, here, trial, by_row, at_end, held, nu
             value = goal(table, pool, shape, rows, loose, room, tips, trial, 0, gradient, lagrangian)
         if status == SOLVED and not good:
             status = UNSURE if is_near_saddle(table, settings, results, violation, dual) else STALLED
-    results[IMPROPER] = write_rows(table, here, y, loose, tick, pool[SCALE], state)
-    if settings[SECOND_ORDER] > 0.0 and results[HELD] + results[CARRIED] == 0.0 and status != CONTACT_LOST:
+    result.improper = write_rows(table, here, y, loose, tick, pool_header_at(pool, 0).scale, state)
+    if limits.second_order > 0.0 and result.held + result.carried == 0.0 and status != CONTACT_LOST:
         status = test_end(program, settings, results, status, tips, here, rows, y, active, forces, system)
-    if settings[RECALL] > 0.0:
+    if limits.recall > 0.0:
         # With clearances what a tick ends with depends on rounding where wires wedge: there, rows are evaluated afresh.
         good = status == SOLVED if watched else status != CONTACT_LOST
-        leave(table, state, int(settings[RECALL]), here, good and results[HELD] == 0.0 and rows == table[ROWS])
+        leave(table, state, int(limits.recall), here, good and result.held == 0.0 and rows == header.rows)
     if watched:
         clear_guards(table)
     return status, value, violation, dual

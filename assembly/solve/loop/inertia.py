@@ -8,20 +8,17 @@ solve has made one. Rows that touch without pushing count for nothing: in the fa
 from __future__ import annotations
 
 from assembly._kernel import kernel
-from assembly.constraints.program.records import IMPLICIT
+from assembly.constraints.program.records import header_at
 from assembly.constraints.program.row_terms import add_row_terms
 from assembly.solve.linear_algebra.factorize import factorize_shifted
 from assembly.solve.loop.direction import LEAST_SHIFT
 from assembly.solve.loop.line_search import goal
 from assembly.solve.loop.multipliers import NEAR, WEAK, strongest
 from assembly.solve.loop.settings import (
-    CURVED,
-    FIRST_SHIFT,
-    PENALTY,
-    PENALTY_FLOOR,
     SOLVED,
-    TICK,
     UNSURE,
+    results_at,
+    settings_at,
 )
 
 # A factorization tells of the end with a shift up to this, at a point where the dual residual was no more than that.
@@ -49,29 +46,31 @@ def note_factor(settings, results, iteration, shift, dual, restoring, is_fresh, 
     One that is leaves one and a sum that tells which one-sided rows it had; one that tells of negative curvature is
     DOWNWARD: near an end a step tries a shift no larger than the dual residual first.
     """
+    result = results_at(results, 0)
     if iteration == 0:
-        results[FIRST_SHIFT] = shift
-    if not is_fresh or settings[TICK] == 1.0:
+        result.first_shift = shift
+    if not is_fresh or settings_at(settings, 0).tick == 1.0:
         return
     force = strongest(y, rows)
     # Weak multipliers are left out of the matrix (`multipliers.curve_rows`).
     bends = force >= WEAK or force <= IDLE
     if shift <= SMALL_SHIFT and dual <= NEAR_END and bends and not restoring:
-        results[CURVED] = 1.0 + pushing_sum(rows, one_sided, active, 0.0)
+        result.curved = 1.0 + pushing_sum(rows, one_sided, active, 0.0)
     else:
-        results[CURVED] = DOWNWARD if shift >= CLEAR_SHIFT > dual and not restoring else UNKNOWN
+        result.curved = DOWNWARD if shift >= CLEAR_SHIFT > dual and not restoring else UNKNOWN
 
 
 @kernel(inner=True)
 def told_convex(results, rows, one_sided, residual, y, scratch):
     """Whether the last factorization had the rows that push at the end, and none that only touches."""
-    if not results[CURVED] > 0.0:
+    result = results_at(results, 0)
+    if not result.curved > 0.0:
         return False
     for r in range(rows):
         scratch[r] = -y[r]
         if one_sided[r] == 1 and abs(residual[r]) <= NEAR and y[r] >= -IDLE:
             return False
-    return results[CURVED] == 1.0 + pushing_sum(rows, one_sided, scratch, IDLE)
+    return result.curved == 1.0 + pushing_sum(rows, one_sided, scratch, IDLE)
 
 
 @kernel(inner=True)
@@ -93,17 +92,19 @@ def test_end(program, settings, results, status, tips, here, rows, y, active, fo
     Of a tick that is asked for it the result says whether its end is a minimum. A first solve that ends where it began
     is looked at: what it is may be decided by higher orders. Scenes without an objective are left as they are.
     """
+    result = results_at(results, 0)
+    limits = settings_at(settings, 0)
     table, _pool, shape, _loose, _room = program
-    tick = settings[TICK] == 1.0
-    if not tick and (status != SOLVED or table[IMPLICIT] == 1):
+    tick = limits.tick == 1.0
+    if not tick and (status != SOLVED or header_at(table, 0).implicit == 1):
         return status
-    mu = settings[PENALTY_FLOOR]
+    mu = limits.penalty_floor
     if not tick:
-        if results[CURVED] == DOWNWARD or (results[CURVED] == 0.0 and settings[PENALTY] > mu):
+        if result.curved == DOWNWARD or (result.curved == 0.0 and limits.penalty > mu):
             return UNSURE
         if told_convex(results, rows, shape[1], here[3], y, forces):
             return status
     shift = 0.0 if tick else LEAST_SHIFT
     convex = is_convex(program, tips, here, rows, y, active, system, mu, shift)
-    results[CURVED] = 1.0 if convex else -1.0
+    result.curved = 1.0 if convex else -1.0
     return status if tick or convex else UNSURE

@@ -18,21 +18,13 @@ from assembly._kernel import kernel
 from assembly.constraints.program.evaluate import joint_row
 from assembly.constraints.program.primitives import place_frames
 from assembly.constraints.program.records import (
-    ANGLE,
-    CONTACTS,
     EXTRA_COLUMN,
-    GATHER_TABLE,
-    JOINT,
     JOINT_RECORD,
     JOINT_ROW,
-    JOINT_TABLE,
-    KIND,
-    ONE_SIDED,
-    PARAMETERS,
     ROW,
-    ROW_TABLE,
-    ROWS,
-    SECOND,
+    header_at,
+    joint_row_at,
+    row_at,
 )
 from assembly.kinematics.motion import retract
 from assembly.solve.linear_algebra.factorize import factorize, substitute
@@ -51,8 +43,9 @@ LOWER = 0.9
 @kernel(inner=True)
 def scattered(table, residual, one_sided):
     """Whether a row of a joint is far from holding."""
-    for r in range(table[CONTACTS], table[ROWS]):
-        if table[table[ROW_TABLE] + ROW * r + KIND] == JOINT_ROW:
+    header = header_at(table, 0)
+    for r in range(header.contacts, header.rows):
+        if row_at(table, header.row_table + ROW * r).kind == JOINT_ROW:
             c = min(residual[r], 0.0) if one_sided[r] == 1 else residual[r]
             if abs(c) > SCATTERED:
                 return True
@@ -62,14 +55,16 @@ def scattered(table, residual, one_sided):
 @kernel(inner=True)
 def place_joint(table, pool, k, q, records):
     """The world frames of joint k."""
-    joint = table[JOINT_TABLE] + JOINT_RECORD * k
-    place_frames(pool, table[joint + 2], q, table[joint], table[joint + 1], records, table[CONTACTS] + k)
+    header = header_at(table, 0)
+    joint = header.joint_table + JOINT_RECORD * k
+    place_frames(pool, table[joint + 2], q, table[joint], table[joint + 1], records, header.contacts + k)
 
 
 @kernel(inline=True)
 def is_of(table, row, joint):
     """Whether a row is one of a joint alone; of any where `joint` is negative."""
-    return joint < 0 or (table[row + JOINT] == joint and table[row + SECOND] < 0)
+    joint_there = joint_row_at(table, row)
+    return joint < 0 or (joint_there.joint == joint and joint_there.second < 0)
 
 
 @kernel(inner=True)
@@ -79,15 +74,16 @@ def body_rows(table, pool, first, count, joint, point):
     cost = 0.0
     for l in range(first, first + count):
         r = table[l]
-        row = table[ROW_TABLE] + ROW * r
+        row = header_at(table, 0).row_table + ROW * r
+        joint_there = joint_row_at(table, row)
         if not is_of(table, row, joint):
             continue
-        second = table[row + SECOND]
-        place_joint(table, pool, table[row + JOINT], q, records)
+        second = joint_there.second
+        place_joint(table, pool, joint_there.joint, q, records)
         if second >= 0:
             place_joint(table, pool, table[second + 2], q, records)
         joint_row(table, pool, r, tracked, tracked, records, residual, jacobian)
-        if table[row + ONE_SIDED] == 0 or residual[r] < 0.0:
+        if row_at(table, row).one_sided == 0 or residual[r] < 0.0:
             cost += 0.5 * residual[r] * residual[r]
     return cost
 
@@ -96,10 +92,11 @@ def body_rows(table, pool, first, count, joint, point):
 def follow_drives(table, pool, first, count, tracked):
     """Driven angles of rows listed in the table are looked for near their values again."""
     for l in range(first, first + count):
-        row = table[ROW_TABLE] + ROW * table[l]
-        if table[row + ONE_SIDED] == 0 and table[row + SECOND] < 0 and table[row + ANGLE] >= 0:
-            o = table[row + PARAMETERS]
-            tracked[table[row + ANGLE], 0] = pool[o + 2] / pool[o]
+        row = header_at(table, 0).row_table + ROW * table[l]
+        joint = joint_row_at(table, row)
+        if row_at(table, row).one_sided == 0 and joint.second < 0 and joint.angle >= 0:
+            o = joint.parameters
+            tracked[joint.angle, 0] = pool[o + 2] / pool[o]
 
 
 @kernel(inner=True)
@@ -118,8 +115,9 @@ def body_row(bases, jacobian, r, s, out):
 def is_half_around(table, residual, first, count):
     """Whether an angle of rows listed in the table is far from where it is driven to."""
     for l in range(first, first + count):
-        row = table[ROW_TABLE] + ROW * table[l]
-        driven = table[row + ONE_SIDED] == 0 and table[row + SECOND] < 0 and table[row + ANGLE] >= 0
+        row = header_at(table, 0).row_table + ROW * table[l]
+        joint = joint_row_at(table, row)
+        driven = row_at(table, row).one_sided == 0 and joint.second < 0 and joint.angle >= 0
         if driven and abs(residual[table[l]]) > SCATTERED:
             return True
     return False
@@ -136,8 +134,8 @@ def normal_equations(table, bases, first, count, joint, s, point, room):
             matrix[i, j] = 0.0
     for l in range(first, first + count):
         r = table[l]
-        at = table[ROW_TABLE] + ROW * r
-        if not is_of(table, at, joint) or (table[at + ONE_SIDED] == 1 and residual[r] >= 0.0):
+        at = header_at(table, 0).row_table + ROW * r
+        if not is_of(table, at, joint) or (row_at(table, at).one_sided == 1 and residual[r] >= 0.0):
             continue
         body_row(bases, jacobian, r, s, row)
         for i in range(6):
@@ -198,10 +196,11 @@ def put_pose(q, body, pose):
 @kernel(inner=True, allocates=True)
 def gather(table, pool, bases, slots, point):
     """Move the bodies of the point one by one."""
+    header = header_at(table, 0)
     q, tracked, _records, residual, _jacobian = point
     room = (np.empty((6, 6)), np.empty((6, 6)), np.full(6, 5), np.empty(6), np.empty(6), np.empty(6))
-    o = table[GATHER_TABLE] + 1
-    for _entry in range(table[table[GATHER_TABLE]]):
+    o = header.gather_table + 1
+    for _entry in range(table[header.gather_table]):
         body = table[o]
         count = table[o + 1]
         first = o + 2
@@ -214,7 +213,7 @@ def gather(table, pool, bases, slots, point):
         best = pose_of(q, body)
         tried = -1
         for l in range(first, first + count):
-            joint = table[table[ROW_TABLE] + ROW * table[l] + JOINT]
+            joint = joint_row_at(table, header.row_table + ROW * table[l]).joint
             if cost <= ENOUGH:
                 break
             if joint == tried:

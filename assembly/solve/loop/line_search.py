@@ -10,9 +10,9 @@ from assembly._kernel import kernel
 from assembly.constraints.program.contact import MAY_GO, hold_all, is_guard, may_go
 from assembly.constraints.program.evaluate import evaluate
 from assembly.constraints.program.objective_terms import objective
-from assembly.constraints.program.records import MOVING, WATCH
+from assembly.constraints.program.records import header_at
 from assembly.proximity.extrema.face_face import BEND
-from assembly.proximity.features.solid_contact import STAYS
+from assembly.proximity.features.solid_contact import tracked_at
 from assembly.solve.linear_algebra.factorize import factorize_shifted, forward_step, solve_step
 from assembly.solve.loop.clearances import ends_unseen, is_too_far
 from assembly.solve.loop.dexterity import add_dexterities
@@ -44,7 +44,7 @@ def damped_step(table, lagrangian, n, order, shift, radius, damps, matrix, desce
         turn = 0.0
         for i in range(n):
             longest = max(longest, abs(step[i]))
-            if i % 6 >= 3 and i < 6 * table[MOVING]:
+            if i % 6 >= 3 and i < 6 * header_at(table, 0).moving:
                 turn = max(turn, abs(step[i]))
         excess = max(turn / TURN, longest / radius)
         if excess <= 1.5 or attempt == SHORTENINGS or not damps:
@@ -86,6 +86,7 @@ def search(program, tips, here, trial, rows, y, base, value, restoring, leave, m
     way for certain.
     """
     table, pool, shape, loose, room = program
+    header = header_at(table, 0)
     active, forces, _foreseen = weights
     lets_go, may_go_all = leave
     gradient, (descent, step, straight), lagrangian, matrix = system
@@ -107,13 +108,13 @@ def search(program, tips, here, trial, rows, y, base, value, restoring, leave, m
         move(table, here[0], step, alpha, trial[0])
         carry(table, pool, bases, loose, here, trial, step, alpha)
         known = may_go_all and alpha == 1.0 and bends == 0
-        if table[WATCH] >= 0 and not known and is_too_far(table, pool, loose[5], trial):
+        if header.watch >= 0 and not known and is_too_far(table, pool, loose[5], trial):
             # Bent, it would go farther than is known to be free.
             bends = 2
             alpha *= 0.5
             continue
         lost = evaluate(table, pool, loose[4], BEND, loose, room, trial)
-        if table[WATCH] >= 0 and not lets_go and lost < 0 and ends_unseen(table, pool, loose[5], here, trial):
+        if header.watch >= 0 and not lets_go and lost < 0 and ends_unseen(table, pool, loose[5], here, trial):
             # A tick has no last look, which would tell of what it led through.
             bends = 2
             alpha *= 0.5
@@ -141,8 +142,8 @@ def search(program, tips, here, trial, rows, y, base, value, restoring, leave, m
                     step[i] = straight[i]
         # A bent step may be longer than it was.
         short = lets_go and bends % 3 == 0 and alpha <= HALVED and alpha * longest < LETS_GO
-        if lost >= 0 and short and may_go(table, lost, residual) and here[1][lost, STAYS] >= 0.0:
-            here[1][lost, STAYS] = MAY_GO - here[1][lost, STAYS]
+        if lost >= 0 and short and may_go(table, lost, residual) and tracked_at(here[1], lost).stays >= 0.0:
+            tracked_at(here[1], lost).stays = MAY_GO - tracked_at(here[1], lost).stays
             continue
         alpha *= 0.5
         # A pair near a fold is freed; a clearance's is given up where its gap does not close.

@@ -6,7 +6,7 @@ import math
 
 from assembly._kernel import kernel
 from assembly.constraints.program.envelope import clear_upper
-from assembly.constraints.program.records import CONTACTS, TRIMS
+from assembly.constraints.program.records import header_at
 from assembly.constraints.program.row_terms import add_square
 from assembly.solve.linear_algebra.factorize import factorize, factorize_shifted, solve_step, substitute
 from assembly.solve.loop.residuals import add_row, add_transposed, clear_row, times
@@ -57,12 +57,13 @@ def foresee(table, shape, rows, residual, jacobian, y, mu, step, in_matrix, acti
 
     Their sign is that of y + (c + J step) / mu. Returns how many rows changed.
     """
+    header = header_at(table, 0)
     bases, one_sided = shape[0], shape[1]
     changed = 0
     for r in range(rows):
         if one_sided[r] == 0 or (active[r] > 0.0 and foreseen[r] == 0.0):
             continue
-        if table[CONTACTS] <= r < table[CONTACTS] + table[TRIMS]:
+        if header.contacts <= r < header.contacts + header.trims:
             # Their slopes change too fast for that.
             continue
         pushes = y[r] + (residual[r] + times(bases, jacobian, r, step)) / mu < 0.0

@@ -7,19 +7,20 @@ import math
 from assembly._kernel import kernel
 from assembly.constraints.program.contact import copy_tracked, is_guard
 from assembly.constraints.program.records import (
-    BODY_F,
-    CONTACTS,
     FREE_COLUMN,
-    MINIMUM,
     ROW,
-    ROW_TABLE,
-    SHELL_F,
     SURFACE_F,
-    TRACKED,
+    contact_row_at,
+    header_at,
+    row_at,
 )
 from assembly.geometry.splines.domain import into_domain
-from assembly.proximity.extrema.rates import RATES, ZED
-from assembly.proximity.features.solid_contact import CONTACT_RECORD, IDLE, PAIR_GAP, SLACK
+from assembly.proximity.extrema.rates import ZED, derivatives_at
+from assembly.proximity.features.solid_contact import (
+    CONTACT_RECORD,
+    contact_record_at,
+    tracked_at,
+)
 from assembly.solve.loop.residuals import times
 
 
@@ -39,10 +40,10 @@ def stays_open(table, pool, bases, k, here, trial, d, alpha):
 
     No gap changes by more than points of the two bodies go, those of each seen from where they were.
     """
-    left = here[2][k, SLACK]
+    left = contact_record_at(here[2], k).slack
     if not left > 0.0 or bases[k, 2] >= 0:
         return False
-    minimum = table[table[ROW_TABLE] + ROW * k + MINIMUM]
+    minimum = contact_row_at(table, header_at(table, 0).row_table + ROW * k).minimum
     left -= longest_way(d, bases[k, 0], alpha, pool[minimum + 4])
     left -= longest_way(d, bases[k, 1], alpha, pool[minimum + 5])
     if not left > 0.0:
@@ -51,7 +52,7 @@ def stays_open(table, pool, bases, k, here, trial, d, alpha):
         trial[2][k, i] = here[2][k, i]
     for i in range(FREE_COLUMN):
         trial[4][k, i] = here[4][k, i]
-    trial[2][k, SLACK] = left
+    contact_record_at(trial[2], k).slack = left
     return True
 
 
@@ -63,19 +64,20 @@ def carry(table, pool, bases, loose, here, trial, d, alpha):
     goes into `loose`. Rows of clearances that stay open for certain are marked there as IDLE, and their derivatives go
     on to the trial point as they are.
     """
+    header = header_at(table, 0)
     _q, tracked, records, _residual, jacobian = here
     lengths = loose[1]
     out = loose[4]
-    for k in range(table[TRACKED]):
+    for k in range(header.tracked):
         copy_tracked(tracked, k, out)
-    for k in range(table[CONTACTS]):
-        row = table[ROW_TABLE] + ROW * k
-        if table[row + BODY_F] < 0:
+    for k in range(header.contacts):
+        row = header.row_table + ROW * k
+        if row_at(table, row).body_f < 0:
             continue
         f = bases[k, 0]
         g = bases[k, 1]
         u = bases[k, 2]
-        out[k, PAIR_GAP] += alpha * times(bases, jacobian, k, d)
+        tracked_at(out, k).gap += alpha * times(bases, jacobian, k, d)
         if u >= 0:
             for i in range(4):
                 out[k, i] += alpha * d[u + i] / lengths[k, i]
@@ -84,22 +86,24 @@ def carry(table, pool, bases, loose, here, trial, d, alpha):
                 s = 0.0
                 for i in range(6):
                     if f >= 0:
-                        s += records[k, ZED + 12 * j + i] * d[f + i]
+                        s += derivatives_at(records, k).zed[j, i] * d[f + i]
                     if g >= 0:
                         s += records[k, ZED + 12 * j + 6 + i] * d[g + i]
                 s *= alpha
                 for i in range(4):
-                    out[k, i] += records[k, RATES + 4 * i + j] * s
+                    out[k, i] += derivatives_at(records, k).rates[i, j] * s
         keep_inside(table, pool, row, k, out)
         if is_guard(table, k) and stays_open(table, pool, bases, k, here, trial, d, alpha):
-            out[k, IDLE] = 1.0
-            out[k, PAIR_GAP] = max(out[k, PAIR_GAP], pool[table[row + MINIMUM]] + trial[2][k, SLACK])
+            tracked_at(out, k).idle = 1.0
+            tracked_at(out, k).gap = max(
+                tracked_at(out, k).gap, pool[contact_row_at(table, row).minimum] + contact_record_at(trial[2], k).slack
+            )
 
 
 @kernel(inner=True)
 def keep_inside(table, pool, row, k, out):
     """A prediction may run over the end of a patch; Newton starts inside. What becomes of edges is up to switching."""
-    if table[row + SHELL_F] >= 0:
+    if contact_row_at(table, row).shell_f >= 0:
         return
     for side in range(2):
         i = 2 * side

@@ -8,19 +8,13 @@ from assembly._kernel import kernel
 from assembly.constraints.program.contact import TOUCHING
 from assembly.constraints.program.evaluate import evaluate
 from assembly.constraints.program.records import (
-    BODIES,
-    CONTACTS,
-    IS_LENGTH,
-    REFERENCE,
     ROW,
-    ROW_TABLE,
-    ROWS,
-    SCALE,
-    SLOTS,
-    TRACKED,
+    header_at,
+    pool_header_at,
+    row_at,
 )
 from assembly.proximity.extrema.face_face import BEND
-from assembly.proximity.features.solid_contact import PROPER, TRACK
+from assembly.proximity.features.solid_contact import TRACK, contact_record_at
 from assembly.solve.loop.contacts import free_pairs_hold
 from assembly.solve.loop.settings import HISTORY
 from assembly.solve.loop.violation import off_rows, off_tangency
@@ -37,9 +31,10 @@ def log(history, iteration, figures):
 @kernel(inner=True)
 def scaled_poses(table, pool, state, q):
     """Poses of a state as the program has them."""
-    for b in range(table[BODIES]):
+    units = pool_header_at(pool, 0)
+    for b in range(header_at(table, 0).bodies):
         for k in range(3):
-            q[b, k] = (state[7 * b + k] - pool[REFERENCE + k]) / pool[SCALE]
+            q[b, k] = (state[7 * b + k] - units.reference[k]) / units.scale
         for k in range(3, 7):
             q[b, k] = state[7 * b + k]
 
@@ -47,11 +42,13 @@ def scaled_poses(table, pool, state, q):
 @kernel(inner=True)
 def write_pose(table, pool, q, state):
     """Poses of the moving bodies into the state, in the user's coordinates; what did not move keeps its bits."""
-    for b in range(table[BODIES]):
-        if table[table[SLOTS] + b] >= 0:
+    units = pool_header_at(pool, 0)
+    header = header_at(table, 0)
+    for b in range(header.bodies):
+        if table[header.slots + b] >= 0:
             for k in range(3):
-                if q[b, k] != (state[7 * b + k] - pool[REFERENCE + k]) / pool[SCALE]:
-                    state[7 * b + k] = q[b, k] * pool[SCALE] + pool[REFERENCE + k]
+                if q[b, k] != (state[7 * b + k] - units.reference[k]) / units.scale:
+                    state[7 * b + k] = q[b, k] * units.scale + units.reference[k]
             for k in range(3, 7):
                 state[7 * b + k] = q[b, k]
 
@@ -59,7 +56,7 @@ def write_pose(table, pool, q, state):
 @kernel(inner=True)
 def is_clear(table, residual):
     """Whether no contact, given or of a clearance, is one of bodies in each other."""
-    for r in range(table[CONTACTS]):
+    for r in range(header_at(table, 0).contacts):
         if residual[r] < -TOUCHING:
             return False
     return True
@@ -105,7 +102,7 @@ def judge(table, pool, state, loose, room, shape, rows, here, trial, bound, lax)
         return False, math.inf
     for r in range(rows):
         here[3][r] = trial[3][r]
-    for k in range(table[CONTACTS]):
+    for k in range(header_at(table, 0).contacts):
         for i in range(TRACK):
             here[1][k, i] = trial[1][k, i]
     violation = off_rows(table, loose, shape[1], trial, lax)
@@ -116,25 +113,26 @@ def judge(table, pool, state, loose, room, shape, rows, here, trial, bound, lax)
 @kernel(inner=True)
 def write_rows(table, here, y, loose, lax, size, state):
     """Tracked values, multipliers and residuals into the state; returns at how many contacts surfaces cross."""
+    header = header_at(table, 0)
     _q, tracked, records, residual, jacobian = here
     free = loose[0]
-    m = table[ROWS]
-    o = 7 * table[BODIES]
-    for k in range(table[TRACKED]):
+    m = header.rows
+    o = 7 * header.bodies
+    for k in range(header.tracked):
         for i in range(TRACK):
             state[o + TRACK * k + i] = tracked[k, i]
-    o += TRACK * table[TRACKED]
+    o += TRACK * header.tracked
     crossing = 0.0
     for r in range(m):
         state[o + r] = y[r]
         worst = residual[r]
-        if r < table[CONTACTS]:
+        if r < header.contacts:
             if free[r] >= 0:
                 # What a free pair lacks to be extremal is a violation of its contact, too.
                 off = off_tangency(residual, jacobian, r, m + 4 * free[r], lax, loose[3])
                 if off > abs(worst):
                     worst = -off
-            elif records[r, PROPER] == 0.0 and abs(worst) <= TOUCHING:
+            elif contact_record_at(records, r).proper == 0.0 and abs(worst) <= TOUCHING:
                 crossing += 1.0
-        state[o + m + r] = worst * size if table[table[ROW_TABLE] + ROW * r + IS_LENGTH] == 1 else worst
+        state[o + m + r] = worst * size if row_at(table, header.row_table + ROW * r).is_length == 1 else worst
     return crossing

@@ -10,42 +10,20 @@ from assembly._carve import carve
 from assembly._kernel import kernel
 from assembly.constraints.program.envelope import close_envelope, place_folds
 from assembly.constraints.program.hessian_blocks import choose_storage
-from assembly.constraints.program.objective_terms import TAPE_TERM, TERM, TERM_KIND, TERM_TAPE
+from assembly.constraints.program.objective_terms import TAPE_TERM, TERM, term_at
 from assembly.constraints.program.records import (
-    ANGLE,
-    BLOCK_LENGTH,
-    BLOCK_RECORD,
-    BODIES,
-    BODY_F,
-    BODY_G,
-    CONTACTS,
-    DEXTERITIES,
-    EXTRA,
     EXTRA_COLUMN,
     FREE_COLUMN,
     JOINT_ROW,
-    KIND,
-    MOVING,
-    ONE_SIDED,
-    PARAMETERS,
     ROW,
-    ROW_TABLE,
-    ROWS,
-    SECOND,
     SECOND_BODY_F,
     SECOND_BODY_G,
-    SLOTS,
-    TAPE_BODIES,
-    TAPE_LIST,
     TAPE_RECORD,
-    TAPE_ROW_AT,
-    TAPE_TABLE,
-    TAPE_VALUES,
-    TAPES,
-    TERM_TABLE,
-    TERMS,
-    TRIM_PAIR,
-    TRIMS,
+    header_at,
+    joint_row_at,
+    row_at,
+    tape_at,
+    trim_row_at,
 )
 from assembly.kinematics.motion import retract
 
@@ -53,44 +31,47 @@ from assembly.kinematics.motion import retract
 @kernel(inline=True)
 def slot(table, body):
     """Where a body's twist stands among the unknowns; negative for a fixed one, and for none."""
-    return 6 * table[table[SLOTS] + body] if body >= 0 else -1
+    return 6 * table[header_at(table, 0).slots + body] if body >= 0 else -1
 
 
 @kernel(inner=True)
 def place_rows(table, free, bases, one_sided):
     """Where each row's variables stand, and its side."""
-    for r in range(table[ROWS]):
-        row = table[ROW_TABLE] + ROW * r
-        one_sided[r] = table[row + ONE_SIDED]
+    header = header_at(table, 0)
+    for r in range(header.rows):
+        row = header.row_table + ROW * r
+        fields = row_at(table, row)
+        one_sided[r] = fields.one_sided
         for b in range(bases.shape[1]):
             bases[r, b] = -1
-        bases[r, 0] = slot(table, table[row + BODY_F])
-        bases[r, 1] = slot(table, table[row + BODY_G])
-        second = table[row + SECOND]
-        if table[row + KIND] == JOINT_ROW and second >= 0:
+        bases[r, 0] = slot(table, fields.body_f)
+        bases[r, 1] = slot(table, fields.body_g)
+        second = joint_row_at(table, row).second
+        if fields.kind == JOINT_ROW and second >= 0:
             bases[r, 3] = slot(table, table[second + SECOND_BODY_F])
             bases[r, 4] = slot(table, table[second + SECOND_BODY_G])
-    for r in range(table[CONTACTS]):
+    for r in range(header.contacts):
         if free[r] >= 0:
-            bases[r, 2] = 6 * table[MOVING] + 4 * free[r]
+            bases[r, 2] = 6 * header.moving + 4 * free[r]
             for i in range(4):
-                e = table[ROWS] + 4 * free[r] + i
+                e = header.rows + 4 * free[r] + i
                 one_sided[e] = 0
                 for j in range(bases.shape[1]):
                     bases[e, j] = bases[r, j]
-    for r in range(table[CONTACTS], table[CONTACTS] + table[TRIMS]):
-        bases[r, 2] = bases[table[table[ROW_TABLE] + ROW * r + TRIM_PAIR], 2]
-    for t in range(table[TAPES]):
-        tape = table[TAPE_TABLE] + TAPE_RECORD * t
-        for v in range(table[tape + TAPE_VALUES]):
-            for b in range(2, table[tape + TAPE_BODIES]):
-                bases[table[tape + TAPE_ROW_AT] + v, b + 1] = slot(table, table[table[tape + TAPE_LIST] + b])
+    for r in range(header.contacts, header.contacts + header.trims):
+        bases[r, 2] = bases[trim_row_at(table, header.row_table + ROW * r).contact, 2]
+    for t in range(header.tapes):
+        tape = tape_at(table, header.tape_table + TAPE_RECORD * t)
+        for v in range(tape.values):
+            for b in range(2, tape.bodies):
+                bases[tape.first_row + v, b + 1] = slot(table, table[tape.body_list + b])
 
 
 @kernel(inline=True, allocates=True)
 def record_of_blocks(table):
     """The part of the table that has it; empty where the scene has none."""
-    return table[table[BLOCK_RECORD] : table[BLOCK_RECORD] + table[BLOCK_LENGTH]]
+    header = header_at(table, 0)
+    return table[header.block_record : header.block_record + header.block_length]
 
 
 @kernel(inline=True)
@@ -114,24 +95,25 @@ def body_span(bases, r, n):
 @kernel(inner=True)
 def place_unknowns(table, bases, rows, n, order):
     """Where the Hessian of the Lagrangian has entries, and its factor (see `constraints/program/envelope.py`)."""
+    header = header_at(table, 0)
     places, folds = order[0], order[1]
     last, ends = places[0], places[2]
     choose_storage(order, n)
-    first = 6 * table[MOVING]
+    first = 6 * header.moving
     for i in range(n):
         last[i] = first + (i - first) // 4 * 4 + 3 if i >= first else i // 6 * 6 + 5
     for r in range(rows):
         low, high = body_span(bases, r, n)
         if high >= 0:
             last[low] = max(last[low], high)
-    for t in range(table[TERMS]):
-        term = table[TERM_TABLE] + TERM * t
-        if table[term + TERM_KIND] == TAPE_TERM:
-            tape = table[term + TERM_TAPE]
+    for t in range(header.terms):
+        term = term_at(table, header.term_table + TERM * t)
+        if term.kind == TAPE_TERM:
+            tape = tape_at(table, term.tape)
             low = n
             high = -1
-            for b in range(table[tape + TAPE_BODIES]):
-                at = slot(table, table[table[tape + TAPE_LIST] + b])
+            for b in range(tape.bodies):
+                at = slot(table, table[tape.body_list + b])
                 if at >= 0:
                     low = min(low, at)
                     high = max(high, at + 5)
@@ -140,13 +122,13 @@ def place_unknowns(table, bases, rows, n, order):
     close_envelope(last, first)
     count = (n - first) // 4
     folds[folds.shape[0] - 1, 0] = 0
-    if count == 0 or table[DEXTERITIES] > 0:
+    if count == 0 or header.dexterities > 0:
         for i in range(n):
-            if table[DEXTERITIES] > 0:
+            if header.dexterities > 0:
                 last[i] = n - 1
             ends[i] = last[i]
         return
-    for r in range(table[CONTACTS]):
+    for r in range(header.contacts):
         if bases[r, 2] >= 0:
             k = (bases[r, 2] - first) // 4
             folds[k, 0] = bases[r, 0]
@@ -197,7 +179,8 @@ def arrange(table, free, shape, rows, n):
 @kernel(inline=True)
 def size_of_shape(table, most, n):
     """How many integers and doubles `shape_of` carves at most."""
-    integers = (6 + table[EXTRA]) * most + 2 * (table[CONTACTS] + 1) + 4 * (n + 1)
+    header = header_at(table, 0)
+    integers = (6 + header.extra) * most + 2 * (header.contacts + 1) + 4 * (n + 1)
     return integers, 13 * max(n, 36)
 
 
@@ -208,12 +191,13 @@ def shape_of(table, most, n, blocks, integers, doubles):
     `blocks` is the scene's record of them, `record_of_blocks`, or an empty one for a dense Hessian. The room is that of
     the ends of two blocks of memory.
     """
+    header = header_at(table, 0)
     end, tail = size_of_shape(table, most, n)
     at = integers.size - end
     of_rows = carve(integers, at, (3, most))
-    folds = carve(integers, at + 3 * most, (table[CONTACTS] + 1, 2))
-    places = carve(integers, at + 3 * most + 2 * (table[CONTACTS] + 1), (4, n + 1))
-    bases = carve(integers, integers.size - (3 + table[EXTRA]) * most, (most, 3 + table[EXTRA]))
+    folds = carve(integers, at + 3 * most, (header.contacts + 1, 2))
+    places = carve(integers, at + 3 * most + 2 * (header.contacts + 1), (4, n + 1))
+    bases = carve(integers, integers.size - (3 + header.extra) * most, (most, 3 + header.extra))
     scratch = carve(doubles, doubles.size - tail, (13 if blocks.size > 0 else 1, max(n, 36)))
     return bases, of_rows[0], (places, folds, scratch, blocks), (of_rows[1], of_rows[2])
 
@@ -301,8 +285,9 @@ def merit(residual, one_sided, rows, y, mu):
 @kernel(inner=True)
 def move(table, q, d, alpha, out):
     """Every moving body retracted by alpha d."""
-    for b in range(table[BODIES]):
-        s = 6 * table[table[SLOTS] + b]
+    header = header_at(table, 0)
+    for b in range(header.bodies):
+        s = 6 * table[header.slots + b]
         if s >= 0:
             retract(
                 q,
@@ -316,15 +301,17 @@ def move(table, q, d, alpha, out):
 @kernel(inner=True)
 def turned(table, pool, tracked):
     """The largest product of a factor and an angle in a row."""
+    header = header_at(table, 0)
     most = 0.0
-    for r in range(table[CONTACTS], table[ROWS]):
-        row = table[ROW_TABLE] + ROW * r
-        if table[row + KIND] != JOINT_ROW:
+    for r in range(header.contacts, header.rows):
+        row = header.row_table + ROW * r
+        joint = joint_row_at(table, row)
+        if row_at(table, row).kind != JOINT_ROW:
             continue
-        o = table[row + PARAMETERS]
-        if table[row + ANGLE] >= 0:
-            most = max(most, max(abs(pool[o + 2]), abs(pool[o] * tracked[table[row + ANGLE], 0])))
-        second = table[row + SECOND]
+        o = joint.parameters
+        if joint.angle >= 0:
+            most = max(most, max(abs(pool[o + 2]), abs(pool[o] * tracked[joint.angle, 0])))
+        second = joint.second
         if second >= 0 and table[second + 3] >= 0:
             most = max(most, abs(pool[o + 1] * tracked[table[second + 3], 0]))
     return most

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
+from assembly._record import place_of, record_dtype, record_view, size_of
 from assembly.constraints.program.evaluate import evaluate
-from assembly.constraints.program.records import ROWS, WATCH
+from assembly.constraints.program.records import header_at
 from assembly.proximity.extrema.face_face import BEND
 from assembly.solve.loop.clearances import is_too_far
 from assembly.solve.loop.multipliers import toward_rows
@@ -20,7 +21,23 @@ SHORTENED, ASTRAY, LEAST_SHARE = 0.25, 10.0, 1e-4
 # What is known of the way: the softness of the last step, the share to take of the next one, the least violation so
 # far, whether the last step led off. Of the loop: whole steps in a row that changed nothing, and that gained little;
 # steps of any length that left what rows are off, and whether only what is near is looked at for that.
-SOFTNESS, SHARE, LOWEST, LED_OFF, STILLS, SLOW_STEPS, DRAGS, NEARBY, WAY = 0, 1, 2, 3, 4, 5, 6, 7, 8
+DRAGS = 6
+NEARBY = 7
+RESTORATION = record_dtype(
+    "f8",
+    softness=1,
+    share=1,
+    lowest=1,
+    led_off=1,
+    stills=1,
+    slow_steps=3,
+)
+restoration_at = record_view(RESTORATION)
+SOFTNESS = place_of(RESTORATION, "softness")
+SHARE = place_of(RESTORATION, "share")
+STILLS = place_of(RESTORATION, "stills")
+SLOW_STEPS = place_of(RESTORATION, "slow_steps")
+WAY = size_of(RESTORATION)
 
 
 @kernel(inline=True)
@@ -31,16 +48,17 @@ def way_back(program, here, trial, rows, weights, mu, softness, share, enough, s
     rows it leads: infinitely where bodies may not go so far, or a pair is lost.
     """
     table, pool, shape, loose, room = program
+    header = header_at(table, 0)
     active, forces, _foreseen = weights
     _gradient, (_descent, step, _straight), lagrangian, matrix = system
     bases, one_sided, _order, _of_rows = shape
     n = step.size
     softness = toward_rows(
-        shape, table[ROWS], rows, here[3], here[4], mu, active, softness, enough, lagrangian, matrix, n, forces, step
+        shape, header.rows, rows, here[3], here[4], mu, active, softness, enough, lagrangian, matrix, n, forces, step
     )
     move(table, here[0], step, share, trial[0])
     carry(table, pool, bases, loose, here, trial, step, share)
-    if table[WATCH] >= 0 and is_too_far(table, pool, loose[5], trial):
+    if header.watch >= 0 and is_too_far(table, pool, loose[5], trial):
         return softness, math.inf
     if evaluate(table, pool, loose[4], BEND, loose, room, trial) >= 0:
         return softness, math.inf
@@ -50,11 +68,12 @@ def way_back(program, here, trial, rows, weights, mu, softness, share, enough, s
 @kernel(inner=True)
 def begin_way(way):
     """Rows have changed: what was found of steps and violations counts no more."""
-    way[SHARE] = 1.0
-    way[LOWEST] = math.inf
-    way[LED_OFF] = 0.0
-    way[STILLS] = 0.0
-    way[SLOW_STEPS] = 0.0
+    progress = restoration_at(way, 0)
+    progress.share = 1.0
+    progress.lowest = math.inf
+    progress.led_off = 0.0
+    progress.stills = 0.0
+    progress.slow_steps[0] = 0.0
     way[DRAGS] = 0.0
     way[NEARBY] = 0.0
 
@@ -62,16 +81,17 @@ def begin_way(way):
 @kernel(inline=True)
 def step_back(program, here, trial, rows, weights, mu, violation, enough, system, tick, way):
     """A step on the way back, into the trial point; whether it is to be taken. If not, the next one is shorter."""
-    if violation < way[LOWEST]:
-        way[LOWEST] = violation
-        way[LED_OFF] = 0.0
-    way[SOFTNESS], there = way_back(
-        program, here, trial, rows, weights, mu, way[SOFTNESS], way[SHARE], enough, system, tick
+    progress = restoration_at(way, 0)
+    if violation < progress.lowest:
+        progress.lowest = violation
+        progress.led_off = 0.0
+    progress.softness, there = way_back(
+        program, here, trial, rows, weights, mu, progress.softness, progress.share, enough, system, tick
     )
-    nearer = there < way[LOWEST]
-    if not nearer and not (tick and there < ASTRAY * way[LOWEST] and way[LED_OFF] == 0.0):
-        way[SHARE] *= SHORTENED
+    nearer = there < progress.lowest
+    if not nearer and not (tick and there < ASTRAY * progress.lowest and progress.led_off == 0.0):
+        progress.share *= SHORTENED
         return False
-    way[LED_OFF] = 0.0 if nearer else 1.0
-    way[SHARE] = min(way[SHARE] / SHORTENED, 1.0)
+    progress.led_off = 0.0 if nearer else 1.0
+    progress.share = min(progress.share / SHORTENED, 1.0)
     return True

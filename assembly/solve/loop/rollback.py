@@ -13,15 +13,9 @@ from __future__ import annotations
 
 from assembly._kernel import kernel
 from assembly.constraints.program.records import (
-    FIRST_GUARD,
-    GUARD_NUMBER,
-    GUARDS,
-    MINIMUM,
     ROW,
-    ROW_TABLE,
-    ROWS,
-    SHELL_F,
-    WATCH,
+    contact_row_at,
+    header_at,
 )
 from assembly.proximity.manager.update import AS_NEEDED, any_crossed
 from assembly.solve.loop.clearances import forget_guards, look_around, place_guards
@@ -41,25 +35,27 @@ def has_sunk(table, pool, memory, residual):
 
     Of solids rows lead out the way they came: corners stay on their faces.
     """
-    for k in range(table[GUARDS]):
-        r = table[FIRST_GUARD] + k
-        row = table[ROW_TABLE] + ROW * r
-        if table[row + GUARD_NUMBER] > 0 and table[row + SHELL_F] < 0:
+    header = header_at(table, 0)
+    for k in range(header.guards):
+        r = header.first_guard + k
+        row = contact_row_at(table, header.row_table + ROW * r)
+        if row.guard_number > 0 and row.shell_f < 0:
             # How far bodies may go in one step is behind the least gap, which the residual is less.
-            at = table[row + MINIMUM]
+            at = row.minimum
             if residual[r] + pool[at] < -DEEP * pool[at + 1]:
                 return True
-    return any_crossed(table, table[WATCH], memory)
+    return any_crossed(table, header.watch, memory)
 
 
 @kernel(inner=True)
 def begin_again(table, pool, held, loose, here, y, better_y):
     """Back to the pose that is held. Its contacts are found anew; no row has pushed yet."""
+    header = header_at(table, 0)
     memory, free = loose[5], loose[0]
-    bring_back(held, table[ROWS], here, y)
+    bring_back(held, header.rows, here, y)
     forget_guards(table, memory)
     look_around(table, pool, memory, here, AS_NEEDED)
     place_guards(table, memory, here, y, better_y, free, False)
-    for r in range(table[ROWS]):
+    for r in range(header.rows):
         y[r] = 0.0
         better_y[r] = 0.0

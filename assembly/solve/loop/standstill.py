@@ -6,8 +6,8 @@ import math
 
 from assembly._kernel import kernel
 from assembly.constraints.program.contact import TOUCHING
-from assembly.solve.loop.restoration import DRAGS, NEARBY, SLOW_STEPS, STILLS
-from assembly.solve.loop.settings import NEIGHBORHOOD, STATIONARITY
+from assembly.solve.loop.restoration import DRAGS, NEARBY, restoration_at
+from assembly.solve.loop.settings import NEIGHBORHOOD, settings_at
 
 # So many whole steps in a row that leave this part of the largest violation tell that rows contradict each other; one
 # may be by an old factor.
@@ -41,10 +41,13 @@ def stands_still(way, settings, feasible, violation, left, dual, force, mu):
     The multipliers y + c / mu of the next step leave the Lagrangian as stationary as y only where J^T c = 0. `force` is
     the strongest one, which grows by every step, `left` the part of the violation that the last whole step left.
     """
-    nearly = settings[STATIONARITY] * max(1.0, force) + (out_of_reach(violation) + ROUNDED * feasible) / mu
+    progress = restoration_at(way, 0)
+    nearly = (
+        settings_at(settings, 0).stationarity * max(1.0, force) + (out_of_reach(violation) + ROUNDED * feasible) / mu
+    )
     still = left > STILL and dual <= nearly
-    way[STILLS] = way[STILLS] + 1.0 if still else 0.0
-    return way[STILLS] == STUCK
+    progress.stills = progress.stills + 1.0 if still else 0.0
+    return progress.stills == STUCK
 
 
 @kernel(inline=True)
@@ -91,7 +94,7 @@ def stays_off(way, feasible, steepest, violation, before):
 @kernel(inline=True)
 def is_stuck(way):
     """Whether the loop was found to stand still, and has not moved since but by restoring rows."""
-    return way[STILLS] == STUCK
+    return restoration_at(way, 0).stills == STUCK
 
 
 @kernel(inline=True)
@@ -106,5 +109,6 @@ def next_floor(way, floor, is_slow):
 
     Rows whose slopes all but vanish, at a dead center say: only a harder penalty holds them.
     """
-    way[SLOW_STEPS] = way[SLOW_STEPS] + 1.0 if is_slow else 0.0
-    return max(0.1 * floor, HARDEST) if way[SLOW_STEPS] >= SLOW else floor
+    progress = restoration_at(way, 0)
+    progress.slow_steps[0] = progress.slow_steps[0] + 1.0 if is_slow else 0.0
+    return max(0.1 * floor, HARDEST) if progress.slow_steps[0] >= SLOW else floor

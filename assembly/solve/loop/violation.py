@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly.constraints.program.records import CONTACTS, FREE_COLUMN, ROWS
+from assembly.constraints.program.records import FREE_COLUMN, header_at
 from assembly.solve.loop.residuals import violation_of
 
 
@@ -61,11 +61,12 @@ def off_tangency(residual, jacobian, r, e, lax, work):
 @kernel(inner=True)
 def off_rows(table, loose, one_sided, point, lax):
     """The largest violation of rows and of the tangency of free pairs, which is counted as by `off_tangency`."""
+    header = header_at(table, 0)
     free = loose[0]
-    worst = violation_of(point[3], one_sided, table[ROWS])
-    for k in range(table[CONTACTS]):
+    worst = violation_of(point[3], one_sided, header.rows)
+    for k in range(header.contacts):
         if free[k] >= 0:
-            off = off_tangency(point[3], point[4], k, table[ROWS] + 4 * free[k], lax, loose[3])
+            off = off_tangency(point[3], point[4], k, header.rows + 4 * free[k], lax, loose[3])
             if not off <= worst:
                 worst = off
     return worst

@@ -8,16 +8,11 @@ from __future__ import annotations
 from assembly._kernel import kernel
 from assembly.constraints.program.contact import idle_row
 from assembly.constraints.program.records import (
-    BODIES,
-    BODY_F,
-    CONTACTS,
     FREE_COLUMN,
-    GUARD_NUMBER,
-    JOINTS,
     ROW,
-    ROW_TABLE,
-    ROWS,
-    TRACKED,
+    contact_row_at,
+    header_at,
+    row_at,
 )
 from assembly.proximity.features.solid_contact import CONTACT_RECORD
 
@@ -34,23 +29,25 @@ def recall_size(bodies, pairs):
 @kernel(inline=True)
 def is_simple(table):
     """Whether all rows are contacts; others have values that change between ticks."""
-    return table[ROWS] == table[CONTACTS] and table[TRACKED] == table[CONTACTS] and table[JOINTS] == 0
+    header = header_at(table, 0)
+    return header.rows == header.contacts and header.tracked == header.contacts and header.joints == 0
 
 
 @kernel(inline=True)
 def recall(table, state, at, point):
     """Take over the rows that were left at these poses, with these contacts. Whether there were."""
+    header = header_at(table, 0)
     if state[at] != 1.0 or not is_simple(table):
         return False
-    for k in range(7 * table[BODIES]):
+    for k in range(7 * header.bodies):
         if state[at + 1 + k] != state[k]:
             return False
-    o = at + 1 + 7 * table[BODIES]
-    for r in range(table[CONTACTS]):
-        if state[o + RECALLED * r] != float(table[table[ROW_TABLE] + ROW * r + GUARD_NUMBER]):
+    o = at + 1 + 7 * header.bodies
+    for r in range(header.contacts):
+        if state[o + RECALLED * r] != float(contact_row_at(table, header.row_table + ROW * r).guard_number):
             return False
-    for r in range(table[CONTACTS]):
-        if table[table[ROW_TABLE] + ROW * r + BODY_F] < 0:
+    for r in range(header.contacts):
+        if row_at(table, header.row_table + ROW * r).body_f < 0:
             idle_row(r, 1.0, point)
             continue
         a = o + RECALLED * r
@@ -65,18 +62,19 @@ def recall(table, state, at, point):
 @kernel(inline=True)
 def leave(table, state, at, point, good):
     """Leave the rows of a point whose poses are in the state, if they are `good`."""
+    header = header_at(table, 0)
     state[at] = 0.0
     if not good or not is_simple(table):
         return
     state[at] = 1.0
-    for k in range(7 * table[BODIES]):
+    for k in range(7 * header.bodies):
         state[at + 1 + k] = state[k]
-    o = at + 1 + 7 * table[BODIES]
-    for r in range(table[CONTACTS]):
+    o = at + 1 + 7 * header.bodies
+    for r in range(header.contacts):
         a = o + RECALLED * r
-        row = table[ROW_TABLE] + ROW * r
-        state[a] = float(table[row + GUARD_NUMBER])
-        if table[row + BODY_F] < 0:
+        row = header.row_table + ROW * r
+        state[a] = float(contact_row_at(table, row).guard_number)
+        if row_at(table, row).body_f < 0:
             continue
         state[a + 1] = point[3][r]
         for i in range(CONTACT_RECORD):

@@ -6,20 +6,10 @@ import numpy as np
 
 from assembly._carve import carve
 from assembly._kernel import kernel
-from assembly.constraints.program.hessian_blocks import BLOCKS, FACTORED, is_blocked
+from assembly.constraints.program.hessian_blocks import blocks_at, is_blocked
 from assembly.constraints.program.records import (
-    BLOCK_RECORD,
-    BODIES,
-    CONTACTS,
-    EXTRA,
     EXTRA_COLUMN,
-    GUARDS,
-    JOINTS,
-    MOVING,
-    ROWS,
-    TAPE_ROOM,
-    TRACKED,
-    VECTOR_TRIMS,
+    header_at,
 )
 from assembly.proximity.extrema.lifted_pair import VARIABLES, VECTORS
 from assembly.proximity.features.solid_contact import CONTACT_RECORD, TRACK
@@ -34,31 +24,35 @@ BY_ROW = 7
 @kernel(inline=True, allocates=True)
 def results_of(table, state):
     """The end of a state, behind poses, tracked values, multipliers and residuals."""
-    return state[7 * table[BODIES] + TRACK * table[TRACKED] + 2 * table[ROWS] :]
+    header = header_at(table, 0)
+    return state[7 * header.bodies + TRACK * header.tracked + 2 * header.rows :]
 
 
 @kernel(inline=True)
 def room_needed(table):
     """How many doubles and integers a solve works in: what is carved below, and by `shape_of`."""
-    pairs, bodies, tracks, tapes = table[CONTACTS], table[BODIES], table[TRACKED], table[TAPE_ROOM]
-    most, n = table[ROWS] + 4 * pairs, 6 * table[MOVING]
+    header = header_at(table, 0)
+    pairs, bodies, tracks, tapes = header.contacts, header.bodies, header.tracked, header.tape_room
+    most, n = header.rows + 4 * pairs, 6 * header.moving
     integers, doubles = size_of_shape(table, most, n + 4 * pairs)
     # Poses, tracked values, records, Jacobians, what a row has one of.
     doubles += 21 * bodies + 4 * TRACK * tracks + 2 * record_count(table) * CONTACT_RECORD
-    doubles += 2 * most * (EXTRA_COLUMN + 6 * table[EXTRA]) + (BY_ROW + 1) * most
+    doubles += 2 * most * (EXTRA_COLUMN + 6 * header.extra) + (BY_ROW + 1) * most
     # Of pairs; of tapes; multipliers of least squares; the way back.
     doubles += 4 * pairs + (3 * VECTORS + VARIABLES) * VARIABLES
     doubles += table[tapes] + table[tapes + 1] + table[tapes + 2] + (most + 1) * most + WAY
     # Of unknowns, while no pair is at a fold.
-    blocks = table[BLOCK_RECORD]
-    doubles += 4 * n + (36 * (table[blocks + BLOCKS] + table[blocks + FACTORED]) if blocks > 0 else 2 * n * n)
-    return doubles, integers + pairs + table[GUARDS]
+    blocks = header.block_record
+    layout = blocks_at(table, blocks)
+    doubles += 4 * n + (36 * (layout.blocks + layout.factored) if blocks > 0 else 2 * n * n)
+    return doubles, integers + pairs + header.guards
 
 
 @kernel(inline=True)
 def record_count(table):
     """How many records a point has."""
-    return table[CONTACTS] + table[JOINTS] + table[VECTOR_TRIMS]
+    header = header_at(table, 0)
+    return header.contacts + header.joints + header.vector_trims
 
 
 @kernel(inline=True, allocates=True)
@@ -68,7 +62,8 @@ def carve_points(table, most, doubles, at):
     A point: poses, tracked values, records, residual, Jacobian. `most` rows at most. The third one is a pose, its
     tracked values and its multipliers.
     """
-    bodies, tracks, columns = table[BODIES], table[TRACKED], EXTRA_COLUMN + 6 * table[EXTRA]
+    header = header_at(table, 0)
+    bodies, tracks, columns = header.bodies, header.tracked, EXTRA_COLUMN + 6 * header.extra
     poses = carve(doubles, at, (3, bodies, 7))
     at += 21 * bodies
     tracked = carve(doubles, at, (4, tracks, TRACK))
@@ -93,7 +88,7 @@ def carve_pairs(table, guess, memory, doubles, at, integers):
 
     With what a watch of clearances remembers. No pair is free yet. And where it ends.
     """
-    pairs = table[CONTACTS]
+    pairs = header_at(table, 0).contacts
     free = carve(integers, 0, (pairs,))
     for k in range(pairs):
         free[k] = -1
@@ -108,7 +103,7 @@ def carve_pairs(table, guess, memory, doubles, at, integers):
 @kernel(inline=True, allocates=True)
 def carve_tapes(table, doubles, at):
     """What the instructions of expressions work in, and where it ends."""
-    o = table[TAPE_ROOM]
+    o = header_at(table, 0).tape_room
     inputs = carve(doubles, at, (table[o],))
     outputs = carve(doubles, at + table[o], (table[o + 1],))
     work = carve(doubles, at + table[o] + table[o + 1], (table[o + 2],))
@@ -118,8 +113,9 @@ def carve_tapes(table, doubles, at):
 @kernel(inline=True)
 def sides_of(n, order):
     """Rows and columns of the Hessian's array and of its factor's, for n unknowns."""
+    layout = blocks_at(order[3], 0)
     if is_blocked(order):
-        return (6 * order[3][BLOCKS], 6), (1, 36 * order[3][FACTORED])
+        return (6 * layout.blocks, 6), (1, 36 * layout.factored)
     return (n, n), (n, n)
 
 
@@ -140,13 +136,14 @@ def carve_all(table, memory, doubles, integers):
     Points (here, trial, held), room by row, the shape of what is sparse, what pairs need, numbers of contacts, tapes,
     room for least squares, what is known of a way back, room for unknowns.
     """
-    pairs = table[CONTACTS]
-    most, n = table[ROWS] + 4 * pairs, 6 * table[MOVING]
+    header = header_at(table, 0)
+    pairs = header.contacts
+    most, n = header.rows + 4 * pairs, 6 * header.moving
     here, trial, by_row, guess, held, at = carve_points(table, most, doubles, 0)
     shape = shape_of(table, most, n + 4 * pairs, record_of_blocks(table), integers, doubles)
     loose, at = carve_pairs(table, guess, memory, doubles, at, integers)
-    numbers = carve(integers, pairs, (table[GUARDS],))
-    arrange(table, loose[0], shape, table[ROWS], n)
+    numbers = carve(integers, pairs, (header.guards,))
+    arrange(table, loose[0], shape, header.rows, n)
     tapes, at = carve_tapes(table, doubles, at)
     gram = carve(doubles, at, (most + 1, most))
     at += (most + 1) * most

@@ -15,7 +15,7 @@ import numpy as np
 from assembly._carve import carve
 from assembly._kernel import kernel
 from assembly.constraints.program.evaluate import evaluate
-from assembly.constraints.program.records import BODIES, CONTACTS, MOVING, ROWS, TRACKED
+from assembly.constraints.program.records import header_at
 from assembly.constraints.program.row_terms import add_row_terms
 from assembly.proximity.extrema.face_face import BEND
 from assembly.proximity.features.solid_contact import TRACK
@@ -40,22 +40,24 @@ MU, SOFTNESS, GAIN = 1e-6, 1e-2, 0.1
 @kernel(inner=True)
 def write_tracked(table, tracked, state):
     """Tracked values of a point into a state."""
-    for k in range(table[TRACKED]):
+    header = header_at(table, 0)
+    for k in range(header.tracked):
         for i in range(TRACK):
-            state[7 * table[BODIES] + TRACK * k + i] = tracked[k, i]
+            state[7 * header.bodies + TRACK * k + i] = tracked[k, i]
 
 
 @kernel(inner=True, allocates=True)
 def write_curvature(table, pool, state, forces, out, tips, integers, doubles):
     """The same as `curvature_at`, with what it works in."""
-    pairs = table[CONTACTS]
+    header = header_at(table, 0)
+    pairs = header.contacts
     free = np.empty(pairs, np.int64)
     lost, count, point, loose, room = point_at(table, pool, state, free)
     if lost >= 0:
         return -1
     write_tracked(table, point[1], state)
-    rows, n = table[ROWS] + 4 * count, 6 * table[MOVING] + 4 * count
-    shape = shape_of(table, table[ROWS] + 4 * pairs, 6 * table[MOVING] + 4 * pairs, table[:0], integers, doubles)
+    rows, n = header.rows + 4 * count, 6 * header.moving + 4 * count
+    shape = shape_of(table, header.rows + 4 * pairs, 6 * header.moving + 4 * pairs, table[:0], integers, doubles)
     arrange(table, free, shape, rows, n)
     jacobian = carve(out, 1 + rows + n, (rows, n))
     hessian = carve(out, 1 + rows + n + rows * n, (n, n))
@@ -87,8 +89,9 @@ def curvature_at(table, pool, state, forces, out, tips):
     (n), the rows' Jacobian (m, n), and the Hessian of objective + forces . rows (n, n). `tips` is None where no term
     of the objective is a dexterity.
     """
-    pairs = table[CONTACTS]
-    integers, doubles = size_of_shape(table, table[ROWS] + 4 * pairs, 6 * table[MOVING] + 4 * pairs)
+    header = header_at(table, 0)
+    pairs = header.contacts
+    integers, doubles = size_of_shape(table, header.rows + 4 * pairs, 6 * header.moving + 4 * pairs)
     return write_curvature(table, pool, state, forces, out, tips, np.empty(integers, np.int64), np.empty(doubles))
 
 
@@ -104,16 +107,17 @@ def is_at_most(values, limit):
 @kernel(inner=True, allocates=True)
 def walk_within(table, pool, state, step, share, kept, residual, tips, integers, doubles):
     """The same as `walk`, with what it works in."""
-    pairs = table[CONTACTS]
+    header = header_at(table, 0)
+    pairs = header.contacts
     free = np.empty(pairs, np.int64)
     lost, count, here, loose, room = point_at(table, pool, state, free)
-    rows, n = table[ROWS] + 4 * count, 6 * table[MOVING] + 4 * count
+    rows, n = header.rows + 4 * count, 6 * header.moving + 4 * count
     if lost >= 0 or n != step.size:
         return math.inf
     blocks = record_of_blocks(table)
-    shape = shape_of(table, table[ROWS] + 4 * pairs, 6 * table[MOVING] + 4 * pairs, blocks, integers, doubles)
+    shape = shape_of(table, header.rows + 4 * pairs, 6 * header.moving + 4 * pairs, blocks, integers, doubles)
     arrange(table, free, shape, rows, n)
-    for r in range(table[ROWS]):
+    for r in range(header.rows):
         if kept[r] > 0.0:
             shape[1][r] = 0
     trial = new_point(table)
@@ -139,7 +143,7 @@ def walk_within(table, pool, state, step, share, kept, residual, tips, integers,
         if not math.isfinite(off):
             break
         toward_rows(
-            shape, table[ROWS], rows, here[3], here[4], MU, active, SOFTNESS, EXACT, lagrangian, matrix, n, forces, way
+            shape, header.rows, rows, here[3], here[4], MU, active, SOFTNESS, EXACT, lagrangian, matrix, n, forces, way
         )
         if not is_at_most(way, LONGEST):
             break
@@ -158,8 +162,9 @@ def walk(table, pool, state, step, share, kept, residual, tips):
     One-sided rows that are `kept` (not zero) stay at their bound. Infinite, with the state as it was, where no pose
     near it holds. The residuals left, within rounding, are written.
     """
-    pairs = table[CONTACTS]
-    integers, doubles = size_of_shape(table, table[ROWS] + 4 * pairs, 6 * table[MOVING] + 4 * pairs)
+    header = header_at(table, 0)
+    pairs = header.contacts
+    integers, doubles = size_of_shape(table, header.rows + 4 * pairs, 6 * header.moving + 4 * pairs)
     return walk_within(
         table, pool, state, step, share, kept, residual, tips, np.empty(integers, np.int64), np.empty(doubles)
     )
@@ -168,8 +173,9 @@ def walk(table, pool, state, step, share, kept, residual, tips):
 @kernel(inner=True, allocates=True)
 def least_within(table, pool, state, forces, active, direction, tips, integers, doubles):
     """The same as `least_curvature`, with what it works in."""
-    lost, count, point, loose, room = point_at(table, pool, state, np.empty(table[CONTACTS], np.int64))
-    rows, n = table[ROWS], 6 * table[MOVING]
+    header = header_at(table, 0)
+    lost, count, point, loose, room = point_at(table, pool, state, np.empty(header.contacts, np.int64))
+    rows, n = header.rows, 6 * header.moving
     if lost >= 0 or count > 0:
         return math.nan
     shape = shape_of(table, rows, n, record_of_blocks(table), integers, doubles)
@@ -215,7 +221,8 @@ def least_curvature(table, pool, state, forces, active, direction, tips):
 
     `active` has the weight of every row that is to be kept, zero for others. No number where a contact is at a fold.
     """
-    integers, doubles = size_of_shape(table, table[ROWS], 6 * table[MOVING])
+    header = header_at(table, 0)
+    integers, doubles = size_of_shape(table, header.rows, 6 * header.moving)
     return least_within(
         table, pool, state, forces, active, direction, tips, np.empty(integers, np.int64), np.empty(doubles)
     )

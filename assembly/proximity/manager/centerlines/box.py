@@ -18,7 +18,12 @@ import math
 
 from assembly._kernel import kernel
 from assembly.geometry.vec import add, blend, dot, matvec, matvec_t, sub
-from assembly.proximity.manager.centerlines.curve import BEYOND, HALF, JUMPS, PART_BEND, spine_point, three
+from assembly.proximity.manager.centerlines.curve import (
+    BEYOND,
+    centerline_part_at,
+    spine_point,
+    three,
+)
 
 # What a box is: nothing is known, no slope zero in it, F convex over it, F'' indefinite over it.
 UNKNOWN, EMPTY, CONVEX, BARREN = 0, 1, 2, 3
@@ -104,11 +109,12 @@ def beyond_joints(pool, o, low, high, d, sign, slack, least, bend):
 
     And the largest curvature there; -1 where no curvature jumps.
     """
+    part = centerline_part_at(pool, o)
     sharpest = -1.0
-    half = pool[o + HALF]
+    half = part.half
     for side in range(2):
         at_border = low <= -half if side == 0 else high >= half
-        if pool[o + JUMPS + side] == 1.0 and at_border:
+        if part.jumps[side] == 1.0 and at_border:
             vector = three(pool, o + BEYOND + 3 * side)
             length = math.sqrt(dot(vector, vector))
             least = min(least, 1.0 + sign * dot(d, vector) - length * slack)
@@ -130,8 +136,8 @@ def box_of(pool, o, p, turn, shift, box, open_ends, reach, rho):
     h = 0.5 * (box[1] - box[0])
     k = 0.5 * (box[3] - box[2])
     d, f, bend_f, g, bend_g = apart(pool, o, p, turn, shift, box[0] + h, box[2] + k)
-    kf = pool[o + PART_BEND]
-    kg = pool[p + PART_BEND]
+    kf = centerline_part_at(pool, o).bend
+    kg = centerline_part_at(pool, p).bend
     turn_f = kf * h
     turn_g = kg * k
     least = segment_distance(d, f, g, h, k) - 0.5 * (turn_f * h + turn_g * k) - ROUNDING

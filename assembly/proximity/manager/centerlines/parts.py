@@ -8,18 +8,22 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly.geometry.vec import add, dot, matvec, sub
-from assembly.proximity.bvh.neighbor_list import COUNT, ENTRIES, can_be_listed, moved_since, reaches, write_list
+from assembly.proximity.bvh.neighbor_list import (
+    ENTRIES,
+    can_be_listed,
+    moved_since,
+    neighbor_list_at,
+    reaches,
+    write_list,
+)
 from assembly.proximity.manager.centerlines.box import ROUNDING, segment_distance
 from assembly.proximity.manager.centerlines.curve import (
     BALL,
     BALL_RADIUS,
-    HALF,
-    NODE_POOL,
-    NODE_TABLE,
     PART,
-    PART_BEND,
-    PART_POOL,
     TANGENT,
+    centerline_at,
+    centerline_part_at,
     three,
 )
 
@@ -34,17 +38,19 @@ def balls_apart(pool, o, p, turn, shift):
 @kernel(inline=True)
 def parts_apart(pool, o, p, turn, shift):
     """A lower bound of the distance of the parts at o of f and at p of g: that of their tangents in the middle."""
-    h = pool[o + HALF]
-    k = pool[p + HALF]
+    part = centerline_part_at(pool, o)
+    part_record = centerline_part_at(pool, p)
+    h = part.half
+    k = part_record.half
     d = sub(add(matvec(turn, three(pool, p)), shift), three(pool, o))
     least = segment_distance(d, three(pool, o + TANGENT), matvec(turn, three(pool, p + TANGENT)), h, k)
-    return least - 0.5 * (pool[o + PART_BEND] * h * h + pool[p + PART_BEND] * k * k) - ROUNDING
+    return least - 0.5 * (part.bend * h * h + part_record.bend * k * k) - ROUNDING
 
 
 @kernel(inline=True)
 def whole_box(table, pool, spine, part, boxes, b, at):
     """A side of box b: a whole part, from and to its ends."""
-    half = pool[table[spine + PART_POOL] + PART * part + HALF]
+    half = centerline_part_at(pool, centerline_at(table, spine).part_pool + PART * part).half
     boxes[b, at] = float(part)
     boxes[b, at + 1] = -half
     boxes[b, at + 2] = half
@@ -57,8 +63,10 @@ def descend(table, pool, spines, turn, shift, reach, stack, out):
     Returns how many, or -1 where there is no room; and how far all others are beyond.
     """
     f, g = spines
-    nodes_f = table[f + NODE_POOL]
-    nodes_g = table[g + NODE_POOL]
+    line = centerline_at(table, f)
+    centerline = centerline_at(table, g)
+    nodes_f = line.node_pool
+    nodes_g = centerline.node_pool
     stack[0, 0] = 0
     stack[0, 1] = 0
     used = 1
@@ -74,14 +82,12 @@ def descend(table, pool, spines, turn, shift, reach, stack, out):
         if apart > reach:
             beyond = min(beyond, apart)
             continue
-        child_f = table[table[f + NODE_TABLE] + i]
-        child_g = table[table[g + NODE_TABLE] + j]
+        child_f = table[line.node_table + i]
+        child_g = table[centerline.node_table + j]
         if child_f < 0 and child_g < 0:
             part_f = np.int64(-1 - child_f)
             part_g = np.int64(-1 - child_g)
-            apart = parts_apart(
-                pool, table[f + PART_POOL] + PART * part_f, table[g + PART_POOL] + PART * part_g, turn, shift
-            )
+            apart = parts_apart(pool, line.part_pool + PART * part_f, centerline.part_pool + PART * part_g, turn, shift)
             if apart > reach:
                 beyond = min(beyond, apart)
                 continue
@@ -121,7 +127,7 @@ def near_parts(table, pool, at, p, scene, moving, reach, ring, stack, out, boxes
         count, _beyond = descend(table, pool, spines, turn, shift, reach + ring, stack, out)
         fits = 1 if write_list(table, pool, at, p, moving, reach, ring, out, count) else -1
     if fits == 1:
-        many = table[at + COUNT]
+        many = neighbor_list_at(table, at).count
         for k in range(many):
             out[k, 0] = table[at + ENTRIES + 2 * k]
             out[k, 1] = table[at + ENTRIES + 2 * k + 1]
@@ -130,7 +136,16 @@ def near_parts(table, pool, at, p, scene, moving, reach, ring, stack, out, boxes
     count = 0
     for k in range(many):
         i, j = out[k, 0], out[k, 1]
-        if parts_apart(pool, table[f + PART_POOL] + PART * i, table[g + PART_POOL] + PART * j, turn, shift) > reach:
+        if (
+            parts_apart(
+                pool,
+                centerline_at(table, f).part_pool + PART * i,
+                centerline_at(table, g).part_pool + PART * j,
+                turn,
+                shift,
+            )
+            > reach
+        ):
             continue
         if count == boxes.shape[0]:
             return -1

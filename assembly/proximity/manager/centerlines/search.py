@@ -18,21 +18,26 @@ from assembly.geometry.vec import add, cross, dot, matvec, matvec_t, scale, sub
 from assembly.proximity.extrema.face_face import pair_frame
 from assembly.proximity.manager.centerlines.box import BARREN, CONVEX, EMPTY, UNKNOWN, apart, box_of
 from assembly.proximity.manager.centerlines.curve import (
-    CLOSED,
-    HALF,
-    NUMBERS,
     PART,
-    PART_BEND,
-    PART_POOL,
-    PARTS,
-    SHARPEST,
     both_radii,
+    centerline_at,
+    centerline_part_at,
     spine_place,
     spine_point,
+    wire_at,
     wire_parameters,
 )
 from assembly.proximity.manager.centerlines.minima import convex_minimum, valley_minima
-from assembly.proximity.manager.extrema import GAP, NEW, NOTHING, ORIGIN, SAME, USELESS, add_root, are_one, write
+from assembly.proximity.manager.extrema import (
+    NEW,
+    NOTHING,
+    SAME,
+    USELESS,
+    add_root,
+    are_one,
+    extremum_at,
+    write,
+)
 
 # Room: boxes that wait, six doubles each (part and lengths of f, then of g).
 BOXES, BOX = 2048, 6
@@ -55,17 +60,19 @@ MEETING = 1e-12
 @kernel(inline=True)
 def open_ends(table, pool, f, g, box):
     """At which free ends of two spines a box is: f's start and end, g's start and end."""
-    free_f = table[f + CLOSED] == 0
-    free_g = table[g + CLOSED] == 0
+    line = centerline_at(table, f)
+    centerline = centerline_at(table, g)
+    free_f = line.closed == 0
+    free_g = centerline.closed == 0
     i = np.int64(box[0])
     j = np.int64(box[3])
-    half_f = pool[table[f + PART_POOL] + PART * i + HALF]
-    half_g = pool[table[g + PART_POOL] + PART * j + HALF]
+    half_f = centerline_part_at(pool, line.part_pool + PART * i).half
+    half_g = centerline_part_at(pool, centerline.part_pool + PART * j).half
     return (
         free_f and i == 0 and box[1] <= -half_f,
-        free_f and i == table[f + PARTS] - 1 and box[2] >= half_f,
+        free_f and i == line.parts - 1 and box[2] >= half_f,
         free_g and j == 0 and box[4] <= -half_g,
-        free_g and j == table[g + PARTS] - 1 and box[5] >= half_g,
+        free_g and j == centerline.parts - 1 and box[5] >= half_g,
     )
 
 
@@ -81,10 +88,12 @@ def mark_known(table, pool, scene, roots, count, marks):
         marks[k, 1] = s
         marks[k, 2] = float(j)
         marks[k, 3] = t
-        o = table[f + PART_POOL] + PART * i
-        p = table[g + PART_POOL] + PART * j
+        o = centerline_at(table, f).part_pool + PART * i
+        p = centerline_at(table, g).part_pool + PART * j
         d, tf, _bend_f, tg, _bend_g = apart(pool, o, p, scene[0], scene[1], s, t)
-        if roots[k, ORIGIN] == USELESS or not abs(dot(d, tf)) + abs(dot(d, tg)) <= AT_ROOT * math.sqrt(dot(d, d)):
+        if extremum_at(roots, k).origin == USELESS or not abs(dot(d, tf)) + abs(dot(d, tg)) <= AT_ROOT * math.sqrt(
+            dot(d, d)
+        ):
             # Of far sides, at a half ball, or on its way to a root: what is there is looked for.
             marks[k, 0] = math.nan
 
@@ -121,8 +130,8 @@ def add_minimum(table, pool, scene, i, j, s, t, neglect, roots, count, work):
     if count == roots.shape[0]:
         return count
     f, g = scene[5]
-    o = table[f + PART_POOL] + PART * i
-    p = table[g + PART_POOL] + PART * j
+    o = centerline_at(table, f).part_pool + PART * i
+    p = centerline_at(table, g).part_pool + PART * j
     d, tf, _bend_f, tg, _bend_g = apart(pool, o, p, scene[0], scene[1], s, t)
     length = math.sqrt(dot(d, d))
     way = scale(1.0 / length, d) if length >= MEETING else across_both(tf, tg)
@@ -131,20 +140,21 @@ def add_minimum(table, pool, scene, i, j, s, t, neglect, roots, count, work):
     start = (u_f, v_f, u_g, v_g)
     gap = length - both_radii(table, pool, scene[5])
     before = count
+    extremum = extremum_at(roots, before)
     count, found = add_root(table, pool, scene, (0, 0), start, (0.0, 0.0, 0.0), neglect, roots, count, work, 0.0)
-    if found == NOTHING or not abs(roots[before, GAP] - gap) <= ASTRAY:
+    if found == NOTHING or not abs(extremum.gap - gap) <= ASTRAY:
         # At a fold Newton's method may find nothing, or go elsewhere: the minimum is known without it.
         frame = pair_frame(table, pool, scene[2][0], scene[2][1], scene[0], scene[1], start)
         if not frame[11]:
             return before
         write(roots, before, start, 0, 0, frame[0], frame[10], frame[3], frame[4], 0.0)
         for k in range(before):
-            radius = min(neglect, SAME) if roots[k, ORIGIN] == USELESS else neglect
+            radius = min(neglect, SAME) if extremum_at(roots, k).origin == USELESS else neglect
             if are_one(table, pool, scene, roots, before, k, radius):
                 return before
         count = before + 1
     if count > before:
-        roots[before, ORIGIN] = NEW
+        extremum.origin = NEW
     return count
 
 
@@ -177,8 +187,8 @@ def add_minima(table, pool, scene, box, ends, what, neglect, places, roots, coun
     f, g = scene[5]
     i = np.int64(box[0])
     j = np.int64(box[3])
-    o = table[f + PART_POOL] + PART * i
-    p = table[g + PART_POOL] + PART * j
+    o = centerline_at(table, f).part_pool + PART * i
+    p = centerline_at(table, g).part_pool + PART * j
     part = (box[1], box[2], box[4], box[5])
     certain = True
     settled = False
@@ -191,7 +201,7 @@ def add_minima(table, pool, scene, box, ends, what, neglect, places, roots, coun
         many, level, certain = valley_minima(pool, o, p, scene[0], scene[1], part, ends, places)
         if level:
             # All along it is as good: points here and there stand for it.
-            neglect = max(neglect, SPARSE / max(pool[o + PART_BEND], pool[p + PART_BEND]))
+            neglect = max(neglect, SPARSE / max(centerline_part_at(pool, o).bend, centerline_part_at(pool, p).bend))
         for m in range(many):
             count = add_minimum(table, pool, scene, i, j, places[m, 0], places[m, 1], neglect, roots, count, work)
     return count, certain
@@ -212,9 +222,11 @@ def search_spines(table, pool, scene, moving, rho, lengths, neglect, boxes, wait
     """
     least, near, reach, flank = lengths
     f, g = scene[5]
+    line = centerline_at(table, f)
+    centerline = centerline_at(table, g)
     side, _tree, _e, turn, shift = moving
     radii = both_radii(table, pool, scene[5]) + least
-    sharpest = max(pool[table[f + NUMBERS] + SHARPEST], pool[table[g + NUMBERS] + SHARPEST])
+    sharpest = max(wire_at(pool, line.numbers).sharpest, wire_at(pool, centerline.numbers).sharpest)
     known = count
     marks, places = rooms
     mark_known(table, pool, scene, roots, known, marks)
@@ -227,8 +239,8 @@ def search_spines(table, pool, scene, moving, rho, lengths, neglect, boxes, wait
     while waiting > 0:
         b = waiting - 1
         box = (boxes[b, 0], boxes[b, 1], boxes[b, 2], boxes[b, 3], boxes[b, 4], boxes[b, 5])
-        o = table[f + PART_POOL] + PART * np.int64(box[0])
-        p = table[g + PART_POOL] + PART * np.int64(box[3])
+        o = line.part_pool + PART * np.int64(box[0])
+        p = centerline.part_pool + PART * np.int64(box[3])
         part = (box[1], box[2], box[4], box[5])
         ends = open_ends(table, pool, f, g, box)
         low, what, margin = box_of(pool, o, p, scene[0], scene[1], part, ends, radii + reach, rho)
