@@ -58,7 +58,7 @@ class Watch:
         self.bodies = [asm.Body(f"body {k + 1}", surface) for k, surface in enumerate(surfaces)]
         scene = asm.Assembly(self.bodies)
         # Wires that move fast are looked at far ahead, and as many contacts are listed.
-        scene.constrain(asm.Clearance(places=16))
+        scene.constrain(asm.Clearance(slots=16))
         self._packed = packed = scene.packed()
         self._at = int(packed.table[layout.WATCH])
         self.pairs = [(self.bodies.index(a), self.bodies.index(b)) for a, b in packed.guarded[0]]

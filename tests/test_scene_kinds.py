@@ -82,7 +82,7 @@ def every_constraint():
         touch,
         *joints,
         asm.TrimContact(touch, loop, "inside", "cartesian", side="b", name="kept"),
-        asm.Clearance([ground, crank], THIRD, neglect=0.1, places=3, exclude=[(crank, ground)]),
+        asm.Clearance([ground, crank], THIRD, merge_radius=0.1, slots=3, exclude=[(crank, ground)]),
         asm.Expression(mixed(3, 2), [wheel, ground, crank], unilateral=True, scale=0.1, weight=THIRD),
     )
     scene.minimize(

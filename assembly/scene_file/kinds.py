@@ -131,6 +131,11 @@ def _free(*names: str) -> tuple[Field, ...]:
     )
 
 
+def _clearance(neglect: float, places: int | None, **others: Any) -> Clearance:
+    """Files have the former names of two options."""
+    return Clearance(merge_radius=neglect, slots=places, **others)
+
+
 def _point_distance(body: Body, point: list[float], target: list[float], weight: float) -> PointDistance:
     return PointDistance(body.point(*point), target, weight)
 
@@ -272,8 +277,9 @@ CONSTRAINTS = OneOf(
             ),
             Field("minimum", NUMBER),
             Field("exclude", Listed(Listed(BODY_NAME))),
-            Field("neglect", NUMBER),
-            Field("places", Plain(or_null(whole))),
+            Field("neglect", NUMBER, "merge_radius"),
+            Field("places", Plain(or_null(whole)), "slots"),
+            make=_clearance,
         ),
         "expression": EXPRESSION,
     }

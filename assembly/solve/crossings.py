@@ -104,7 +104,7 @@ class _Watched(Clearance):
 
     def __init__(self, pairs: Sequence[Pair], name: str) -> None:
         bodies = dict.fromkeys(body for pair in pairs for body in pair)
-        super().__init__(bodies, name=name, places=PLACES * (1 + min(len(pairs), len(bodies))))
+        super().__init__(bodies, name=name, slots=PLACES * (1 + min(len(pairs), len(bodies))))
         self._pairs = list(pairs)
 
     def pairs(self, bodies: Sequence[Body]) -> list[Pair]:

@@ -32,7 +32,7 @@ def judge(f, g):
     The deepest gap is NaN where no contact is listed.
     """
     scene = asm.Assembly([asm.Body("f", f), asm.Body("g", g)])
-    scene.constrain(asm.Clearance(places=32))
+    scene.constrain(asm.Clearance(slots=32))
     packed = scene.packed()
 
     def at(q):

@@ -195,7 +195,7 @@ def crowd(count: int = CROWD) -> asm.Assembly:
     rng = np.random.default_rng(0)
     shape = asm.shapes.ellipsoid(1.0, 0.9, 0.8)
     scene = asm.Assembly(asm.Body(f"{k}", shape, rng.uniform(-1.0, 1.0, 3)) for k in range(count))
-    scene.constrain(asm.Clearance(places=600))
+    scene.constrain(asm.Clearance(slots=600))
     return scene
 
 

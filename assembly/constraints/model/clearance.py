@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Sequence
 
 from assembly.constraints.model.constraint import Constraint
 from assembly.constraints.model.tracked_sizes import check_size
-from assembly.errors import InputError, bounded, items, number
+from assembly.errors import InputError, bounded, items, number, renamed
 from assembly.kinematics.body import Body
 
 __all__ = ["Clearance"]
@@ -43,13 +44,15 @@ class Clearance(Constraint):
         "clearance" or "clearance a-b-..." by default.
     exclude : iterable of (Body, Body)
         Pairs that may overlap: a pin in its hole, links that a joint holds together.
-    neglect : float
+    merge_radius : float
         Two contacts of the same two bodies whose points are nearer than this on both, and near along the surfaces as
         well, are one: the radius of the spheres of neglect (paper 001, section 5), in parts of the scene's size.
         Contacts farther apart are all kept, also across a wire thinner than the radius.
-    places : int, optional
+    slots : int, optional
         How many contacts may be near at a time; by default six for one pair and two more for each further one, at most
         eight and four a body. A solve that needs more doubles it.
+    neglect, places
+        Former names of `merge_radius` and `slots`; they warn.
 
     Raises
     ------
@@ -69,7 +72,9 @@ class Clearance(Constraint):
         name: str | None = None,
         *,
         exclude: Iterable[tuple[Body, Body]] = (),
-        neglect: float = 1e-6,
+        merge_radius: float = 1e-6,
+        slots: int | None = None,
+        neglect: float | None = None,
         places: int | None = None,
     ) -> None:
         chosen = None if bodies is None else items("bodies", bodies, "two bodies or more, or None for all")
@@ -87,12 +92,16 @@ class Clearance(Constraint):
         self._minimum = bounded("minimum", minimum)
         if not self._minimum >= 0.0:
             raise InputError(f"minimum is {self._minimum:g}; expected a length of zero or more")
-        self._neglect = number("neglect", neglect)
-        if not 0.0 < self._neglect <= 1.0:
-            raise InputError(f"neglect is {self._neglect:g}; expected a part of the scene's size, from above 0 to 1")
-        if places is not None and (not isinstance(places, int) or isinstance(places, bool) or places < 1):
-            raise InputError(f"places is {places!r}; expected an integer of 1 or more")
-        self._places = places
+        merge_radius = renamed("merge_radius", merge_radius, "neglect", neglect)
+        self._merge_radius = number("merge_radius", merge_radius)
+        if not 0.0 < self._merge_radius <= 1.0:
+            raise InputError(
+                f"merge_radius is {self._merge_radius:g}; expected a part of the scene's size, from above 0 to 1"
+            )
+        slots = renamed("slots", slots, "places", places)
+        if slots is not None and (not isinstance(slots, int) or isinstance(slots, bool) or slots < 1):
+            raise InputError(f"slots is {slots!r}; expected an integer of 1 or more")
+        self._slots = slots
         self._excluded = tuple(_pair(k, pair) for k, pair in enumerate(exclude))
         for k, pair in enumerate(self._excluded):
             for body in pair:
@@ -105,14 +114,25 @@ class Clearance(Constraint):
         return self._minimum
 
     @property
-    def neglect(self) -> float:
+    def merge_radius(self) -> float:
         """Radius of the spheres of neglect, in parts of the scene's size."""
-        return self._neglect
+        return self._merge_radius
+
+    @property
+    def slots(self) -> int | None:
+        """How many contacts may be near at a time; None for six a pair."""
+        return self._slots
+
+    @property
+    def neglect(self) -> float:
+        """`merge_radius`, by its former name."""
+        return renamed("merge_radius", self._merge_radius, "neglect", self._merge_radius)
 
     @property
     def places(self) -> int | None:
-        """How many contacts may be near at a time; None for six a pair."""
-        return self._places
+        """`slots`, by its former name."""
+        warnings.warn("places is called slots now", DeprecationWarning, stacklevel=2)
+        return self._slots
 
     @property
     def exclude(self) -> tuple[tuple[Body, Body], ...]:

@@ -67,7 +67,7 @@ def place_count(clearance: Clearance, pairs: Sequence[Pair]) -> int:
     if not pairs:
         return 0
     bodies = len({id(body) for pair in pairs for body in pair})
-    return clearance.places or min(4 + 2 * len(pairs), 8 + 4 * bodies)
+    return clearance.slots or min(4 + 2 * len(pairs), 8 + 4 * bodies)
 
 
 def is_of_surfaces(pair: Pair) -> bool:
@@ -94,7 +94,7 @@ def pack_watch(
         first += count
     count, pair_table = pairs.write()
     lengths = np.zeros(watch_memory.LENGTH_COUNT)
-    lengths[watch_memory.NEGLECT] = min(clearance.neglect for clearance in clearances)
+    lengths[watch_memory.NEGLECT] = min(clearance.merge_radius for clearance in clearances)
     lengths[watch_memory.FIRST_REACH], lengths[watch_memory.LAST_REACH] = FIRST_REACH, LAST_REACH
     _, lengths_place = writer.add(pool=lengths)
     lists = min(count, MOST_LISTS)
