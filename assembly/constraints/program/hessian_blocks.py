@@ -62,14 +62,14 @@ BLOCK_HEADER = size_of(BLOCK_HEADER_RECORD)
 @kernel(inline=True)
 def is_blocked(order):
     """Whether the Hessian is kept by blocks now."""
-    folds = order[1]
+    folds = order.folds
     return folds[folds.shape[0] - 1, 1] == 1
 
 
 @kernel(inline=True)
 def choose_storage(order, n):
     """By blocks, if the scene has a record of them and all n unknowns are bodies'."""
-    folds, blocks = order[1], order[3]
+    folds, blocks = order.folds, order.blocks
     by_blocks = blocks.size > 0 and n == 6 * blocks_at(blocks, 0).count
     folds[folds.shape[0] - 1, 1] = 1 if by_blocks else 0
 
@@ -91,14 +91,14 @@ def block_row(blocks, at, other):
 def spot(order, at, other):
     """Row and column of the Hessian's array where the block of the unknowns at.. and other.., at <= other, begins."""
     if is_blocked(order):
-        return block_row(order[3], at, other), 0
+        return block_row(order.blocks, at, other), 0
     return at, other
 
 
 @kernel(inner=True)
 def clear_patch(order, f, g):
     """Zeros for the terms of two bodies; where their twists, at f.. and g.. (negative: fixed), stand in the patch."""
-    patch = order[2][1:]
+    patch = order.scratch[1:]
     for i in range(12):
         for j in range(12):
             patch[i, j] = 0.0
@@ -110,7 +110,7 @@ def clear_patch(order, f, g):
 @kernel(inner=True)
 def add_patch(order, f, g, hessian):
     """Hessian += the patch, of the bodies whose twists are at f.. and g.."""
-    blocks, patch = order[3], order[2][1:]
+    blocks, patch = order.blocks, order.scratch[1:]
     low = min(f, g)
     high = max(f, g)
     if low < 0:

@@ -154,7 +154,7 @@ def term_by_blocks(pool, o, kind, q, body, s, entries, gradient, hessian):
     if s < 0:
         slope, block, order = gradient[:0], hessian[:0], 0
     else:
-        at = block_row(entries[3], s, s)
+        at = block_row(entries.blocks, s, s)
         slope, block, order = gradient[s : s + 6], hessian[at : at + 6], 1
     if kind == POINT_DISTANCE:
         return point_distance(pool, o, q, body, 0, order, slope, block)

@@ -173,7 +173,7 @@ JOINT_ROW_RECORD = record_dtype(
     joint=1,
     angle=1,
     parameters=1,  # where the two factors and the value are in the pool
-    second=1,  # where a second coordinate's record is (`SECOND_COORDINATE`); -1: none
+    second=1,  # where the record of a second coordinate is, which has bodies of its own; -1: none
 )
 joint_row_at = record_view(JOINT_ROW_RECORD)
 COORDINATE = place_of(JOINT_ROW_RECORD, "coordinate")
@@ -186,14 +186,17 @@ COORDINATE_RECORD = record_dtype(
     angle=1,  # row of tracked values where its angle is unwrapped; -1: it is none
 )
 coordinate_at = record_view(COORDINATE_RECORD)
-# A second coordinate of a row, which has bodies of its own.
-SECOND_COORDINATE = record_dtype(
+# A coordinate with bodies of its own: the second one of a row, an input of a dexterity.
+BODY_COORDINATE = record_dtype(
     "i8",
-    coordinate=4,  # a `COORDINATE_RECORD`
+    kind=1,  # these four as in `COORDINATE_RECORD`
+    component=1,
+    joint=1,
+    angle=1,
     body_f=1,
     body_g=1,
 )
-second_coordinate_at = record_view(SECOND_COORDINATE)
+body_coordinate_at = record_view(BODY_COORDINATE)
 # A row of a tape.
 TAPE_ROW_RECORD = record_dtype(
     "i8",

@@ -51,11 +51,11 @@ def recall(table, state, at, point):
             idle_row(r, 1.0, point)
             continue
         a = o + RECALLED * r
-        point[3][r] = state[a + 1]
+        point.residual[r] = state[a + 1]
         for i in range(CONTACT_RECORD):
-            point[2][r, i] = state[a + 2 + i]
+            point.records[r, i] = state[a + 2 + i]
         for i in range(FREE_COLUMN):
-            point[4][r, i] = state[a + 2 + CONTACT_RECORD + i]
+            point.jacobian[r, i] = state[a + 2 + CONTACT_RECORD + i]
     return True
 
 
@@ -76,8 +76,8 @@ def leave(table, state, at, point, good):
         state[a] = float(contact_row_at(table, row).guard_number)
         if row_at(table, row).body_f < 0:
             continue
-        state[a + 1] = point[3][r]
+        state[a + 1] = point.residual[r]
         for i in range(CONTACT_RECORD):
-            state[a + 2 + i] = point[2][r, i]
+            state[a + 2 + i] = point.records[r, i]
         for i in range(FREE_COLUMN):
-            state[a + 2 + CONTACT_RECORD + i] = point[4][r, i]
+            state[a + 2 + CONTACT_RECORD + i] = point.jacobian[r, i]
