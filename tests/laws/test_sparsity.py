@@ -44,7 +44,7 @@ def random_system(rng, bodies, pairs):
     last = np.concatenate([np.maximum.accumulate(last), np.repeat(6 * bodies + 4 * np.arange(pairs) + 3, 4)])
     places = np.empty((3, n), np.int64)
     places[0] = last
-    order = (places, folds, np.empty((1, n)), np.empty(0, np.int64))
+    order = layout.Sparsity(places, folds, np.empty((1, n)), np.empty(0, np.int64))
     place_folds(n, order)
     dense = np.triu(matrix) + np.triu(matrix, 1).T
     dense += np.diag(np.abs(dense).sum(axis=1) + 1.0)
@@ -58,8 +58,8 @@ def test_the_step_is_that_of_the_dense_matrix(bodies, pairs):
     n = len(dense)
     if pairs > 0:
         # A permutation, and rows of the factor that reach farther and farther.
-        assert sorted(order[0][1]) == list(range(n))
-        assert (np.diff(order[0][2]) >= 0).all()
+        assert sorted(order.places[1]) == list(range(n))
+        assert (np.diff(order.places[2]) >= 0).all()
     # What the order does not list is neither read nor written.
     upper, factor = np.full((n, n), np.nan), np.full((n, n), np.nan)
     clear_upper(order, n, upper)
@@ -83,9 +83,9 @@ def test_the_step_is_that_of_the_dense_matrix(bodies, pairs):
 def test_a_chain_with_folds_is_as_narrow_as_one_without():
     rng = np.random.default_rng(1)
     order, dense = random_system(rng, 40, 39)
-    reach = order[0][2] - np.arange(len(dense))
+    reach = order.places[2] - np.arange(len(dense))
     # Two bodies and what may stand behind each of them.
-    most = np.bincount(np.maximum(order[1][:39, 0], order[1][:39, 1]).clip(0) // 6).max()
+    most = np.bincount(np.maximum(order.folds[:39, 0], order.folds[:39, 1]).clip(0) // 6).max()
     assert reach.max() < 12 + 4 * (2 * most + 1)
 
 
@@ -110,7 +110,7 @@ def test_rows_of_a_chain_meet_only_their_neighbors():
     # Six rows a pair, and those of the next pair.
     assert (last_row - np.arange(rows)).max() < 18
     # A body, the next one, and the pairs behind both; behind the last one stands the pair with the fixed body as well.
-    assert (order[0][2][:n] - np.arange(n)).max() < 24
+    assert (order.places[2][:n] - np.arange(n)).max() < 24
 
 
 def test_the_way_back_onto_rows_breaks_no_idle_ones():
