@@ -6,7 +6,7 @@ listed apart, in `folds`. Factorized in that order, one such pair would fill the
 factor the unknowns of a pair stand behind the later one of its bodies: unknown i is number place[i] there, and row p
 of the factor reaches to ends[p].
 
-    order = ((last, place, ends), folds, scratch, blocks)
+    order = Sparsity(places (last, place, ends), folds, scratch, blocks)
 
 `folds` (pairs + 1, 2) holds the unknowns of the two bodies, negative for a fixed one, and in its last row how many
 pairs there are, and whether all this is put aside for blocks (`constraints/program/hessian_blocks.py`). Of scratch

@@ -34,11 +34,11 @@ from assembly.constraints.program.tapes import tape_rows
 def coordinate_row(pool, kind, component, k, angle, factor, start, tracked, records, jacobian, r, column):
     """Factor times a coordinate, its gradient into row r from `column` on; its angle is tracked."""
     near = start[angle, 0] if angle >= 0 else 0.0
-    here = coordinate(kind, component, records, k, near)
+    found = coordinate(kind, component, records, k, near)
     if angle >= 0:
-        tracked[angle, 0] = here.value
-    write_gradient(here.n, here.arm_f, here.arm_g, here.h, factor, jacobian, r, column)
-    return factor * here.value
+        tracked[angle, 0] = found.value
+    write_gradient(found.n, found.arm_f, found.arm_g, found.h, factor, jacobian, r, column)
+    return factor * found.value
 
 
 @kernel(inner=True)

@@ -2,17 +2,8 @@
 
 An n x n matrix of thousands of unknowns is almost all zeros, and memory that is touched for the first time in every
 solve costs more than the arithmetic. So scenes of many bodies have a record of blocks
-(`constraints/packing/elimination_order.py`), whose rows stand in the order of the factor:
-
-    N, blocks of the Hessian, blocks of the factor, and where these begin, counted from the record:
-    place (N)           row of the body whose twist is number k among the unknowns
-    first (N + 1)       of every row its first block of the Hessian; that is the one on the diagonal
-    column (.)          of a block; not before its row
-    seat (.)            where it stands in its row of the factor, twice, plus one where it goes there transposed
-    panel (N + 1), across (.)                     rows of the factor and their columns, ascending
-    meeting (N + 1), meeting_row (.), meeting_at (.)   of every column the rows above that have it, and at which place
-
-and, as numbers in its header, the addresses of the two kernels that make the factor and solve by it.
+(`constraints/packing/elimination_order.py`), whose rows stand in the order of the factor: a header
+(`BLOCK_HEADER_RECORD`) and the lists that it names.
 
 A block is turned as the upper triangle of the unknowns has it, block e in rows 6 e.. of an array of six columns.
 Where a pair at a fold has unknowns of its own, everything is dense in an envelope as in a small scene
@@ -24,22 +15,23 @@ from __future__ import annotations
 from assembly._kernel import kernel
 from assembly._record import place_of, record_dtype, record_view, size_of
 
+# Header of the record: counts, then where lists begin, counted from the record (their lengths in parentheses).
 BLOCK_HEADER_RECORD = record_dtype(
     "i8",
-    count=1,
-    blocks=1,
-    factored=1,
-    place=1,
-    first=1,
-    column=1,
-    seat=1,
-    panel=1,
-    across=1,
-    meeting=1,
-    meeting_row=1,
-    meeting_at=1,
-    factorize_address=1,
-    solve_address=1,
+    count=1,  # N, moving bodies
+    blocks=1,  # of the Hessian
+    factored=1,  # blocks of the factor
+    place=1,  # (N) row of the body whose twist is number k among the unknowns
+    first=1,  # (N + 1) of every row its first block of the Hessian; that is the one on the diagonal
+    column=1,  # (blocks) of a block; not before its row
+    seat=1,  # (blocks) where it stands in its row of the factor, twice, plus one where it goes there transposed
+    panel=1,  # (N + 1) rows of the factor: of every one its first block
+    across=1,  # (factored) their columns, ascending
+    meeting=1,  # (N + 1) of every column the first of the rows above that have it
+    meeting_row=1,  # these rows
+    meeting_at=1,  # at which place of its row each has the column
+    factorize_address=1,  # kernel that makes the factor
+    solve_address=1,  # kernel that solves by it
 )
 blocks_at = record_view(BLOCK_HEADER_RECORD)
 COUNT = place_of(BLOCK_HEADER_RECORD, "count")

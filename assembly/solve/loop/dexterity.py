@@ -91,14 +91,14 @@ def input_row(table, at, records, tracked, b, r):
     """Row r of b: the gradient of an input's coordinate."""
     asked = body_coordinate_at(table, at)
     near = tracked[asked.angle, 0] if asked.angle >= 0 else 0.0
-    here = coordinate(asked.kind, asked.component, records, header_at(table, 0).contacts + asked.joint, near)
-    n, h = here.n, here.h
+    found = coordinate(asked.kind, asked.component, records, header_at(table, 0).contacts + asked.joint, near)
+    n, h = found.n, found.h
     for side in range(2):
         s = slot(table, asked.body_f if side == 0 else asked.body_g)
         if s < 0:
             continue
         sign = -1.0 if side == 0 else 1.0
-        turn = cross(here.arm_f if side == 0 else here.arm_g, n)
+        turn = cross(found.arm_f if side == 0 else found.arm_g, n)
         for i in range(3):
             b[r, s + i] += sign * n[i]
             b[r, s + 3 + i] += sign * (turn[i] + h[i])
