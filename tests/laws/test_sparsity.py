@@ -10,7 +10,7 @@ from assembly.constraints.program import records as layout
 from assembly.constraints.program.envelope import clear_upper, place_folds
 from assembly.solve.linear_algebra.factorize import factorize_shifted, forward_step, solve_step
 from assembly.solve.loop.multipliers import curve_rows, toward_rows
-from assembly.solve.loop.residuals import arrange
+from assembly.solve.loop.residuals import Structure, arrange
 from tests.laws.loop_point import room_of_shape
 
 
@@ -121,8 +121,8 @@ def test_the_way_back_onto_rows_breaks_no_idle_ones():
     jacobian = np.zeros((rows, layout.EXTRA_COLUMN))
     jacobian[0, 0], jacobian[1, :2] = 1.0, (-1.0, 1.0)
     places = np.array([np.full(6, 5), np.arange(6), np.full(6, 5)])
-    order = (places, np.zeros((1, 2), np.int64), np.empty((1, 6)), np.empty(0, np.int64))
-    shape = (bases, np.ones(rows, np.int64), order, (np.arange(rows), np.full(rows, rows - 1)))
+    order = layout.Sparsity(places, np.zeros((1, 2), np.int64), np.empty((1, 6)), np.empty(0, np.int64))
+    shape = Structure(bases, np.ones(rows, np.int64), order, (np.arange(rows), np.full(rows, rows - 1)))
     residual, active, mu = np.array([-1e-3, 0.0]), np.empty(rows), 1e-6
     matrices, out = np.empty((2, 6, 6)), np.empty(6)
     forces = np.empty(rows)
@@ -139,8 +139,8 @@ def way_back(sides, residual, jacobian, softness=1.0, enough=0.0):
     bases = np.full((rows, 3), -1, dtype=np.int64)
     bases[:, 0] = 0
     places = np.array([np.full(6, 5), np.arange(6), np.full(6, 5)])
-    order = (places, np.zeros((1, 2), np.int64), np.empty((1, 6)), np.empty(0, np.int64))
-    shape = (bases, np.array(sides), order, (np.arange(rows), np.full(rows, rows - 1)))
+    order = layout.Sparsity(places, np.zeros((1, 2), np.int64), np.empty((1, 6)), np.empty(0, np.int64))
+    shape = Structure(bases, np.array(sides), order, (np.arange(rows), np.full(rows, rows - 1)))
     whole = np.zeros((rows, layout.EXTRA_COLUMN))
     whole[:, :6] = jacobian
     active, forces, matrices, out = np.empty(rows), np.empty(rows), np.empty((2, 6, 6)), np.empty(6)
@@ -190,8 +190,8 @@ def test_the_way_back_onto_rows_is_soft_only_where_it_must_be(angle):
     jacobian = np.zeros((rows, layout.EXTRA_COLUMN))
     jacobian[0, 0], jacobian[1, :2] = 1.0, (np.cos(angle), np.sin(angle))
     places = np.array([np.full(6, 5), np.arange(6), np.full(6, 5)])
-    order = (places, np.zeros((1, 2), np.int64), np.empty((1, 6)), np.empty(0, np.int64))
-    shape = (bases, np.zeros(rows, np.int64), order, (np.arange(rows), np.full(rows, rows - 1)))
+    order = layout.Sparsity(places, np.zeros((1, 2), np.int64), np.empty((1, 6)), np.empty(0, np.int64))
+    shape = Structure(bases, np.zeros(rows, np.int64), order, (np.arange(rows), np.full(rows, rows - 1)))
     residual, mu = np.array([1e-10, -1e-10]), 1e-6
     matrices, out, forces = np.empty((2, 6, 6)), np.empty(6), np.empty(rows)
     back = (jacobian, mu, np.full(rows, 1.0 / mu), 1.0)

@@ -20,6 +20,7 @@ The loop of a solve calls the two kernels at the end by their addresses.
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 import numpy as np
 
@@ -52,6 +53,8 @@ from assembly.proximity.features.trim_distance import trim_distance
 
 # A vector shorter than this has no direction of its own.
 NO_LENGTH = 1e-9
+# Of contacts: which of them have their coordinates as unknowns (negative: it has not), and lengths of these.
+LiftedCoordinates = namedtuple("LiftedCoordinates", "free lengths")
 
 
 @kernel(inner=True)
@@ -323,7 +326,7 @@ def growth(table, pool, r, j, loose, point):
 def trim_rows(table, pool, free, lengths, q, tracked, records, residual, jacobian):
     """All rows of trims, and their gradients."""
     header = header_at(table, 0)
-    loose = (free, lengths)
+    loose = LiftedCoordinates(free, lengths)
     point = Iterate(q, tracked, records, residual, jacobian)
     r = header.contacts
     while r < header.contacts + header.trims:
@@ -368,7 +371,7 @@ def trim_terms(table, pool, r, free, lengths, bases, tracked, records, jacobian,
     row = trim_row_at(table, header_at(table, 0).row_table + ROW * r)
     k = row.contact
     o = 2 * row.side
-    loose = (free, lengths)
+    loose = LiftedCoordinates(free, lengths)
     _s, n, bend = trim_distance(table, pool, row.loop, tracked[k, o], tracked[k, o + 1])
     places = np.empty((1, bases.shape[1]), np.int64)
     for b in range(bases.shape[1]):
