@@ -31,11 +31,6 @@ TERM_RECORD = record_dtype(
 )
 term_at = record_view(TERM_RECORD)
 TERM = size_of(TERM_RECORD)
-TERM_KIND = place_of(TERM_RECORD, "kind")
-TERM_BODY = place_of(TERM_RECORD, "body")
-TERM_PARAMETERS = place_of(TERM_RECORD, "parameters")
-TERM_TAPE = place_of(TERM_RECORD, "tape")
-TERM_FOLLOWS = place_of(TERM_RECORD, "follows")
 POINT_DISTANCE, POSTURE, TAPE_TERM, DEXTERITY = 0, 1, 2, 3
 # Parameters of a point distance.
 POINT_DISTANCE_FIELDS = record_dtype(
@@ -54,7 +49,6 @@ POSTURE_FIELDS = record_dtype(
     lever=1,  # of 4 sin^2(angle / 2)
 )
 posture_at = record_view(POSTURE_FIELDS)
-POSTURE_POSITION = place_of(POSTURE_FIELDS, "position")
 POSTURE_QUATERNION = place_of(POSTURE_FIELDS, "quaternion")
 POSTURE_PARAMETERS = size_of(POSTURE_FIELDS)
 
@@ -177,9 +171,11 @@ def recenter(table, pool, q):
     for t in range(header.terms):
         term = term_at(table, header.term_table + TERM * t)
         if term.kind == POSTURE and term.follows == 1:
-            o = term.parameters + POSTURE_POSITION
-            for k in range(7):
-                pool[o + k] = q[term.body, k]
+            reference = posture_at(pool, term.parameters)
+            for k in range(3):
+                reference.position[k] = q[term.body, k]
+            for k in range(4):
+                reference.quaternion[k] = q[term.body, 3 + k]
 
 
 @kernel(inner=True)

@@ -227,9 +227,6 @@ TAPE_FIELDS = record_dtype(
     spare=1,
 )
 tape_at = record_view(TAPE_FIELDS)
-TAPE_VALUES = place_of(TAPE_FIELDS, "values")
-TAPE_ROW_AT = place_of(TAPE_FIELDS, "first_row")
-TAPE_SCALE = place_of(TAPE_FIELDS, "unit")
 TAPE_RECORD = size_of(TAPE_FIELDS)
 # Columns of the Jacobian: twists of f and g, a lifted pair's coordinates, further bodies.
 FREE_COLUMN, EXTRA_COLUMN = 12, 16
