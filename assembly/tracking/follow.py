@@ -14,10 +14,10 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly.constraints.program.contact import track_contact, track_row
+from assembly.constraints.program.contact import surface_of, track_contact, track_row
 from assembly.constraints.program.records import (
     ROW,
-    SURFACE_F,
+    Iterate,
     contact_row_at,
     header_at,
     pool_header_at,
@@ -27,7 +27,7 @@ from assembly.geometry.splines.domain import into_domain
 from assembly.geometry.splines.evaluate import surface_at
 from assembly.geometry.vec import quaternion_product
 from assembly.proximity.extrema.face_face import BEND, CONVERGED, SINGULAR
-from assembly.proximity.extrema.rates import ZED, derivatives_at
+from assembly.proximity.extrema.rates import derivatives_at
 from assembly.proximity.features.solid_contact import TRACK, contact_record_at, tracked_at
 from assembly.proximity.manager.state import (
     PAIR_MEMORY,
@@ -37,6 +37,7 @@ from assembly.proximity.manager.state import (
     memory_header_at,
     memory_places,
     pair_state_at,
+    place_at,
 )
 from assembly.proximity.manager.update import IN_TURNS
 from assembly.solve.loop.clearances import look_around, place_guards
@@ -100,14 +101,14 @@ def predict(table, pool, row, r, tracked, records, twists, guess):
     for j in range(4):
         s = 0.0
         for i in range(6):
-            s += derivatives.zed[j, i] * twists[f, i] + records[r, ZED + 12 * j + 6 + i] * twists[g, i]
+            s += derivatives.zed[j, i] * twists[f, i] + derivatives.zed[j, 6 + i] * twists[g, i]
         for i in range(4):
             guess[r, i] += derivatives.rates[i, j] * s
     if contact_row_at(table, row).shell_f < 0:
         for side in range(2):
             i = 2 * side
             guess[r, i], guess[r, i + 1], _clamped = into_domain(
-                table, pool, table[row + SURFACE_F + side], guess[r, i], guess[r, i + 1]
+                table, pool, surface_of(table, row, side), guess[r, i], guess[r, i + 1]
             )
 
 
@@ -129,7 +130,7 @@ def is_astray(table, pool, row, r, before, guess, after):
     """Whether a contact of two surfaces was corrected by so much that it may have come to another root."""
     for side in range(2):
         i = 2 * side
-        surface = table[row + SURFACE_F + side]
+        surface = surface_of(table, row, side)
         moved = part_of_domain(table, pool, surface, before[r, i], before[r, i + 1], guess[r, i], guess[r, i + 1])
         off = part_of_domain(table, pool, surface, guess[r, i], guess[r, i + 1], after[r, i], after[r, i + 1])
         if off > ASTRAY * moved + SLACK:
@@ -162,7 +163,7 @@ def correct(table, pool, row, r, q, guess, tracked, records):
 def look_at_all_of(table, memory, k):
     """Let the next look take up the pair of bodies whose contact is at place k."""
     pairs, places, _events = memory_places(table, header_at(table, 0).watch)
-    p = int(memory[places + PLACE_MEMORY * k])
+    p = int(place_at(memory, places + PLACE_MEMORY * k).pair)
     pair_state_at(memory, pairs + PAIR_MEMORY * p).allowance = 0.0
 
 
@@ -174,7 +175,7 @@ def doubt_twins(table, pool, memory, k, records):
     places = memory_places(table, header.watch)[1]
     near = lengths_at(pool, manager_at(table, header.watch).lengths).neglect
     for l in range(k):
-        if memory[places + PLACE_MEMORY * l] != memory[places + PLACE_MEMORY * k]:
+        if place_at(memory, places + PLACE_MEMORY * l).pair != place_at(memory, places + PLACE_MEMORY * k).pair:
             continue
         square = 0.0
         for i in range(3):
@@ -199,6 +200,8 @@ def follow(table, pool, q, poses, tracked, records, room, free, memory):
     header = header_at(table, 0)
     state = memory_header_at(memory, 0)
     standing, twists, guess, before, rows = room
+    # Nothing evaluates rows here: what would be their residuals and multipliers is room alone.
+    listed = Iterate(poses, tracked, records, rows[0], rows)
     events = state.event_count
     if not place_bodies(table, pool, q, standing):
         return -1
@@ -222,10 +225,10 @@ def follow(table, pool, q, poses, tracked, records, room, free, memory):
         elif contact_row_at(table, row).shell_f < 0 and is_astray(table, pool, row, r, before, guess, tracked):
             look_at_all_of(table, memory, k)
         doubt_twins(table, pool, memory, k, records)
-    look_around(table, pool, memory, (poses, tracked), IN_TURNS)
+    look_around(table, pool, memory, listed, IN_TURNS)
     for k in range(header.guards):
         before[first + k, 0] = float(contact_row_at(table, header.row_table + ROW * (first + k)).guard_number)
-    place_guards(table, memory, (poses, tracked, records, rows[0]), rows[0], rows[1], free, False)
+    place_guards(table, memory, listed, rows[0], rows[1], free, False)
     for k in range(header.guards):
         r = first + k
         row = header.row_table + ROW * r

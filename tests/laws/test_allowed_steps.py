@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import assembly as asm
-from assembly.constraints.program.records import MOVING, WATCH
+from assembly.constraints.program.records import MOVING, WATCH, Iterate
 from assembly.proximity.brep.borders import feature_kind
 from assembly.proximity.brep.records import EDGE, FACE
 from assembly.proximity.bvh.tree import ELEMENT, ELEMENT_FEATURE, ELEMENT_POOL
@@ -73,7 +73,9 @@ class Looked:
 
     def allowed(self, q, step, share):
         trial = q.copy()
-        return allowed_share(self.table, self.pool, self.memory, (q,), (trial,), step, share)
+        return allowed_share(
+            self.table, self.pool, self.memory, Iterate(q, *[None] * 4), Iterate(trial, *[None] * 4), step, share
+        )
 
     def column(self, k):
         at = memory_places(self.table, self.watch)[0]

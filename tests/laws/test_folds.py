@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly.constraints.program.records import FREE_COLUMN, ROWS, WATCH
+from assembly.constraints.program.records import FREE_COLUMN, ROWS, WATCH, Iterate
 from assembly.geometry.splines.evaluate import SURFACE_RECORD
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.extrema.face_face import SINGULAR, solve_pair
@@ -224,7 +224,7 @@ def test_a_free_contact_of_a_clearance_goes_to_its_extremum_if_it_is_off_it(off)
     q[:, :3] = (q[:, :3] - packed.reference) / packed.scale
     rows = int(table[ROWS])
     tracked, free = np.full((packed.tracked, TRACK), np.nan), np.full(rows, -1)
-    point = (q, tracked, np.zeros((rows, CONTACT_RECORD)), np.zeros(rows))
+    point = Iterate(q, tracked, np.zeros((rows, CONTACT_RECORD)), np.zeros(rows), None)
     assert look_around(table, packed.pool, memory, point, watch.EVERYTHING)
     place_guards(table, memory, point, np.zeros(rows), np.zeros(rows), free, True)
     row = int(np.flatnonzero(~np.isnan(tracked[:, 0]))[0])

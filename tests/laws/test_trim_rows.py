@@ -182,7 +182,7 @@ def test_rows_against_the_closed_forms(seed):
         _, rate = pair_moved(made.q.ravel()[None], lengths[None], 0.0)
         # Both exact but for rounding, in units of a few times the shape's size.
         np.testing.assert_allclose(packed.scale * point.residual[1:], unit * value, rtol=0, atol=1e-11)
-        jacobian = point.point[4][1:, :12]
+        jacobian = point.point.jacobian[1:, :12]
         np.testing.assert_allclose(packed.scale * (jacobian @ twist), unit * (slope @ rate[0]), rtol=0, atol=1e-10)
 
 

@@ -14,6 +14,7 @@ from assembly._kernel import kernel
 from assembly.constraints.program.records import (
     FREE_COLUMN,
     ROW,
+    Iterate,
     contact_row_at,
     header_at,
     row_at,
@@ -124,6 +125,13 @@ def track_row(table, pool, row, q, start, patience, records, tracked, r):
 
 
 @kernel(inline=True)
+def surface_of(table, row, side):
+    """The surface of a contact on side 0, of f, or 1, of g."""
+    contact = contact_row_at(table, row)
+    return contact.surface_f if side == 0 else contact.surface_g
+
+
+@kernel(inline=True)
 def is_guard(table, r):
     """Whether row r is a clearance's."""
     header = header_at(table, 0)
@@ -168,12 +176,12 @@ def copy_tracked(start, r, tracked):
 @kernel(inline=True)
 def idle_row(r, gap, point):
     """A row that is open by `gap`."""
-    records = point[2]
+    records = point.records
     contact = contact_record_at(records, r)
     derivatives_at(records, r).gap = gap
     contact.proper = 1.0
     contact.fold = 1.0
-    point[3][r] = gap
+    point.residual[r] = gap
 
 
 @kernel(inner=True)
@@ -196,20 +204,20 @@ def lost_guard(table, pool, r, start, point, past, goes):
     ):
         return False
     idle_row(r, gap, point)
-    tracked_at(point[1], r).gap = gap + least
+    tracked_at(point.tracked, r).gap = gap + least
     # Nothing moves it: its pair is not known.
     for i in range(RATES, RECORD):
-        point[2][r, i] = 0.0
+        point.records[r, i] = 0.0
     for i in range(FREE_COLUMN):
-        point[4][r, i] = 0.0
-    point[1][r, 0] = math.nan
+        point.jacobian[r, i] = 0.0
+    point.tracked[r, 0] = math.nan
     return True
 
 
 @kernel(inline=True)
 def write_gap_row(table, pool, r, point):
     """Row r, of contact r, from its record: the gap less the least one, and its gradient over the twists."""
-    _q, tracked, records, residual, jacobian = point
+    tracked, records, residual, jacobian = point.tracked, point.records, point.residual, point.jacobian
     derivatives = derivatives_at(records, r)
     residual[r] = derivatives.gap - least_gap(table, pool, r, tracked)
     gradient_row(records, r, jacobian, r)
@@ -228,7 +236,7 @@ def solids_row(table, pool, r, start, patience, point):
     that.
     """
     pair = tracked_at(start, r)
-    q, tracked, records, _residual, _jacobian = point
+    q, tracked, records = point.q, point.tracked, point.records
     row = header_at(table, 0).row_table + ROW * r
     goes = pair.stays <= MAY_GO
     if goes:
@@ -264,7 +272,7 @@ def row_of_pair(table, pool, r, start, patience, point):
     A contact is carried from `start` to its extremal pair, by steps that turn no normal by more than `patience`. A
     one-sided row that loses its pair takes the nearest one there is.
     """
-    q, tracked, records, _residual, _jacobian = point
+    q, tracked, records = point.q, point.tracked, point.records
     derivatives = derivatives_at(records, r)
     contact = contact_record_at(records, r)
     row = header_at(table, 0).row_table + ROW * r
@@ -302,7 +310,7 @@ def contact_row(table, pool, r, start, patience, point):
     A row of a clearance that stays open is as `solve/loop/predict.py` left it.
     """
     pair = tracked_at(start, r)
-    _q, tracked, records, residual, _jacobian = point
+    tracked, records, residual = point.tracked, point.records, point.residual
     contact_record = contact_record_at(records, r)
     row = header_at(table, 0).row_table + ROW * r
     contact = contact_row_at(table, row)
@@ -331,7 +339,7 @@ def contact_row(table, pool, r, start, patience, point):
 )
 def contact_rows(table, pool, start, patience, free, q, tracked, records, residual, jacobian):
     """All rows of contacts but those of free pairs, and their gradients. Returns one whose pair was lost, or -1."""
-    point = (q, tracked, records, residual, jacobian)
+    point = Iterate(q, tracked, records, residual, jacobian)
     for r in range(header_at(table, 0).contacts):
         if free[r] < 0 and not contact_row(table, pool, r, start, patience, point):
             return r

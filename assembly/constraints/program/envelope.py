@@ -6,7 +6,7 @@ listed apart, in `folds`. Factorized in that order, one such pair would fill the
 factor the unknowns of a pair stand behind the later one of its bodies: unknown i is number place[i] there, and row p
 of the factor reaches to ends[p].
 
-    order = ((last, place, ends), folds, scratch, blocks)
+    order = Sparsity(places (last, place, ends), folds, scratch, blocks)
 
 `folds` (pairs + 1, 2) holds the unknowns of the two bodies, negative for a fixed one, and in its last row how many
 pairs there are, and whether all this is put aside for blocks (`constraints/program/hessian_blocks.py`). Of scratch
@@ -24,7 +24,7 @@ from assembly.constraints.program.hessian_blocks import blocks_at, is_blocked
 @kernel(inline=True)
 def listed_folds(order):
     """How many pairs at folds have their unknowns placed."""
-    folds = order[1]
+    folds = order.folds
     return folds[folds.shape[0] - 1, 0]
 
 
@@ -32,11 +32,11 @@ def listed_folds(order):
 def clear_upper(order, n, hessian):
     """Zeros wherever the Hessian has entries."""
     if is_blocked(order):
-        for i in range(6 * blocks_at(order[3], 0).blocks):
+        for i in range(6 * blocks_at(order.blocks, 0).blocks):
             for j in range(6):
                 hessian[i, j] = 0.0
         return
-    last, folds = order[0][0], order[1]
+    last, folds = order.places[0], order.folds
     for i in range(n):
         for j in range(i, last[i] + 1):
             hessian[i, j] = 0.0
@@ -54,7 +54,7 @@ def clear_upper(order, n, hessian):
 @kernel(inner=True)
 def place_upper(hessian, n, order, shift, matrix):
     """The upper triangle of hessian + shift I, in the order of the factor."""
-    places, folds = order[0], order[1]
+    places, folds = order.places, order.folds
     last, place, ends = places[0], places[1], places[2]
     count = listed_folds(order)
     if count == 0:
@@ -92,7 +92,7 @@ def close_envelope(last, n):
 @kernel(inner=True)
 def place_folds(n, order):
     """The order of the factor, for `last` and `folds` as they are: see the heading."""
-    places, folds = order[0], order[1]
+    places, folds = order.places, order.folds
     last, place, ends = places[0], places[1], places[2]
     count = listed_folds(order)
     first = n - 4 * count

@@ -21,7 +21,9 @@ from assembly.constraints.program.records import (
     JOINT_ROW,
     ROW,
     TAPE_RECORD,
+    coordinate_at,
     header_at,
+    joint_at,
     joint_row_at,
     row_at,
 )
@@ -32,11 +34,11 @@ from assembly.constraints.program.tapes import tape_rows
 def coordinate_row(pool, kind, component, k, angle, factor, start, tracked, records, jacobian, r, column):
     """Factor times a coordinate, its gradient into row r from `column` on; its angle is tracked."""
     near = start[angle, 0] if angle >= 0 else 0.0
-    value, n, arm_f, arm_g, h = coordinate(kind, component, records, k, near)
+    found = coordinate(kind, component, records, k, near)
     if angle >= 0:
-        tracked[angle, 0] = value
-    write_gradient(n, arm_f, arm_g, h, factor, jacobian, r, column)
-    return factor * value
+        tracked[angle, 0] = found.value
+    write_gradient(found.n, found.arm_f, found.arm_g, found.h, factor, jacobian, r, column)
+    return factor * found.value
 
 
 @kernel(inner=True)
@@ -50,13 +52,13 @@ def joint_row(table, pool, r, start, tracked, records, residual, jacobian):
     second = joint.second
     value = -pool[o + 2]
     for part in range(1 if second < 0 else 2):
-        at = row + COORDINATE if part == 0 else second
+        asked = coordinate_at(table, row + COORDINATE if part == 0 else second)
         value += coordinate_row(
             pool,
-            table[at],
-            table[at + 1],
-            pairs + table[at + 2],
-            table[at + 3],
+            asked.kind,
+            asked.component,
+            pairs + asked.joint,
+            asked.angle,
             pool[o + part],
             start,
             tracked,
@@ -72,16 +74,16 @@ def joint_row(table, pool, r, start, tracked, records, residual, jacobian):
 def evaluate(table, pool, start, patience, loose, room, point):
     """Evaluate all rows at the point's poses. Returns the contact whose pair was lost, or -1.
 
-    `start` are the tracked values to begin from. `point` is (poses, tracked values, records, residual, Jacobian); all
-    but the poses are written. `loose` is what pairs need: (places of the free ones, lengths, room, ...).
+    `start` are the tracked values to begin from. Of `point`, an `Iterate`, all but the poses is written. `loose` are
+    `LiftedPairs`.
     """
     header = header_at(table, 0)
-    q, tracked, records, residual, jacobian = point
+    q, tracked, records, residual, jacobian = point.q, point.tracked, point.records, point.residual, point.jacobian
     pairs = header.contacts
-    free = loose[0]
+    free = loose.free
     for r in range(pairs):
         if free[r] >= 0:
-            one = (table, pool, r, start, free, loose[1], loose[2], q, tracked, records, residual, jacobian)
+            one = (table, pool, r, start, free, loose.lengths, loose.vectors, q, tracked, records, residual, jacobian)
             call_address(header.free_row_address, one)
     if pairs > 0:
         others = (table, pool, start, patience, free, q, tracked, records, residual, jacobian)
@@ -89,13 +91,15 @@ def evaluate(table, pool, start, patience, loose, room, point):
         if lost >= 0:
             return lost
     if header.trims > 0:
-        call_address(header.trim_rows_address, (table, pool, free, loose[1], q, tracked, records, residual, jacobian))
+        call_address(
+            header.trim_rows_address, (table, pool, free, loose.lengths, q, tracked, records, residual, jacobian)
+        )
     for k in range(pairs, header.tracked):
         # Of an angle that no row has, only an input of a dexterity, this is all that is known.
         copy_tracked(start, k, tracked)
     for k in range(header.joints):
-        joint = header.joint_table + JOINT_RECORD * k
-        place_frames(pool, table[joint + 2], q, table[joint], table[joint + 1], records, pairs + k)
+        joint = joint_at(table, header.joint_table + JOINT_RECORD * k)
+        place_frames(pool, joint.frames, q, joint.body_f, joint.body_g, records, pairs + k)
     for r in range(pairs, header.rows):
         if row_at(table, header.row_table + ROW * r).kind == JOINT_ROW:
             joint_row(table, pool, r, start, tracked, records, residual, jacobian)

@@ -14,39 +14,41 @@ from assembly._kernel import kernel
 from assembly._record import place_of, record_dtype, record_view, size_of
 from assembly.constraints.program.envelope import clear_upper
 from assembly.constraints.program.hessian_blocks import block_row, is_blocked, spot
-from assembly.constraints.program.records import header_at, pool_header_at
+from assembly.constraints.program.records import header_at, pool_header_at, tape_at
 from assembly.constraints.program.tapes import place_tape
 from assembly.geometry.vec import add, cross, dot, matvec, quaternion_product, sub
 from assembly.kinematics.motion import position, rotation
 
-# A term: kind, body, offset of its parameters, its tape, and whether a posture is that of the start of each solve.
+# A term.
 TERM_RECORD = record_dtype(
     "i8",
-    kind=1,
-    body=1,
-    parameters=1,
-    tape=1,
-    follows=1,
+    kind=1,  # POINT_DISTANCE, ...
+    body=1,  # -1: none
+    parameters=1,  # where these are in the pool
+    tape=1,  # where the record of its tape is, or of its dexterity
+    follows=1,  # 1: a posture whose reference is the start of each solve
     spare=3,
 )
 term_at = record_view(TERM_RECORD)
 TERM = size_of(TERM_RECORD)
-TERM_KIND = place_of(TERM_RECORD, "kind")
-TERM_BODY = place_of(TERM_RECORD, "body")
-TERM_PARAMETERS = place_of(TERM_RECORD, "parameters")
-TERM_TAPE = place_of(TERM_RECORD, "tape")
-TERM_FOLLOWS = place_of(TERM_RECORD, "follows")
 POINT_DISTANCE, POSTURE, TAPE_TERM, DEXTERITY = 0, 1, 2, 3
+# Parameters of a point distance.
+POINT_DISTANCE_FIELDS = record_dtype(
+    "f8",
+    weight=1,
+    point=3,  # in the axes of its body
+    target=3,
+)
+point_distance_at = record_view(POINT_DISTANCE_FIELDS)
 # Parameters of a posture.
 POSTURE_FIELDS = record_dtype(
     "f8",
-    length=1,
-    position=3,
-    quaternion=4,
-    turn=1,
+    weight=1,  # of the square of the distance
+    position=3,  # of the reference
+    quaternion=4,  # of the reference
+    lever=1,  # of 4 sin^2(angle / 2)
 )
 posture_at = record_view(POSTURE_FIELDS)
-POSTURE_POSITION = place_of(POSTURE_FIELDS, "position")
 POSTURE_QUATERNION = place_of(POSTURE_FIELDS, "quaternion")
 POSTURE_PARAMETERS = size_of(POSTURE_FIELDS)
 
@@ -59,9 +61,10 @@ def load(array, o):
 @kernel(inner=True)
 def point_distance(pool, o, q, body, s, order, gradient, hessian):
     """Value of weight |p - target|^2; from order 1 on its derivatives are added at s, the place of the body's twist."""
-    weight = pool[o]
-    p = matvec(rotation(q, body), load(pool, o + 1))
-    e = add(sub(position(q, body), load(pool, o + 4)), p)
+    term = point_distance_at(pool, o)
+    weight = term.weight
+    p = matvec(rotation(q, body), (term.point[0], term.point[1], term.point[2]))
+    e = add(sub(position(q, body), (term.target[0], term.target[1], term.target[2])), p)
     value = weight * dot(e, e)
     if s < 0 or order == 0:
         return value
@@ -86,13 +89,12 @@ def point_distance(pool, o, q, body, s, order, gradient, hessian):
 @kernel(inner=True)
 def posture(pool, o, q, body, s, order, gradient, hessian):
     """|x - x0|^2 and 4 sin^2(angle / 2), with c and u the scalar and vector part of e0 e^*."""
-    posture_record = posture_at(pool, o)
-    weight = posture_record.length
-    lever = posture_record.turn
-    d = sub(position(q, body), load(pool, o + POSTURE_POSITION))
-    at = o + POSTURE_QUATERNION
+    term = posture_at(pool, o)
+    weight, lever = term.weight, term.lever
+    turn = term.quaternion
+    d = sub(position(q, body), (term.position[0], term.position[1], term.position[2]))
     c, ux, uy, uz = quaternion_product(
-        (pool[at], pool[at + 1], pool[at + 2], pool[at + 3]), (q[body, 3], -q[body, 4], -q[body, 5], -q[body, 6])
+        (turn[0], turn[1], turn[2], turn[3]), (q[body, 3], -q[body, 4], -q[body, 5], -q[body, 6])
     )
     u = (ux, uy, uz)
     value = weight * dot(d, d) + 4.0 * lever * dot(u, u)
@@ -119,11 +121,12 @@ def tape_term(table, pool, term, q, order, room, entries, gradient, hessian):
     size = pool_header_at(pool, 0).scale
     # A term's tape has the record of a row's tape, one value.
     tape = term_record.tape
+    expression = tape_at(table, tape)
     end = place_tape(table, pool, tape, q, inputs)
-    call_address(header.run_tape_address, (table, pool, table[tape], inputs, work, outputs))
+    call_address(header.run_tape_address, (table, pool, expression.first_order, inputs, work, outputs))
     value = weight * outputs[0]
-    count = table[tape + 3]
-    bodies = table[tape + 4]
+    count = expression.bodies
+    bodies = expression.body_list
     if order == 0 or not math.isfinite(value):
         return value if math.isfinite(value) else math.inf
     for b in range(count):
@@ -133,7 +136,7 @@ def tape_term(table, pool, term, q, order, room, entries, gradient, hessian):
                 gradient[s + i] += weight * size * outputs[1 + 6 * b + i]
                 gradient[s + 3 + i] += weight * outputs[4 + 6 * b + i]
     inputs[end] = weight
-    call_address(header.run_tape_address, (table, pool, table[tape + 1], inputs, work, outputs))
+    call_address(header.run_tape_address, (table, pool, expression.second_order, inputs, work, outputs))
     for b in range(count):
         at = 6 * table[header.slots + table[bodies + b]]
         for c in range(count):
@@ -154,7 +157,7 @@ def term_by_blocks(pool, o, kind, q, body, s, entries, gradient, hessian):
     if s < 0:
         slope, block, order = gradient[:0], hessian[:0], 0
     else:
-        at = block_row(entries[3], s, s)
+        at = block_row(entries.blocks, s, s)
         slope, block, order = gradient[s : s + 6], hessian[at : at + 6], 1
     if kind == POINT_DISTANCE:
         return point_distance(pool, o, q, body, 0, order, slope, block)
@@ -168,9 +171,11 @@ def recenter(table, pool, q):
     for t in range(header.terms):
         term = term_at(table, header.term_table + TERM * t)
         if term.kind == POSTURE and term.follows == 1:
-            o = term.parameters + POSTURE_POSITION
-            for k in range(7):
-                pool[o + k] = q[term.body, k]
+            reference = posture_at(pool, term.parameters)
+            for k in range(3):
+                reference.position[k] = q[term.body, k]
+            for k in range(4):
+                reference.quaternion[k] = q[term.body, 3 + k]
 
 
 @kernel(inner=True)

@@ -18,6 +18,7 @@ curvatures are those a little apart: values and derivatives are finite everywher
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 from assembly._kernel import kernel
 from assembly._record import place_of, record_dtype, record_view, size_of
@@ -26,16 +27,22 @@ from assembly.kinematics.motion import rotation
 from assembly.proximity.extrema.rates import load, put
 
 COINCIDENT, SLIDE, DISTANCE, DOT, SWING, TURN, AZIMUTH, ANGLE = 0, 1, 2, 3, 4, 5, 6, 7
+# A coordinate's value, and n, arm_f, arm_g, h of its gradient -(n, arm_f x n + h), (n, arm_g x n + h).
+Coordinate = namedtuple("Coordinate", "value n arm_f arm_g h")
+# What `swing` says of a SWING; its names are those of the formulas there, `rate` is phi', `second` phi'' u.z_b.
+Swing = namedtuple("Swing", "value u hu p phi j m rate second")
+# h, and K = sym(a b^T) + sym(c d^T) - t I, of a coordinate of angles.
+TurningForm = namedtuple("TurningForm", "h a b c d t")
 # A joint's frames in the pool: p_a, x_a, y_a, z_a, p_b, x_b, y_b, z_b, each in the axes of its body.
 FRAMES = 24
-# A record: R_f p_a, the axes of a, R_g p_b, the axes of b, d; all in world axes.
+# A joint at poses, in world axes; lengths over the scene's size.
 JOINT_FRAMES = record_dtype(
     "f8",
-    arm_a=3,
-    axes_a=(3, 3),
-    arm_b=3,
-    axes_b=(3, 3),
-    apart=3,
+    arm_a=3,  # R_f p_a
+    axes_a=(3, 3),  # x, y, z of frame a
+    arm_b=3,  # R_g p_b
+    axes_b=(3, 3),  # of frame b
+    apart=3,  # d, from the origin of a to that of b
 )
 joint_frames_at = record_view(JOINT_FRAMES)
 ARM_A = place_of(JOINT_FRAMES, "arm_a")
@@ -125,7 +132,7 @@ def swing(component, records, k):
         phi = 1.0 + x * (1 / 3 + x * (2 / 15 + x * (2 / 35 + x * (8 / 315))))
         e = -(1 / 3 + x * (4 / 15 + x * (6 / 35 + x * (32 / 315 + x * (40 / 693)))))
         second = 4 / 15 + x * (12 / 35 + x * (96 / 315 + x * (160 / 693)))
-        return phi * a, u, hu, cross(v, z), phi, e * a, e * a, e, second * a
+        return Swing(phi * a, u, hu, cross(v, z), phi, e * a, e * a, e, second * a)
     c, s, n = tilt(records, k)
     theta = math.atan2(s, c)
     along = 1.0 if component == 0 else 0.0
@@ -137,7 +144,7 @@ def swing(component, records, k):
     j = along * (c * phi - 1.0)
     e = steep * (c * phi - 1.0)
     w = along * (s * phi + 3.0 * c * e)
-    return theta * along, u, hu, scale(-1.0, n), phi, j, steep * j, e, w
+    return Swing(theta * along, u, hu, scale(-1.0, n), phi, j, steep * j, e, w)
 
 
 @kernel(inline=True)
@@ -147,10 +154,7 @@ def unwrap(angle, near):
 
 @kernel(inner=True)
 def coordinate(kind, component, records, k, near):
-    """Value of a coordinate and n, arm_f, arm_g, h of its gradient -(n, arm_f x n + h), (n, arm_g x n + h).
-
-    A TURN or an AZIMUTH is the one within pi of `near`.
-    """
+    """A coordinate and its gradient. A TURN or an AZIMUTH is the one within pi of `near`."""
     value = near
     n = ZERO
     d = ZERO
@@ -163,8 +167,9 @@ def coordinate(kind, component, records, k, near):
         d = load(records, k, APART)
         value = dot(n, d)
     elif kind == SWING:
-        value, _u, hu, p, phi, j, _m, _e, _w = swing(component, records, k)
-        h = blend(phi, hu, j, p)
+        part = swing(component, records, k)
+        value = part.value
+        h = blend(part.phi, part.hu, part.j, part.p)
     elif kind == TURN:
         x = load(records, k, AXES_A)
         y = load(records, k, AXES_A + 3)
@@ -196,7 +201,7 @@ def coordinate(kind, component, records, k, near):
     # `records` is used last where the branches meet: else Numba counts references to it, which costs half a row.
     arm_f = add(load(records, k, ARM_A), d)
     arm_g = load(records, k, ARM_B)
-    return value, n, arm_f, arm_g, h
+    return Coordinate(value, n, arm_f, arm_g, h)
 
 
 @kernel(inline=True)
@@ -306,7 +311,7 @@ def add_point_terms(kind, component, records, k, y, hessian, f, g):
 
 @kernel(inline=True)
 def turning_form(kind, component, records, k):
-    """h, and a, b, c, d, t of K = sym(a b^T) + sym(c d^T) - t I, of a coordinate of angles."""
+    """The second derivative of a coordinate of angles."""
     z = load(records, k, AXES_A + 6)
     a = ZERO
     b = ZERO
@@ -315,12 +320,13 @@ def turning_form(kind, component, records, k):
     h = ZERO
     t = 0.0
     if kind == SWING:
-        _value, u, hu, c, phi, j, m, e, w = swing(component, records, k)
-        a = blend(phi, u, m, z)
+        part = swing(component, records, k)
+        c = part.p
+        a = blend(part.phi, part.u, part.m, z)
         b = load(records, k, AXES_B + 6)
         t = dot(a, b)
-        d = blend(2.0 * e, hu, w, c)
-        h = blend(phi, hu, j, c)
+        d = blend(2.0 * part.rate, part.hu, part.second, c)
+        h = blend(part.phi, part.hu, part.j, c)
     elif kind == TURN:
         # h = 2 m / |m|^2, and |m|^2 / 2 = 1 + z_a.z_b changes along m x z_a.
         m = add(z, load(records, k, AXES_B + 6))
@@ -351,7 +357,7 @@ def turning_form(kind, component, records, k):
         t = -steep * cosine
         c = h
         d = scale(t, h)
-    return h, a, b, c, d, t
+    return TurningForm(h, a, b, c, d, t)
 
 
 @kernel(inner=True)
@@ -360,14 +366,14 @@ def add_coordinate_hessian(kind, component, records, k, y, hessian, f, g):
     if kind == COINCIDENT or kind == SLIDE or kind == DISTANCE:
         add_point_terms(kind, component, records, k, y, hessian, f, g)
     elif f >= 0 or g >= 0:
-        h, a, b, c, d, t = turning_form(kind, component, records, k)
-        block = symmetric(scale(y, a), b, scale(y, c), d, y * t)
+        form = turning_form(kind, component, records, k)
+        block = symmetric(scale(y, form.a), form.b, scale(y, form.c), form.d, y * form.t)
         if f >= 0:
             add_block(hessian, f + 3, f + 3, block)
         if g >= 0:
             add_block(hessian, g + 3, g + 3, block)
         if f >= 0 and g >= 0:
-            x, y, z = scale(0.5 * y if f < g else -0.5 * y, h)
+            x, y, z = scale(0.5 * y if f < g else -0.5 * y, form.h)
             xx, xy, xz, _yx, yy, yz, _zx, _zy, zz = block
             other = (-xx, -xy - z, -xz + y, -xy + z, -yy, -yz - x, -xz - y, -yz + x, -zz)
             add_block(hessian, min(f, g) + 3, max(f, g) + 3, other)

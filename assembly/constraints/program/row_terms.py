@@ -18,6 +18,7 @@ from assembly.constraints.program.records import (
     JOINT_ROW,
     ROW,
     TAPE_RECORD,
+    coordinate_at,
     header_at,
     joint_row_at,
     row_at,
@@ -79,7 +80,7 @@ def add_gram_blocks(blocks, bases, jacobian, r, weight, hessian):
 def add_square(order, bases, jacobian, r, weight, hessian):
     """Upper triangle of hessian += weight J_r^T J_r, however it is kept."""
     if is_blocked(order):
-        add_gram_blocks(order[3], bases, jacobian, r, weight, hessian)
+        add_gram_blocks(order.blocks, bases, jacobian, r, weight, hessian)
     else:
         add_gram(bases, jacobian, r, weight, hessian)
 
@@ -88,7 +89,7 @@ def add_square(order, bases, jacobian, r, weight, hessian):
 def add_coordinate_blocks(kind, component, records, k, y, order, hessian, f, g):
     """As `add_coordinate_hessian`, for a Hessian by blocks."""
     at_f, at_g = clear_patch(order, f, g)
-    add_coordinate_hessian(kind, component, records, k, y, order[2][1:], at_f, at_g)
+    add_coordinate_hessian(kind, component, records, k, y, order.scratch[1:], at_f, at_g)
     add_patch(order, f, g, hessian)
 
 
@@ -99,11 +100,11 @@ def add_row_terms(table, pool, loose, room, shape, point, y, weights, hessian):
     The rows of tangency of a free pair go with its row.
     """
     header = header_at(table, 0)
-    q, tracked, records, _residual, jacobian = point
-    bases, order = shape[0], shape[2]
+    q, tracked, records, jacobian = point.q, point.tracked, point.records, point.jacobian
+    bases, order = shape.bases, shape.sparsity
     blocked = is_blocked(order)
     pairs = header.contacts
-    free, lengths, vectors, block = loose[0], loose[1], loose[2], loose[3]
+    free, lengths, vectors, block = loose.free, loose.lengths, loose.vectors, loose.variables
     for r in range(pairs):
         if free[r] >= 0:
             call_address(
@@ -112,7 +113,7 @@ def add_row_terms(table, pool, loose, room, shape, point, y, weights, hessian):
             )
         elif blocked and (y[r] != 0.0 or weights[r] != 0.0):
             f, g = clear_patch(order, bases[r, 0], bases[r, 1])
-            add_gap_terms(records, r, jacobian, r, y[r], weights[r], order[2][1:], f, g)
+            add_gap_terms(records, r, jacobian, r, y[r], weights[r], order.scratch[1:], f, g)
             add_patch(order, bases[r, 0], bases[r, 1], hessian)
         elif y[r] != 0.0 or weights[r] != 0.0:
             add_gap_terms(records, r, jacobian, r, y[r], weights[r], hessian, bases[r, 0], bases[r, 1])
@@ -126,7 +127,7 @@ def add_row_terms(table, pool, loose, room, shape, point, y, weights, hessian):
             )
     for r in range(pairs + header.trims, header.rows):
         if weights[r] != 0.0 and blocked:
-            add_gram_blocks(order[3], bases, jacobian, r, weights[r], hessian)
+            add_gram_blocks(order.blocks, bases, jacobian, r, weights[r], hessian)
         elif weights[r] != 0.0:
             add_gram(bases, jacobian, r, weights[r], hessian)
         row = header.row_table + ROW * r
@@ -135,15 +136,15 @@ def add_row_terms(table, pool, loose, room, shape, point, y, weights, hessian):
             continue
         second = joint.second
         for part in range(1 if second < 0 else 2):
-            at = row + COORDINATE if part == 0 else second
+            asked = coordinate_at(table, row + COORDINATE if part == 0 else second)
             f = bases[r, 0 if part == 0 else 3]
             g = bases[r, 1 if part == 0 else 4]
-            k = pairs + table[at + 2]
+            k = pairs + asked.joint
             factor = y[r] * pool[joint.parameters + part]
             if blocked:
-                add_coordinate_blocks(table[at], table[at + 1], records, k, factor, order, hessian, f, g)
+                add_coordinate_blocks(asked.kind, asked.component, records, k, factor, order, hessian, f, g)
             else:
-                add_coordinate_hessian(table[at], table[at + 1], records, k, factor, hessian, f, g)
+                add_coordinate_hessian(asked.kind, asked.component, records, k, factor, hessian, f, g)
     for t in range(header.tapes):
         tape = header.tape_table + TAPE_RECORD * t
         expression = tape_at(table, tape)

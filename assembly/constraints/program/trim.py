@@ -20,10 +20,12 @@ The loop of a solve calls the two kernels at the end by their addresses.
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly.constraints.program.contact import surface_of
 from assembly.constraints.program.records import (
     BETWEEN,
     CARTESIAN,
@@ -31,8 +33,7 @@ from assembly.constraints.program.records import (
     PARAMETRIC,
     ROW,
     SIGNED,
-    SURFACE_F,
-    SURFACE_G,
+    Iterate,
     header_at,
     row_at,
     trim_row_at,
@@ -52,6 +53,8 @@ from assembly.proximity.features.trim_distance import trim_distance
 
 # A vector shorter than this has no direction of its own.
 NO_LENGTH = 1e-9
+# Of contacts: which of them have their coordinates as unknowns (negative: it has not), and lengths of these.
+LiftedCoordinates = namedtuple("LiftedCoordinates", "free lengths")
 
 
 @kernel(inner=True)
@@ -64,8 +67,8 @@ def clear(jacobian, r):
 @kernel(inner=True)
 def add_coordinate(loose, records, k, i, factor, jacobian, r):
     """Row r += factor times the derivative of coordinate i of contact k: an unknown, or by the contact velocity."""
-    free = loose[0]
-    lengths = loose[1]
+    free = loose.free
+    lengths = loose.lengths
     if free[k] >= 0:
         jacobian[r, FREE_COLUMN + i] += factor / lengths[k, i]
     else:
@@ -85,7 +88,7 @@ def add_rate(records, k, i, factor, jacobian, r):
 @kernel(inner=True)
 def signed_row(table, pool, r, loose, point):
     """Row r, of a trim in the signed form."""
-    _q, tracked, records, residual, jacobian = point
+    tracked, records, residual, jacobian = point.tracked, point.records, point.residual, point.jacobian
     row = trim_row_at(table, header_at(table, 0).row_table + ROW * r)
     k = row.contact
     o = 2 * row.side
@@ -133,7 +136,7 @@ def own_surface(table, row):
     """The surface that has the loop of a trim."""
     trim = trim_row_at(table, row)
     pair = header_at(table, 0).row_table + ROW * trim.contact
-    return table[pair + SURFACE_F + trim.side]
+    return surface_of(table, pair, trim.side)
 
 
 @kernel(inline=True)
@@ -141,7 +144,7 @@ def other_surface(table, row):
     """The surface that touches the one with the loop."""
     trim = trim_row_at(table, row)
     pair = header_at(table, 0).row_table + ROW * trim.contact
-    return table[pair + SURFACE_G - trim.side]
+    return surface_of(table, pair, 1 - trim.side)
 
 
 @kernel(inner=True)
@@ -175,7 +178,7 @@ def offset_tangents(pu, pv, puu, puv, pvv, n, beta):
 def vector_rows(table, pool, first, loose, point):
     """The rows of a trim from `first` on, in one of the paper's forms."""
     header = header_at(table, 0)
-    q, tracked, records, residual, jacobian = point
+    q, tracked, records, residual, jacobian = point.q, point.tracked, point.records, point.residual, point.jacobian
     row = header.row_table + ROW * first
     trim = trim_row_at(table, row)
     fields = row_at(table, row)
@@ -208,7 +211,7 @@ def vector_rows(table, pool, first, loose, point):
     arm_g = sub(point_w, position(q, j))
     du = matvec(away, du)
     dv = matvec(away, dv)
-    free = loose[0][k] >= 0
+    free = loose.free[k] >= 0
     # Seen from the side of the loop the other point is p + beta n.
     toward = (0.0, 0.0, 0.0)
     if form == BETWEEN and not free:
@@ -257,8 +260,8 @@ def signed_length(table, pool, first, count, side, loose, point):
     The length is smooth through zero, but its gradient is 0 / 0 there: as all columns of the rows are then along one
     line, that of the greatest stands for the direction, and the signed distance says which way is positive.
     """
-    residual = point[3]
-    jacobian = point[4]
+    residual = point.residual
+    jacobian = point.jacobian
     square = 0.0
     for l in range(count):
         square += residual[first + l] * residual[first + l]
@@ -301,8 +304,8 @@ def signed_length(table, pool, first, count, side, loose, point):
 @kernel(inner=True)
 def growth(table, pool, r, j, loose, point):
     """The derivative along column j of the signed distance, positive on the right side of the loop."""
-    tracked = point[1]
-    records = point[2]
+    tracked = point.tracked
+    records = point.records
     row = trim_row_at(table, header_at(table, 0).row_table + ROW * r)
     k = row.contact
     derivatives = derivatives_at(records, k)
@@ -311,7 +314,7 @@ def growth(table, pool, r, j, loose, point):
     _s, n, _bend = trim_distance(table, pool, row.loop, tracked[k, o], tracked[k, o + 1])
     value = 0.0
     for i in range(2):
-        if loose[0][k] >= 0:
+        if loose.free[k] >= 0:
             value += n[i] if j == FREE_COLUMN + o + i else 0.0
         elif j < FREE_COLUMN:
             for l in range(4):
@@ -323,8 +326,8 @@ def growth(table, pool, r, j, loose, point):
 def trim_rows(table, pool, free, lengths, q, tracked, records, residual, jacobian):
     """All rows of trims, and their gradients."""
     header = header_at(table, 0)
-    loose = (free, lengths)
-    point = (q, tracked, records, residual, jacobian)
+    loose = LiftedCoordinates(free, lengths)
+    point = Iterate(q, tracked, records, residual, jacobian)
     r = header.contacts
     while r < header.contacts + header.trims:
         row = trim_row_at(table, header.row_table + ROW * r)
@@ -368,7 +371,7 @@ def trim_terms(table, pool, r, free, lengths, bases, tracked, records, jacobian,
     row = trim_row_at(table, header_at(table, 0).row_table + ROW * r)
     k = row.contact
     o = 2 * row.side
-    loose = (free, lengths)
+    loose = LiftedCoordinates(free, lengths)
     _s, n, bend = trim_distance(table, pool, row.loop, tracked[k, o], tracked[k, o + 1])
     places = np.empty((1, bases.shape[1]), np.int64)
     for b in range(bases.shape[1]):

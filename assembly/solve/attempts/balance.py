@@ -9,17 +9,18 @@ steepest slope where it ended; from where all holds, or is off by less, with the
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._record import rows_of as records_in
 from assembly.constraints.packing.scene import Packed
 from assembly.constraints.program.records import (
     SLOTS,
+    TAPE_FIELDS,
     TAPE_RECORD,
-    TAPE_ROW_AT,
-    TAPE_SCALE,
     TAPE_TABLE,
-    TAPE_VALUES,
     TAPES,
 )
 from assembly.errors import InputError
@@ -63,7 +64,7 @@ def balanced(packed: Packed, settings: Array, outcome: Outcome, run: Run) -> Out
     if slopes is None:
         return outcome
     twin = packed.twin()
-    twin.pool[_records(packed)[:, TAPE_SCALE]] *= slopes
+    twin.pool[_records(packed).unit] *= slopes
     onward = settings.copy()
     onward[GATHER] = 0.0
     alike = run(twin, onward, _with_multipliers(packed, outcome.state, 0.0 * slopes))
@@ -109,15 +110,15 @@ def _with_multipliers(packed: Packed, state: Array, shares: Array) -> Array:
     if not shares.any():
         state[packed.multipliers_at : packed.residuals_at] = 0.0
     for record, share in zip(_records(packed), shares, strict=True):
-        first = packed.multipliers_at + record[TAPE_ROW_AT]
-        state[first : first + record[TAPE_VALUES]] *= share
+        first = packed.multipliers_at + record.first_row
+        state[first : first + record.values] *= share
     return state
 
 
-def _records(packed: Packed) -> NDArray[np.int64]:
+def _records(packed: Packed) -> Any:
     """The records of expressions that are rows."""
     table = packed.table
-    return table[table[TAPE_TABLE] :][: TAPE_RECORD * table[TAPES]].reshape(-1, TAPE_RECORD)
+    return records_in(TAPE_FIELDS, table[table[TAPE_TABLE] :][: TAPE_RECORD * table[TAPES]].reshape(-1, TAPE_RECORD))
 
 
 def _slopes(packed: Packed, state: Array) -> Array | None:
@@ -128,7 +129,7 @@ def _slopes(packed: Packed, state: Array) -> Array | None:
         return None
     steepest = np.zeros(packed.rows)
     np.maximum.at(steepest, rows.program_rows, np.linalg.norm(rows.jacobian, axis=1))
-    first = _records(packed)[:, TAPE_ROW_AT]
-    counts = _records(packed)[:, TAPE_VALUES]
+    first = _records(packed).first_row
+    counts = _records(packed).values
     found = np.array([steepest[k : k + n].max() for k, n in zip(first, counts, strict=True)])
     return np.where(found > FLAT, found, 1.0)

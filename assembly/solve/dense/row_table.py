@@ -8,6 +8,7 @@ program, then four of tangency for every such contact.
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 import numpy as np
 
@@ -19,9 +20,11 @@ from assembly.constraints.program.records import (
     FREE_COLUMN,
     JOINT_ROW,
     ROW,
-    SECOND_BODY_F,
-    SECOND_BODY_G,
     TAPE_RECORD,
+    Iterate,
+    LiftedPairs,
+    TapeRoom,
+    body_coordinate_at,
     header_at,
     joint_row_at,
     row_at,
@@ -35,6 +38,10 @@ from assembly.solve.loop.line_search import goal
 from assembly.solve.loop.report import scaled_poses
 from assembly.solve.loop.residuals import arrange, shape_of, size_of_shape
 from assembly.solve.loop.settings import FREE_BELOW
+
+# A point of the loop at a state: the contact that is lost, or -1, and all rows are evaluated; how many contacts are at
+# folds; the iterate, and what contacts and tapes work in.
+PointFound = namedtuple("PointFound", "lost count iterate lifted tapes")
 
 
 @kernel(inner=True)
@@ -59,8 +66,8 @@ def spread_rows(table, free, count, packed, out):
         spread_block(packed, r, 6, row_at(table, row).body_g, out)
         second = joint_row_at(table, row).second
         if row_at(table, row).kind == JOINT_ROW and second >= 0:
-            spread_block(packed, r, EXTRA_COLUMN, table[second + SECOND_BODY_F], out)
-            spread_block(packed, r, EXTRA_COLUMN + 6, table[second + SECOND_BODY_G], out)
+            spread_block(packed, r, EXTRA_COLUMN, body_coordinate_at(table, second).body_f, out)
+            spread_block(packed, r, EXTRA_COLUMN + 6, body_coordinate_at(table, second).body_g, out)
     for k in range(header.contacts):
         if free[k] >= 0:
             row = header.row_table + ROW * k
@@ -93,13 +100,13 @@ def new_point(table):
     most = header.rows + 4 * pairs
     records = np.ones((pairs + header.joints + header.vector_trims, CONTACT_RECORD))
     packed = np.zeros((most, EXTRA_COLUMN + 6 * header.extra))
-    return np.empty((header.bodies, 7)), np.empty((header.tracked, TRACK)), records, np.zeros(most), packed
+    tracked = np.empty((header.tracked, TRACK))
+    return Iterate(np.empty((header.bodies, 7)), tracked, records, np.zeros(most), packed)
 
 
 @kernel(inner=True, allocates=True)
 def point_at(table, pool, state, free):
-    """A point of the loop at a state: whether all its rows are evaluated (-1, or the contact that is lost), how many
-    contacts are at folds, the point, and what pairs and tapes need.
+    """A point of the loop at a state, a `PointFound`.
 
     Parameters of contacts that are NaN are found by a global start, pairs at folds are freed, as the loop does.
     """
@@ -108,10 +115,10 @@ def point_at(table, pool, state, free):
     tracks = header.tracked
     start = np.empty((tracks, TRACK))
     point = new_point(table)
-    q, tracked, records, residual, _packed = point
+    q, tracked, records, residual = point.q, point.tracked, point.records, point.residual
     o = header.tape_room
-    room = (np.empty(table[o]), np.empty(table[o + 1]), np.empty(table[o + 2]))
-    loose = (
+    room = TapeRoom(np.empty(table[o]), np.empty(table[o + 1]), np.empty(table[o + 2]))
+    loose = LiftedPairs(
         free,
         np.empty((pairs, 4)),
         np.empty((VECTORS if pairs > 0 else 0, 3, VARIABLES)),
@@ -126,11 +133,11 @@ def point_at(table, pool, state, free):
     for k in range(pairs):
         free[k] = -1
     count = 0
-    lost = start_contacts(table, pool, q, tracked, free, loose[1])
+    lost = start_contacts(table, pool, q, tracked, free, loose.lengths)
     if lost < 0:
         # Every contact counts here, also one that pushes nothing.
         active = np.ones(residual.size)
-        count = free_folds(table, pool, records, tracked, active, free, loose[1], -1.0, -1, False)
+        count = free_folds(table, pool, records, tracked, active, free, loose.lengths, -1.0, -1, False)
         before = -1
         while count != before:
             for k in range(tracks):
@@ -138,8 +145,8 @@ def point_at(table, pool, state, free):
                     start[k, i] = tracked[k, i]
             lost = evaluate(table, pool, start, math.inf, loose, room, point)
             before = count
-            count = free_folds(table, pool, records, tracked, active, free, loose[1], FREE_BELOW, lost, False)
-    return lost, count, point, loose, room
+            count = free_folds(table, pool, records, tracked, active, free, loose.lengths, FREE_BELOW, lost, False)
+    return PointFound(lost, count, point, loose, room)
 
 
 @kernel(signatures="(i8[::1], f8[::1], f8[::1], i8[::1], f8[::1], f8[:, ::1])")
@@ -152,8 +159,9 @@ def rows_at(table, pool, state, free, residual, jacobian):
     as there are folds
     """
     header = header_at(table, 0)
-    lost, count, point, _loose, _room = point_at(table, pool, state, free)
-    _q, tracked, _records, values, packed = point
+    found = point_at(table, pool, state, free)
+    lost, count, point = found.lost, found.count, found.iterate
+    tracked, values, packed = point.tracked, point.residual, point.jacobian
     for k in range(header.tracked):
         for i in range(TRACK):
             state[7 * header.bodies + TRACK * k + i] = tracked[k, i]
@@ -172,7 +180,7 @@ def gradient_at(table, pool, state, free, gradient, tips):
     """
     header = header_at(table, 0)
     found = point_at(table, pool, state, free)
-    integers, doubles = size_of_shape(table, header.rows + 4 * found[1], 6 * header.moving + 4 * found[1])
+    integers, doubles = size_of_shape(table, header.rows + 4 * found.count, 6 * header.moving + 4 * found.count)
     # The blocks outlive what is carved from them: they are arguments of the kernel that carves.
     return slopes_at(table, pool, free, found, tips, gradient, np.empty(integers, np.int64), np.empty(doubles))
 
@@ -181,7 +189,7 @@ def gradient_at(table, pool, state, free, gradient, tips):
 def slopes_at(table, pool, free, found, tips, gradient, integers, doubles):
     """The same at a point that `point_at` found, with what it works in."""
     header = header_at(table, 0)
-    lost, count, point, loose, room = found
+    lost, count, point, loose, room = found.lost, found.count, found.iterate, found.lifted, found.tapes
     rows = header.rows + 4 * count
     n = 6 * header.moving + 4 * count
     shape = shape_of(table, rows, n, table[:0], integers, doubles)
@@ -191,7 +199,7 @@ def slopes_at(table, pool, free, found, tips, gradient, integers, doubles):
     if lost < 0:
         value = goal(table, pool, shape, rows, loose, room, tips, point, 1, slopes, curves)
     else:
-        value = objective(table, pool, point[0], 1, room, shape[2], slopes, curves)
+        value = objective(table, pool, point.q, 1, room, shape.sparsity, slopes, curves)
     for b in range(header.bodies):
         s = table[header.slots + b]
         for k in range(6):

@@ -18,6 +18,7 @@ from assembly.constraints.model.joint import Joint
 from assembly.constraints.packing.scene import Packed
 from assembly.constraints.program import objective_terms as terms
 from assembly.constraints.program import records as layout
+from assembly.constraints.program.primitives import FRAMES
 from assembly.errors import InputError, positive
 from assembly.kinematics.body import Body, Frame, Point
 from assembly.kinematics.ellipsoid import Ellipsoid
@@ -203,7 +204,7 @@ def _with_term(packed: Packed, objective: Dexterity) -> tuple[NDArray[np.int64],
     for k, freedom in enumerate(task.inputs):
         pair = freedom.coordinate.frames
         bodies = [places[frame.body] for frame in (pair.frame_a, pair.frame_b)]
-        frames += [*bodies, pool.size + 24 * k]
+        frames += [*bodies, pool.size + FRAMES * k]
         numbers += [part for frame in (pair.frame_a, pair.frame_b) for part in (frame.origin / scale, frame.axes.T)]
         # Which turn an angle is on is no matter here.
         fields += [freedom.coordinate.kind, freedom.coordinate.component, joints + k, -1, *bodies]
@@ -211,14 +212,12 @@ def _with_term(packed: Packed, objective: Dexterity) -> tuple[NDArray[np.int64],
     units = [1.0 if freedom.coordinate.is_angle else 1.0 / scale for freedom in task.inputs]
     turn = task.length if task.task == "pose" else 1.0
     parameters = np.concatenate([[1.0], task.origin / scale, [scale, turn], direction, units])
-    record = np.zeros(terms.TERM, dtype=np.int64)
     own = table[first : first + layout.JOINT_RECORD * joints]
-    extended = np.concatenate([table, own, frames, fields, record]).astype(np.int64)
+    extended = np.concatenate([table, own, frames, fields, [0] * terms.TERM]).astype(np.int64)
     extended[layout.JOINT_TABLE] = table.size
     extended[layout.JOINTS] = joints + len(task.inputs)
     term = extended.size - terms.TERM
-    extended[term + terms.TERM_KIND] = terms.DEXTERITY
-    extended[term + terms.TERM_BODY] = places[task.tip.body]
-    extended[term + terms.TERM_PARAMETERS] = pool.size + 24 * len(task.inputs)
-    extended[term + terms.TERM_TAPE] = term - len(fields)
+    record = terms.term_at(extended, term)
+    record.kind, record.body = terms.DEXTERITY, places[task.tip.body]
+    record.parameters, record.tape = pool.size + FRAMES * len(task.inputs), term - len(fields)
     return extended, np.concatenate([pool, *(part.ravel() for part in numbers), parameters]), term

@@ -21,16 +21,16 @@ def tip_at(table, pool, term, state, free, jacobian):
     """
     header = header_at(table, 0)
     term_record = term_at(table, term)
-    lost, count, point, _loose, _room = point_at(table, pool, state, free)
+    at = point_at(table, pool, state, free)
+    lost, count = at.lost, at.count
     if lost >= 0:
         return lost, DEPENDENT, 0.0
     rows = header.rows + 4 * count
     bases = np.empty((rows, 3 + header.extra), np.int64)
     place_rows(table, free, bases, np.empty(rows, np.int64))
-    outcome, found, _used, _inputs, _adjoint = tip_map(
-        table, pool, term, bases, rows, 6 * header.moving + 4 * count, point, 1
-    )
+    tip = tip_map(table, pool, term, bases, rows, 6 * header.moving + 4 * count, at.iterate, 1)
+    found = tip.jacobian
     jacobian[:] = found
     measure = dexterity_at(table, term_record.tape).measure
     value = measure_jacobian(measure, pool, term_record.parameters + DIRECTION, found, np.empty(found.shape))
-    return lost, outcome, value
+    return lost, tip.outcome, value

@@ -89,7 +89,7 @@ def substitute(m, n, last, b):
 @kernel(inner=True)
 def forward_step(matrix, n, order, b):
     """Solve U^T x = b in place, for the factor that `factorize_shifted` left; x in the order of the factor."""
-    places, vector, blocks = order[0], order[2][0], order[3]
+    places, vector, blocks = order.places, order.scratch[0], order.blocks
     place, ends = places[1], places[2]
     if is_blocked(order):
         call_address(blocks_at(blocks, 0).solve_address, (blocks, matrix[0], b, vector, 1))
@@ -107,7 +107,7 @@ def forward_step(matrix, n, order, b):
 @kernel(inner=True)
 def solve_step(matrix, n, order, b):
     """Solve (lagrangian + d I) x = b in place, for the factor that `factorize_shifted` left."""
-    places, vector, blocks = order[0], order[2][0], order[3]
+    places, vector, blocks = order.places, order.scratch[0], order.blocks
     place, ends = places[1], places[2]
     if is_blocked(order):
         call_address(blocks_at(blocks, 0).solve_address, (blocks, matrix[0], b, vector, 0))
@@ -126,7 +126,7 @@ def solve_step(matrix, n, order, b):
 def greatest_on_diagonal(lagrangian, n, order):
     """The largest entry on the diagonal, without its sign, but at least one; not finite if one is not."""
     if is_blocked(order):
-        return greatest_diagonal(lagrangian, order[3])
+        return greatest_diagonal(lagrangian, order.blocks)
     greatest = 1.0
     for i in range(n):
         greatest = max(greatest, abs(lagrangian[i, i]))
@@ -143,13 +143,13 @@ def factorize_shifted(lagrangian, n, order, shift, matrix):
     while shift <= 1e8 * scale:
         if blocked:
             # What says where unknowns of pairs stand, and the vector, are free here.
-            parts = (lagrangian, order[3], shift, matrix[0], order[0][1], order[2][0])
-            if call_address(blocks_at(order[3], 0).factorize_address, parts) == 1:
+            parts = (lagrangian, order.blocks, shift, matrix[0], order.places[1], order.scratch[0])
+            if call_address(blocks_at(order.blocks, 0).factorize_address, parts) == 1:
                 return shift
             shift = max(8.0 * shift, 1e-6)
             continue
         place_upper(lagrangian, n, order, shift, matrix)
-        if factorize(matrix, n, order[0][2]):
+        if factorize(matrix, n, order.places[2]):
             return shift
         shift = max(8.0 * shift, 1e-6)
     return -1.0

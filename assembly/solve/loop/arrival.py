@@ -36,16 +36,16 @@ def reach_of(table, pool, q):
 @kernel(inner=True)
 def rounding_at(table, pool, settings, here):
     """The violation that is none: what is asked for, or what rounding of coordinates and of whole turns violates."""
-    reach = max(reach_of(table, pool, here[0]), turned(table, pool, here[1]))
+    reach = max(reach_of(table, pool, here.q), turned(table, pool, here.tracked))
     return max(settings_at(settings, 0).feasibility, min(ROUNDING * reach, MOST_ROUNDING))
 
 
 @kernel(inner=True)
 def slope_rounding(program, here, lagrangian, n, rows, y):
     """What rounding leaves of the Lagrangian's slope: poses' by the objective's curvature, and that of forces."""
-    table, pool, shape, _loose, _room = program
-    reach = max(1.0, reach_of(table, pool, here[0]))
-    return ROUNDING * (reach * greatest_on_diagonal(lagrangian, n, shape[2]) + strongest(y, rows))
+    table, pool, shape = program.table, program.pool, program.structure
+    reach = max(1.0, reach_of(table, pool, here.q))
+    return ROUNDING * (reach * greatest_on_diagonal(lagrangian, n, shape.sparsity) + strongest(y, rows))
 
 
 @kernel(inner=True)
@@ -65,7 +65,7 @@ def has_arrived(program, settings, results, here, violation, last_violation, fea
     steps gain nothing more.
     """
     limits = settings_at(settings, 0)
-    table, pool = program[0], program[1]
+    table, pool = program.table, program.pool
     if is_near_saddle(table, settings, results, violation, dual):
         return True
     if not (violation <= feasible and dual <= limits.stationarity):

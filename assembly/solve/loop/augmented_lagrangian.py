@@ -49,7 +49,7 @@ from assembly.solve.loop.clearances import allowed_share, look_again, numbers_of
 from assembly.solve.loop.contacts import free_folds, is_of_surfaces
 from assembly.solve.loop.deadline import HALF, begin_tick, is_cut, is_spent, may_end, set_deadline
 from assembly.solve.loop.direction import CLOSE, aim, cut_step, leave_saddle, propose, short_share
-from assembly.solve.loop.finish import finish, return_to
+from assembly.solve.loop.finish import End, finish, return_to
 from assembly.solve.loop.inertia import note_factor
 from assembly.solve.loop.line_search import SHORTEST, goal, search
 from assembly.solve.loop.multipliers import (
@@ -73,7 +73,6 @@ from assembly.solve.loop.settings import (
     RUNNING,
     SOLVED,
     STALLED,
-    STRAYS,
     results_at,
     settings_at,
 )
@@ -87,7 +86,7 @@ from assembly.solve.loop.standstill import (
     stays_off,
 )
 from assembly.solve.loop.violation import off_rows
-from assembly.solve.loop.workspace import carve_all, results_of, room_needed
+from assembly.solve.loop.workspace import Program, carve_all, results_of, room_needed
 
 # Every so many steps the largest violation must have halved, or the loop sees whether the rows can hold; so many times.
 PATIENCE = 25
@@ -136,20 +135,22 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
     rows = m
     n = 6 * header.moving
     # The last pose that held is none yet.
-    points, by_row, shape, loose, numbers, room, gram, way, system = carve_all(table, memory, doubles, integers)
+    workspace = carve_all(table, memory, doubles, integers)
+    shape, loose, room, system = workspace.structure, workspace.lifted, workspace.tapes, workspace.system
+    by_row, numbers, gram, way = workspace.by_row, workspace.numbers, workspace.gram, workspace.way
     progress = restoration_at(way, 0)
-    here, trial, held = points
-    y, better_y, active, forces, foreseen = by_row[2], by_row[3], by_row[4], by_row[5], by_row[6]
+    here, trial, held = workspace.here, workspace.trial, workspace.held
+    y, better_y, active, forces, foreseen = by_row.y, by_row.better_y, by_row.active, by_row.forces, by_row.foreseen
     weights = (active, forces, foreseen)
     read_state(table, pool, state, here, trial, y, better_y)
-    bases, one_sided, order, _of_rows = shape
-    free = loose[0]
+    one_sided, order = shape.one_sided, shape.sparsity
+    free = loose.free
     # What stays as it is for the whole solve.
-    program = (table, pool, shape, loose, room)
-    gradient, lines, lagrangian, _factor = system
+    program = Program(table, pool, shape, loose, room)
+    gradient, lines, lagrangian = system.gradient, system.directions, system.hessian
 
     feasible = rounding_at(table, pool, settings, here)
-    farthest = FAR * (1.0 + reach_of(table, pool, here[0])) if settings[STRAYS] == 1.0 else math.inf
+    farthest = FAR * (1.0 + reach_of(table, pool, here.q)) if limits.strays == 1.0 else math.inf
     tick = limits.tick == 1.0
     # A tick goes on with the last one, if that one's time was spent.
     begin, done, looks = begin_tick(table, settings, results, memory)
@@ -190,7 +191,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
     holds = False
     status, lost, folded = set_out(program, settings, state, here, by_row, n)
     if status == CONTACT_LOST:
-        value = objective(table, pool, here[0], 0, room, order, gradient, lagrangian)
+        value = objective(table, pool, here.q, 0, room, order, gradient, lagrangian)
     count = 0
     freed = 0
     below = FREE_BELOW
@@ -230,22 +231,24 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         if watched and not changed and not late:
             how = (CAREFUL if holds_now else AS_NEEDED) | (SPARING if tick else IN_TURNS | DOUBTFUL)
             how |= MEASURED if measured else AS_NEEDED
-            changed = look_again(table, pool, memory, here, how, free, loose[4])
+            changed = look_again(table, pool, memory, here, how, free, loose.guess)
             late = is_cut(table, memory)
         if changed:
             place_guards(table, memory, here, y, better_y, free, False)
-        weigh_rows(rows, one_sided, here[3], y, mu, forces, active)
+        weigh_rows(rows, one_sided, here.residual, y, mu, forces, active)
         if folded:
             # Nothing is known of its row yet.
             active[lost] = 1.0 / mu
         if pairs > 0:
-            count = free_folds(table, pool, here[2], here[1], active, free, loose[1], below, lost, free_trims)
+            count = free_folds(
+                table, pool, here.records, here.tracked, active, free, loose.lengths, below, lost, free_trims
+            )
         if m + 4 * count != rows or changed:
             changed = False
             rows, n, system, lost = rearrange(program, count, rows, here, y, better_y, active)
             if iteration == 0 and lost < 0:
                 let_touch(table, here, limits.touching)
-            gradient, lines, lagrangian, _factor = system
+            gradient, lines, lagrangian = system.gradient, system.directions, system.hessian
             kept = False
             # What was hard for other rows need not be for these.
             floor, mu = limits.penalty_floor, max(mu, limits.penalty_floor)
@@ -262,7 +265,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             result.culprit = float(lost)
             status = CONTACT_LOST if folded else STALLED
         lost = np.int64(-1)
-        residual = here[3]
+        residual = here.residual
         violation = off_rows(table, loose, one_sided, here, tick)
         value = goal(table, pool, shape, rows, loose, room, tips, here, 1, gradient, lagrangian)
         # Rows of vectors depend on one another: their multipliers drift where nothing keeps them short.
@@ -273,7 +276,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         touches = first or (watched and not tick and violation <= TOUCHING)
         good = max(0.0 if first else 0.1 * last_dual, limits.stationarity if touches else 0.0)
         dual = choose_multipliers(
-            shape, rows, here, shortened, vectors, touches, good, active, gradient, lines[0], gram, y, better_y
+            shape, rows, here, shortened, vectors, touches, good, active, gradient, lines.descent, gram, y, better_y
         )
         log(history, iteration, (value, violation, dual, mu, shift, alpha, radius))
         asked, stops = pause(table, pool, settings, results, asked, iteration, value, violation)
@@ -303,14 +306,14 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         if arrived and not retreats and not (looks_last and iteration > limit):
             # A contact that ends right here is lost and found again, however often it is looked for.
             if looks_last and iteration != looked_at:
-                changed = look_again(table, pool, memory, here, EVERYTHING, free, loose[4])
+                changed = look_again(table, pool, memory, here, EVERYTHING, free, loose.guess)
                 if changed:
                     looked_at = iteration = iteration + 1
                     continue
             # Deeper than looks reach no row tells of a crossing.
             status = STALLED if looks_last and any_crossed(table, header.watch, memory) else SOLVED
             if status == SOLVED:
-                dual = least_multipliers(shape, rows, here, active, gradient, lines[0], gram, dual, y, better_y)
+                dual = least_multipliers(shape, rows, here, active, gradient, lines.descent, gram, dual, y, better_y)
             break
         # What holds, of a tick or where nothing else is asked for; with clearances, what does not cross.
         clear = watched and not tick and not sunk and is_clear(table, residual)
@@ -321,7 +324,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             keep(here, y, rows, held)
             if watched:
                 numbers_of(table, numbers)
-        if iteration == STRAYING and settings[STRAYS] == 1.0 and not reach_of(table, pool, here[0]) <= farthest:
+        if iteration == STRAYING and limits.strays == 1.0 and not reach_of(table, pool, here.q) <= farthest:
             status = ITERATION_LIMIT
             break
         if iteration >= limit and (not tick or violation <= feasible or iteration >= longest_tick):
@@ -420,7 +423,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         cut, may_go = short_share(reach, longest, turn), True
         if watched:
             most_of_it = cut
-            cut, may_go = allowed_share(table, pool, memory, here, trial, lines[1], most_of_it)
+            cut, may_go = allowed_share(table, pool, memory, here, trial, lines.step, most_of_it)
             if tick and not may_go and asked_at != iteration:
                 # A tick looks where a step would go farther than is known to be free: at pairs that would use much.
                 if may_end(table, settings, memory, clock, iteration, HALF):
@@ -428,10 +431,10 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
                     violation = violation if iteration > 0 else math.inf
                     break
                 asked_at = iteration
-                changed = look_again(table, pool, memory, here, AS_NEEDED | MEASURED, free, loose[4])
+                changed = look_again(table, pool, memory, here, AS_NEEDED | MEASURED, free, loose.guess)
                 if changed or is_cut(table, memory):
                     continue
-                cut, may_go = allowed_share(table, pool, memory, here, trial, lines[1], most_of_it)
+                cut, may_go = allowed_share(table, pool, memory, here, trial, lines.step, most_of_it)
         slope, steepest = cut_step(shape, here, rows, y, mu, cut, foreseen, lines)
         if restoring:
             ends = steepest <= 1e-9 * violation or longest < 1e-12
@@ -439,7 +442,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             slows = iteration >= check_at and violation > 0.99 * check_violation
             if (ends or slows) and watched and iteration < limit:
                 # A contact may have come to where a given one stands, of which no clearance asks anything.
-                changed = look_again(table, pool, memory, here, EVERYTHING, free, loose[4])
+                changed = look_again(table, pool, memory, here, EVERYTHING, free, loose.guess)
                 if changed:
                     iteration += 1
                     continue
@@ -476,7 +479,11 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
                 # Perhaps a fold is near enough to matter; else nothing moves any more.
                 below = 0.3
                 for k in range(pairs):
-                    if free[k] < 0 and abs(contact_record_at(here[2], k).fold) < below and is_of_surfaces(table, k):
+                    if (
+                        free[k] < 0
+                        and abs(contact_record_at(here.records, k).fold) < below
+                        and is_of_surfaces(table, k)
+                    ):
                         lost = np.int64(k)
             if lost >= 0 and free[lost] < 0 and is_of_surfaces(table, lost):
                 # A look may put another contact in its place, time and again.
@@ -495,12 +502,12 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
                 continue
             status = STALLED
             continue
-        propose(shape, here, rows, y, mu, active, lines[2], alpha, better_y)
+        propose(shape, here, rows, y, mu, active, lines.straight, alpha, better_y)
         here, trial = trial, here
         if alpha == 1.0:
             kept = cut == 1.0 and used == shift and mu == floor and not restoring
             if cut == 1.0 and used == shift:
-                slow = mu == floor and violation_of(here[3], one_sided, rows) > max(0.5 * violation, feasible)
+                slow = mu == floor and violation_of(here.residual, one_sided, rows) > max(0.5 * violation, feasible)
                 floor = next_floor(way, floor, slow and not tick)
                 mu = max(0.1 * mu, floor)
             radius = min(2.0 * radius, 1e6)
@@ -513,7 +520,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         violation = math.inf
     if limits.carries == 1.0 and status == OUT_OF_TIME and not violation <= feasible:
         result.carried = float(1 + done + iteration)
-    at_end = (status, value, violation, dual, feasible, rows, holds)
+    at_end = End(status, value, violation, dual, feasible, rows, holds)
     status, value, violation, dual = finish(
         program, settings, state, tips, here, trial, by_row, at_end, held, numbers, system, gram
     )

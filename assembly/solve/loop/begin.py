@@ -47,17 +47,17 @@ def read_state(table, pool, state, here, trial, y, better_y):
             value = state[7 * b + k]
             if k < 3:
                 value = (value - units.reference[k]) / size
-            here[0][b, k] = value
-            trial[0][b, k] = value
-    recenter(table, pool, here[0])
+            here.q[b, k] = value
+            trial.q[b, k] = value
+    recenter(table, pool, here.q)
     for k in range(tracks):
         for i in range(TRACK):
-            here[1][k, i] = state[o_tracked + TRACK * k + i]
+            here.tracked[k, i] = state[o_tracked + TRACK * k + i]
     for k in range(header.contacts):
         # Before anything is evaluated no pair is near a fold.
-        contact_record_at(here[2], k).fold = 1.0
+        contact_record_at(here.records, k).fold = 1.0
     for r in range(header.rows):
-        here[3][r] = math.inf
+        here.residual[r] = math.inf
         y[r] = state[o_y + r]
         better_y[r] = y[r]
 
@@ -66,13 +66,13 @@ def read_state(table, pool, state, here, trial, y, better_y):
 def let_touch(table, here, touching):
     """Let contacts of bodies that are in each other by no more than `touching` stay so: their rows hold."""
     for k in range(header_at(table, 0).contacts):
-        pair = tracked_at(here[1], k)
-        if is_guard(table, k) or not here[3][k] < 0.0:
+        pair = tracked_at(here.tracked, k)
+        if is_guard(table, k) or not here.residual[k] < 0.0:
             continue
-        allowed = pair.allowed - here[3][k]
+        allowed = pair.allowed - here.residual[k]
         if allowed <= touching:
             pair.allowed = allowed
-            here[3][k] = 0.0
+            here.residual[k] = 0.0
 
 
 @kernel(inline=True)
@@ -83,28 +83,28 @@ def find_contacts(program, state, recalled, here, by_row, n, free_trims, sparing
     Returns the contact that has no pair, or -1, and whether that was told by evaluating the rows: which are not
     evaluated yet where a contact has no pair to begin with, or is at a fold.
     """
-    table, pool, shape, loose, room = program
+    table, pool, shape, loose, room = program.table, program.pool, program.structure, program.lifted, program.tapes
     header = header_at(table, 0)
-    free, lengths, memory = loose[0], loose[1], loose[5]
+    free, lengths, memory = loose.free, loose.lengths, loose.memory
     memory_header = memory_header_at(memory, 0)
-    y, better_y, active = by_row[2], by_row[3], by_row[4]
+    y, better_y, active = by_row.y, by_row.better_y, by_row.active
     watched = header.watch >= 0
     came = False
     if watched:
         place_guards(table, memory, here, y, better_y, free, True)
-    lost = start_contacts(table, pool, here[0], here[1], free, lengths)
+    lost = start_contacts(table, pool, here.q, here.tracked, free, lengths)
     if watched and lost < 0:
         memory_header.overlap = touching
         came = look_around(table, pool, memory, here, SPARING if sparing else AS_NEEDED)
         memory_header.overlap = 0.0
         place_guards(table, memory, here, y, better_y, free, False)
-    count = free_folds(table, pool, here[2], here[1], active, free, lengths, -1.0, -1, free_trims)
+    count = free_folds(table, pool, here.records, here.tracked, active, free, lengths, -1.0, -1, free_trims)
     if lost >= 0 or count > 0:
         return lost, False
     if watched:
         arrange(table, free, shape, header.rows, n)
     if recalled == 0 or came or not recall(table, state, recalled, here):
-        lost = evaluate(table, pool, here[1], math.inf, loose, room, here)
+        lost = evaluate(table, pool, here.tracked, math.inf, loose, room, here)
         if lost < 0:
             let_touch(table, here, touching)
     return lost, True
@@ -113,27 +113,27 @@ def find_contacts(program, state, recalled, here, by_row, n, free_trims, sparing
 @kernel(inner=True)
 def put_together(program, here, by_row):
     """Gather scattered bodies, and begin again from there; returns the contact that has no pair, or -1."""
-    table, pool, shape, loose, room = program
+    table, pool, shape, loose, room = program.table, program.pool, program.structure, program.lifted, program.tapes
     header = header_at(table, 0)
-    free, lengths, memory = loose[0], loose[1], loose[5]
-    y, better_y = by_row[2], by_row[3]
+    free, lengths, memory = loose.free, loose.lengths, loose.memory
+    y, better_y = by_row.y, by_row.better_y
     watched = header.watch >= 0
-    gather(table, pool, shape[0], header.slots, here)
+    gather(table, pool, shape.bases, header.slots, here)
     for k in range(header.contacts):
-        here[1][k, 0] = math.nan
+        here.tracked[k, 0] = math.nan
     if watched:
         forget_guards(table, memory)
         place_guards(table, memory, here, y, better_y, free, False)
-    start_contacts(table, pool, here[0], here[1], free, lengths)
+    start_contacts(table, pool, here.q, here.tracked, free, lengths)
     if watched:
         look_around(table, pool, memory, here, AS_NEEDED)
         place_guards(table, memory, here, y, better_y, free, False)
     if header.implicit == 1:
-        recenter(table, pool, here[0])
+        recenter(table, pool, here.q)
     for r in range(header.rows):
         y[r] = 0.0
         better_y[r] = 0.0
-    return evaluate(table, pool, here[1], math.inf, loose, room, here)
+    return evaluate(table, pool, here.tracked, math.inf, loose, room, here)
 
 
 @kernel(inline=True, allocates=True)
@@ -144,7 +144,7 @@ def set_out(program, settings, state, here, by_row, n):
     freed.
     """
     limits = settings_at(settings, 0)
-    table, _pool, shape, _loose, _room = program
+    table, shape = program.table, program.structure
     results = results_of(table, state)
     result = results_at(results, 0)
     result.culprit = -1.0
@@ -158,7 +158,7 @@ def set_out(program, settings, state, here, by_row, n):
     # A tick begins where the last one ended: there a pair that Newton's method loses is at a fold.
     folded = lost >= 0 and evaluated and tick and is_of_surfaces(table, lost)
     status = CONTACT_LOST if lost >= 0 and not folded else RUNNING
-    result.scatter = 1.0 if status == RUNNING and scattered(table, here[3], shape[1]) else 0.0
+    result.scatter = 1.0 if status == RUNNING and scattered(table, here.residual, shape.one_sided) else 0.0
     if limits.gather > 0.0 and result.scatter == 1.0:
         lost = put_together(program, here, by_row)
         folded = False
@@ -175,7 +175,7 @@ def rearrange(program, count, before, here, y, better_y, active):
 
     Returns how many rows and unknowns there are, room for these, and which contact is lost at this point, or -1.
     """
-    table, pool, shape, loose, room = program
+    table, pool, shape, loose, room = program.table, program.pool, program.structure, program.lifted, program.tapes
     header = header_at(table, 0)
     for r in range(before, y.size):
         # New rows of tangency say nothing yet: least squares leave them out.
@@ -184,6 +184,6 @@ def rearrange(program, count, before, here, y, better_y, active):
         active[r] = 0.0
     rows = header.rows + 4 * count
     n = 6 * header.moving + 4 * count
-    arrange(table, loose[0], shape, rows, n)
-    system = unknowns(n, shape[2])
-    return rows, n, system, evaluate(table, pool, here[1], math.inf, loose, room, here)
+    arrange(table, loose.free, shape, rows, n)
+    system = unknowns(n, shape.sparsity)
+    return rows, n, system, evaluate(table, pool, here.tracked, math.inf, loose, room, here)

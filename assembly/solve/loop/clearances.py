@@ -11,8 +11,6 @@ from assembly._kernel import kernel
 from assembly.constraints.program.contact import is_of_solids
 from assembly.constraints.program.records import (
     ROW,
-    SHELL_F,
-    SURFACE_F,
     contact_row_at,
     header_at,
     row_at,
@@ -24,8 +22,6 @@ from assembly.proximity.manager.state import (
     IN_PLACE,
     PAIR_MEMORY,
     PAIR_RECORD,
-    PAIR_SHELL_F,
-    PAIR_SURFACE_F,
     PLACE_MEMORY,
     SLICE,
     lengths_at,
@@ -64,7 +60,7 @@ def forget_guards(table, memory):
     for p in range(manager_at(table, watch).pairs):
         pair_state_at(memory, pairs + PAIR_MEMORY * p).turn[0] = math.nan
     for k in range(header.guards):
-        memory[places + PLACE_MEMORY * k] = -1.0
+        place_at(memory, places + PLACE_MEMORY * k).pair = -1.0
 
 
 @kernel(inner=True)
@@ -79,11 +75,11 @@ def place_guards(table, memory, here, y, better_y, free, begins):
     for k in range(header.guards):
         slot = place_at(memory, places + PLACE_MEMORY * k)
         r = header.first_guard + k
-        contact_record = contact_record_at(here[2], r)
+        contact_record = contact_record_at(here.records, r)
         row = header.row_table + ROW * r
         contact = contact_row_at(table, row)
         fields = row_at(table, row)
-        p = np.int64(memory[places + PLACE_MEMORY * k])
+        p = np.int64(slot.pair)
         number = np.int64(slot.number) if p >= 0 else 0
         if number == contact.guard_number:
             continue
@@ -95,20 +91,20 @@ def place_guards(table, memory, here, y, better_y, free, begins):
         # Nothing is known of it yet.
         contact_record.fold = 1.0
         contact_record.slack = 0.0
-        here[3][r] = 1.0
+        here.residual[r] = 1.0
         if p < 0:
             fields.body_f = -1
             fields.body_g = -1
             continue
-        pair = manager_at(table, watch).pair_table + PAIR_RECORD * p
-        pair_record = pair_at(table, pair)
+        pair_record = pair_at(table, manager_at(table, watch).pair_table + PAIR_RECORD * p)
         fields.body_f = pair_record.body_f
         fields.body_g = pair_record.body_g
         in_place = slot.given == 1.0
         contact.minimum = pair_record.minimum + (IN_PLACE if in_place else 0)
-        for i in range(2):
-            table[row + SURFACE_F + i] = table[pair + PAIR_SURFACE_F + i]
-            table[row + SHELL_F + i] = table[pair + PAIR_SHELL_F + i]
+        contact.surface_f = pair_record.surface_f
+        contact.surface_g = pair_record.surface_g
+        contact.shell_f = pair_record.shell_f
+        contact.shell_g = pair_record.shell_g
 
 
 @kernel(inner=True)
@@ -128,7 +124,7 @@ def look_around(table, pool, memory, point, how):
         return True
     if asks:
         state.deadline = call_address(manager.clock, ()) + SLICE
-    changed = call_address(header.look_address, (table, pool, watch, memory, point[0], point[1], how)) > 0
+    changed = call_address(header.look_address, (table, pool, watch, memory, point.q, point.tracked, how)) > 0
     aborted = asks and state.deadline < 0.0
     if asks and not aborted:
         state.deadline = math.inf
@@ -144,7 +140,7 @@ def look_again(table, pool, memory, point, how, free, scratch):
     contacts are from each other may be on its way to a saddle, and goes there.
     """
     header = header_at(table, 0)
-    tracked = point[1]
+    tracked = point.tracked
     first = header.first_guard
     for r in range(first, first + header.guards):
         if free[r] >= 0:
@@ -155,7 +151,7 @@ def look_again(table, pool, memory, point, how, free, scratch):
     neglect = lengths_at(pool, manager_at(table, header.watch).lengths).neglect
     for r in range(first, first + header.guards):
         place = places + PLACE_MEMORY * (r - first)
-        number = np.int64(place_at(memory, place).number) if memory[place] >= 0.0 else 0
+        number = np.int64(place_at(memory, place).number) if place_at(memory, place).pair >= 0.0 else 0
         if free[r] >= 0 and number == contact_row_at(table, header.row_table + ROW * r).guard_number:
             row = contact_row_at(table, header.row_table + ROW * r)
             f, g = row.surface_f, row.surface_g
@@ -186,7 +182,7 @@ def go_back(table, memory, numbers):
         number = contact_row_at(table, header.row_table + ROW * (header.first_guard + k)).guard_number
         if number != numbers[k]:
             same = False
-            memory[places + PLACE_MEMORY * k] = -1.0
+            place_at(memory, places + PLACE_MEMORY * k).pair = -1.0
     if not same:
         for p in range(manager_at(table, watch).pairs):
             pair_state_at(memory, pairs + PAIR_MEMORY * p).turn[0] = math.nan
@@ -208,10 +204,10 @@ def allowed_share(table, pool, memory, here, trial, step, share):
     The poses at the end of the share go into the trial point. Of what it would use of allowances there it is then known
     of which pairs more is known by another look.
     """
-    move(table, here[0], step, share, trial[0])
+    move(table, here.q, step, share, trial.q)
     watch = header_at(table, 0).watch
     manager = manager_at(table, watch)
-    if measure(table, pool, memory, 0, manager.pairs, trial[0]) <= 1.0:
+    if measure(table, pool, memory, 0, manager.pairs, trial.q) <= 1.0:
         return share, True
     at = memory_places(table, watch)[0]
     allowed = 1.0
@@ -222,7 +218,7 @@ def allowed_share(table, pool, memory, here, trial, step, share):
         o.cut_short = end * o.allowance
         begin = end
         if end > USED:
-            measure(table, pool, memory, p, p + 1, here[0])
+            measure(table, pool, memory, p, p + 1, here.q)
             begin = o.part
             o.part = end
         if end > max(begin, 1.0):
@@ -238,7 +234,7 @@ def allowed_share(table, pool, memory, here, trial, step, share):
 @kernel(inner=True)
 def is_too_far(table, pool, memory, point):
     """Whether the poses of a point are farther than the watch allows."""
-    return measure(table, pool, memory, 0, manager_at(table, header_at(table, 0).watch).pairs, point[0]) > 1.0
+    return measure(table, pool, memory, 0, manager_at(table, header_at(table, 0).watch).pairs, point.q) > 1.0
 
 
 @kernel(inner=True)
@@ -253,9 +249,14 @@ def ends_unseen(table, pool, memory, before, after):
     places = memory_places(table, watch)[1]
     for k in range(header.guards):
         r = header.first_guard + k
-        p = np.int64(memory[places + PLACE_MEMORY * k])
-        if p >= 0 and math.isnan(after[1][r, 0]) and not math.isnan(before[1][r, 0]) and is_of_solids(table, r):
-            most = max(before[3][r], SLIGHTLY)
-            if call_address(header.went_address, (table, pool, watch, p, before[0], after[0], most)) == 1:
+        p = np.int64(place_at(memory, places + PLACE_MEMORY * k).pair)
+        if (
+            p >= 0
+            and math.isnan(after.tracked[r, 0])
+            and not math.isnan(before.tracked[r, 0])
+            and is_of_solids(table, r)
+        ):
+            most = max(before.residual[r], SLIGHTLY)
+            if call_address(header.went_address, (table, pool, watch, p, before.q, after.q, most)) == 1:
                 return True
     return False

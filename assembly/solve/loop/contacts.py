@@ -6,11 +6,10 @@ import math
 
 from assembly._address import call_address
 from assembly._kernel import kernel
-from assembly.constraints.program.contact import is_guard, search_row, start_row
+from assembly.constraints.program.contact import is_guard, search_row, start_row, surface_of
 from assembly.constraints.program.records import (
     ROW,
     SIGNED,
-    SURFACE_F,
     contact_row_at,
     header_at,
     row_at,
@@ -50,7 +49,7 @@ def free_pair(table, pool, row, k, contacts, free, lengths):
     )
     for i in range(4):
         # Over the whole domain, because a parameter has a unit of its own.
-        low, high, _closed = limits(table, pool, table[row + SURFACE_F + i // 2], i % 2)
+        low, high, _closed = limits(table, pool, surface_of(table, row, i // 2), i % 2)
         if lengths[k, i] * (high - low) < POLAR:
             return False
     free[k] = 0

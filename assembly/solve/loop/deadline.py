@@ -60,7 +60,7 @@ def begin_tick(table, settings, results, memory):
         state.deadline = math.inf
         # Looks of ticks are short, and with a budget end by it.
         asks = limits.tick == 0.0
-        table[header.watch + GO_ON_AT] = int(limits.ask_address[0]) if asks else 0
+        table[header.watch + GO_ON_AT] = int(limits.ask_address) if asks else 0
         if asks:
             manager.clock = header.clock_address
         if is_new:

@@ -18,6 +18,7 @@ X_b X_a = H_ab + (gradient of rotation) . (a x b) / 2; of the second part only T
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 import numpy as np
 
@@ -32,7 +33,10 @@ from assembly.constraints.program.objective_terms import (
 )
 from assembly.constraints.program.primitives import add_coordinate_hessian, coordinate
 from assembly.constraints.program.records import (
+    BODY_COORDINATE,
     ROW,
+    Iterate,
+    body_coordinate_at,
     header_at,
     row_at,
 )
@@ -44,28 +48,24 @@ from assembly.solve.loop.predict import carry
 from assembly.solve.loop.rates import rate_system, settle
 from assembly.solve.loop.residuals import move, slot, times
 
-# The record of a term in the table: measure, task, number of inputs; then for each: kind, component, joint, angle,
-# bodies f and g.
-INPUT = 6
+# A term in the table; behind it a `BODY_COORDINATE` an input.
 DEXTERITY_TERM = record_dtype(
     "i8",
-    measure=1,
-    task=1,
-    inputs=1,
+    measure=1,  # `singular_values.py`
+    task=1,  # POSITION, ROTATION or POSE
+    inputs=1,  # how many
 )
 dexterity_at = record_view(DEXTERITY_TERM)
-MEASURE = place_of(DEXTERITY_TERM, "measure")
-INPUT_LIST = size_of(DEXTERITY_TERM)
+INPUT_LIST, INPUT = size_of(DEXTERITY_TERM), size_of(BODY_COORDINATE)
 POSITION, ROTATION, POSE = 0, 1, 2
-# Its parameters in the pool: weight, the tip on its body, factors of lengths and of turns, direction (6), then a factor
-# for every input.
+# Its parameters in the pool; behind them the factor of every input's unit.
 DEXTERITY_WEIGHTS = record_dtype(
     "f8",
-    weight=1,
-    arm=3,
-    linear=1,
-    angular=1,
-    direction=6,
+    weight=1,  # of the term
+    arm=3,  # the tip, in the axes of its body
+    linear=1,  # factor of velocities
+    angular=1,  # factor of angular velocities
+    direction=6,  # along which some measures look
 )
 dexterity_weights_at = record_view(DEXTERITY_WEIGHTS)
 ARM = place_of(DEXTERITY_WEIGHTS, "arm")
@@ -73,6 +73,11 @@ DIRECTION = place_of(DEXTERITY_WEIGHTS, "direction")
 FACTORS = size_of(DEXTERITY_WEIGHTS)
 # Outcomes of `tip_map`.
 DETERMINED, DEPENDENT, OPEN = 0, 1, 2
+# The outcome, the tip's Jacobian, the rows that hold the mechanism, rates of inputs and what the tip needs (vectors in
+# rows): the heading's V, Z and A V; P, Y and A P.
+TipMap = namedtuple("TipMap", "outcome jacobian used inputs adjoint")
+InputRates = namedtuple("InputRates", "v z changes")
+Adjoint = namedtuple("Adjoint", "p y loads")
 # What rows may change by unit rates of the inputs, and how much of the tip's motion may be left open.
 UNDETERMINED = 1e-6
 # Rows that change by less than this are as good as kept.
@@ -84,16 +89,16 @@ STEP = 1e-6
 @kernel(inner=True)
 def input_row(table, at, records, tracked, b, r):
     """Row r of b: the gradient of an input's coordinate."""
-    angle = table[at + 3]
-    near = tracked[angle, 0] if angle >= 0 else 0.0
-    k = header_at(table, 0).contacts + table[at + 2]
-    _value, n, arm_f, arm_g, h = coordinate(table[at], table[at + 1], records, k, near)
+    asked = body_coordinate_at(table, at)
+    near = tracked[asked.angle, 0] if asked.angle >= 0 else 0.0
+    found = coordinate(asked.kind, asked.component, records, header_at(table, 0).contacts + asked.joint, near)
+    n, h = found.n, found.h
     for side in range(2):
-        s = slot(table, table[at + 4 + side])
+        s = slot(table, asked.body_f if side == 0 else asked.body_g)
         if s < 0:
             continue
         sign = -1.0 if side == 0 else 1.0
-        turn = cross(arm_f if side == 0 else arm_g, n)
+        turn = cross(found.arm_f if side == 0 else found.arm_g, n)
         for i in range(3):
             b[r, s + i] += sign * n[i]
             b[r, s + 3 + i] += sign * (turn[i] + h[i])
@@ -197,15 +202,14 @@ def largest(values):
 def tip_map(table, pool, term, bases, rows, n, point, order):
     """The tip's Jacobian in the user's units, at a point whose rows are evaluated.
 
-    Returns whether it is determined, the Jacobian, the rows used, what inputs do (rates V, forces Z, A V) and what the
-    tip needs (P, Y, A P), vectors in rows. What the tip needs, and so whether its motion is open, is found from order 1
-    on.
+    What the tip needs, and so whether its motion is open, is found from order 1 on.
     """
     term_record = term_at(table, term)
-    q, tracked, records, residual, jacobian = point
+    q, tracked, records, residual, jacobian = point.q, point.tracked, point.records, point.residual, point.jacobian
     record = term_record.tape
     dexterity_record = dexterity_at(table, record)
     o = term_record.parameters
+    factors = o + FACTORS
     body = term_record.body
     k = dexterity_record.inputs
     task = dexterity_record.task
@@ -239,7 +243,7 @@ def tip_map(table, pool, term, bases, rows, n, point, order):
             h[i] = 0.0
             tip_velocity(pool, o, task, arm, v[i], s, tip, i)
             for r in range(m):
-                tip[r, i] *= pool[o + FACTORS + i]
+                tip[r, i] *= pool[factors + i]
         unit = np.zeros((m, 1))
         for r in range(m if order > 0 else 0):
             for i in range(n):
@@ -253,28 +257,31 @@ def tip_map(table, pool, term, bases, rows, n, point, order):
         changes = row_rates(bases, jacobian, used, v)
         if not max(missed, largest(changes)) <= leeway:
             outcome = DEPENDENT
-    return outcome, tip, used, (v, z, changes), (p, y, row_rates(bases, jacobian, used, p))
+    return TipMap(outcome, tip, used, InputRates(v, z, changes), Adjoint(p, y, row_rates(bases, jacobian, used, p)))
 
 
 @kernel(inner=True)
-def bend(table, pool, record, shape, loose, room, point, forces, inputs, rates, hessian, gradient):
-    """gradient -= H v, H the second derivative of forces . rows + inputs . (values of the inputs)."""
+def bend(table, pool, record, shape, loose, room, point, forces, weights, inputs, rates, hessian, gradient):
+    """gradient -= H v, H the second derivative of forces . rows + inputs . (values of the inputs).
+
+    `weights` are no weights of rows: zeros.
+    """
     n = rates.size
     for r in range(n):
         for c in range(r, n):
             hessian[r, c] = 0.0
-    add_row_terms(table, pool, loose, room, shape, point, forces, shape[1], hessian)
+    add_row_terms(table, pool, loose, room, shape, point, forces, weights, hessian)
     for j in range(inputs.size):
-        at = record + INPUT_LIST + INPUT * j
+        asked = body_coordinate_at(table, record + INPUT_LIST + INPUT * j)
         add_coordinate_hessian(
-            table[at],
-            table[at + 1],
-            point[2],
-            header_at(table, 0).contacts + table[at + 2],
+            asked.kind,
+            asked.component,
+            point.records,
+            header_at(table, 0).contacts + asked.joint,
             inputs[j],
             hessian,
-            slot(table, table[at + 4]),
-            slot(table, table[at + 5]),
+            slot(table, asked.body_f),
+            slot(table, asked.body_g),
         )
     for r in range(n):
         for c in range(r, n):
@@ -287,15 +294,19 @@ def bend(table, pool, record, shape, loose, room, point, forces, inputs, rates, 
 def dexterity(table, pool, term, shape, rows, loose, room, point, order, gradient):
     """Value of the term at a point whose rows are evaluated; from order 1 on its gradient is added."""
     term_record = term_at(table, term)
-    bases = shape[0]
+    bases = shape.bases
     n = gradient.size
     record = term_record.tape
     dexterity_record = dexterity_at(table, record)
     o = term_record.parameters
+    factors = o + FACTORS
     task = dexterity_record.task
     weight = dexterity_weights_at(pool, o).weight
-    outcome, jacobian, used, (v, z, changes), (p, y, loads) = tip_map(table, pool, term, bases, rows, n, point, order)
-    if outcome != DETERMINED:
+    tip = tip_map(table, pool, term, bases, rows, n, point, order)
+    jacobian, used = tip.jacobian, tip.used
+    v, z, changes = tip.inputs
+    p, y, loads = tip.adjoint
+    if tip.outcome != DETERMINED:
         return math.inf
     slopes = np.empty(jacobian.shape)
     value = measure_jacobian(dexterity_record.measure, pool, o + DIRECTION, jacobian, slopes)
@@ -305,13 +316,13 @@ def dexterity(table, pool, term, shape, rows, loose, room, point, order, gradien
         return weight * value
     body = term_record.body
     s = slot(table, body)
-    arm = matvec(rotation(point[0], body), load(pool, o + ARM))
+    arm = matvec(rotation(point.q, body), load(pool, o + ARM))
     m, k = jacobian.shape
     # Room for one combination at a time: p, y, A p as forces on all rows.
     pull = np.empty(n)
     turn = np.empty(k)
     forces = np.zeros(rows)
-    none = (bases, np.zeros(rows), shape[2])
+    none = np.zeros(rows)
     hessian = np.empty((n, n))
     for i in range(k):
         for c in range(n):
@@ -321,7 +332,7 @@ def dexterity(table, pool, term, shape, rows, loose, room, point, order, gradien
         for l in range(used.size):
             forces[used[l]] = 0.0
         for r in range(m):
-            w = slopes[r, i] * weight * pool[o + FACTORS + i]
+            w = slopes[r, i] * weight * pool[factors + i]
             slopes[r, i] = w
             for c in range(n):
                 pull[c] += w * p[r, c]
@@ -329,11 +340,11 @@ def dexterity(table, pool, term, shape, rows, loose, room, point, order, gradien
                 turn[j] += w * y[r, j]
             for l in range(used.size):
                 forces[used[l]] += w * loads[r, l]
-        bend(table, pool, record, none, loose, room, point, forces, turn, v[i], hessian, gradient)
+        bend(table, pool, record, shape, loose, room, point, forces, none, turn, v[i], hessian, gradient)
         if largest(changes[i]) > KEPT:
             for l in range(used.size):
                 forces[used[l]] = changes[i, l]
-            bend(table, pool, record, none, loose, room, point, forces, z[i], pull, hessian, gradient)
+            bend(table, pool, record, shape, loose, room, point, forces, none, z[i], pull, hessian, gradient)
         if s >= 0:
             add_tip_bend(pool, o, task, arm, slopes, i, v[i], s, gradient)
     return weight * value
@@ -355,12 +366,12 @@ def add_dexterities(table, pool, shape, rows, loose, room, here, order, gradient
             continue
         for i in range(n):
             gradient[i] += slope[i]
-        beside = (
-            here[0].copy(),
-            here[1].copy(),
-            np.empty(here[2].shape),
-            np.empty(here[3].size),
-            np.empty(here[4].shape),
+        beside = Iterate(
+            here.q.copy(),
+            here.tracked.copy(),
+            np.empty(here.records.shape),
+            np.empty(here.residual.size),
+            np.empty(here.jacobian.shape),
         )
         step = np.zeros(n)
         other = np.empty(n)
@@ -368,10 +379,10 @@ def add_dexterities(table, pool, shape, rows, loose, room, here, order, gradient
             for i in range(n):
                 other[i] = 0.0
             step[j] = STEP
-            move(table, here[0], step, 1.0, beside[0])
-            carry(table, pool, shape[0], loose, here, beside, step, 1.0)
+            move(table, here.q, step, 1.0, beside.q)
+            carry(table, pool, shape.bases, loose, here, beside, step, 1.0)
             step[j] = 0.0
-            if evaluate(table, pool, loose[4], math.inf, loose, room, beside) >= 0:
+            if evaluate(table, pool, loose.guess, math.inf, loose, room, beside) >= 0:
                 continue
             if math.isfinite(dexterity(table, pool, term, shape, rows, loose, room, beside, 1, other)):
                 for i in range(n):

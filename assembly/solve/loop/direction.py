@@ -37,14 +37,14 @@ def aim(program, here, rows, y, mu, shift, radius, cuts, dual, violation, restor
     shift of the matrix and that of the factor the step is by, negative where there is none; the step's largest
     component and turn.
     """
-    table, pool, shape, loose, room = program
+    table, pool, shape, loose, room = program.table, program.pool, program.structure, program.lifted, program.tapes
     header = header_at(table, 0)
     active, forces, foreseen = weights
-    gradient, lines, lagrangian, matrix = system
-    bases, one_sided, order, _of_rows = shape
-    descent, step, straight = lines
+    gradient, lines, lagrangian, matrix = system.gradient, system.directions, system.hessian, system.factor
+    bases, one_sided, order = shape.bases, shape.one_sided, shape.sparsity
+    descent, step, straight = lines.descent, lines.step, lines.straight
     n = descent.size
-    residual, jacobian = here[3], here[4]
+    residual, jacobian = here.residual, here.jacobian
     weigh_rows(rows, one_sided, residual, y, mu, forces, active)
     for i in range(n):
         descent[i] = -gradient[i]
@@ -99,7 +99,7 @@ def short_share(radius, longest, turn):
 @kernel(inline=True)
 def cut_step(shape, here, rows, y, mu, cut, foreseen, lines):
     """Shorten the step to a share. Returns the merit's slope along it, and the largest component of the descent."""
-    descent, step, straight = lines
+    descent, step, straight = lines.descent, lines.step, lines.straight
     slope = 0.0
     steepest = 0.0
     for i in range(descent.size):
@@ -110,18 +110,18 @@ def cut_step(shape, here, rows, y, mu, cut, foreseen, lines):
     for r in range(rows):
         if foreseen[r] == 1.0:
             # What the row adds to the descent is not in the merit before it binds.
-            slope -= (y[r] + here[3][r] / mu) * times(shape[0], here[4], r, step)
+            slope -= (y[r] + here.residual[r] / mu) * times(shape.bases, here.jacobian, r, step)
     return slope, steepest
 
 
 @kernel(inline=True)
 def propose(shape, here, rows, y, mu, active, straight, alpha, better_y):
     """The multipliers of first order after a share alpha of the straight step."""
-    bases, one_sided, _order, _of_rows = shape
+    bases, one_sided = shape.bases, shape.one_sided
     for r in range(rows):
         better_y[r] = 0.0
         if active[r] > 0.0:
-            better_y[r] = y[r] + alpha * (times(bases, here[4], r, straight) + here[3][r]) / mu
+            better_y[r] = y[r] + alpha * (times(bases, here.jacobian, r, straight) + here.residual[r]) / mu
             if one_sided[r] == 1:
                 better_y[r] = min(better_y[r], 0.0)
 
@@ -132,13 +132,13 @@ def leave_saddle(program, here, trial, number, system):
 
     Of axes that are parallel and are to stand at right angles, say. `number` is how many moves there have been.
     """
-    table, pool, shape, loose, room = program
-    _gradient, (_descent, step, _straight), lagrangian, matrix = system
+    table, pool, shape, loose, room = program.table, program.pool, program.structure, program.lifted, program.tapes
+    step, lagrangian, matrix = system.directions.step, system.hessian, system.factor
     n = step.size
-    if not factorize_shifted(lagrangian, n, shape[2], LEAST_SHIFT, matrix) > SADDLE:
+    if not factorize_shifted(lagrangian, n, shape.sparsity, LEAST_SHIFT, matrix) > SADDLE:
         return False
     for i in range(n):
         step[i] = KICK * math.sin(number + 1 + i) if i < 6 * header_at(table, 0).moving else 0.0
-    move(table, here[0], step, 1.0, trial[0])
-    carry(table, pool, shape[0], loose, here, trial, step, 1.0)
-    return evaluate(table, pool, loose[4], math.inf, loose, room, trial) < 0
+    move(table, here.q, step, 1.0, trial.q)
+    carry(table, pool, shape.bases, loose, here, trial, step, 1.0)
+    return evaluate(table, pool, loose.guess, math.inf, loose, room, trial) < 0

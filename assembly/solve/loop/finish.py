@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 from assembly._kernel import kernel
 from assembly.constraints.program.evaluate import evaluate
@@ -29,21 +30,25 @@ from assembly.solve.loop.settings import (
 from assembly.solve.loop.warm_start import leave
 from assembly.solve.loop.workspace import results_of
 
+# How the loop ended: status, and objective, violation, dual residual of its last iterate; the violation that counts as
+# none, how many rows there are, whether there is a last feasible iterate.
+End = namedtuple("End", "status value violation dual feasible rows holds")
+
 
 @kernel(inner=True)
 def tells_crossing(table, pool, loose, room, here, y, better_y):
     """Look at everything where a solve failed; whether bodies are in each other, with or without a row that says so."""
-    memory, free = loose[5], loose[0]
+    memory, free = loose.memory, loose.free
     look_around(table, pool, memory, here, EVERYTHING)
     place_guards(table, memory, here, y, better_y, free, False)
-    lost = evaluate(table, pool, here[1], math.inf, loose, room, here)
-    return lost >= 0 or not is_clear(table, here[3]) or any_crossed(table, header_at(table, 0).watch, memory)
+    lost = evaluate(table, pool, here.tracked, math.inf, loose, room, here)
+    return lost >= 0 or not is_clear(table, here.residual) or any_crossed(table, header_at(table, 0).watch, memory)
 
 
 @kernel(inner=True)
 def return_to(table, pool, held, numbers, loose, rows, here, y, better_y, tick):
     """Back to the last pose that held; what is near there is looked for again."""
-    memory, free = loose[5], loose[0]
+    memory, free = loose.memory, loose.free
     bring_back(held, rows, here, y)
     if header_at(table, 0).watch >= 0:
         go_back(table, memory, numbers)
@@ -54,17 +59,14 @@ def return_to(table, pool, held, numbers, loose, rows, here, y, better_y, tick):
 
 @kernel(inline=True, allocates=True)
 def finish(program, settings, state, tips, here, trial, by_row, at_end, held, numbers, system, gram):
-    """Write the end into the state; returns the status, and objective, violation, dual of the pose as it is returned.
-
-    `at_end`: these where the loop ended, what of a violation is none, how many rows there are, whether `held` has a
-    pose.
-    """
+    """Write the end into the state; returns status, objective, violation and dual residual of the pose returned."""
     limits = settings_at(settings, 0)
-    table, pool, shape, loose, room = program
+    table, pool, shape, loose, room = program.table, program.pool, program.structure, program.lifted, program.tapes
     header = header_at(table, 0)
-    gradient, lines, lagrangian, _matrix = system
-    y, better_y, active, forces = by_row[2], by_row[3], by_row[4], by_row[5]
-    status, value, violation, dual, feasible, rows, holds = at_end
+    gradient, lines, lagrangian = system.gradient, system.directions, system.hessian
+    y, better_y, active, forces = by_row.y, by_row.better_y, by_row.active, by_row.forces
+    status, value, violation, dual = at_end.status, at_end.value, at_end.violation, at_end.dual
+    feasible, rows, holds = at_end.feasible, at_end.rows, at_end.holds
     results = results_of(table, state)
     result = results_at(results, 0)
     tick = limits.tick == 1.0
@@ -79,9 +81,9 @@ def finish(program, settings, state, tips, here, trial, by_row, at_end, held, nu
     gathered = header.implicit == 1 and limits.gather > 0.0 and result.scatter == 1.0
     if gathered:
         # The way from where bodies were gathered was as short as could be; it is measured from where they were given.
-        scaled_poses(table, pool, state, trial[0])
-        recenter(table, pool, trial[0])
-    write_pose(table, pool, here[0], state)
+        scaled_poses(table, pool, state, trial.q)
+        recenter(table, pool, trial.q)
+    write_pose(table, pool, here.q, state)
     if status != CONTACT_LOST and not (tick and result.held == 0.0):
         # A tick that went well ends at a pose that was just evaluated.
         bound = 1.25 * feasible
@@ -90,12 +92,12 @@ def finish(program, settings, state, tips, here, trial, by_row, at_end, held, nu
         if (is_wish or is_cut_short) and holds and not good and not watched:
             return_to(table, pool, held, numbers, loose, rows, here, y, better_y, tick)
             result.held = 1.0
-            write_pose(table, pool, here[0], state)
+            write_pose(table, pool, here.q, state)
             good, violation = judge(table, pool, state, loose, room, shape, rows, here, trial, bound, tick)
         if is_wish and good and (fails or result.held == 1.0):
             status = SOLVED
             value = goal(table, pool, shape, rows, loose, room, tips, trial, 1, gradient, lagrangian)
-            dual = multipliers_at(shape, rows, trial, active, gradient, lines[0], gram, y)
+            dual = multipliers_at(shape, rows, trial, active, gradient, lines.descent, gram, y)
         elif gathered or is_cut_short:
             value = goal(table, pool, shape, rows, loose, room, tips, trial, 0, gradient, lagrangian)
         if status == SOLVED and not good:

@@ -76,13 +76,13 @@ def told_convex(results, rows, one_sided, residual, y, scratch):
 @kernel(inner=True)
 def is_convex(program, tips, here, rows, y, active, system, mu, shift):
     """Whether the matrix of the rows that push, shifted by so much, has a factor at this point."""
-    table, pool, shape, loose, room = program
-    gradient, _lines, lagrangian, matrix = system
+    table, pool, shape, loose, room = program.table, program.pool, program.structure, program.lifted, program.tapes
+    gradient, lagrangian, matrix = system.gradient, system.hessian, system.factor
     goal(table, pool, shape, rows, loose, room, tips, here, 1, gradient, lagrangian)
     for r in range(rows):
-        active[r] = 0.0 if shape[1][r] == 1 and y[r] >= -IDLE else 1.0 / mu
+        active[r] = 0.0 if shape.one_sided[r] == 1 and y[r] >= -IDLE else 1.0 / mu
     add_row_terms(table, pool, loose, room, shape, here, y, active, lagrangian)
-    return factorize_shifted(lagrangian, gradient.size, shape[2], shift, matrix) == shift
+    return factorize_shifted(lagrangian, gradient.size, shape.sparsity, shift, matrix) == shift
 
 
 @kernel(inline=True)
@@ -94,7 +94,7 @@ def test_end(program, settings, results, status, tips, here, rows, y, active, fo
     """
     result = results_at(results, 0)
     limits = settings_at(settings, 0)
-    table, _pool, shape, _loose, _room = program
+    table, shape = program.table, program.structure
     tick = limits.tick == 1.0
     if not tick and (status != SOLVED or header_at(table, 0).implicit == 1):
         return status
@@ -102,7 +102,7 @@ def test_end(program, settings, results, status, tips, here, rows, y, active, fo
     if not tick:
         if result.curved == DOWNWARD or (result.curved == 0.0 and limits.penalty > mu):
             return UNSURE
-        if told_convex(results, rows, shape[1], here[3], y, forces):
+        if told_convex(results, rows, shape.one_sided, here.residual, y, forces):
             return status
     shift = 0.0 if tick else LEAST_SHIFT
     convex = is_convex(program, tips, here, rows, y, active, system, mu, shift)

@@ -11,6 +11,7 @@ all are as small as they get.
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 import numpy as np
 
@@ -22,7 +23,9 @@ from assembly.constraints.program.records import (
     JOINT_RECORD,
     JOINT_ROW,
     ROW,
+    coordinate_at,
     header_at,
+    joint_at,
     joint_row_at,
     row_at,
 )
@@ -38,6 +41,8 @@ ENOUGH = 1e-26
 DAMPING, STUCK = 1e-4, 1e6
 # A place where rows are smaller by less than this is no better one.
 LOWER = 0.9
+# What the fit of one body works in: J^T J, the same with damping, how far its rows reach, a row, J^T c, the step.
+FitRoom = namedtuple("FitRoom", "matrix damped last row slope step")
 
 
 @kernel(inner=True)
@@ -56,8 +61,8 @@ def scattered(table, residual, one_sided):
 def place_joint(table, pool, k, q, records):
     """The world frames of joint k."""
     header = header_at(table, 0)
-    joint = header.joint_table + JOINT_RECORD * k
-    place_frames(pool, table[joint + 2], q, table[joint], table[joint + 1], records, header.contacts + k)
+    joint = joint_at(table, header.joint_table + JOINT_RECORD * k)
+    place_frames(pool, joint.frames, q, joint.body_f, joint.body_g, records, header.contacts + k)
 
 
 @kernel(inline=True)
@@ -70,7 +75,7 @@ def is_of(table, row, joint):
 @kernel(inner=True)
 def body_rows(table, pool, first, count, joint, point):
     """Evaluate rows listed in the table, of a joint or of all (-1); half the sum of squares of what does not hold."""
-    q, tracked, records, residual, jacobian = point
+    q, tracked, records, residual, jacobian = point.q, point.tracked, point.records, point.residual, point.jacobian
     cost = 0.0
     for l in range(first, first + count):
         r = table[l]
@@ -81,7 +86,7 @@ def body_rows(table, pool, first, count, joint, point):
         second = joint_there.second
         place_joint(table, pool, joint_there.joint, q, records)
         if second >= 0:
-            place_joint(table, pool, table[second + 2], q, records)
+            place_joint(table, pool, coordinate_at(table, second).joint, q, records)
         joint_row(table, pool, r, tracked, tracked, records, residual, jacobian)
         if row_at(table, row).one_sided == 0 or residual[r] < 0.0:
             cost += 0.5 * residual[r] * residual[r]
@@ -126,8 +131,8 @@ def is_half_around(table, residual, first, count):
 @kernel(inner=True)
 def normal_equations(table, bases, first, count, joint, s, point, room):
     """J^T J and J^T c of rows that do not hold, in the twist that stands at s."""
-    _q, _tracked, _records, residual, jacobian = point
-    matrix, _damped, _last, row, slope, _step = room
+    residual, jacobian = point.residual, point.jacobian
+    matrix, row, slope = room.matrix, room.row, room.slope
     for i in range(6):
         slope[i] = 0.0
         for j in range(i, 6):
@@ -150,8 +155,8 @@ def fit_body(table, pool, bases, body, first, count, joint, s, point, room):
 
     Returns half the sum of squares of those that do not hold.
     """
-    q = point[0]
-    matrix, damped, last, _row, slope, step = room
+    q = point.q
+    matrix, damped, last, slope, step = room.matrix, room.damped, room.last, room.slope, room.step
     damping = DAMPING
     cost = body_rows(table, pool, first, count, joint, point)
     for _step in range(STEPS):
@@ -197,8 +202,8 @@ def put_pose(q, body, pose):
 def gather(table, pool, bases, slots, point):
     """Move the bodies of the point one by one."""
     header = header_at(table, 0)
-    q, tracked, _records, residual, _jacobian = point
-    room = (np.empty((6, 6)), np.empty((6, 6)), np.full(6, 5), np.empty(6), np.empty(6), np.empty(6))
+    q, tracked, residual = point.q, point.tracked, point.residual
+    room = FitRoom(np.empty((6, 6)), np.empty((6, 6)), np.full(6, 5), np.empty(6), np.empty(6), np.empty(6))
     o = header.gather_table + 1
     for _entry in range(table[header.gather_table]):
         body = table[o]

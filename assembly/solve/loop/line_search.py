@@ -70,7 +70,7 @@ def goal(table, pool, shape, rows, loose, room, tips, point, order, gradient, he
 
     `tips` is None where no term is a dexterity: then what these need is not even compiled.
     """
-    value = objective(table, pool, point[0], order, room, shape[2], gradient, hessian)
+    value = objective(table, pool, point.q, order, room, shape.sparsity, gradient, hessian)
     if tips is not None:
         value += add_dexterities(table, pool, shape, rows, loose, room, point, order, gradient, hessian)
     return value
@@ -85,14 +85,21 @@ def search(program, tips, here, trial, rows, y, base, value, restoring, leave, m
     says whether a contact that ends where solids are in each other may be given up, and whether bodies may go all the
     way for certain.
     """
-    table, pool, shape, loose, room = program
+    table, pool, shape, loose, room = program.table, program.pool, program.structure, program.lifted, program.tapes
     header = header_at(table, 0)
     active, forces, _foreseen = weights
     lets_go, may_go_all = leave
-    gradient, (descent, step, straight), lagrangian, matrix = system
-    bases, one_sided, order, _of_rows = shape
+    gradient, descent, step, straight, lagrangian, matrix = (
+        system.gradient,
+        system.directions.descent,
+        system.directions.step,
+        system.directions.straight,
+        system.hessian,
+        system.factor,
+    )
+    bases, one_sided, order = shape.bases, shape.one_sided, shape.sparsity
     n = descent.size
-    residual = here[3]
+    residual = here.residual
     here_merit = merit(residual, one_sided, rows, y, mu) + base
     # Of the violations alone no objective rounds anything off.
     noise = 1e-14 * (abs(here_merit) + (0.0 if restoring else abs(value)) + 1e-300)
@@ -105,22 +112,22 @@ def search(program, tips, here, trial, rows, y, base, value, restoring, leave, m
     bends = 0
     lost = -1
     while alpha * longest > 1e-9 * SHORTEST or alpha == 1.0:
-        move(table, here[0], step, alpha, trial[0])
+        move(table, here.q, step, alpha, trial.q)
         carry(table, pool, bases, loose, here, trial, step, alpha)
         known = may_go_all and alpha == 1.0 and bends == 0
-        if header.watch >= 0 and not known and is_too_far(table, pool, loose[5], trial):
+        if header.watch >= 0 and not known and is_too_far(table, pool, loose.memory, trial):
             # Bent, it would go farther than is known to be free.
             bends = 2
             alpha *= 0.5
             continue
-        lost = evaluate(table, pool, loose[4], BEND, loose, room, trial)
-        if header.watch >= 0 and not lets_go and lost < 0 and ends_unseen(table, pool, loose[5], here, trial):
+        lost = evaluate(table, pool, loose.guess, BEND, loose, room, trial)
+        if header.watch >= 0 and not lets_go and lost < 0 and ends_unseen(table, pool, loose.memory, here, trial):
             # A tick has no last look, which would tell of what it led through.
             bends = 2
             alpha *= 0.5
             continue
         if lost < 0:
-            there = merit(trial[3], one_sided, rows, y, mu)
+            there = merit(trial.residual, one_sided, rows, y, mu)
             if not restoring:
                 there += goal(table, pool, shape, rows, loose, room, tips, trial, 0, gradient, lagrangian)
             if there <= here_merit + 1e-4 * alpha * slope + noise:
@@ -130,8 +137,8 @@ def search(program, tips, here, trial, rows, y, base, value, restoring, leave, m
                 for i in range(n):
                     descent[i] = 0.0
                 for r in range(rows):
-                    forces[r] = -(trial[3][r] - (1.0 - alpha) * residual[r]) * active[r]
-                add_transposed(bases, here[4], rows, forces, descent)
+                    forces[r] = -(trial.residual[r] - (1.0 - alpha) * residual[r]) * active[r]
+                add_transposed(bases, here.jacobian, rows, forces, descent)
                 solve_step(matrix, n, order, descent)
                 for i in range(n):
                     step[i] += descent[i] / alpha
@@ -142,12 +149,12 @@ def search(program, tips, here, trial, rows, y, base, value, restoring, leave, m
                     step[i] = straight[i]
         # A bent step may be longer than it was.
         short = lets_go and bends % 3 == 0 and alpha <= HALVED and alpha * longest < LETS_GO
-        if lost >= 0 and short and may_go(table, lost, residual) and tracked_at(here[1], lost).stays >= 0.0:
-            tracked_at(here[1], lost).stays = MAY_GO - tracked_at(here[1], lost).stays
+        if lost >= 0 and short and may_go(table, lost, residual) and tracked_at(here.tracked, lost).stays >= 0.0:
+            tracked_at(here.tracked, lost).stays = MAY_GO - tracked_at(here.tracked, lost).stays
             continue
         alpha *= 0.5
         # A pair near a fold is freed; a clearance's is given up where its gap does not close.
         if lost >= 0 and alpha * longest < 0.01 and not is_guard(table, lost):
             break
-    hold_all(table, here[1])
+    hold_all(table, here.tracked)
     return False, alpha, lost

@@ -46,9 +46,9 @@ def let_count(shape, r, counts, residual, jacobian, y, mu, in_matrix, active, fo
     sign = 1.0 if counts else -1.0
     foreseen[r] = 1.0 if counts else 0.0
     active[r] = 1.0 / mu if counts else 0.0
-    add_row(shape[0], jacobian, r, -sign * (y[r] + residual[r] / mu), descent)
+    add_row(shape.bases, jacobian, r, -sign * (y[r] + residual[r] / mu), descent)
     if in_matrix:
-        add_square(shape[2], shape[0], jacobian, r, sign / mu, lagrangian)
+        add_square(shape.sparsity, shape.bases, jacobian, r, sign / mu, lagrangian)
 
 
 @kernel(inner=True)
@@ -58,7 +58,7 @@ def foresee(table, shape, rows, residual, jacobian, y, mu, step, in_matrix, acti
     Their sign is that of y + (c + J step) / mu. Returns how many rows changed.
     """
     header = header_at(table, 0)
-    bases, one_sided = shape[0], shape[1]
+    bases, one_sided = shape.bases, shape.one_sided
     changed = 0
     for r in range(rows):
         if one_sided[r] == 0 or (active[r] > 0.0 and foreseen[r] == 0.0):
@@ -91,7 +91,7 @@ def toward_rows(shape, m, rows, residual, jacobian, mu, active, softness, enough
     first `m` by that, those of the program, is to be a small part or at most `enough`: the softness falls until it is.
     Returns the softness.
     """
-    bases, one_sided, order, _of_rows = shape
+    bases, one_sided, order = shape.bases, shape.one_sided, shape.sparsity
     for r in range(rows):
         active[r] = 0.0 if one_sided[r] == 1 and residual[r] >= 0.0 else 1.0 / mu
     releases = 0
@@ -228,7 +228,7 @@ def pushing_multipliers(shape, rows, residual, jacobian, active, exchanges, roun
     that are wrong are exchanged at once as long as they become fewer (block pivoting, Portugal, Judice and Vicente
     1994); what still pulls in the end is set to zero.
     """
-    bases, one_sided, _order, of_rows = shape
+    bases, one_sided, of_rows = shape.bases, shape.one_sided, shape.row_order
     fewest = rows + 1
     patience = BLOCKED
     for k in range(exchanges + 1):
@@ -259,9 +259,9 @@ def choose_multipliers(
     These are for after a shortened step, and for where rows hold and neither of the others is good: it depends on which
     rows push then. There, and with rows of `vectors`, they are refined. Returns the dual residual.
     """
-    bases, one_sided, _order, _of_rows = shape
-    residual = here[3]
-    jacobian = here[4]
+    bases, one_sided = shape.bases, shape.one_sided
+    residual = here.residual
+    jacobian = here.jacobian
     dual = dual_residual(bases, jacobian, rows, one_sided, residual, gradient, better_y, scratch)
     # Where they are as good as they should be, the old ones need no look.
     other = math.inf
@@ -313,9 +313,9 @@ def least_multipliers(shape, rows, here, active, gradient, scratch, gram, dual, 
     """
     if not strongest(y, rows) > EXCESS * strongest(gradient, gradient.size):
         return dual
-    bases, one_sided, _order, _of_rows = shape
-    residual = here[3]
-    jacobian = here[4]
+    bases, one_sided = shape.bases, shape.one_sided
+    residual = here.residual
+    jacobian = here.jacobian
     pushing_multipliers(shape, rows, residual, jacobian, active, 0, 1, gradient, scratch, gram, better_y)
     other = dual_residual(bases, jacobian, rows, one_sided, residual, gradient, better_y, scratch)
     if other > max(10.0 * dual, 1e-11):
@@ -328,9 +328,9 @@ def least_multipliers(shape, rows, here, active, gradient, scratch, gram, dual, 
 @kernel(inner=True)
 def multipliers_at(shape, rows, point, active, gradient, scratch, gram, y):
     """Multipliers of least squares at a point that may be no extremum, of rows that touch there. The dual residual."""
-    bases, one_sided, _order, _of_rows = shape
-    residual = point[3]
-    jacobian = point[4]
+    bases, one_sided = shape.bases, shape.one_sided
+    residual = point.residual
+    jacobian = point.jacobian
     for r in range(rows):
         active[r] = 1.0 if one_sided[r] == 0 or residual[r] <= NEAR else 0.0
     pushing_multipliers(shape, rows, residual, jacobian, active, EXCHANGES, ROUNDS, gradient, scratch, gram, y)

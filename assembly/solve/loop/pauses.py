@@ -26,7 +26,7 @@ def pause(table, pool, settings, results, asked, iteration, value, violation):
     header = header_at(table, 0)
     result = results_at(results, 0)
     limits = settings_at(settings, 0)
-    if limits.ask_address[0] == 0.0 or (iteration < SHORT and not is_large(table)):
+    if limits.ask_address == 0.0 or (iteration < SHORT and not is_large(table)):
         return asked, False
     now = call_address(header.clock_address, ()) if header.clock_address != 0 else asked + SLICE
     if asked == 0 or now - asked < SLICE:
@@ -36,5 +36,5 @@ def pause(table, pool, settings, results, asked, iteration, value, violation):
         value,
         violation * pool_header_at(pool, 0).scale,
     )
-    ends = call_address(int(limits.ask_address[0]), ()) != GOES_ON
+    ends = call_address(int(limits.ask_address), ()) != GOES_ON
     return call_address(header.clock_address, ()) if header.clock_address != 0 else now, ends

@@ -5,17 +5,16 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly.constraints.program.contact import copy_tracked, is_guard
+from assembly.constraints.program.contact import copy_tracked, is_guard, surface_of
 from assembly.constraints.program.records import (
     FREE_COLUMN,
     ROW,
-    SURFACE_F,
     contact_row_at,
     header_at,
     row_at,
 )
 from assembly.geometry.splines.domain import into_domain
-from assembly.proximity.extrema.rates import ZED, derivatives_at
+from assembly.proximity.extrema.rates import derivatives_at
 from assembly.proximity.features.solid_contact import (
     CONTACT_RECORD,
     contact_record_at,
@@ -40,7 +39,7 @@ def stays_open(table, pool, bases, k, here, trial, d, alpha):
 
     No gap changes by more than points of the two bodies go, those of each seen from where they were.
     """
-    left = contact_record_at(here[2], k).slack
+    left = contact_record_at(here.records, k).slack
     if not left > 0.0 or bases[k, 2] >= 0:
         return False
     minimum = contact_row_at(table, header_at(table, 0).row_table + ROW * k).minimum
@@ -49,10 +48,10 @@ def stays_open(table, pool, bases, k, here, trial, d, alpha):
     if not left > 0.0:
         return False
     for i in range(CONTACT_RECORD):
-        trial[2][k, i] = here[2][k, i]
+        trial.records[k, i] = here.records[k, i]
     for i in range(FREE_COLUMN):
-        trial[4][k, i] = here[4][k, i]
-    contact_record_at(trial[2], k).slack = left
+        trial.jacobian[k, i] = here.jacobian[k, i]
+    contact_record_at(trial.records, k).slack = left
     return True
 
 
@@ -65,9 +64,9 @@ def carry(table, pool, bases, loose, here, trial, d, alpha):
     on to the trial point as they are.
     """
     header = header_at(table, 0)
-    _q, tracked, records, _residual, jacobian = here
-    lengths = loose[1]
-    out = loose[4]
+    tracked, records, jacobian = here.tracked, here.records, here.jacobian
+    lengths = loose.lengths
+    out = loose.guess
     for k in range(header.tracked):
         copy_tracked(tracked, k, out)
     for k in range(header.contacts):
@@ -88,7 +87,7 @@ def carry(table, pool, bases, loose, here, trial, d, alpha):
                     if f >= 0:
                         s += derivatives_at(records, k).zed[j, i] * d[f + i]
                     if g >= 0:
-                        s += records[k, ZED + 12 * j + 6 + i] * d[g + i]
+                        s += derivatives_at(records, k).zed[j, 6 + i] * d[g + i]
                 s *= alpha
                 for i in range(4):
                     out[k, i] += derivatives_at(records, k).rates[i, j] * s
@@ -96,7 +95,8 @@ def carry(table, pool, bases, loose, here, trial, d, alpha):
         if is_guard(table, k) and stays_open(table, pool, bases, k, here, trial, d, alpha):
             tracked_at(out, k).idle = 1.0
             tracked_at(out, k).gap = max(
-                tracked_at(out, k).gap, pool[contact_row_at(table, row).minimum] + contact_record_at(trial[2], k).slack
+                tracked_at(out, k).gap,
+                pool[contact_row_at(table, row).minimum] + contact_record_at(trial.records, k).slack,
             )
 
 
@@ -108,5 +108,5 @@ def keep_inside(table, pool, row, k, out):
     for side in range(2):
         i = 2 * side
         out[k, i], out[k, i + 1], _clamped = into_domain(
-            table, pool, table[row + SURFACE_F + side], out[k, i], out[k, i + 1]
+            table, pool, surface_of(table, row, side), out[k, i], out[k, i + 1]
         )

@@ -18,6 +18,7 @@ rest.
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 import numpy as np
 
@@ -30,6 +31,8 @@ REST = 1e-10
 PASSES = 8
 # A pass that changes rates by no more than this part of them is the last one: errors shrink by the same factor each.
 ENOUGH = 1e-8
+# Factors of M and G with how far their rows reach, and rows M^-1 B^T.
+RateFactors = namedtuple("RateFactors", "matrix last solved gram ends")
 
 
 @kernel(inner=True)
@@ -97,7 +100,7 @@ def rate_system(bases, jacobian, used, b):
             for l in range(n):
                 gram[i, j] += b[i, l] * s[j, l]
     exists = factorize(gram, k, ends) and exists
-    return exists, (matrix, last, s, gram, ends)
+    return exists, RateFactors(matrix, last, s, gram, ends)
 
 
 @kernel(inner=True, allocates=True)
@@ -106,7 +109,7 @@ def settle(system, bases, jacobian, used, b, g, h, v, z):
 
     What no pass takes off g pushes motions that nothing determines; their part of v is left out.
     """
-    matrix, last, s, gram, ends = system
+    matrix, last, s, gram, ends = system.matrix, system.last, system.solved, system.gram, system.ends
     k, n = b.shape
     rest = g.copy()
     missing = h.copy()

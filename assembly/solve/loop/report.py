@@ -65,27 +65,27 @@ def is_clear(table, residual):
 @kernel(inner=True)
 def keep(here, y, rows, held):
     """Copy poses, tracked values and multipliers of a point."""
-    for b in range(held[0].shape[0]):
+    for b in range(held.q.shape[0]):
         for k in range(7):
-            held[0][b, k] = here[0][b, k]
-    for r in range(held[1].shape[0]):
+            held.q[b, k] = here.q[b, k]
+    for r in range(held.tracked.shape[0]):
         for k in range(TRACK):
-            held[1][r, k] = here[1][r, k]
+            held.tracked[r, k] = here.tracked[r, k]
     for r in range(rows):
-        held[2][r] = y[r]
+        held.y[r] = y[r]
 
 
 @kernel(inner=True)
 def bring_back(held, rows, here, y):
     """The point that `keep` copied."""
-    for b in range(held[0].shape[0]):
+    for b in range(held.q.shape[0]):
         for k in range(7):
-            here[0][b, k] = held[0][b, k]
-    for r in range(held[1].shape[0]):
+            here.q[b, k] = held.q[b, k]
+    for r in range(held.tracked.shape[0]):
         for k in range(TRACK):
-            here[1][r, k] = held[1][r, k]
+            here.tracked[r, k] = held.tracked[r, k]
     for r in range(rows):
-        y[r] = held[2][r]
+        y[r] = held.y[r]
 
 
 @kernel(inner=True)
@@ -95,18 +95,18 @@ def judge(table, pool, state, loose, room, shape, rows, here, trial, bound, lax)
     Residuals and pairs found are copied to `here`. Returns whether every row holds within the bound, and the largest
     violation, tangency counted by gaps if `lax`.
     """
-    q = trial[0]
+    q = trial.q
     scaled_poses(table, pool, state, q)
-    lost = evaluate(table, pool, here[1], BEND, loose, room, trial)
+    lost = evaluate(table, pool, here.tracked, BEND, loose, room, trial)
     if lost >= 0:
         return False, math.inf
     for r in range(rows):
-        here[3][r] = trial[3][r]
+        here.residual[r] = trial.residual[r]
     for k in range(header_at(table, 0).contacts):
         for i in range(TRACK):
-            here[1][k, i] = trial[1][k, i]
-    violation = off_rows(table, loose, shape[1], trial, lax)
-    holds = free_pairs_hold(table, pool, q, here[1], loose[0], 1e-9)
+            here.tracked[k, i] = trial.tracked[k, i]
+    violation = off_rows(table, loose, shape.one_sided, trial, lax)
+    holds = free_pairs_hold(table, pool, q, here.tracked, loose.free, 1e-9)
     return holds and violation <= bound, violation
 
 
@@ -114,8 +114,8 @@ def judge(table, pool, state, loose, room, shape, rows, here, trial, bound, lax)
 def write_rows(table, here, y, loose, lax, size, state):
     """Tracked values, multipliers and residuals into the state; returns at how many contacts surfaces cross."""
     header = header_at(table, 0)
-    _q, tracked, records, residual, jacobian = here
-    free = loose[0]
+    tracked, records, residual, jacobian = here.tracked, here.records, here.residual, here.jacobian
+    free = loose.free
     m = header.rows
     o = 7 * header.bodies
     for k in range(header.tracked):
@@ -129,7 +129,7 @@ def write_rows(table, here, y, loose, lax, size, state):
         if r < header.contacts:
             if free[r] >= 0:
                 # What a free pair lacks to be extremal is a violation of its contact, too.
-                off = off_tangency(residual, jacobian, r, m + 4 * free[r], lax, loose[3])
+                off = off_tangency(residual, jacobian, r, m + 4 * free[r], lax, loose.variables)
                 if off > abs(worst):
                     worst = -off
             elif contact_record_at(records, r).proper == 0.0 and abs(worst) <= TOUCHING:

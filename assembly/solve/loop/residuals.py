@@ -6,6 +6,8 @@ coordinates, then twists of further bodies.
 
 from __future__ import annotations
 
+from collections import namedtuple
+
 from assembly._carve import carve
 from assembly._kernel import kernel
 from assembly.constraints.program.envelope import close_envelope, place_folds
@@ -16,9 +18,9 @@ from assembly.constraints.program.records import (
     FREE_COLUMN,
     JOINT_ROW,
     ROW,
-    SECOND_BODY_F,
-    SECOND_BODY_G,
     TAPE_RECORD,
+    Sparsity,
+    body_coordinate_at,
     header_at,
     joint_row_at,
     row_at,
@@ -26,6 +28,10 @@ from assembly.constraints.program.records import (
     trim_row_at,
 )
 from assembly.kinematics.motion import retract
+
+# Where rows and unknowns stand. `bases`: see the heading; `one_sided`: 1 for rows residual >= 0; where the Hessian has
+# entries (`constraints/program/envelope.py`); rows in the order of their bodies, and how far those of J J^T reach.
+Structure = namedtuple("Structure", "bases one_sided sparsity row_order")
 
 
 @kernel(inline=True)
@@ -48,8 +54,8 @@ def place_rows(table, free, bases, one_sided):
         bases[r, 1] = slot(table, fields.body_g)
         second = joint_row_at(table, row).second
         if fields.kind == JOINT_ROW and second >= 0:
-            bases[r, 3] = slot(table, table[second + SECOND_BODY_F])
-            bases[r, 4] = slot(table, table[second + SECOND_BODY_G])
+            bases[r, 3] = slot(table, body_coordinate_at(table, second).body_f)
+            bases[r, 4] = slot(table, body_coordinate_at(table, second).body_g)
     for r in range(header.contacts):
         if free[r] >= 0:
             bases[r, 2] = 6 * header.moving + 4 * free[r]
@@ -96,7 +102,7 @@ def body_span(bases, r, n):
 def place_unknowns(table, bases, rows, n, order):
     """Where the Hessian of the Lagrangian has entries, and its factor (see `constraints/program/envelope.py`)."""
     header = header_at(table, 0)
-    places, folds = order[0], order[1]
+    places, folds = order.places, order.folds
     last, ends = places[0], places[2]
     choose_storage(order, n)
     first = 6 * header.moving
@@ -170,10 +176,10 @@ def order_rows(bases, rows, n, sequence, last_row, latest):
 @kernel(inner=True)
 def arrange(table, free, shape, rows, n):
     """Where rows and unknowns stand, now that the pairs in `free` are at folds."""
-    bases, one_sided, order, (sequence, last_row) = shape
+    bases, one_sided, order, (sequence, last_row) = shape.bases, shape.one_sided, shape.sparsity, shape.row_order
     place_rows(table, free, bases, one_sided)
     place_unknowns(table, bases, rows, n, order)
-    order_rows(bases, rows, n, sequence, last_row, order[0][3])
+    order_rows(bases, rows, n, sequence, last_row, order.places[3])
 
 
 @kernel(inline=True)
@@ -186,7 +192,7 @@ def size_of_shape(table, most, n):
 
 @kernel(inline=True, allocates=True)
 def shape_of(table, most, n, blocks, integers, doubles):
-    """Room for what `arrange` finds, for so many rows and unknowns: (bases, one_sided, order, order of rows).
+    """Room for what `arrange` finds, for so many rows and unknowns: a `Structure`.
 
     `blocks` is the scene's record of them, `record_of_blocks`, or an empty one for a dense Hessian. The room is that of
     the ends of two blocks of memory.
@@ -199,7 +205,8 @@ def shape_of(table, most, n, blocks, integers, doubles):
     places = carve(integers, at + 3 * most + 2 * (header.contacts + 1), (4, n + 1))
     bases = carve(integers, integers.size - (3 + header.extra) * most, (most, 3 + header.extra))
     scratch = carve(doubles, doubles.size - tail, (13 if blocks.size > 0 else 1, max(n, 36)))
-    return bases, of_rows[0], (places, folds, scratch, blocks), (of_rows[1], of_rows[2])
+    sparsity = Sparsity(places, folds, scratch, blocks)
+    return Structure(bases, of_rows[0], sparsity, (of_rows[1], of_rows[2]))
 
 
 @kernel(inner=True)

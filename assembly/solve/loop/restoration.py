@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly._record import place_of, record_dtype, record_view, size_of
+from assembly._record import record_dtype, record_view, size_of
 from assembly.constraints.program.evaluate import evaluate
 from assembly.constraints.program.records import header_at
 from assembly.proximity.extrema.face_face import BEND
@@ -18,25 +18,19 @@ from assembly.solve.loop.violation import off_rows
 # A step is shortened by this where it leads farther off; a tick's may lead off by this once, if the next one leads
 # back.
 SHORTENED, ASTRAY, LEAST_SHARE = 0.25, 10.0, 1e-4
-# What is known of the way: the softness of the last step, the share to take of the next one, the least violation so
-# far, whether the last step led off. Of the loop: whole steps in a row that changed nothing, and that gained little;
-# steps of any length that left what rows are off, and whether only what is near is looked at for that.
-DRAGS = 6
-NEARBY = 7
+# What is known of the way back, and of a loop that stands still (`standstill.py`).
 RESTORATION = record_dtype(
     "f8",
-    softness=1,
-    share=1,
-    lowest=1,
-    led_off=1,
-    stills=1,
-    slow_steps=3,
+    softness=1,  # of the last step back
+    share=1,  # of the next step back that is taken
+    lowest=1,  # least violation so far
+    led_off=1,  # 1: the last step led farther off
+    stills=1,  # whole steps in a row that changed nothing
+    slow_steps=1,  # whole steps in a row that gained little
+    drags=1,  # steps of any length in a row that left what rows are off
+    nearby=1,  # 1: steps that restore rows are no longer than a neighborhood
 )
 restoration_at = record_view(RESTORATION)
-SOFTNESS = place_of(RESTORATION, "softness")
-SHARE = place_of(RESTORATION, "share")
-STILLS = place_of(RESTORATION, "stills")
-SLOW_STEPS = place_of(RESTORATION, "slow_steps")
 WAY = size_of(RESTORATION)
 
 
@@ -47,20 +41,33 @@ def way_back(program, here, trial, rows, weights, mu, softness, share, enough, s
     `weights` is room for which rows count, and for forces. Returns the softness that the step took, and how far off the
     rows it leads: infinitely where bodies may not go so far, or a pair is lost.
     """
-    table, pool, shape, loose, room = program
+    table, pool, shape, loose, room = program.table, program.pool, program.structure, program.lifted, program.tapes
     header = header_at(table, 0)
     active, forces, _foreseen = weights
-    _gradient, (_descent, step, _straight), lagrangian, matrix = system
-    bases, one_sided, _order, _of_rows = shape
+    step, lagrangian, matrix = system.directions.step, system.hessian, system.factor
+    bases, one_sided = shape.bases, shape.one_sided
     n = step.size
     softness = toward_rows(
-        shape, header.rows, rows, here[3], here[4], mu, active, softness, enough, lagrangian, matrix, n, forces, step
+        shape,
+        header.rows,
+        rows,
+        here.residual,
+        here.jacobian,
+        mu,
+        active,
+        softness,
+        enough,
+        lagrangian,
+        matrix,
+        n,
+        forces,
+        step,
     )
-    move(table, here[0], step, share, trial[0])
+    move(table, here.q, step, share, trial.q)
     carry(table, pool, bases, loose, here, trial, step, share)
-    if header.watch >= 0 and is_too_far(table, pool, loose[5], trial):
+    if header.watch >= 0 and is_too_far(table, pool, loose.memory, trial):
         return softness, math.inf
-    if evaluate(table, pool, loose[4], BEND, loose, room, trial) >= 0:
+    if evaluate(table, pool, loose.guess, BEND, loose, room, trial) >= 0:
         return softness, math.inf
     return softness, off_rows(table, loose, one_sided, trial, tick)
 
@@ -73,9 +80,9 @@ def begin_way(way):
     progress.lowest = math.inf
     progress.led_off = 0.0
     progress.stills = 0.0
-    progress.slow_steps[0] = 0.0
-    way[DRAGS] = 0.0
-    way[NEARBY] = 0.0
+    progress.slow_steps = 0.0
+    progress.drags = 0.0
+    progress.nearby = 0.0
 
 
 @kernel(inline=True)

@@ -51,7 +51,7 @@ def has_sunk(table, pool, memory, residual):
 def begin_again(table, pool, held, loose, here, y, better_y):
     """Back to the pose that is held. Its contacts are found anew; no row has pushed yet."""
     header = header_at(table, 0)
-    memory, free = loose[5], loose[0]
+    memory, free = loose.memory, loose.free
     bring_back(held, header.rows, here, y)
     forget_guards(table, memory)
     look_around(table, pool, memory, here, AS_NEEDED)

@@ -10,37 +10,28 @@ SOLVED, INFEASIBLE, STALLED, ITERATION_LIMIT, CONTACT_LOST, OUT_OF_TIME, RUNNING
 UNSURE = 100
 # Scattered bodies were gathered, and turns are to be chosen where they are now.
 GATHERED = 101
-# Settings, in scaled lengths.
-# Whether all that moved is looked at once more before a pose counts as solved. Of a tick: whether it is one, which ends
-# at a pose that holds after so many iterations, and at the last one that held where it ends otherwise; how long it may
-# take (0: as long as it takes). Whether the end is tested for a minimum. Of a tick: where in the state the rows are
-# that the last one left (0: nowhere). Whether nothing is asked for but that constraints hold: the least move is a wish.
-# Whether a tick whose time is spent where its pose does not hold leaves that pose for the next one to go on from. What
-# rows that repeat each other may disagree by (`solve/attempts/fit.py`). What bodies may be in each other where a solve
-# begins, and may stay.
-# The address at which a solve asks whether it is to go on (0: nowhere). Whether a solve ends early whose bodies go away
-# without bound.
-STRAYS = 18
+# What a solve or a tick is asked for. Lengths are scaled.
 SETTINGS_RECORD = record_dtype(
     "f8",
-    feasibility=1,
-    stationarity=1,
-    iterations=1,
-    penalty=1,
-    penalty_floor=1,
-    radius=1,
-    gather=1,
-    free_trims=1,
-    last_look=1,
-    tick=1,
-    budget=1,
-    second_order=1,
-    recall=1,
-    any_pose=1,
-    carries=1,
-    fit=1,
-    touching=1,
-    ask_address=2,
+    feasibility=1,  # largest violation that counts as none [scaled length, radian]
+    stationarity=1,  # largest dual residual that counts as none
+    iterations=1,  # steps at most
+    penalty=1,  # mu of the first step
+    penalty_floor=1,  # mu falls to this, and farther where rows need it
+    radius=1,  # length of the first step at most
+    gather=1,  # whether scattered bodies are gathered: 0, GATHERS or ASSEMBLES
+    free_trims=1,  # 1: contacts of trims that count get their coordinates as unknowns
+    last_look=1,  # 1: all that moved is looked at once more before a pose counts as solved
+    tick=1,  # 1: ends at a pose that holds after so many iterations, else at the last one that held
+    budget=1,  # of a tick: how long it may take [ns]; 0: as long as it takes
+    second_order=1,  # whether the end is tested for a minimum: 0, TESTED or REACHED
+    recall=1,  # of a tick: where in the state the rows are that the last one left; 0: nowhere
+    any_pose=1,  # 1: nothing is asked for but that constraints hold; the least move is a soft objective
+    carries=1,  # 1: a tick whose time is spent where its pose does not hold leaves that pose to the next one
+    fit=1,  # what rows that repeat each other may disagree by (`solve/attempts/fit.py`)
+    touching=1,  # depth that bodies may be in each other by where a solve begins, and may stay
+    ask_address=1,  # kernel that is asked whether to go on (`solve/interruption.py`); 0: none
+    strays=1,  # 1: ends early where bodies go away without bound
 )
 settings_at = record_view(SETTINGS_RECORD)
 FEASIBILITY = place_of(SETTINGS_RECORD, "feasibility")
@@ -61,34 +52,29 @@ CARRIES = place_of(SETTINGS_RECORD, "carries")
 FIT = place_of(SETTINGS_RECORD, "fit")
 TOUCHING = place_of(SETTINGS_RECORD, "touching")
 ASK_AT = place_of(SETTINGS_RECORD, "ask_address")
+STRAYS = place_of(SETTINGS_RECORD, "strays")
 SETTINGS = size_of(SETTINGS_RECORD)
 # Whether the end is tested for a minimum (TESTED: and saddles are left before they are reached to the last digit).
 TESTED, REACHED = 1.0, 2.0
 # Whether scattered bodies are gathered (ASSEMBLES: and the loop ends there).
 GATHERS, ASSEMBLES = 1.0, 2.0
 # Results at the end of the state.
-# Of a tick: whether it ended at a pose that held before; whether its end is a minimum (0: not tested, 1; -1: no), and
-# of a solve what its factorizations told (`solve/loop/inertia.py`); by how much the Hessian of a tick's first step was
-# shifted,
-# which tells the next one where to begin; one more than the steps it has done, if the next one is to go on with it (0:
-# it ended).
 RESULTS_RECORD = record_dtype(
     "f8",
-    status=1,
-    count=1,
-    objective=1,
-    violation=1,
-    dual=1,
-    culprit=1,
-    improper=1,
-    scatter=1,
-    held=1,
-    curved=1,
-    first_shift=1,
-    carried=1,
+    status=1,  # an outcome
+    count=1,  # iterations
+    objective=1,  # scaled value
+    violation=1,  # largest one, in the user's lengths
+    dual=1,  # dual residual
+    culprit=1,  # contact that has no pair; -1: none
+    improper=1,  # contacts at which surfaces cross
+    scatter=1,  # 1: bodies were scattered at the start
+    held=1,  # of a tick, 1: it ended at a pose that held before
+    curved=1,  # whether the end is a minimum (0: not tested, 1: yes, -1: no); of a solve: see `inertia.py`
+    first_shift=1,  # shift of the Hessian in a tick's first step, where the next one begins
+    carried=1,  # one more than the steps done, if the next tick is to go on from here; 0: it ended
 )
 results_at = record_view(RESULTS_RECORD)
-STATUS = place_of(RESULTS_RECORD, "status")
 COUNT = place_of(RESULTS_RECORD, "count")
 OBJECTIVE = place_of(RESULTS_RECORD, "objective")
 VIOLATION = place_of(RESULTS_RECORD, "violation")
@@ -98,7 +84,6 @@ IMPROPER = place_of(RESULTS_RECORD, "improper")
 SCATTER = place_of(RESULTS_RECORD, "scatter")
 HELD = place_of(RESULTS_RECORD, "held")
 CURVED = place_of(RESULTS_RECORD, "curved")
-FIRST_SHIFT = place_of(RESULTS_RECORD, "first_shift")
 CARRIED = place_of(RESULTS_RECORD, "carried")
 HISTORY = 7  # figures an iteration: objective, feasibility, stationarity, mu, regularization, step length, radius
 # Rounding of poses far from the origin, in parts of that.

@@ -6,7 +6,7 @@ import math
 
 from assembly._kernel import kernel
 from assembly.constraints.program.contact import TOUCHING
-from assembly.solve.loop.restoration import DRAGS, NEARBY, restoration_at
+from assembly.solve.loop.restoration import restoration_at
 from assembly.solve.loop.settings import NEIGHBORHOOD, settings_at
 
 # So many whole steps in a row that leave this part of the largest violation tell that rows contradict each other; one
@@ -57,25 +57,27 @@ def drags(way, violation, before):
     A linkage with a freedom may be off by less and less along it, for as long as it moves: each step goes as far as
     the rows' curvature lets it, and gains nothing.
     """
+    progress = restoration_at(way, 0)
     by_little = TOUCHING < violation <= LITTLE
-    way[DRAGS] = way[DRAGS] + 1.0 if by_little and violation > STILL * before else 0.0
-    if way[DRAGS] < DRAGGED:
+    progress.drags = progress.drags + 1.0 if by_little and violation > STILL * before else 0.0
+    if progress.drags < DRAGGED:
         return False
-    way[DRAGS] = 0.0
-    way[NEARBY] = 1.0
+    progress.drags = 0.0
+    progress.nearby = 1.0
     return True
 
 
 @kernel(inline=True)
 def bound_nearby(way, violation, before):
     """How long steps may be that restore rows, of which `drags` told; as long as steps gain nothing."""
-    if way[NEARBY] == 0.0:
+    progress = restoration_at(way, 0)
+    if progress.nearby == 0.0:
         return math.inf
     if violation <= STILL * before < math.inf:
-        way[NEARBY] = 0.0
-        way[DRAGS] = 0.0
+        progress.nearby = 0.0
+        progress.drags = 0.0
         return math.inf
-    way[DRAGS] += 1.0 if before < math.inf else 0.0
+    progress.drags += 1.0 if before < math.inf else 0.0
     return NEIGHBORHOOD
 
 
@@ -85,7 +87,8 @@ def stays_off(way, feasible, steepest, violation, before):
 
     Near a dead center |J^T c| falls faster than |c|, below its rounding in the end, but every step still gains.
     """
-    if way[NEARBY] == 1.0 and way[DRAGS] >= SETTLED:
+    progress = restoration_at(way, 0)
+    if progress.nearby == 1.0 and progress.drags >= SETTLED:
         return True
     gains = violation <= STILL * before
     return steepest <= out_of_reach(violation) + (0.0 if gains else ROUNDED * feasible)
@@ -110,5 +113,5 @@ def next_floor(way, floor, is_slow):
     Rows whose slopes all but vanish, at a dead center say: only a harder penalty holds them.
     """
     progress = restoration_at(way, 0)
-    progress.slow_steps[0] = progress.slow_steps[0] + 1.0 if is_slow else 0.0
-    return max(0.1 * floor, HARDEST) if progress.slow_steps[0] >= SLOW else floor
+    progress.slow_steps = progress.slow_steps + 1.0 if is_slow else 0.0
+    return max(0.1 * floor, HARDEST) if progress.slow_steps >= SLOW else floor

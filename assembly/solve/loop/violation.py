@@ -62,11 +62,11 @@ def off_tangency(residual, jacobian, r, e, lax, work):
 def off_rows(table, loose, one_sided, point, lax):
     """The largest violation of rows and of the tangency of free pairs, which is counted as by `off_tangency`."""
     header = header_at(table, 0)
-    free = loose[0]
-    worst = violation_of(point[3], one_sided, header.rows)
+    free = loose.free
+    worst = violation_of(point.residual, one_sided, header.rows)
     for k in range(header.contacts):
         if free[k] >= 0:
-            off = off_tangency(point[3], point[4], k, header.rows + 4 * free[k], lax, loose[3])
+            off = off_tangency(point.residual, point.jacobian, k, header.rows + 4 * free[k], lax, loose.variables)
             if not off <= worst:
                 worst = off
     return worst

@@ -6,6 +6,7 @@ whether there is something | poses, as in the state | of every contact: number, 
 from __future__ import annotations
 
 from assembly._kernel import kernel
+from assembly._record import record_dtype, record_view, size_of
 from assembly.constraints.program.contact import idle_row
 from assembly.constraints.program.records import (
     FREE_COLUMN,
@@ -16,8 +17,16 @@ from assembly.constraints.program.records import (
 )
 from assembly.proximity.features.solid_contact import CONTACT_RECORD
 
-# Of a contact: its number, its residual, then its record and its gradient.
-RECALLED = 2 + CONTACT_RECORD + FREE_COLUMN
+# What is left of a contact.
+RECALLED_CONTACT = record_dtype(
+    "f8",
+    number=1,  # of a clearance's contact; 0: of none
+    residual=1,
+    record=CONTACT_RECORD,  # its row of records (`solid_contact.py`)
+    gradient=FREE_COLUMN,  # of the residual, in the twists of both bodies
+)
+recalled_at = record_view(RECALLED_CONTACT)
+RECALLED = size_of(RECALLED_CONTACT)
 
 
 @kernel(inline=True)
@@ -44,18 +53,20 @@ def recall(table, state, at, point):
             return False
     o = at + 1 + 7 * header.bodies
     for r in range(header.contacts):
-        if state[o + RECALLED * r] != float(contact_row_at(table, header.row_table + ROW * r).guard_number):
+        if recalled_at(state, o + RECALLED * r).number != float(
+            contact_row_at(table, header.row_table + ROW * r).guard_number
+        ):
             return False
     for r in range(header.contacts):
         if row_at(table, header.row_table + ROW * r).body_f < 0:
             idle_row(r, 1.0, point)
             continue
-        a = o + RECALLED * r
-        point[3][r] = state[a + 1]
+        left = recalled_at(state, o + RECALLED * r)
+        point.residual[r] = left.residual
         for i in range(CONTACT_RECORD):
-            point[2][r, i] = state[a + 2 + i]
+            point.records[r, i] = left.record[i]
         for i in range(FREE_COLUMN):
-            point[4][r, i] = state[a + 2 + CONTACT_RECORD + i]
+            point.jacobian[r, i] = left.gradient[i]
     return True
 
 
@@ -71,13 +82,13 @@ def leave(table, state, at, point, good):
         state[at + 1 + k] = state[k]
     o = at + 1 + 7 * header.bodies
     for r in range(header.contacts):
-        a = o + RECALLED * r
+        left = recalled_at(state, o + RECALLED * r)
         row = header.row_table + ROW * r
-        state[a] = float(contact_row_at(table, row).guard_number)
+        left.number = float(contact_row_at(table, row).guard_number)
         if row_at(table, row).body_f < 0:
             continue
-        state[a + 1] = point[3][r]
+        left.residual = point.residual[r]
         for i in range(CONTACT_RECORD):
-            state[a + 2 + i] = point[2][r, i]
+            left.record[i] = point.records[r, i]
         for i in range(FREE_COLUMN):
-            state[a + 2 + CONTACT_RECORD + i] = point[4][r, i]
+            left.gradient[i] = point.jacobian[r, i]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import namedtuple
+
 import numpy as np
 
 from assembly._carve import carve
@@ -9,6 +11,9 @@ from assembly._kernel import kernel
 from assembly.constraints.program.hessian_blocks import blocks_at, is_blocked
 from assembly.constraints.program.records import (
     EXTRA_COLUMN,
+    Iterate,
+    LiftedPairs,
+    TapeRoom,
     header_at,
 )
 from assembly.proximity.extrema.lifted_pair import VARIABLES, VECTORS
@@ -16,9 +21,22 @@ from assembly.proximity.features.solid_contact import CONTACT_RECORD, TRACK
 from assembly.solve.loop.residuals import arrange, record_of_blocks, shape_of, size_of_shape
 from assembly.solve.loop.restoration import WAY
 
-# What a row has a number of, behind its residuals here and at the trial point: its multiplier, a better one, whether it
-# counts, what it pushes with, whether a step would break it.
+# What a row has a number of: residuals at the current and the trial iterate, then these (`RowVectors`).
 BY_ROW = 7
+# Of every row: its multiplier, a better one, whether it counts (its weight), what it pushes with, whether a step would
+# break it.
+RowVectors = namedtuple("RowVectors", "y better_y active forces foreseen")
+# The last feasible iterate: poses, tracked values, multipliers.
+Held = namedtuple("Held", "q tracked y")
+# The linear system of a step: the objective's gradient, vectors, the Hessian of the Lagrangian, its Cholesky factor.
+System = namedtuple("System", "gradient directions hessian factor")
+# Of all unknowns: right side of the system, or scratch; the step; the step before its second-order correction.
+Directions = namedtuple("Directions", "descent step straight")
+# What stays as it is for a whole solve: table and pool, `Structure`, `LiftedPairs`, `TapeRoom`.
+Program = namedtuple("Program", "table pool structure lifted tapes")
+# All that a solve works in. `numbers`: of the contacts that clearances had at the last feasible iterate; `gram`: room
+# for least squares; `way`: what is known of a way back (`restoration.py`).
+Workspace = namedtuple("Workspace", "here trial held by_row structure lifted numbers tapes gram way system")
 
 
 @kernel(inline=True, allocates=True)
@@ -57,10 +75,9 @@ def record_count(table):
 
 @kernel(inline=True, allocates=True)
 def carve_points(table, most, doubles, at):
-    """Two points of the search, room by row, tracked values more, for a guess, a third point to keep; where it ends.
+    """The iterates (current, trial, last feasible), vectors by row, room for a guess of tracked values; where it ends.
 
-    A point: poses, tracked values, records, residual, Jacobian. `most` rows at most. The third one is a pose, its
-    tracked values and its multipliers.
+    `most` rows at most.
     """
     header = header_at(table, 0)
     bodies, tracks, columns = header.bodies, header.tracked, EXTRA_COLUMN + 6 * header.extra
@@ -77,9 +94,10 @@ def carve_points(table, most, doubles, at):
     for k in range(BY_ROW):
         for r in range(most):
             by_row[k, r] = 0.0
-    here = (poses[0], tracked[0], records[0], by_row[0], jacobians[0])
-    trial = (poses[1], tracked[1], records[1], by_row[1], jacobians[1])
-    return here, trial, by_row, tracked[2], (poses[2], tracked[3], by_row[BY_ROW]), at
+    here = Iterate(poses[0], tracked[0], records[0], by_row[0], jacobians[0])
+    trial = Iterate(poses[1], tracked[1], records[1], by_row[1], jacobians[1])
+    vectors = RowVectors(by_row[2], by_row[3], by_row[4], by_row[5], by_row[6])
+    return (here, trial, Held(poses[2], tracked[3], by_row[BY_ROW])), vectors, tracked[2], at
 
 
 @kernel(inline=True, allocates=True)
@@ -97,7 +115,7 @@ def carve_pairs(table, guess, memory, doubles, at, integers):
     vectors = carve(doubles, at, (VECTORS, 3, VARIABLES))
     at += 3 * VECTORS * VARIABLES
     values = carve(doubles, at, (VARIABLES, VARIABLES))
-    return (free, lengths, vectors, values, guess, memory), at + VARIABLES * VARIABLES
+    return LiftedPairs(free, lengths, vectors, values, guess, memory), at + VARIABLES * VARIABLES
 
 
 @kernel(inline=True, allocates=True)
@@ -107,13 +125,13 @@ def carve_tapes(table, doubles, at):
     inputs = carve(doubles, at, (table[o],))
     outputs = carve(doubles, at + table[o], (table[o + 1],))
     work = carve(doubles, at + table[o] + table[o + 1], (table[o + 2],))
-    return (inputs, outputs, work), at + table[o] + table[o + 1] + table[o + 2]
+    return TapeRoom(inputs, outputs, work), at + table[o] + table[o + 1] + table[o + 2]
 
 
 @kernel(inline=True)
 def sides_of(n, order):
     """Rows and columns of the Hessian's array and of its factor's, for n unknowns."""
-    layout = blocks_at(order[3], 0)
+    layout = blocks_at(order.blocks, 0)
     if is_blocked(order):
         return (6 * layout.blocks, 6), (1, 36 * layout.factored)
     return (n, n), (n, n)
@@ -121,35 +139,31 @@ def sides_of(n, order):
 
 @kernel(inline=True, allocates=True)
 def carve_unknowns(n, order, doubles, at):
-    """Room for n unknowns: gradient, (right side or scratch, step, step before it was bent), Hessian, its factor."""
+    """The system of a step of n unknowns."""
     hessian, factor = sides_of(n, order)
     vectors = carve(doubles, at, (4, n))
     end = at + 4 * n + hessian[0] * hessian[1]
     matrices = carve(doubles, at + 4 * n, hessian), carve(doubles, end, factor)
-    return vectors[0], (vectors[1], vectors[2], vectors[3]), matrices[0], matrices[1]
+    return System(vectors[0], Directions(vectors[1], vectors[2], vectors[3]), matrices[0], matrices[1])
 
 
 @kernel(inline=True, allocates=True)
 def carve_all(table, memory, doubles, integers):
-    """All that a solve works in, as `room_needed` counts it; rows and unknowns are those without free pairs.
-
-    Points (here, trial, held), room by row, the shape of what is sparse, what pairs need, numbers of contacts, tapes,
-    room for least squares, what is known of a way back, room for unknowns.
-    """
+    """All that a solve works in, as `room_needed` counts it; rows and unknowns are those without lifted pairs."""
     header = header_at(table, 0)
     pairs = header.contacts
     most, n = header.rows + 4 * pairs, 6 * header.moving
-    here, trial, by_row, guess, held, at = carve_points(table, most, doubles, 0)
+    (here, trial, held), by_row, guess, at = carve_points(table, most, doubles, 0)
     shape = shape_of(table, most, n + 4 * pairs, record_of_blocks(table), integers, doubles)
     loose, at = carve_pairs(table, guess, memory, doubles, at, integers)
     numbers = carve(integers, pairs, (header.guards,))
-    arrange(table, loose[0], shape, header.rows, n)
+    arrange(table, loose.free, shape, header.rows, n)
     tapes, at = carve_tapes(table, doubles, at)
     gram = carve(doubles, at, (most + 1, most))
     at += (most + 1) * most
     way = carve(doubles, at, (WAY,))
-    system = carve_unknowns(n, shape[2], doubles, at + WAY)
-    return (here, trial, held), by_row, shape, loose, numbers, tapes, gram, way, system
+    system = carve_unknowns(n, shape.sparsity, doubles, at + WAY)
+    return Workspace(here, trial, held, by_row, shape, loose, numbers, tapes, gram, way, system)
 
 
 @kernel(inline=True, allocates=True)
@@ -157,4 +171,4 @@ def unknowns(n, order):
     """The same of its own: where pairs at folds bring more unknowns."""
     hessian, factor = sides_of(n, order)
     vectors = np.empty((4, n))
-    return vectors[0], (vectors[1], vectors[2], vectors[3]), np.empty(hessian), np.empty(factor)
+    return System(vectors[0], Directions(vectors[1], vectors[2], vectors[3]), np.empty(hessian), np.empty(factor))

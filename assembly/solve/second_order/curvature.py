@@ -52,10 +52,11 @@ def write_curvature(table, pool, state, forces, out, tips, integers, doubles):
     header = header_at(table, 0)
     pairs = header.contacts
     free = np.empty(pairs, np.int64)
-    lost, count, point, loose, room = point_at(table, pool, state, free)
+    found = point_at(table, pool, state, free)
+    lost, count, point, loose, room = found.lost, found.count, found.iterate, found.lifted, found.tapes
     if lost >= 0:
         return -1
-    write_tracked(table, point[1], state)
+    write_tracked(table, point.tracked, state)
     rows, n = header.rows + 4 * count, 6 * header.moving + 4 * count
     shape = shape_of(table, header.rows + 4 * pairs, 6 * header.moving + 4 * pairs, table[:0], integers, doubles)
     arrange(table, free, shape, rows, n)
@@ -67,8 +68,8 @@ def write_curvature(table, pool, state, forces, out, tips, integers, doubles):
     out[0] = goal(table, pool, shape, rows, loose, room, tips, point, 1, slopes, hessian)
     add_row_terms(table, pool, loose, room, shape, point, forces, np.zeros(rows), hessian)
     for r in range(rows):
-        out[1 + r] = point[3][r]
-        add_row(shape[0], point[4], r, 1.0, jacobian[r])
+        out[1 + r] = point.residual[r]
+        add_row(shape.bases, point.jacobian, r, 1.0, jacobian[r])
     for i in range(n):
         out[1 + rows + i] = slopes[i]
         for j in range(i):
@@ -110,7 +111,8 @@ def walk_within(table, pool, state, step, share, kept, residual, tips, integers,
     header = header_at(table, 0)
     pairs = header.contacts
     free = np.empty(pairs, np.int64)
-    lost, count, here, loose, room = point_at(table, pool, state, free)
+    found = point_at(table, pool, state, free)
+    lost, count, here, loose, room = found.lost, found.count, found.iterate, found.lifted, found.tapes
     rows, n = header.rows + 4 * count, 6 * header.moving + 4 * count
     if lost >= 0 or n != step.size:
         return math.inf
@@ -119,31 +121,45 @@ def walk_within(table, pool, state, step, share, kept, residual, tips, integers,
     arrange(table, free, shape, rows, n)
     for r in range(header.rows):
         if kept[r] > 0.0:
-            shape[1][r] = 0
+            shape.one_sided[r] = 0
     trial = new_point(table)
-    trial[0][:] = here[0]
-    _gradient, _lines, lagrangian, matrix = unknowns(n, shape[2])
+    trial.q[:] = here.q
+    system = unknowns(n, shape.sparsity)
+    lagrangian, matrix = system.hessian, system.factor
     active, forces, way = np.zeros(rows), np.zeros(rows), step.copy()
     before = math.inf
     for _ in range(STEPS):
-        move(table, here[0], way, share, trial[0])
-        carry(table, pool, shape[0], loose, here, trial, way, share)
-        if evaluate(table, pool, loose[4], BEND, loose, room, trial) >= 0:
+        move(table, here.q, way, share, trial.q)
+        carry(table, pool, shape.bases, loose, here, trial, way, share)
+        if evaluate(table, pool, loose.guess, BEND, loose, room, trial) >= 0:
             return math.inf
         here, trial = trial, here
         share = 1.0
-        off = off_rows(table, loose, shape[1], here, False)
+        off = off_rows(table, loose, shape.one_sided, here, False)
         if off <= EXACT or (off <= HOLDS and off > GAIN * before):
-            write_pose(table, pool, here[0], state)
-            write_tracked(table, here[1], state)
+            write_pose(table, pool, here.q, state)
+            write_tracked(table, here.tracked, state)
             for r in range(rows):
-                residual[r] = here[3][r]
+                residual[r] = here.residual[r]
             return goal(table, pool, shape, rows, loose, room, tips, here, 0, way, lagrangian)
         before = off
         if not math.isfinite(off):
             break
         toward_rows(
-            shape, header.rows, rows, here[3], here[4], MU, active, SOFTNESS, EXACT, lagrangian, matrix, n, forces, way
+            shape,
+            header.rows,
+            rows,
+            here.residual,
+            here.jacobian,
+            MU,
+            active,
+            SOFTNESS,
+            EXACT,
+            lagrangian,
+            matrix,
+            n,
+            forces,
+            way,
         )
         if not is_at_most(way, LONGEST):
             break
@@ -174,22 +190,24 @@ def walk(table, pool, state, step, share, kept, residual, tips):
 def least_within(table, pool, state, forces, active, direction, tips, integers, doubles):
     """The same as `least_curvature`, with what it works in."""
     header = header_at(table, 0)
-    lost, count, point, loose, room = point_at(table, pool, state, np.empty(header.contacts, np.int64))
+    found = point_at(table, pool, state, np.empty(header.contacts, np.int64))
+    lost, count, point, loose, room = found.lost, found.count, found.iterate, found.lifted, found.tapes
     rows, n = header.rows, 6 * header.moving
     if lost >= 0 or count > 0:
         return math.nan
     shape = shape_of(table, rows, n, record_of_blocks(table), integers, doubles)
-    arrange(table, loose[0], shape, rows, n)
-    gradient, lines, lagrangian, matrix = unknowns(n, shape[2])
+    arrange(table, loose.free, shape, rows, n)
+    system = unknowns(n, shape.sparsity)
+    gradient, lines, lagrangian, matrix = system.gradient, system.directions, system.hessian, system.factor
     goal(table, pool, shape, rows, loose, room, tips, point, 1, gradient, lagrangian)
     add_row_terms(table, pool, loose, room, shape, point, forces, active, lagrangian)
-    shift = factorize_shifted(lagrangian, n, shape[2], LEAST_SHIFT, matrix)
+    shift = factorize_shifted(lagrangian, n, shape.sparsity, LEAST_SHIFT, matrix)
     if shift < 0.0:
         return math.nan
     for i in range(n):
         direction[i] = math.sin(1.0 + i)
     curvature = math.nan
-    before, after = lines[0], lines[1]
+    before, after = lines.descent, lines.step
     for _ in range(ITERATIONS):
         square = 0.0
         for i in range(n):
@@ -198,7 +216,7 @@ def least_within(table, pool, state, forces, active, direction, tips, integers, 
             before[i] = direction[i] / math.sqrt(square)
             after[i] = before[i]
         # With A + s I the matrix and w = (A + s I)^-1 v: w^T A w = w.v - s w.w.
-        solve_step(matrix, n, shape[2], after)
+        solve_step(matrix, n, shape.sparsity, after)
         across, square = 0.0, 0.0
         for i in range(n):
             across += after[i] * before[i]

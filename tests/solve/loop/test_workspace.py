@@ -58,16 +58,16 @@ def test_nothing_stands_in_one_place(scene):
     table = scene().packed().table
     sizes = room_needed(table)
     doubles, integers = np.zeros(sizes[0]), np.zeros(sizes[1], dtype=np.int64)
-    points, by_row, shape, loose, numbers, tapes, gram, way, unknowns = carve_all(table, np.empty(0), doubles, integers)
-    here, trial, held = points
-    gradient, lines, hessian, factor = unknowns
+    space = carve_all(table, np.empty(0), doubles, integers)
+    lifted, shape, system = space.lifted, space.structure, space.system
     doubles[:], integers[:] = 0.0, 0
-    # What a point has of every row is in `by_row`.
-    of_points = [*here[:3], here[4], *trial[:3], trial[4], by_row, loose[4], *held[:2]]
-    used = [*of_points, *loose[1:4], *tapes, gram, way, gradient, *lines, hessian, factor, shape[2][2]]
+    used = [*space.here, *space.trial, *space.held, *space.by_row, *space.tapes, space.gram, space.way]
+    used += [lifted.lengths, lifted.vectors, lifted.variables, lifted.guess, shape.sparsity.scratch]
+    used += [system.gradient, *system.directions, system.hessian, system.factor]
     for array in used:
         array += 1.0
-    for array in (shape[0], shape[1], *shape[2][:2], *shape[3], loose[0], numbers):
+    sparsity = [shape.sparsity.places, shape.sparsity.folds]
+    for array in (shape.bases, shape.one_sided, *sparsity, *shape.row_order, lifted.free, space.numbers):
         array += 1
     assert doubles.max() == 1.0 and integers.max() == 1
     assert doubles.sum() == sum(array.size for array in used)
