@@ -98,14 +98,14 @@ def element_distance(table, pool, trees, turn, shift, bulk, e, d):
 
 
 @kernel(inner=True)
-def facing_pairs(table, pool, watch, memory, p, scene, moving, reach, stack, candidates):
+def facing_pairs(table, pool, watch, memory, p, posed, moving, reach, stack, candidates):
     """The patches of the two bodies of pair p that face each other within its reach, into `candidates`.
 
     Returns how many pairs there are, and the reach: it is less where there is no room for all.
     """
     manager = manager_at(table, watch)
     pair = manager.pair_table + PAIR_RECORD * p
-    turn, shift, trees = scene[0], scene[1], scene[3]
+    turn, shift, trees = posed.turn, posed.shift, posed.trees
     least = pool[pair_at(table, pair).minimum]
     found = np.int64(-1)
     lists = manager.lists
@@ -130,17 +130,19 @@ def facing_pairs(table, pool, watch, memory, p, scene, moving, reach, stack, can
 
 
 @kernel(inner=True)
-def near_enough(table, pool, scene, least, reach, flank, candidates, found, distances):
+def near_enough(table, pool, posed, least, reach, flank, candidates, found, distances):
     """A distance within which so few of the pairs of patches are that each can be looked into; fills `distances`.
 
     What is within a part of the flank, or in the wrong order, is looked into in any case.
     """
-    bulk = magnitudes(scene[0])
+    bulk = magnitudes(posed.turn)
     enough = max(TAKE * reach, flank)
     lowest = CROWDED_PART * flank
     for c in range(found):
         distances[c] = (
-            element_distance(table, pool, scene[3], scene[0], scene[1], bulk, candidates[c, 0], candidates[c, 1])
+            element_distance(
+                table, pool, posed.trees, posed.turn, posed.shift, bulk, candidates[c, 0], candidates[c, 1]
+            )
             - least
         )
     for _ in range(6):

@@ -15,7 +15,6 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly.geometry.splines.evaluate import surface_point
 from assembly.geometry.vec import add, dot, matvec, matvec_t, scale, sub
-from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.brep.borders import feature_at, feature_kind
 from assembly.proximity.brep.records import EDGE, VERTEX
 from assembly.proximity.bvh.tree import (
@@ -40,6 +39,7 @@ from assembly.proximity.manager.extrema import (
     given_at,
 )
 from assembly.proximity.manager.overlap import DEPTH, foot_at, surface_of, with_children
+from assembly.proximity.manager.posed_pair import posed_pair
 from assembly.proximity.manager.state import (
     PAIR_RECORD,
     lengths_at,
@@ -129,19 +129,19 @@ def nearest_point(table, pool, tree, surface, shell, y, reach, stack):
 
 
 @kernel(inner=True)
-def between_bodies(table, pool, scene, c, reach, stack):
+def between_bodies(table, pool, posed, c, reach, stack):
     """The middle of the nearest points of both bodies to c, how far these are apart, and whether both are in reach."""
-    turn, shift, surfaces, trees = scene
-    p, found_f = nearest_point(table, pool, trees[0], surfaces[0], surfaces[2], c, reach, stack)
+    turn, shift = posed.turn, posed.shift
+    p, found_f = nearest_point(table, pool, posed.trees[0], posed.surfaces[0], posed.shells[0], c, reach, stack)
     at_g = matvec_t(turn, sub(c, shift))
-    q, found_g = nearest_point(table, pool, trees[1], surfaces[1], surfaces[3], at_g, reach, stack)
+    q, found_g = nearest_point(table, pool, posed.trees[1], posed.surfaces[1], posed.shells[1], at_g, reach, stack)
     q = add(matvec(turn, q), shift)
     d = sub(q, p)
     return scale(0.5, add(p, q)), math.sqrt(dot(d, d)), found_f and found_g
 
 
 @kernel(inner=True)
-def leads_to(table, pool, scene, begin, end, level, stack):
+def leads_to(table, pool, posed, begin, end, level, stack):
     """Whether a way between the bodies leads from one point to another one, along which they are nearer than a level.
 
     It goes straight for the end, and after every stride back to where both bodies are equally far.
@@ -156,7 +156,7 @@ def leads_to(table, pool, scene, begin, end, level, stack):
         c = add(c, scale(stride / left, sub(end, c)))
         near = False
         for _centering in range(CENTERINGS):
-            c, gap, found = between_bodies(table, pool, scene, c, stride + level, stack)
+            c, gap, found = between_bodies(table, pool, posed, c, stride + level, stack)
             if not found:
                 return False
             near = gap < level
@@ -170,7 +170,7 @@ def leads_to(table, pool, scene, begin, end, level, stack):
 
 
 @kernel(inner=True)
-def contact_points(table, pool, scene, given, tracked):
+def contact_points(table, pool, posed, given, tracked):
     """The pair of points of a given contact, in the axes of body f of its pair of bodies."""
     given_record = given_at(table, given)
     r = given_record.row
@@ -185,7 +185,7 @@ def contact_points(table, pool, scene, given, tracked):
     )  # fmt: skip
     if given_record.swapped == 1:
         a, b = b, a
-    return a, add(matvec(scene[0], b), scene[1])
+    return a, add(matvec(posed.turn, b), posed.shift)
 
 
 @kernel(inline=True)
@@ -206,7 +206,7 @@ def apart(a, b):
 
 
 @kernel(inner=True, allocates=True)
-def spread(table, pool, scene, roots, count, begin, limits, stack):
+def spread(table, pool, posed, roots, count, begin, limits, stack):
     """Mark the roots in the place of a contact whose points have their middle at `begin`.
 
     From root to root, the nearest first: each is tried from the nearest point that is known to be in the place. The
@@ -237,7 +237,7 @@ def spread(table, pool, scene, roots, count, begin, limits, stack):
         tried[best] = nearest[best]
         start = (source[best, 0], source[best, 1], source[best, 2])
         end = (middles[best, 0], middles[best, 1], middles[best, 2])
-        if not leads_to(table, pool, scene, start, end, level, stack):
+        if not leads_to(table, pool, posed, start, end, level, stack):
             continue
         extremum_at(roots, best).place = BESIDE_CONTACT
         eligible[best] = False
@@ -253,15 +253,7 @@ def mark_places(table, pool, watch, p, q, tracked, roots, count):
     """Mark the roots of pair p that are a given contact's pair, or in its place; how many contacts have one."""
     manager = manager_at(table, watch)
     pair = pair_at(table, manager.pair_table + PAIR_RECORD * p)
-    i, j = pair.body_f, pair.body_g
-    turn, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
-    surfaces = (
-        pair.surface_f,
-        pair.surface_g,
-        pair.shell_f,
-        pair.shell_g,
-    )
-    scene = (turn, shift, surfaces, (pair.tree_f, pair.tree_g))
+    posed = posed_pair(manager, pair, q)
     least = pool[pair.minimum]
     neglect = lengths_at(pool, manager.lengths).neglect
     stack = np.empty(DEPTH, np.int64)
@@ -273,7 +265,7 @@ def mark_places(table, pool, watch, p, q, tracked, roots, count):
         if math.isnan(tracked[r, 0]):
             continue
         known += 1
-        a, b = contact_points(table, pool, scene, given, tracked)
+        a, b = contact_points(table, pool, posed, given, tracked)
         for k in range(count):
             p_f, p_g = root_points(roots, k)
             if max(apart(p_f, a), apart(p_g, b)) <= neglect:
@@ -282,5 +274,5 @@ def mark_places(table, pool, watch, p, q, tracked, roots, count):
         # A contact that may stay open, and is by more than the least gap, excuses nothing that is nearer.
         lowest = least if given_record.opens == 1 and gap >= least else -math.inf
         limits = (gap + least, lowest)
-        spread(table, pool, scene, roots, count, scale(0.5, add(a, b)), limits, stack)
+        spread(table, pool, posed, roots, count, scale(0.5, add(a, b)), limits, stack)
     return known

@@ -127,11 +127,11 @@ def goes_through(table, pool, tree, shell, e, a, b, margin):
 
 
 @kernel(inner=True)
-def pierces(table, pool, scene, pair, margin, offsets):
+def pierces(table, pool, posed, pair, margin, offsets):
     """Whether of two elements, of f and of g, one is a part of an edge that goes through the other, a patch."""
     for side in range(2):
-        tree, shell = scene[3][side], scene[2][2 + side]
-        other, other_shell = scene[3][1 - side], scene[2][3 - side]
+        tree, shell = posed.trees[side], posed.shells[side]
+        other, other_shell = posed.trees[1 - side], posed.shells[1 - side]
         o = tree_at(table, tree).element_pool + ELEMENT * pair[side]
         p = tree_at(table, other).element_pool + ELEMENT * pair[1 - side]
         code = np.int64(element_at(pool, o).feature)
@@ -140,11 +140,11 @@ def pierces(table, pool, scene, pair, margin, offsets):
             continue
         a, b, bent = chord_of(table, pool, feature_at(table, shell, code), pool[o], pool[o + 2])
         if side == 0:
-            a = matvec_t(scene[0], sub(a, scene[1]))
-            b = matvec_t(scene[0], sub(b, scene[1]))
+            a = matvec_t(posed.turn, sub(a, posed.shift))
+            b = matvec_t(posed.turn, sub(b, posed.shift))
         else:
-            a = add(matvec(scene[0], a), scene[1])
-            b = add(matvec(scene[0], b), scene[1])
+            a = add(matvec(posed.turn, a), posed.shift)
+            b = add(matvec(posed.turn, b), posed.shift)
         if goes_through(table, pool, other, other_shell, pair[1 - side], a, b, margin + 2.0 * bent + offsets[1 - side]):
             return True
     return False

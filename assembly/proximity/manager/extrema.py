@@ -119,7 +119,7 @@ def square_to(a, b):
 
 
 @kernel(inner=True)
-def are_one(table, pool, scene, roots, i, k, neglect):
+def are_one(table, pool, posed, roots, i, k, neglect):
     """Whether roots i and k are the same contact."""
     square = neglect * neglect
     for side in range(2):
@@ -128,9 +128,9 @@ def are_one(table, pool, scene, roots, i, k, neglect):
         b = (roots[k, o], roots[k, o + 1], roots[k, o + 2])
         if roots[i, CODE_F + side] != roots[k, CODE_F + side] or square_to(a, b) > square:
             return False
-        surface = scene[2][side]
+        surface = posed.surfaces[side]
         if surface < 0:
-            shell = scene[2][2 + side]
+            shell = posed.shells[side]
             if roots[i, CODE_F + side] >= shell_at(table, shell).faces:
                 continue
             surface = feature_at(table, shell, np.int64(roots[i, CODE_F + side]))
@@ -139,20 +139,20 @@ def are_one(table, pool, scene, roots, i, k, neglect):
         )
         p = surface_point(table, pool, surface, u, v)[0]
         if side == 1:
-            p = add(matvec(scene[0], p), scene[1])
+            p = add(matvec(posed.turn, p), posed.shift)
         if square_to(p, a) > square and square_to(p, b) > square:
             return False
     return True
 
 
 @kernel(inner=True)
-def surfaces_root(table, pool, scene, start, roots, k):
+def surfaces_root(table, pool, posed, start, roots, k):
     """Newton on two surfaces from `start`, the controller where it fails; fills root k.
 
     Returns NOTHING, SADDLE or MINIMUM_FOUND.
     """
-    turn, shift = scene[0], scene[1]
-    f, g = scene[2][0], scene[2][1]
+    turn, shift = posed.turn, posed.shift
+    f, g = posed.surfaces[0], posed.surfaces[1]
     status, x, _count, frame, curvature = solve_pair(table, pool, f, g, turn, shift, start, 1.0, math.inf, 0.0, True)
     if status == NOT_CONVERGED:
         # The controller leads down from anywhere, to a minimum of the distance.
@@ -169,9 +169,10 @@ def surfaces_root(table, pool, scene, start, roots, k):
 
 
 @kernel(inner=True)
-def solids_root(table, pool, scene, codes, start, n, roots, k, work, corner):
+def solids_root(table, pool, posed, codes, start, n, roots, k, work, corner):
     """Switching and Newton on the features of two solids, or Newton alone for a corner; fills root k."""
-    i, j, q, track_at = scene[4]
+    i, j = posed.bodies
+    q = posed.poses
     records, tracked = work
     pair = tracked_at(tracked, 0)
     derivatives = derivatives_at(records, 0)
@@ -183,7 +184,8 @@ def solids_root(table, pool, scene, codes, start, n, roots, k, work, corner):
     for l in range(3):
         pair.normal[l] = n[l]
     status = call_address(
-        track_at, (table, pool, scene[2][2], scene[2][3], i, j, q, tracked, math.inf, records, tracked, 0)
+        posed.track_solids,
+        (table, pool, posed.shells[0], posed.shells[1], i, j, q, tracked, math.inf, records, tracked, 0),
     )
     if status != CONVERGED and (status != SINGULAR or corner > 0.0):
         # An edge along another one, or along a face, is no corner: its ends are.
@@ -216,28 +218,28 @@ def write(roots, k, x, code_f, code_g, n, gap, pf, pg, fold):
 
 
 @kernel(inner=True)
-def add_root(table, pool, scene, codes, start, n, neglect, roots, count, work, corner):
+def add_root(table, pool, posed, codes, start, n, neglect, roots, count, work, corner):
     """Look for a root from a start and add it, as USELESS, if it is none of the known ones; a corner where it holds on
     to something.
 
     Returns how many roots there are, and NOTHING, ALIKE, SADDLE or MINIMUM_FOUND.
     """
-    if scene[2][0] >= 0:
-        found = surfaces_root(table, pool, scene, start, roots, count)
+    if posed.surfaces[0] >= 0:
+        found = surfaces_root(table, pool, posed, start, roots, count)
     else:
-        found = solids_root(table, pool, scene, codes, start, n, roots, count, work, corner)
+        found = solids_root(table, pool, posed, codes, start, n, roots, count, work, corner)
     if found == NOTHING:
         return count, found
     for k in range(count):
         # One of far sides, or a saddle, hides no contact beside it.
         radius = min(neglect, SAME) if extremum_at(roots, k).origin == USELESS else neglect
-        if are_one(table, pool, scene, roots, count, k, radius):
+        if are_one(table, pool, posed, roots, count, k, radius):
             return count, ALIKE
     return count + 1, found
 
 
 @kernel(inner=True)
-def add_given(table, pool, scene, tracked, listed, many, neglect, roots, work):
+def add_given(table, pool, posed, tracked, listed, many, neglect, roots, work):
     """Add the roots at which given contacts of the two bodies are now. Returns how many.
 
     A contact whose coordinates are unknowns of a solve may be on its way to another root than Newton's method goes to
@@ -253,15 +255,15 @@ def add_given(table, pool, scene, tracked, listed, many, neglect, roots, work):
         if given.swapped == 1:
             x = (x[2], x[3], x[0], x[1])
         before = count
-        count, found = add_root(table, pool, scene, (0, 0), x, (0.0, 0.0, 0.0), 0.0, roots, count, work, 0.0)
-        if scene[2][0] >= 0 and (found == NOTHING or (count > before and count < roots.shape[0])):
-            frame = pair_frame(table, pool, scene[2][0], scene[2][1], scene[0], scene[1], x)
+        count, found = add_root(table, pool, posed, (0, 0), x, (0.0, 0.0, 0.0), 0.0, roots, count, work, 0.0)
+        if posed.surfaces[0] >= 0 and (found == NOTHING or (count > before and count < roots.shape[0])):
+            frame = pair_frame(table, pool, posed.surfaces[0], posed.surfaces[1], posed.turn, posed.shift, x)
             if frame[11]:
                 write(roots, count, x, 0, 0, frame[0], frame[10], frame[3], frame[4], 0.0)
             if found != NOTHING:
-                same = frame[11] and are_one(table, pool, scene, roots, before, count, neglect)
+                same = frame[11] and are_one(table, pool, posed, roots, before, count, neglect)
                 count = count if same else before
-            elif frame[11] and opposed(frame, scene[0], table, pool, scene[2][1], x):
+            elif frame[11] and opposed(frame, posed.turn, table, pool, posed.surfaces[1], x):
                 # At a fold Newton's method may find nothing: there the contact still is.
                 count += 1
         if count > before:

@@ -48,16 +48,16 @@ def is_beside(table, pool, surfaces, x, y, half, part):
 
 
 @kernel(inner=True)
-def is_known(table, pool, scene, e, d, roots, count):
+def is_known(table, pool, posed, e, d, roots, count):
     """The features of elements e and d, the parameters of their middles, whether a known root is all there is.
 
     And whether one is there that is near a fold, on this side of a knot line or beyond: a second root may be beside it.
     """
-    o = tree_at(table, scene[3][0]).element_pool + ELEMENT * e
-    p = tree_at(table, scene[3][1]).element_pool + ELEMENT * d
+    o = tree_at(table, posed.trees[0]).element_pool + ELEMENT * e
+    p = tree_at(table, posed.trees[1]).element_pool + ELEMENT * d
     codes = (np.int64(element_at(pool, o).feature), np.int64(element_at(pool, p).feature))
     start = (pool[o], pool[o + 1], pool[p], pool[p + 1])
-    half = half_widths(table, pool, scene[3], (e, d))
+    half = half_widths(table, pool, posed.trees, (e, d))
     folds = False
     for k in range(count):
         extremum = extremum_at(roots, k)
@@ -67,11 +67,11 @@ def is_known(table, pool, scene, e, d, roots, count):
             # A point that stays where it is is no root: where the edge, or the face, is nearest may be beside it.
             continue
         x = (roots[k, 0], roots[k, 1], roots[k, 2], roots[k, 3])
-        if not is_beside(table, pool, scene[2], x, start, half, BESIDE):
+        if not is_beside(table, pool, posed.surfaces, x, start, half, BESIDE):
             continue
-        if scene[2][0] >= 0 and math.isnan(extremum.beyond):
+        if posed.surfaces[0] >= 0 and math.isnan(extremum.beyond):
             # Beyond a knot line curvatures may be others.
-            extremum.beyond = fold_beyond(table, pool, scene, x, half)
+            extremum.beyond = fold_beyond(table, pool, posed, x, half)
         if is_alone(roots, k):
             return codes, start, True, False
         folds = True

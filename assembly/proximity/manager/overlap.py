@@ -201,11 +201,12 @@ def is_inside_at(table, pool, tree, surface, shell, e, y, margin, offset):
 
 
 @kernel(inner=True)
-def is_deep(table, pool, scene, e, d, margin, offsets):
+def is_deep(table, pool, posed, e, d, margin, offsets):
     """Whether the middle of a patch of f is farther than a margin inside g at a patch, or the other way round."""
-    turn, shift = scene[0], scene[1]
-    tree_f, tree_g = scene[3]
-    f, g, shell_f, shell_g = scene[2]
+    turn, shift = posed.turn, posed.shift
+    tree_f, tree_g = posed.trees
+    f, g = posed.surfaces
+    shell_f, shell_g = posed.shells
     a, some = middle(table, pool, tree_f, f, shell_f, e)
     a = matvec_t(turn, sub(a, shift))
     if some and is_inside_at(table, pool, tree_g, g, shell_g, d, a, margin, offsets[1]):
@@ -254,11 +255,11 @@ def below_part(table, pool, tree, surface, shell, k, below):
 
 
 @kernel(inner=True)
-def is_wholly_inside(table, pool, scene, side, below):
+def is_wholly_inside(table, pool, posed, side, below):
     """Whether f (side 0) is wholly inside g, or g in f: by rays, each another way, from three points `below` it."""
-    turn, shift = scene[0], scene[1]
-    tree, other = scene[3][side], scene[3][1 - side]
-    surface, shell = scene[2][side], scene[2][2 + side]
+    turn, shift = posed.turn, posed.shift
+    tree, other = posed.trees[side], posed.trees[1 - side]
+    surface, shell = posed.surfaces[side], posed.shells[side]
     # Some direction that no face is likely to lie along, and far enough.
     far = 10.0 * (
         node_at(pool, tree_at(table, tree).node_pool).radius + node_at(pool, tree_at(table, other).node_pool).radius
@@ -273,7 +274,7 @@ def is_wholly_inside(table, pool, scene, side, below):
         elif k == 2:
             ray = (0.5218 * far, -0.8125 * far, -0.2601 * far)
         a = matvec_t(turn, sub(a, shift)) if side == 0 else add(matvec(turn, a), shift)
-        cut, leaves = facets_cut(table, pool, other, scene[2][1 - side], scene[2][3 - side], a, ray, 0.0, 0.0)
+        cut, leaves = facets_cut(table, pool, other, posed.surfaces[1 - side], posed.shells[1 - side], a, ray, 0.0, 0.0)
         # In a bore that is open at its ends a ray goes into the material.
         if cut % 2 == 0 or not leaves:
             return False
@@ -281,39 +282,45 @@ def is_wholly_inside(table, pool, scene, side, below):
 
 
 @kernel(inner=True)
-def crosses(table, pool, scene, stack, candidates, margin, offsets):
+def crosses(table, pool, posed, stack, candidates, margin, offsets):
     """Whether two bodies are in each other by more than a margin, or wholly, whatever extrema there are.
 
     Facets of f and of g are up to `offsets` beside their surfaces.
     """
-    count = overlapping(table, pool, scene[3][0], scene[3][1], scene[0], scene[1], stack, candidates)
+    count = overlapping(table, pool, posed.trees[0], posed.trees[1], posed.turn, posed.shift, stack, candidates)
     for c in range(count):
-        if is_deep(table, pool, scene, candidates[c, 0], candidates[c, 1], margin, offsets):
+        if is_deep(table, pool, posed, candidates[c, 0], candidates[c, 1], margin, offsets):
             return True
-        if scene[2][0] < 0 and pierces(table, pool, scene, (candidates[c, 0], candidates[c, 1]), margin, offsets):
+        if posed.surfaces[0] < 0 and pierces(table, pool, posed, (candidates[c, 0], candidates[c, 1]), margin, offsets):
             return True
-    return is_wholly_inside(table, pool, scene, 0, BELOW + 2.0 * offsets[1]) or is_wholly_inside(
-        table, pool, scene, 1, BELOW + 2.0 * offsets[0]
+    return is_wholly_inside(table, pool, posed, 0, BELOW + 2.0 * offsets[1]) or is_wholly_inside(
+        table, pool, posed, 1, BELOW + 2.0 * offsets[0]
     )
 
 
 @kernel(inner=True)
-def is_outside(table, pool, scene, roots, k, offsets):
+def is_outside(table, pool, posed, roots, k, offsets):
     """Whether root k, of a negative gap, is one of far sides: then a surface is between its points.
 
     Facets of f and of g are up to `offsets` beside their surfaces; gaps of no more are taken for true.
     """
     extremum = extremum_at(roots, k)
     depth = -extremum.gap
-    turn, shift = scene[0], scene[1]
+    turn, shift = posed.turn, posed.shift
     a = (extremum.point_f[0], extremum.point_f[1], extremum.point_f[2])
     b = (extremum.point_g[0], extremum.point_g[1], extremum.point_g[2])
     end = offsets[0] / depth
-    if end < 0.5 and facets_cut(table, pool, scene[3][0], scene[2][0], scene[2][2], a, sub(b, a), end, BETWEEN)[0] > 0:
+    if (
+        end < 0.5
+        and facets_cut(table, pool, posed.trees[0], posed.surfaces[0], posed.shells[0], a, sub(b, a), end, BETWEEN)[0]
+        > 0
+    ):
         return True
     a = matvec_t(turn, sub(a, shift))
     b = matvec_t(turn, sub(b, shift))
     end = offsets[1] / depth
     return (
-        end < 0.5 and facets_cut(table, pool, scene[3][1], scene[2][1], scene[2][3], a, sub(b, a), end, BETWEEN)[0] > 0
+        end < 0.5
+        and facets_cut(table, pool, posed.trees[1], posed.surfaces[1], posed.shells[1], a, sub(b, a), end, BETWEEN)[0]
+        > 0
     )

@@ -308,15 +308,15 @@ def write_root(roots, i, tracked, r):
 
 
 @kernel(inner=True)
-def is_of_far_sides(table, pool, scene, roots, k, offsets):
+def is_of_far_sides(table, pool, posed, roots, k, offsets):
     """Whether root k, with a negative gap, is of sides that are turned away from each other."""
-    if scene[5][0] >= 0:
-        return extremum_at(roots, k).gap < -both_radii(table, pool, scene[5])
-    return is_outside(table, pool, scene, roots, k, offsets)
+    if posed.centerlines[0] >= 0:
+        return extremum_at(roots, k).gap < -both_radii(table, pool, posed.centerlines)
+    return is_outside(table, pool, posed, roots, k, offsets)
 
 
 @kernel(inner=True)
-def known_roots(table, pool, watch, memory, p, scene, offsets, tracked, roots, work):
+def known_roots(table, pool, watch, memory, p, posed, offsets, tracked, roots, work):
     """The roots that contacts of pair p have now: given ones, then listed ones.
 
     A listed contact that lost its root, or came to that of another one or to the far sides, gives up its place. Returns
@@ -328,8 +328,8 @@ def known_roots(table, pool, watch, memory, p, scene, offsets, tracked, roots, w
     neglect = lengths_at(pool, manager.lengths).neglect
     # A contact that is to close a gap would contradict a clearance that asks for one, where both stood for one root.
     radius = neglect if pool[pair.minimum] == 0.0 else math.inf
-    many = pair.given_count if scene[2][0] >= 0 else 0
-    count = add_given(table, pool, scene, tracked, pair.given, many, radius, roots, work)
+    many = pair.given_count if posed.surfaces[0] >= 0 else 0
+    count = add_given(table, pool, posed, tracked, pair.given, many, radius, roots, work)
     first, last = pair.low, pair.high
     any_gone = False
     # Roots first, then corners, which give way to them.
@@ -350,11 +350,11 @@ def known_roots(table, pool, watch, memory, p, scene, offsets, tracked, roots, w
             codes = (np.int64(tracked_pair.feature_f), np.int64(tracked_pair.feature_g))
             n = (tracked_pair.normal[0], tracked_pair.normal[1], tracked_pair.normal[2])
             if corner >= HELD_F:
-                start = sunk(table, pool, scene, codes, corner, start)
-            count, found = add_root(table, pool, scene, codes, start, n, neglect, roots, count, work, corner)
+                start = sunk(table, pool, posed, codes, corner, start)
+            count, found = add_root(table, pool, posed, codes, start, n, neglect, roots, count, work, corner)
             lost = found != ALIKE and found != MINIMUM_FOUND
             if count > before and corner == 0.0 and extremum.gap < 0.0:
-                lost = lost or is_of_far_sides(table, pool, scene, roots, before, offsets)
+                lost = lost or is_of_far_sides(table, pool, posed, roots, before, offsets)
         if count > before and not lost:
             extremum.origin = LISTED + k
             if corner >= HELD_F and extremum.gap < tracked_pair.gap - SUNK:

@@ -19,7 +19,6 @@ import numpy as np
 
 from assembly._address import call_address
 from assembly._kernel import kernel
-from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.bvh.neighbor_list import LIST_INTS
 from assembly.proximity.bvh.tree import least_distance, node_at, tree_at
 from assembly.proximity.features.solid_contact import CONTACT_RECORD, TRACK, tracked_at
@@ -49,6 +48,7 @@ from assembly.proximity.manager.motion_bounds import (
 )
 from assembly.proximity.manager.newton_regions import PASSED
 from assembly.proximity.manager.overlap import crosses
+from assembly.proximity.manager.posed_pair import posed_pair
 from assembly.proximity.manager.search import search_patches
 from assembly.proximity.manager.state import (
     ABORTED,
@@ -102,7 +102,7 @@ CROSSING = 1e-6
 
 
 @kernel(inner=True)
-def list_corners(table, pool, watch, scene, reach, least, offsets, stack, candidates, roots, count, work, tracked):
+def list_corners(table, pool, watch, posed, reach, least, offsets, stack, candidates, roots, count, work, tracked):
     """Add corners over faces to the roots of a pair. Returns how many roots there are.
 
     A listed contact whose root is at one stays there.
@@ -111,7 +111,7 @@ def list_corners(table, pool, watch, scene, reach, least, offsets, stack, candid
     lengths = lengths_at(pool, manager.lengths)
     span = (-lengths.first_reach, reach + least)
     neglect = lengths.neglect
-    count = add_corners(table, pool, scene, span, offsets, neglect, stack, candidates, roots, count, work)
+    count = add_corners(table, pool, posed, span, offsets, neglect, stack, candidates, roots, count, work)
     for k in range(count):
         extremum = extremum_at(roots, k)
         place = np.int64(extremum.origin)
@@ -132,7 +132,7 @@ def nearest_fold(roots, count, least, reach):
 
 
 @kernel(inner=True)
-def crosses_elsewhere(table, pool, watch, memory, p, scene, roots, count, least, offsets, stack, candidates, tracked):
+def crosses_elsewhere(table, pool, watch, memory, p, posed, roots, count, least, offsets, stack, candidates, tracked):
     """Whether the bodies of pair p are in each other where no contact says so."""
     manager = manager_at(table, watch)
     pair = pair_at(table, manager.pair_table + PAIR_RECORD * p)
@@ -147,11 +147,11 @@ def crosses_elsewhere(table, pool, watch, memory, p, scene, roots, count, least,
     for k in range(pair.low, pair.high):
         if memory[places + PLACE_MEMORY * k] == p:
             deep = deep or tracked_at(tracked, manager.first + k).gap < -margin
-    return not deep and crosses(table, pool, scene, stack, candidates, margin, offsets)
+    return not deep and crosses(table, pool, posed, stack, candidates, margin, offsets)
 
 
 @kernel(inner=True)
-def search_by_patches(table, pool, watch, memory, p, scene, moving, reach, offsets, tracked, rooms, roots):
+def search_by_patches(table, pool, watch, memory, p, posed, moving, reach, offsets, tracked, rooms, roots):
     """Find the roots of pair p by patches that face each other; what a look knows of the pair then.
 
     Returns
@@ -166,53 +166,55 @@ def search_by_patches(table, pool, watch, memory, p, scene, moving, reach, offse
     minimum = pair_at(table, manager.pair_table + PAIR_RECORD * p).minimum
     least, flank = pool[minimum], pool[minimum + 1]
     at = memory_places(table, watch)[0] + PAIR_MEMORY * p
-    found, reach = facing_pairs(table, pool, watch, memory, p, scene, moving, reach, stack, candidates)
+    found, reach = facing_pairs(table, pool, watch, memory, p, posed, moving, reach, stack, candidates)
     pair_state_at(memory, at).reach = reach
-    count, any_gone = known_roots(table, pool, watch, memory, p, scene, offsets, tracked, roots, work)
-    enough = near_enough(table, pool, scene, least, reach, flank, candidates, found, distances)
+    count, any_gone = known_roots(table, pool, watch, memory, p, posed, offsets, tracked, roots, work)
+    enough = near_enough(table, pool, posed, least, reach, flank, candidates, found, distances)
     span = (-lengths.last_reach, reach + least)
     neglect = lengths.neglect
     facing = (candidates, distances)
     count, free, fertile, ball = search_patches(
-        table, pool, scene, moving, (flank, enough), span, offsets, neglect, facing, found, roots, count, work, passed
+        table, pool, posed, moving, (flank, enough), span, offsets, neglect, facing, found, roots, count, work, passed
     )
     free = min(free, reach)
     if found == 0:
         # Nothing faces the other body within reach: the boxes tell how far that is so.
-        trees = scene[3]
-        free = max(free, least_distance(table, pool, trees[0], trees[1], scene[0], scene[1], math.inf, stack) - least)
+        trees = posed.trees
+        free = max(
+            free, least_distance(table, pool, trees[0], trees[1], posed.turn, posed.shift, math.inf, stack) - least
+        )
     return count, any_gone, free, fertile, ball, math.inf, found > 0
 
 
 @kernel(inner=True)
-def search_by_spines(table, pool, watch, memory, p, scene, moving, reach, offsets, tracked, rooms, roots):
+def search_by_spines(table, pool, watch, memory, p, posed, moving, reach, offsets, tracked, rooms, roots):
     """The same for two round wires, by their spines."""
     manager = manager_at(table, watch)
     stack, _candidates, _distances, _passed, work, pairs, boxes, marks = rooms
     lengths = lengths_at(pool, manager.lengths)
     minimum = pair_at(table, manager.pair_table + PAIR_RECORD * p).minimum
     least, flank = pool[minimum], pool[minimum + 1]
-    radii = both_radii(table, pool, scene[5]) + least
+    radii = both_radii(table, pool, posed.centerlines) + least
     ring = SPINE_RINGS * lengths.first_reach
     at_list = manager.list_table + LIST_INTS * (p % manager.lists)
-    waiting = near_parts(table, pool, at_list, p, scene, moving, radii + reach, ring, stack, pairs, boxes)
+    waiting = near_parts(table, pool, at_list, p, posed, moving, radii + reach, ring, stack, pairs, boxes)
     while waiting < 0 and reach > LEAST_ALLOWANCE:
         # Out of room: what is nearer is looked at more often.
         reach *= 0.5
-        waiting = near_parts(table, pool, at_list, p, scene, moving, radii + reach, ring, stack, pairs, boxes)
+        waiting = near_parts(table, pool, at_list, p, posed, moving, radii + reach, ring, stack, pairs, boxes)
     pair_state_at(memory, memory_places(table, watch)[0] + PAIR_MEMORY * p).reach = reach
-    count, any_gone = known_roots(table, pool, watch, memory, p, scene, offsets, tracked, roots, work)
+    count, any_gone = known_roots(table, pool, watch, memory, p, posed, offsets, tracked, roots, work)
     if waiting < 0:
         # There is no room for what is as near as it should not be.
         memory_header_at(memory, 0).crowded = 1.0
         return count, any_gone, 0.0, math.inf, NO_BALL, math.inf, True
     if waiting == 0:
-        beyond = parts_beyond(table, pool, scene, radii + reach, stack, pairs) - radii
+        beyond = parts_beyond(table, pool, posed, radii + reach, stack, pairs) - radii
         return count, any_gone, beyond, math.inf, NO_BALL, math.inf, False
     # No tangent turns by more than a motion over this.
     rho = min(2.0 * (radii + reach), 0.99 * node_at(pool, tree_at(table, moving[1]).node_pool).radius)
     count, free, fertile, ball, sure = search_spines(
-        table, pool, scene, moving, rho, (least, TAKE * reach, reach, flank), lengths.neglect, boxes, waiting,
+        table, pool, posed, moving, rho, (least, TAKE * reach, reach, flank), lengths.neglect, boxes, waiting,
         marks, roots, count, work,
     )  # fmt: skip
     return count, any_gone, free, fertile, ball, sure, True
@@ -226,46 +228,31 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, rooms, roots, asks):
     pair = pair_at(table, manager.pair_table + PAIR_RECORD * p)
     at = memory_places(table, watch)[0] + PAIR_MEMORY * p
     known = pair_state_at(memory, at)
-    i = pair.body_f
-    j = pair.body_g
-    turn, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
-    scene = (
-        turn,
-        shift,
-        (
-            pair.surface_f,
-            pair.surface_g,
-            pair.shell_f,
-            pair.shell_g,
-        ),
-        (pair.tree_f, pair.tree_g),
-        (i, j, q, manager.track_solids),
-        (pair.spine_f, pair.spine_g),
-    )
+    posed = posed_pair(manager, pair, q)
     state.looks += 1.0
     minimum = pair.minimum
     least = pool[minimum]
     offsets = (pool[minimum + 2], pool[minimum + 3])
     moving = mover(table, watch, p, q)
     reach = reach_now(table, pool, watch, memory, p, moving)
-    wires = scene[5][0] >= 0
+    wires = posed.centerlines[0] >= 0
     if wires:
         count, any_gone, free, fertile, ball, sure, found = search_by_spines(
-            table, pool, watch, memory, p, scene, moving, reach, offsets, tracked, rooms, roots
+            table, pool, watch, memory, p, posed, moving, reach, offsets, tracked, rooms, roots
         )
     else:
         count, any_gone, free, fertile, ball, sure, found = search_by_patches(
-            table, pool, watch, memory, p, scene, moving, reach, offsets, tracked, rooms, roots
+            table, pool, watch, memory, p, posed, moving, reach, offsets, tracked, rooms, roots
         )
-    if scene[2][0] >= 0:
+    if posed.surfaces[0] >= 0:
         seat_given(table, watch, memory, p, roots, count, tracked)
     elif manager.corners == 1:
         count = list_corners(
-            table, pool, watch, scene, known.reach, least, offsets, rooms[0], rooms[1], roots, count, rooms[4],
+            table, pool, watch, posed, known.reach, least, offsets, rooms[0], rooms[1], roots, count, rooms[4],
             tracked,
         )  # fmt: skip
-    if scene[2][0] < 0 and any_deep(roots, count):
-        drop_flush(table, pool, watch, memory, p, scene, roots, count, tracked)
+    if posed.surfaces[0] < 0 and any_deep(roots, count):
+        drop_flush(table, pool, watch, memory, p, posed, roots, count, tracked)
     if manager.mark_address[0] != 0 and least > 0.0 and pair.given_count > 0:
         call_address(manager.mark_address[0], (table, pool, watch, p, q, tracked, roots, count))
         release_given(table, watch, memory, p, roots, count, tracked)
@@ -276,7 +263,7 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, rooms, roots, asks):
         known.crossed = 1.0 if lowest < -max(CROSSING, state.overlap) else 0.0
     elif asks == ALWAYS or (asks == WHERE_LOST and any_gone):
         crossed = crosses_elsewhere(
-            table, pool, watch, memory, p, scene, roots, count, least, offsets, rooms[0], rooms[1], tracked
+            table, pool, watch, memory, p, posed, roots, count, least, offsets, rooms[0], rooms[1], tracked
         )
         known.crossed = 1.0 if crossed else 0.0
     known.allowance = max(min(rest, free), LEAST_ALLOWANCE)

@@ -108,19 +108,19 @@ def descend(table, pool, spines, turn, shift, reach, stack, out):
 
 
 @kernel(inner=True)
-def parts_beyond(table, pool, scene, reach, stack, out):
+def parts_beyond(table, pool, posed, reach, stack, out):
     """How far two spines are apart at least, where no parts of them are within a reach of each other."""
-    return descend(table, pool, scene[5], scene[0], scene[1], reach, stack, out)[1]
+    return descend(table, pool, posed.centerlines, posed.turn, posed.shift, reach, stack, out)[1]
 
 
 @kernel(inner=True)
-def near_parts(table, pool, at, p, scene, moving, reach, ring, stack, out, boxes):
+def near_parts(table, pool, at, p, posed, moving, reach, ring, stack, out, boxes):
     """Boxes of parts of two spines that are within a reach of each other; how many, or -1 where there is no room.
 
     From the list at `at`, as `patch_list.listed_pairs` has patches.
     """
-    turn, shift = scene[0], scene[1]
-    spines = scene[5]
+    turn, shift = posed.turn, posed.shift
+    spines = posed.centerlines
     f, g = spines
     fits = reaches(table, at, moved_since(table, pool, at, p, moving), reach)
     if fits == 0 and can_be_listed(table, pool, moving, ring + reach):

@@ -77,10 +77,10 @@ def open_ends(table, pool, f, g, box):
 
 
 @kernel(inner=True)
-def mark_known(table, pool, scene, roots, count, marks):
+def mark_known(table, pool, posed, roots, count, marks):
     """Where on the spines known roots are that are at a minimum: part and length of either; NaN for others."""
-    surfaces = scene[2]
-    f, g = scene[5]
+    surfaces = posed.surfaces
+    f, g = posed.centerlines
     for k in range(count):
         i, s = spine_place(table, pool, f, surfaces[0], roots[k, 0], roots[k, 1])
         j, t = spine_place(table, pool, g, surfaces[1], roots[k, 2], roots[k, 3])
@@ -90,7 +90,7 @@ def mark_known(table, pool, scene, roots, count, marks):
         marks[k, 3] = t
         o = centerline_at(table, f).part_pool + PART * i
         p = centerline_at(table, g).part_pool + PART * j
-        d, tf, _bend_f, tg, _bend_g = apart(pool, o, p, scene[0], scene[1], s, t)
+        d, tf, _bend_f, tg, _bend_g = apart(pool, o, p, posed.turn, posed.shift, s, t)
         if extremum_at(roots, k).origin == USELESS or not abs(dot(d, tf)) + abs(dot(d, tg)) <= AT_ROOT * math.sqrt(
             dot(d, d)
         ):
@@ -125,32 +125,32 @@ def across_both(f, g):
 
 
 @kernel(inner=True)
-def add_minimum(table, pool, scene, i, j, s, t, neglect, roots, count, work):
+def add_minimum(table, pool, posed, i, j, s, t, neglect, roots, count, work):
     """Add the contact at lengths s and t along parts i and j, if it is none of the known ones. Returns how many."""
     if count == roots.shape[0]:
         return count
-    f, g = scene[5]
+    f, g = posed.centerlines
     o = centerline_at(table, f).part_pool + PART * i
     p = centerline_at(table, g).part_pool + PART * j
-    d, tf, _bend_f, tg, _bend_g = apart(pool, o, p, scene[0], scene[1], s, t)
+    d, tf, _bend_f, tg, _bend_g = apart(pool, o, p, posed.turn, posed.shift, s, t)
     length = math.sqrt(dot(d, d))
     way = scale(1.0 / length, d) if length >= MEETING else across_both(tf, tg)
-    u_f, v_f = wire_parameters(table, pool, f, scene[2][0], i, s, way)
-    u_g, v_g = wire_parameters(table, pool, g, scene[2][1], j, t, matvec_t(scene[0], scale(-1.0, way)))
+    u_f, v_f = wire_parameters(table, pool, f, posed.surfaces[0], i, s, way)
+    u_g, v_g = wire_parameters(table, pool, g, posed.surfaces[1], j, t, matvec_t(posed.turn, scale(-1.0, way)))
     start = (u_f, v_f, u_g, v_g)
-    gap = length - both_radii(table, pool, scene[5])
+    gap = length - both_radii(table, pool, posed.centerlines)
     before = count
     extremum = extremum_at(roots, before)
-    count, found = add_root(table, pool, scene, (0, 0), start, (0.0, 0.0, 0.0), neglect, roots, count, work, 0.0)
+    count, found = add_root(table, pool, posed, (0, 0), start, (0.0, 0.0, 0.0), neglect, roots, count, work, 0.0)
     if found == NOTHING or not abs(extremum.gap - gap) <= ASTRAY:
         # At a fold Newton's method may find nothing, or go elsewhere: the minimum is known without it.
-        frame = pair_frame(table, pool, scene[2][0], scene[2][1], scene[0], scene[1], start)
+        frame = pair_frame(table, pool, posed.surfaces[0], posed.surfaces[1], posed.turn, posed.shift, start)
         if not frame[11]:
             return before
         write(roots, before, start, 0, 0, frame[0], frame[10], frame[3], frame[4], 0.0)
         for k in range(before):
             radius = min(neglect, SAME) if extremum_at(roots, k).origin == USELESS else neglect
-            if are_one(table, pool, scene, roots, before, k, radius):
+            if are_one(table, pool, posed, roots, before, k, radius):
                 return before
         count = before + 1
     if count > before:
@@ -182,9 +182,9 @@ def halves(boxes, b):
 
 
 @kernel(inner=True)
-def add_minima(table, pool, scene, box, ends, what, neglect, places, roots, count, work):
+def add_minima(table, pool, posed, box, ends, what, neglect, places, roots, count, work):
     """Add the minima that a box has. Returns how many roots there are, and whether these are all for certain."""
-    f, g = scene[5]
+    f, g = posed.centerlines
     i = np.int64(box[0])
     j = np.int64(box[3])
     o = centerline_at(table, f).part_pool + PART * i
@@ -194,21 +194,21 @@ def add_minima(table, pool, scene, box, ends, what, neglect, places, roots, coun
     settled = False
     if what == CONVEX:
         s, t = 0.5 * (box[1] + box[2]), 0.5 * (box[4] + box[5])
-        found, s, t, settled = convex_minimum(pool, o, p, scene[0], scene[1], part, ends, s, t)
+        found, s, t, settled = convex_minimum(pool, o, p, posed.turn, posed.shift, part, ends, s, t)
         if found:
-            count = add_minimum(table, pool, scene, i, j, s, t, neglect, roots, count, work)
+            count = add_minimum(table, pool, posed, i, j, s, t, neglect, roots, count, work)
     if not settled:
-        many, level, certain = valley_minima(pool, o, p, scene[0], scene[1], part, ends, places)
+        many, level, certain = valley_minima(pool, o, p, posed.turn, posed.shift, part, ends, places)
         if level:
             # All along it is as good: points here and there stand for it.
             neglect = max(neglect, SPARSE / max(centerline_part_at(pool, o).bend, centerline_part_at(pool, p).bend))
         for m in range(many):
-            count = add_minimum(table, pool, scene, i, j, places[m, 0], places[m, 1], neglect, roots, count, work)
+            count = add_minimum(table, pool, posed, i, j, places[m, 0], places[m, 1], neglect, roots, count, work)
     return count, certain
 
 
 @kernel(inner=True)
-def search_spines(table, pool, scene, moving, rho, lengths, neglect, boxes, waiting, rooms, roots, count, work):
+def search_spines(table, pool, posed, moving, rho, lengths, neglect, boxes, waiting, rooms, roots, count, work):
     """Look for all contacts of two wires with gaps up to `near`; known ones are the first `count` roots.
 
     The `lengths` are the least gap asked for, how near is near, the reach, and the flank: how far bodies may go at a
@@ -221,15 +221,15 @@ def search_spines(table, pool, scene, moving, rho, lengths, neglect, boxes, wait
     body that moves may go, infinite if there is none; that ball; how far it may, until a pose that stays is looked at.
     """
     least, near, reach, flank = lengths
-    f, g = scene[5]
+    f, g = posed.centerlines
     line = centerline_at(table, f)
     centerline = centerline_at(table, g)
     side, _tree, _e, turn, shift = moving
-    radii = both_radii(table, pool, scene[5]) + least
+    radii = both_radii(table, pool, posed.centerlines) + least
     sharpest = max(wire_at(pool, line.numbers).sharpest, wire_at(pool, centerline.numbers).sharpest)
     known = count
     marks, places = rooms
-    mark_known(table, pool, scene, roots, known, marks)
+    mark_known(table, pool, posed, roots, known, marks)
     free = reach
     fertile = math.inf
     sure = math.inf
@@ -243,7 +243,7 @@ def search_spines(table, pool, scene, moving, rho, lengths, neglect, boxes, wait
         p = centerline.part_pool + PART * np.int64(box[3])
         part = (box[1], box[2], box[4], box[5])
         ends = open_ends(table, pool, f, g, box)
-        low, what, margin = box_of(pool, o, p, scene[0], scene[1], part, ends, radii + reach, rho)
+        low, what, margin = box_of(pool, o, p, posed.turn, posed.shift, part, ends, radii + reach, rho)
         low -= radii
         # A minimum that a box may hold, and nobody looks for, is as near as the box.
         hollow = what == EMPTY or what == BARREN
@@ -261,7 +261,7 @@ def search_spines(table, pool, scene, moving, rho, lengths, neglect, boxes, wait
             waiting += 1
             continue
         if low <= near and not hollow and not (what == CONVEX and is_marked(boxes, b, marks, known)):
-            count, certain = add_minima(table, pool, scene, box, ends, what, neglect, places, roots, count, work)
+            count, certain = add_minima(table, pool, posed, box, ends, what, neglect, places, roots, count, work)
             if halve or count == roots.shape[0] or not certain:
                 # There may be one that is not known.
                 allowed = low
