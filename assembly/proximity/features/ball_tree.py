@@ -41,27 +41,22 @@ from assembly.proximity.features.quadratic_model import (
     vertex_model,
 )
 
-# Integers of a node: what it is, its feature's kind, number and record, its children (-1: none yet), how many; of a
-# face's cell where it is from the trim; whether it has its model.
+# The integers of a node.
 CELL_NODE = record_dtype(
     "i8",
-    level=1,
-    kind=1,
-    feature=1,
-    record=1,
-    child=1,
-    children=1,
-    side=1,
-    has_model=1,
+    level=1,  # WHOLE, PART, GROUP or CELL
+    kind=1,  # its feature: FACE, EDGE or VERTEX,
+    feature=1,  # its number
+    record=1,  # and where its record is in the table
+    child=1,  # its first child; -1: none yet
+    children=1,  # how many
+    side=1,  # of a face's cell, where it is from the trim: UNKNOWN, INSIDE, OUTSIDE or MIXED_SIDE
+    has_model=1,  # 1: its quadratic model is made
 )
 cell_node_at = record_view(CELL_NODE)
 LEVEL = place_of(CELL_NODE, "level")
 KIND = place_of(CELL_NODE, "kind")
-FEATURE = place_of(CELL_NODE, "feature")
 RECORD = place_of(CELL_NODE, "record")
-CHILD = place_of(CELL_NODE, "child")
-CHILDREN = place_of(CELL_NODE, "children")
-SIDE = place_of(CELL_NODE, "side")
 HAS_MODEL = place_of(CELL_NODE, "has_model")
 INFO = size_of(CELL_NODE)
 # Levels.

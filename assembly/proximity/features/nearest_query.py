@@ -21,18 +21,17 @@ from assembly.proximity.features.penetration import PENETRATING, TOUCHING, deepe
 from assembly.proximity.features.separating_normals import WAYS, overlap_at
 from assembly.proximity.features.switching import track_features
 
-# What is written of a pair: parameters (4), point of f, point of g, normal, gap, lower bound, pairs of cells looked
-# at, switches.
+# What is written of a pair, in world axes.
 FEATURE_ANSWER = record_dtype(
     "f8",
-    parameters=4,
+    parameters=4,  # coordinates on the features of f, then of g
     point_f=3,
     point_g=3,
-    normal=3,
+    normal=3,  # from f to g
     gap=1,
-    lower=1,
-    effort=1,
-    switches=1,
+    lower=1,  # lower bound of the distance
+    effort=1,  # pairs of cells looked at
+    switches=1,  # of features
 )
 answer_at = record_view(FEATURE_ANSWER)
 PARAMETERS = place_of(FEATURE_ANSWER, "parameters")

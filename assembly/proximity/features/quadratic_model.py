@@ -26,29 +26,27 @@ from assembly.geometry.splines.evaluate import (
 )
 from assembly.geometry.vec import add, cross, dot, matvec, scale, sub
 
-# A node: box, model (S0, then the vectors p, q, l, m, k and e), sphere, unit normal of the linear part.
-# What of e is along that normal; the length of all terms but the linear ones; how much the normal turns over the box,
-# in radians, and how much curvatures change.
+# A node: box, model and sphere. Lengths are over the size of the scene.
 QUADRATIC_MODEL = record_dtype(
     "f8",
-    u0=1,
+    u0=1,  # middle of the box
     v0=1,
-    half_u=1,
+    half_u=1,  # half its widths: a, b
     half_v=1,
-    point=3,
-    linear_u=3,
-    linear_v=3,
-    square_u=3,
-    mixed=3,
-    square_v=3,
-    rest=1,
-    center=3,
+    point=3,  # S0
+    linear_u=3,  # p
+    linear_v=3,  # q
+    square_u=3,  # l
+    mixed=3,  # m
+    square_v=3,  # k
+    rest=1,  # e
+    center=3,  # of the sphere
     radius=1,
-    normal=3,
-    rest_n=1,
-    curved=1,
-    bend=1,
-    change=1,
+    normal=3,  # unit normal of the linear part
+    rest_n=1,  # what of e is along that normal
+    curved=1,  # length of all terms but the linear ones
+    bend=1,  # how much the normal turns over the box [rad]
+    change=1,  # how much curvatures change over it
 )
 model_at = record_view(QUADRATIC_MODEL)
 U0 = place_of(QUADRATIC_MODEL, "u0")
@@ -66,9 +64,6 @@ CENTER = place_of(QUADRATIC_MODEL, "center")
 RADIUS = place_of(QUADRATIC_MODEL, "radius")
 NORMAL = place_of(QUADRATIC_MODEL, "normal")
 REST_N = place_of(QUADRATIC_MODEL, "rest_n")
-CURVED = place_of(QUADRATIC_MODEL, "curved")
-BEND = place_of(QUADRATIC_MODEL, "bend")
-CHANGE = place_of(QUADRATIC_MODEL, "change")
 NODE = size_of(QUADRATIC_MODEL)
 # Where weights vary by more than this over a box it has no model: e is infinite and its sphere is what bounds it.
 LEAST_WEIGHT = 0.1

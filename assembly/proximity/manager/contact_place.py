@@ -24,6 +24,7 @@ from assembly.proximity.bvh.tree import (
     element_at,
     node_at,
     node_links_at,
+    three_of,
     tree_at,
 )
 from assembly.proximity.extrema.feature_jets import edge_jet, vertex_point
@@ -45,6 +46,7 @@ from assembly.proximity.manager.state import (
     lengths_at,
     manager_at,
     pair_at,
+    pair_lengths_at,
 )
 
 # A way from one pair to another one has so many strides, were it straight; so many it may have at most.
@@ -117,7 +119,8 @@ def nearest_point(table, pool, tree, surface, shell, y, reach, stack):
             if not found:
                 continue
         elif feature_kind(table, shell, code) == EDGE:
-            middle, half = pool[at], pool[at + 2]
+            element = element_at(pool, at)
+            middle, half = element.middle[0], element.half[0]
             p = point_on_edge(table, pool, feature_at(table, shell, code), middle - half, middle + half, y)
         else:
             p = vertex_point(table, pool, feature_at(table, shell, code))
@@ -173,15 +176,14 @@ def leads_to(table, pool, posed, begin, end, level, stack):
 def contact_points(table, pool, posed, given, tracked):
     """The pair of points of a given contact, in the axes of body f of its pair of bodies."""
     given_record = given_at(table, given)
-    r = given_record.row
-    pair = tracked_at(tracked, r)
+    pair = tracked_at(tracked, given_record.row)
     a = point_of(
         table, pool, given_record.surface[0], given_record.shell[0], np.int64(pair.feature_f),
-        tracked[r, 0], tracked[r, 1],
+        pair.parameters[0], pair.parameters[1],
     )  # fmt: skip
     b = point_of(
         table, pool, given_record.surface[1], given_record.shell[1],
-        np.int64(pair.feature_g), tracked[r, 2], tracked[r, 3],
+        np.int64(pair.feature_g), pair.parameters[2], pair.parameters[3],
     )  # fmt: skip
     if given_record.swapped == 1:
         a, b = b, a
@@ -192,10 +194,7 @@ def contact_points(table, pool, posed, given, tracked):
 def root_points(roots, k):
     """The pair of points of a root."""
     extremum = extremum_at(roots, k)
-    return (
-        (extremum.point_f[0], extremum.point_f[1], extremum.point_f[2]),
-        (extremum.point_g[0], extremum.point_g[1], extremum.point_g[2]),
-    )
+    return three_of(extremum.point_f), three_of(extremum.point_g)
 
 
 @kernel(inline=True)
@@ -254,7 +253,7 @@ def mark_places(table, pool, watch, p, q, tracked, roots, count):
     manager = manager_at(table, watch)
     pair = pair_at(table, manager.pair_table + PAIR_RECORD * p)
     posed = posed_pair(manager, pair, q)
-    least = pool[pair.minimum]
+    least = pair_lengths_at(pool, pair.minimum).least
     neglect = lengths_at(pool, manager.lengths).neglect
     stack = np.empty(DEPTH, np.int64)
     known = 0
@@ -262,7 +261,7 @@ def mark_places(table, pool, watch, p, q, tracked, roots, count):
         given = pair.given + GIVEN_RECORD * c
         given_record = given_at(table, given)
         r = given_record.row
-        if math.isnan(tracked[r, 0]):
+        if math.isnan(tracked_at(tracked, r).parameters[0]):
             continue
         known += 1
         a, b = contact_points(table, pool, posed, given, tracked)

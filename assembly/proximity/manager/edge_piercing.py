@@ -82,12 +82,12 @@ def is_well_inside(table, pool, trim, u, v, du, dv):
 
 
 @kernel(inline=True)
-def patch_corners(table, pool, surface, e):
-    """The first (u, v) of the patch at e and its widths, and its corners, counterclockwise in (u, v) from there."""
-    u = pool[e] - pool[e + 2]
-    v = pool[e + 1] - pool[e + 3]
-    wide = 2.0 * pool[e + 2]
-    high = 2.0 * pool[e + 3]
+def patch_corners(table, pool, surface, patch):
+    """The first (u, v) of a patch and its widths, and its corners, counterclockwise in (u, v) from there."""
+    u = patch.middle[0] - patch.half[0]
+    v = patch.middle[1] - patch.half[1]
+    wide = 2.0 * patch.half[0]
+    high = 2.0 * patch.half[1]
     p = surface_point(table, pool, surface, u, v)[0]
     q = surface_point(table, pool, surface, u + wide, v)[0]
     s = surface_point(table, pool, surface, u + wide, v + high)[0]
@@ -101,11 +101,11 @@ def goes_through(table, pool, tree, shell, e, a, b, margin):
     node = node_at(pool, node_of(table, pool, tree, e))
     if node.cosine <= 0.0 or node.sine > FLAT:
         return False
-    o = tree_at(table, tree).element_pool + ELEMENT * e
-    code = np.int64(element_at(pool, o).feature)
+    patch = element_at(pool, tree_at(table, tree).element_pool + ELEMENT * e)
+    code = np.int64(patch.feature)
     face = face_at(table, shell_at(table, shell).face_table + FACE_RECORD * code)
     r = feature_at(table, shell, code)
-    (u, v, wide, high), (p, q, s, t) = patch_corners(table, pool, r, o)
+    (u, v, wide, high), (p, q, s, t) = patch_corners(table, pool, r, patch)
     for k in range(2):
         second, third = (q, s) if k == 0 else (s, t)
         hit, _way, x, y, _along = cut_at(a, sub(b, a), p, second, third, 0.0, 0.0)
@@ -134,11 +134,12 @@ def pierces(table, pool, posed, pair, margin, offsets):
         other, other_shell = posed.trees[1 - side], posed.shells[1 - side]
         o = tree_at(table, tree).element_pool + ELEMENT * pair[side]
         p = tree_at(table, other).element_pool + ELEMENT * pair[1 - side]
-        code = np.int64(element_at(pool, o).feature)
+        part = element_at(pool, o)
+        code = np.int64(part.feature)
         patch = np.int64(element_at(pool, p).feature)
         if feature_kind(table, shell, code) != EDGE or feature_kind(table, other_shell, patch) != FACE:
             continue
-        a, b, bent = chord_of(table, pool, feature_at(table, shell, code), pool[o], pool[o + 2])
+        a, b, bent = chord_of(table, pool, feature_at(table, shell, code), part.middle[0], part.half[0])
         if side == 0:
             a = matvec_t(posed.turn, sub(a, posed.shift))
             b = matvec_t(posed.turn, sub(b, posed.shift))

@@ -17,6 +17,7 @@ from assembly.proximity.bvh.tree import (
     NODE_INTS,
     node_at,
     node_links_at,
+    three_of,
     tree_at,
 )
 from assembly.proximity.manager.extrema import LISTED, NEW, USELESS, extremum_at
@@ -72,8 +73,7 @@ def is_between_flush_faces(table, pool, posed, roots, k, stack, normals):
     """Whether the middle of root k, with a negative gap, is between two faces that all but touch there."""
     extremum = extremum_at(roots, k)
     turn, shift = posed.turn, posed.shift
-    a = (extremum.point_f[0], extremum.point_f[1], extremum.point_f[2])
-    b = (extremum.point_g[0], extremum.point_g[1], extremum.point_g[2])
+    a, b = three_of(extremum.point_f), three_of(extremum.point_g)
     c = scale(0.5, add(a, b))
     reach = -SHORT * extremum.gap
     many = faces_about(table, pool, posed.trees[0], posed.shells[0], c, reach, stack, normals[0])

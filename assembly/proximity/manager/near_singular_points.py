@@ -15,6 +15,7 @@ from assembly.proximity.brep.borders import feature_at, feature_kind
 from assembly.proximity.brep.records import FACE, FACE_RECORD, shell_at
 from assembly.proximity.features.holding import HELD_F, HELD_G
 from assembly.proximity.features.region_tests import is_feasible
+from assembly.proximity.features.solid_contact import pair_parameters
 from assembly.proximity.manager.extrema import (
     NEW,
     ROOT,
@@ -56,7 +57,7 @@ def is_next_in_valley(table, pool, posed, codes, surfaces, x, along, roots, coun
         extremum = extremum_at(roots, k)
         alike = extremum.code_f == codes[0] and extremum.code_g == codes[1]
         if alike and extremum.origin != USELESS and not is_loose(roots, k):
-            y = (roots[k, 0], roots[k, 1], roots[k, 2], roots[k, 3])
+            y = pair_parameters(extremum)
             found, _there, _bend, _on_f, other = across_valley(
                 table, pool, surfaces[0], surfaces[1], posed.turn, posed.shift, y
             )
@@ -76,7 +77,7 @@ def is_left_out(table, pool, posed, roots, k):
     if extremum.origin == USELESS or not is_loose(roots, k) or not is_of_faces(table, posed, codes[0], codes[1]):
         return False
     surfaces = (feature_at(table, posed.shells[0], codes[0]), feature_at(table, posed.shells[1], codes[1]))
-    x = (roots[k, 0], roots[k, 1], roots[k, 2], roots[k, 3])
+    x = pair_parameters(extremum)
     found, _there, _bend, on_f, along = across_valley(table, pool, surfaces[0], surfaces[1], posed.turn, posed.shift, x)
     if not found:
         return False

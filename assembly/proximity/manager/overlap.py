@@ -21,7 +21,6 @@ from assembly.proximity.brep.borders import feature_at
 from assembly.proximity.brep.records import FACE_RECORD, face_at, shell_at
 from assembly.proximity.bvh.tree import (
     ELEMENT,
-    ELEMENT_FEATURE,
     NODE,
     NODE_INTS,
     element_at,
@@ -122,7 +121,7 @@ def facets_cut(table, pool, tree, surface, shell, a, d, end, beside):
         if r < 0:
             continue
         e = tree_record.element_pool + ELEMENT * (-1 - child)
-        (u, v, wide, high), (p, q, s, t) = patch_corners(table, pool, r, e)
+        (u, v, wide, high), (p, q, s, t) = patch_corners(table, pool, r, element_at(pool, e))
         for k in range(2):
             hit, way, x, y, along = cut_at(a, d, p, q if k == 0 else s, s if k == 0 else t, end, beside)
             here = (u + (x + y if k == 0 else x) * wide, v + (y if k == 0 else x + y) * high)
@@ -141,17 +140,18 @@ def foot_at(table, pool, tree, surface, shell, e, y):
     A foot that Newton's method did not reach is none: off the foot of a point outside, the tangent plane of a bulge has
     it inside. One farther off than BESIDE may be on the far side.
     """
-    o = tree_at(table, tree).element_pool + ELEMENT * e
-    code = np.int64(element_at(pool, o).feature)
+    patch = element_at(pool, tree_at(table, tree).element_pool + ELEMENT * e)
+    code = np.int64(patch.feature)
     f = surface_of(table, shell, surface, code)
     if f < 0:
         return 0.0, y, False
-    s, t, distance, n, settled = foot_of(table, pool, f, y, pool[o], pool[o + 1])
+    u, v = patch.middle[0], patch.middle[1]
+    s, t, distance, n, settled = foot_of(table, pool, f, y, u, v)
     for _ in range(FEET):
         if settled:
             break
         s, t, distance, n, settled = foot_of(table, pool, f, y, s, t)
-    beside = is_within(table, pool, f, s, t, pool[o], pool[o + 1], BESIDE * pool[o + 2], BESIDE * pool[o + 3])
+    beside = is_within(table, pool, f, s, t, u, v, BESIDE * patch.half[0], BESIDE * patch.half[1])
     return distance, n, settled and beside and in_trim(table, pool, shell, code, s, t)
 
 
@@ -219,12 +219,12 @@ def is_deep(table, pool, posed, e, d, margin, offsets):
 @kernel(inner=True)
 def middle(table, pool, tree, surface, shell, e):
     """The middle of a patch, in the axes of its body, and whether it is one of a face and within its boundary."""
-    o = tree_at(table, tree).element_pool + ELEMENT * e
-    code = np.int64(element_at(pool, o).feature)
+    patch = element_at(pool, tree_at(table, tree).element_pool + ELEMENT * e)
+    code = np.int64(patch.feature)
     f = surface_of(table, shell, surface, code)
-    if f < 0 or not in_trim(table, pool, shell, code, pool[o], pool[o + 1]):
+    if f < 0 or not in_trim(table, pool, shell, code, patch.middle[0], patch.middle[1]):
         return (0.0, 0.0, 0.0), False
-    return surface_point(table, pool, f, pool[o], pool[o + 1])[0], True
+    return surface_point(table, pool, f, patch.middle[0], patch.middle[1])[0], True
 
 
 @kernel(inner=True)
@@ -235,20 +235,20 @@ def below_part(table, pool, tree, surface, shell, k, below):
     """
     tree_record = tree_at(table, tree)
     solid = shell_at(table, shell)
-    first = tree_record.element_pool + ELEMENT_FEATURE
+    first = tree_record.element_pool
     elements = tree_record.elements
     patches = 0
     for e in range(elements):
-        patches += int(shell < 0 or pool[first + ELEMENT * e] < solid.faces)
+        patches += int(shell < 0 or element_at(pool, first + ELEMENT * e).feature < solid.faces)
     passed = 0
     for e in range(elements):
-        if shell < 0 or pool[first + ELEMENT * e] < solid.faces:
+        if shell < 0 or element_at(pool, first + ELEMENT * e).feature < solid.faces:
             if passed >= patches * k // 3:
                 a, some = middle(table, pool, tree, surface, shell, e)
                 if some:
-                    o = tree_record.element_pool + ELEMENT * e
-                    f = surface_of(table, shell, surface, np.int64(element_at(pool, o).feature))
-                    _p, su, sv, _uu, _uv, _vv = surface_point(table, pool, f, pool[o], pool[o + 1])
+                    patch = element_at(pool, first + ELEMENT * e)
+                    f = surface_of(table, shell, surface, np.int64(patch.feature))
+                    _p, su, sv, _uu, _uv, _vv = surface_point(table, pool, f, patch.middle[0], patch.middle[1])
                     return sub(a, scale(float(surface_at(table, f).sign) * below, unit(cross(su, sv)))), True
             passed += 1
     return (0.0, 0.0, 0.0), False

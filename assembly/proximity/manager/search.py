@@ -23,7 +23,7 @@ from assembly.proximity.manager.extrema import (
     extremum_at,
     is_alone,
 )
-from assembly.proximity.manager.newton_regions import BARREN, LEFT, half_widths, is_known, stays
+from assembly.proximity.manager.newton_regions import LEFT, half_widths, is_known, newton_way_at, stays
 from assembly.proximity.manager.overlap import is_outside
 
 # Starts that a look leads down the slope of the gap, because Newton's method found no minimum from there.
@@ -50,7 +50,7 @@ def look_into(table, pool, posed, e, d, neglect, roots, count, work, passed, sta
         way, near, visited = stays(table, pool, posed.surfaces, posed.turn, posed.shift, start, half, passed, visited)
         stayed = way != LEFT
         if way >= 0:
-            return count, -1, folding or passed[way, BARREN] == 1.0, (folding, visited, slides)
+            return count, -1, folding or newton_way_at(passed, way).barren == 1.0, (folding, visited, slides)
     result = NOTHING
     if stayed or not folding:
         # Where nothing folds, it tells whether it goes to a root that is known.
@@ -77,7 +77,7 @@ def look_into(table, pool, posed, e, d, neglect, roots, count, work, passed, sta
     if count == before or result != MINIMUM_FOUND:
         # Patches that face each other and hold no root of their own.
         if visited > mine:
-            passed[mine, BARREN] = 1.0
+            newton_way_at(passed, mine).barren = 1.0
         return count, -1, True, (folding, visited, slides)
     return count, before, False, (folding, visited, slides)
 

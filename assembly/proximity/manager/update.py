@@ -53,7 +53,6 @@ from assembly.proximity.manager.search import search_patches
 from assembly.proximity.manager.state import (
     ABORTED,
     FAR,
-    GO_ON_AT,
     NEAR,
     PAIR_MEMORY,
     PAIR_RECORD,
@@ -71,7 +70,9 @@ from assembly.proximity.manager.state import (
     memory_header_at,
     memory_places,
     pair_at,
+    pair_lengths_at,
     pair_state_at,
+    place_at,
     release_given,
     seat_given,
 )
@@ -145,7 +146,7 @@ def crosses_elsewhere(table, pool, watch, memory, p, posed, roots, count, least,
         )
         deep = deep or (extremum_at(roots, k).gap < asked - margin and extremum_at(roots, k).origin != USELESS)
     for k in range(pair.low, pair.high):
-        if memory[places + PLACE_MEMORY * k] == p:
+        if place_at(memory, places + PLACE_MEMORY * k).pair == p:
             deep = deep or tracked_at(tracked, manager.first + k).gap < -margin
     return not deep and crosses(table, pool, posed, stack, candidates, margin, offsets)
 
@@ -164,7 +165,8 @@ def search_by_patches(table, pool, watch, memory, p, posed, moving, reach, offse
     stack, candidates, distances, passed, work, _pairs, _boxes, _marks = rooms
     lengths = lengths_at(pool, manager.lengths)
     minimum = pair_at(table, manager.pair_table + PAIR_RECORD * p).minimum
-    least, flank = pool[minimum], pool[minimum + 1]
+    asked = pair_lengths_at(pool, minimum)
+    least, flank = asked.least, asked.curved_bound
     at = memory_places(table, watch)[0] + PAIR_MEMORY * p
     found, reach = facing_pairs(table, pool, watch, memory, p, posed, moving, reach, stack, candidates)
     pair_state_at(memory, at).reach = reach
@@ -193,7 +195,8 @@ def search_by_spines(table, pool, watch, memory, p, posed, moving, reach, offset
     stack, _candidates, _distances, _passed, work, pairs, boxes, marks = rooms
     lengths = lengths_at(pool, manager.lengths)
     minimum = pair_at(table, manager.pair_table + PAIR_RECORD * p).minimum
-    least, flank = pool[minimum], pool[minimum + 1]
+    asked = pair_lengths_at(pool, minimum)
+    least, flank = asked.least, asked.curved_bound
     radii = both_radii(table, pool, posed.centerlines) + least
     ring = SPINE_RINGS * lengths.first_reach
     at_list = manager.list_table + LIST_INTS * (p % manager.lists)
@@ -230,9 +233,9 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, rooms, roots, asks):
     known = pair_state_at(memory, at)
     posed = posed_pair(manager, pair, q)
     state.looks += 1.0
-    minimum = pair.minimum
-    least = pool[minimum]
-    offsets = (pool[minimum + 2], pool[minimum + 3])
+    asked = pair_lengths_at(pool, pair.minimum)
+    least = asked.least
+    offsets = (asked.offset[0], asked.offset[1])
     moving = mover(table, watch, p, q)
     reach = reach_now(table, pool, watch, memory, p, moving)
     wires = posed.centerlines[0] >= 0
@@ -253,8 +256,8 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, rooms, roots, asks):
         )  # fmt: skip
     if posed.surfaces[0] < 0 and any_deep(roots, count):
         drop_flush(table, pool, watch, memory, p, posed, roots, count, tracked)
-    if manager.mark_address[0] != 0 and least > 0.0 and pair.given_count > 0:
-        call_address(manager.mark_address[0], (table, pool, watch, p, q, tracked, roots, count))
+    if manager.mark_address != 0 and least > 0.0 and pair.given_count > 0:
+        call_address(manager.mark_address, (table, pool, watch, p, q, tracked, roots, count))
         release_given(table, watch, memory, p, roots, count, tracked)
     rest, lowest, wanting = list_roots(table, pool, watch, memory, p, roots, count, tracked)
     known.crossed = math.nan
@@ -335,7 +338,7 @@ def look_at_due(table, pool, watch, memory, q, tracked, how, first, most):
         if p != first and not is_due(table, watch, memory, p, tracked, how, most):
             continue
         if p != first and manager.clock != 0 and call_address(manager.clock, ()) > state.deadline:
-            if table[watch + GO_ON_AT] == 0 or call_address(table[watch + GO_ON_AT], ()) == ABORTED:
+            if manager.go_on_address == 0 or call_address(manager.go_on_address, ()) == ABORTED:
                 # Who set it is told, and goes on in another call.
                 state.deadline = -1.0
                 break

@@ -17,9 +17,10 @@ from assembly.geometry.vec import cross, dot
 from assembly.proximity.brep.apexes import unit
 from assembly.proximity.brep.borders import feature_at, feature_kind
 from assembly.proximity.brep.records import EDGE, FACE
-from assembly.proximity.bvh.tree import ELEMENT, element_at, pairs_about, tree_at
+from assembly.proximity.bvh.tree import ELEMENT, element_at, pairs_about, three_of, tree_at
 from assembly.proximity.extrema.feature_jets import edge_jet
 from assembly.proximity.features.holding import FEATURES, HELD_F, HELD_G, POINT, TILT
+from assembly.proximity.features.solid_contact import pair_parameters
 from assembly.proximity.manager.extrema import (
     NEW,
     NOTHING,
@@ -56,8 +57,7 @@ def hold_roots(table, pool, posed, roots, count, work):
         codes = (np.int64(extremum.code_f), np.int64(extremum.code_g))
         if extremum.corner > 0.0 or extremum.gap < -SLACK or not is_corner(table, posed, codes[0], codes[1]):
             continue
-        x = (roots[k, 0], roots[k, 1], roots[k, 2], roots[k, 3])
-        n = (extremum.normal[0], extremum.normal[1], extremum.normal[2])
+        x, n = pair_parameters(extremum), three_of(extremum.normal)
         found = solids_root(table, pool, posed, codes, x, n, roots, count, work, FEATURES)
         extremum.corner = 0.0 if found == NOTHING else FEATURES
 
@@ -77,7 +77,7 @@ def is_next(table, pool, posed, codes, side, start, width, roots, count):
     for k in range(count):
         extremum = extremum_at(roots, k)
         if extremum.code_f == codes[0] and extremum.code_g == codes[1]:
-            _p, other, _bent = edge_jet(table, pool, edge, roots[k, 2 * side])
+            _p, other, _bent = edge_jet(table, pool, edge, extremum.parameters[2 * side])
             if dot(along, unit(other)) > NEXT:
                 return False
     return True
@@ -129,10 +129,11 @@ def add_corners(table, pool, posed, span, offsets, neglect, stack, candidates, r
             break
         o = tree_at(table, tree_f).element_pool + ELEMENT * candidates[c, 0]
         p = tree_at(table, tree_g).element_pool + ELEMENT * candidates[c, 1]
-        codes = (np.int64(element_at(pool, o).feature), np.int64(element_at(pool, p).feature))
-        start = (pool[o], pool[o + 1], pool[p], pool[p + 1])
+        f, g = element_at(pool, o), element_at(pool, p)
+        codes = (np.int64(f.feature), np.int64(g.feature))
+        start = (f.middle[0], f.middle[1], g.middle[0], g.middle[1])
         if is_of_faces(table, posed, codes[0], codes[1]):
-            half = (pool[o + 2], pool[o + 3], pool[p + 2], pool[p + 3])
+            half = (f.half[0], f.half[1], g.half[0], g.half[1])
             count = add_valley(table, pool, posed, codes, start, half, span, offsets, neglect, roots, count, work)
         if not is_corner(table, posed, codes[0], codes[1]):
             continue
@@ -140,7 +141,7 @@ def add_corners(table, pool, posed, span, offsets, neglect, stack, candidates, r
         side = 0 if feature_kind(table, posed.shells[0], codes[0]) == EDGE else 1
         other = feature_kind(table, posed.shells[1 - side], codes[1 - side])
         is_rim = other == FACE and feature_kind(table, posed.shells[side], codes[side]) == EDGE
-        width = pool[(o if side == 0 else p) + 2]
+        width = f.half[0] if side == 0 else g.half[0]
         if is_rim and count < roots.shape[0]:
             if is_next(table, pool, posed, codes, side, start, width, roots, count):
                 count = add_corner(table, pool, posed, codes, start, span, offsets, neglect, roots, count, work, POINT)

@@ -19,10 +19,8 @@ import math
 from assembly._kernel import kernel
 from assembly.geometry.vec import add, blend, dot, matvec, matvec_t, sub
 from assembly.proximity.manager.centerlines.curve import (
-    BEYOND,
     centerline_part_at,
     spine_point,
-    three,
 )
 
 # What a box is: nothing is known, no slope zero in it, F convex over it, F'' indefinite over it.
@@ -115,7 +113,7 @@ def beyond_joints(pool, o, low, high, d, sign, slack, least, bend):
     for side in range(2):
         at_border = low <= -half if side == 0 else high >= half
         if part.jumps[side] == 1.0 and at_border:
-            vector = three(pool, o + BEYOND + 3 * side)
+            vector = (part.beyond[side, 0], part.beyond[side, 1], part.beyond[side, 2])
             length = math.sqrt(dot(vector, vector))
             least = min(least, 1.0 + sign * dot(d, vector) - length * slack)
             sharpest = max(max(sharpest, length), bend)

@@ -10,29 +10,31 @@ from assembly._kernel import kernel
 from assembly.geometry.vec import add, dot, matvec, sub
 from assembly.proximity.bvh.neighbor_list import (
     ENTRIES,
+    ENTRY,
     can_be_listed,
     moved_since,
     neighbor_list_at,
+    neighbors_at,
     reaches,
     write_list,
 )
+from assembly.proximity.bvh.tree import three_of
 from assembly.proximity.manager.centerlines.box import ROUNDING, segment_distance
 from assembly.proximity.manager.centerlines.curve import (
     BALL,
-    BALL_RADIUS,
     PART,
-    TANGENT,
+    ball_at,
     centerline_at,
     centerline_part_at,
-    three,
 )
 
 
 @kernel(inline=True)
 def balls_apart(pool, o, p, turn, shift):
     """How far the balls at o and at p are apart, negative where they meet."""
-    d = sub(add(matvec(turn, three(pool, p)), shift), three(pool, o))
-    return math.sqrt(dot(d, d)) - pool[o + BALL_RADIUS] - pool[p + BALL_RADIUS]
+    f, g = ball_at(pool, o), ball_at(pool, p)
+    d = sub(add(matvec(turn, three_of(g.center)), shift), three_of(f.center))
+    return math.sqrt(dot(d, d)) - f.radius - g.radius
 
 
 @kernel(inline=True)
@@ -42,8 +44,8 @@ def parts_apart(pool, o, p, turn, shift):
     part_record = centerline_part_at(pool, p)
     h = part.half
     k = part_record.half
-    d = sub(add(matvec(turn, three(pool, p)), shift), three(pool, o))
-    least = segment_distance(d, three(pool, o + TANGENT), matvec(turn, three(pool, p + TANGENT)), h, k)
+    d = sub(add(matvec(turn, three_of(part_record.point)), shift), three_of(part.point))
+    least = segment_distance(d, three_of(part.tangent), matvec(turn, three_of(part_record.tangent)), h, k)
     return least - 0.5 * (part.bend * h * h + part_record.bend * k * k) - ROUNDING
 
 
@@ -99,7 +101,7 @@ def descend(table, pool, spines, turn, shift, reach, stack, out):
             continue
         if used + 2 > stack.shape[0]:
             return -1, 0.0
-        down_f = child_g < 0 or (child_f >= 0 and pool[o + BALL_RADIUS] >= pool[p + BALL_RADIUS])
+        down_f = child_g < 0 or (child_f >= 0 and ball_at(pool, o).radius >= ball_at(pool, p).radius)
         for k in range(2):
             stack[used, 0] = child_f + k if down_f else i
             stack[used, 1] = j if down_f else child_g + k
@@ -129,8 +131,9 @@ def near_parts(table, pool, at, p, posed, moving, reach, ring, stack, out, boxes
     if fits == 1:
         many = neighbor_list_at(table, at).count
         for k in range(many):
-            out[k, 0] = table[at + ENTRIES + 2 * k]
-            out[k, 1] = table[at + ENTRIES + 2 * k + 1]
+            entry = neighbors_at(table, at + ENTRIES + ENTRY * k)
+            out[k, 0] = entry.f
+            out[k, 1] = entry.g
     else:
         many, _beyond = descend(table, pool, spines, turn, shift, reach, stack, out)
     count = 0

@@ -16,6 +16,7 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly.geometry.vec import add, cross, dot, matvec, matvec_t, scale, sub
 from assembly.proximity.extrema.face_face import pair_frame
+from assembly.proximity.features.solid_contact import pair_parameters
 from assembly.proximity.manager.centerlines.box import BARREN, CONVEX, EMPTY, UNKNOWN, apart, box_of
 from assembly.proximity.manager.centerlines.curve import (
     PART,
@@ -82,8 +83,9 @@ def mark_known(table, pool, posed, roots, count, marks):
     surfaces = posed.surfaces
     f, g = posed.centerlines
     for k in range(count):
-        i, s = spine_place(table, pool, f, surfaces[0], roots[k, 0], roots[k, 1])
-        j, t = spine_place(table, pool, g, surfaces[1], roots[k, 2], roots[k, 3])
+        x = pair_parameters(extremum_at(roots, k))
+        i, s = spine_place(table, pool, f, surfaces[0], x[0], x[1])
+        j, t = spine_place(table, pool, g, surfaces[1], x[2], x[3])
         marks[k, 0] = float(i)
         marks[k, 1] = s
         marks[k, 2] = float(j)
