@@ -50,14 +50,14 @@ GRAIN, FAR = 2.0**-48, 1000.0
 def moved_since(table, pool, at, p, moving):
     """How far the body that moves is at most from where it was when the list at `at` was made; infinite for another's.
 
-    `moving` is the body whose motion is measured (`allowances.mover`).
+    `moving` is the body whose motion is measured (`manager/motion_bounds.Mover`).
     """
     neighbors = neighbor_list_at(table, at)
-    _side, tree, e, rotation, place = moving
     if neighbors.owner != p:
         return math.inf
-    root = tree_at(table, tree).node_pool
-    middle = add(matvec(rotation, three_of(node_at(pool, root).center)), place)
+    root = tree_at(table, moving.tree).node_pool
+    middle = add(matvec(moving.turn, three_of(node_at(pool, root).center)), moving.shift)
+    e = moving.quaternion
     square = 0.0
     other = 0.0
     for k in range(4):
@@ -82,9 +82,8 @@ def reaches(table, at, moved, reach):
 @kernel(inner=True)
 def can_be_listed(table, pool, moving, reach):
     """Whether lengths of a list are in its range."""
-    _side, tree, _e, rotation, place = moving
-    root = tree_at(table, tree).node_pool
-    middle = add(matvec(rotation, three_of(node_at(pool, root).center)), place)
+    root = tree_at(table, moving.tree).node_pool
+    middle = add(matvec(moving.turn, three_of(node_at(pool, root).center)), moving.shift)
     return dot(middle, middle) < FAR * FAR and reach < FAR and node_at(pool, root).radius < FAR
 
 
@@ -92,11 +91,11 @@ def can_be_listed(table, pool, moving, reach):
 def write_list(table, pool, at, p, moving, reach, ring, found, count):
     """Keep `count` pairs (k, 2), made for motions up to `ring`; none where there is no room. Whether there was."""
     neighbors = neighbor_list_at(table, at)
-    _side, tree, e, rotation, place = moving
-    middle = add(matvec(rotation, three_of(node_at(pool, tree_at(table, tree).node_pool).center)), place)
+    root = node_at(pool, tree_at(table, moving.tree).node_pool)
+    middle = add(matvec(moving.turn, three_of(root.center)), moving.shift)
     neighbors.owner = p
     for k in range(4):
-        neighbors.turn[k] = np.int64(e[k] / GRAIN)
+        neighbors.turn[k] = np.int64(moving.quaternion[k] / GRAIN)
     for k in range(3):
         neighbors.place[k] = np.int64(middle[k] / GRAIN)
     # Less by more than what the pose is rounded by, at a radius of FAR.
@@ -117,14 +116,14 @@ def write_list(table, pool, at, p, moving, reach, ring, found, count):
 def listed_pairs(table, pool, at, p, trees, turn, shift, moving, reach, ring, stack, candidates):
     """What `pairs_within` finds, from the list at `at`, which is made anew where it does not reach.
 
-    The pose is that of g seen from f; `moving` is the body whose motion is measured (`allowances.mover`), and a new
+    The pose is that of g seen from f; `moving` is the body whose motion is measured (`manager/motion_bounds.Mover`), and a new
     list is for motions of it up to `ring`. -1 where there is no room for a list.
     """
     fits = reaches(table, at, moved_since(table, pool, at, p, moving), reach)
     if fits < 0 or (fits == 0 and not can_be_listed(table, pool, moving, ring + reach)):
         return -1
     if fits == 0:
-        tilt = ring / node_at(pool, tree_at(table, moving[1]).node_pool).radius
+        tilt = ring / node_at(pool, tree_at(table, moving.tree).node_pool).radius
         count = pairs_about(table, pool, trees[0], trees[1], turn, shift, reach, ring, tilt, stack, candidates)
         if not write_list(table, pool, at, p, moving, reach, ring, candidates, count):
             return -1

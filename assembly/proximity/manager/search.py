@@ -23,6 +23,7 @@ from assembly.proximity.manager.extrema import (
     extremum_at,
     is_alone,
 )
+from assembly.proximity.manager.motion_bounds import MotionBall, PairSearch
 from assembly.proximity.manager.newton_regions import LEFT, half_widths, is_known, newton_way_at, stays
 from assembly.proximity.manager.overlap import is_outside
 
@@ -88,12 +89,9 @@ def search_patches(
 ):
     """Look into `found` pairs of patches for minima that are not known: new ones where their gaps are in a span.
 
-    The `limits` are the flank and how near is near enough to look into. Returns how many roots there are; how near
-    patches are that are beyond both; and how far what is in a ball on the body that is `moving` may go, in which a
-    motion may bring forth a contact, with that ball: its middle, where that is seen from the other body, its radius.
+    The `limits` are the flank and how near is near enough to look into. Returns a PairSearch.
     """
     flank, enough = limits
-    side, tree, _e, turn, shift = moving
     candidates, distances = facing
     free = math.inf
     fertile = math.inf
@@ -121,7 +119,7 @@ def search_patches(
             bound = max(bound, flank)
         if bears:
             fertile = min(fertile, bound)
-            lo, hi = around(table, pool, tree, candidates[c, side], lo, hi)
+            lo, hi = around(table, pool, moving.tree, candidates[c, moving.side], lo, hi)
         if new >= 0:
             gap = extremum_at(roots, new).gap
             # The far sides of two bodies oppose each other, too.
@@ -130,5 +128,5 @@ def search_patches(
             extremum_at(roots, new).origin = USELESS if alien else NEW
     d = sub(hi, lo)
     center = scale(0.5, add(lo, hi))
-    ball = (center, add(matvec(turn, center), shift), 0.5 * math.sqrt(dot(d, d)))
-    return count, free, fertile, ball
+    place = add(matvec(moving.turn, center), moving.shift)
+    return PairSearch(count, free, fertile, MotionBall(center, place, 0.5 * math.sqrt(dot(d, d))), math.inf)

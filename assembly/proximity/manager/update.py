@@ -14,6 +14,7 @@ may move by less (`motion_bounds.py`). Which patches a look goes into is in `can
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 import numpy as np
 
@@ -39,7 +40,9 @@ from assembly.proximity.manager.extrema import (
 from assembly.proximity.manager.flush import any_deep, drop_flush
 from assembly.proximity.manager.motion_bounds import (
     LEAST_ALLOWANCE,
+    NO_BALL,
     STILL,
+    PairSearch,
     allow_ball,
     largest_part,
     mover,
@@ -92,7 +95,10 @@ CANDIDATES, STACK = 8192, 1024
 FLAT = 0.2
 # Lists of parts of spines that are near are for motions up to so many first reaches.
 SPINE_RINGS = 4.0
-NO_BALL = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0)
+# Arrays of an update. stack: nodes of both trees that wait, (k, 2); candidates: pairs of patches, (k, 2), and their
+# distances; passed: ways of Newton's method, (WAYS, PASSED); work: one record of derivatives, one tracked pair; pairs:
+# parts of centerlines, (k, 2); boxes: of both (`centerlines/search.py`); marks: of known roots, and minima of a box.
+Workspace = namedtuple("Workspace", "stack candidates distances passed work pairs boxes marks")
 # Ways of Newton's method that are remembered in a look.
 WAYS = 64
 # Whether a look tells if bodies cross where no contact says so. A contact that lost its root is a reason to ask in a
@@ -152,17 +158,13 @@ def crosses_elsewhere(table, pool, watch, memory, p, posed, roots, count, least,
 
 
 @kernel(inner=True)
-def search_by_patches(table, pool, watch, memory, p, posed, moving, reach, offsets, tracked, rooms, roots):
-    """Find the roots of pair p by patches that face each other; what a look knows of the pair then.
+def search_by_patches(table, pool, watch, memory, p, posed, moving, reach, offsets, tracked, workspace, roots):
+    """Find the roots of pair p by patches that face each other.
 
-    Returns
-    -------
-    How many roots there are; whether a listed one was lost; how far bodies may go for what is not listed;
-    how far what is in a ball may go, and that ball; how far, until a pose that stays is looked at; whether there is
-    anything within reach.
+    Returns a PairSearch, whether a listed root was lost, and whether there is anything within reach.
     """
     manager = manager_at(table, watch)
-    stack, candidates, distances, passed, work, _pairs, _boxes, _marks = rooms
+    stack, candidates, distances = workspace.stack, workspace.candidates, workspace.distances
     lengths = lengths_at(pool, manager.lengths)
     minimum = pair_at(table, manager.pair_table + PAIR_RECORD * p).minimum
     asked = pair_lengths_at(pool, minimum)
@@ -170,29 +172,30 @@ def search_by_patches(table, pool, watch, memory, p, posed, moving, reach, offse
     at = memory_places(table, watch)[0] + PAIR_MEMORY * p
     found, reach = facing_pairs(table, pool, watch, memory, p, posed, moving, reach, stack, candidates)
     pair_state_at(memory, at).reach = reach
-    count, any_gone = known_roots(table, pool, watch, memory, p, posed, offsets, tracked, roots, work)
+    count, any_gone = known_roots(table, pool, watch, memory, p, posed, offsets, tracked, roots, workspace.work)
     enough = near_enough(table, pool, posed, least, reach, flank, candidates, found, distances)
     span = (-lengths.last_reach, reach + least)
     neglect = lengths.neglect
     facing = (candidates, distances)
-    count, free, fertile, ball = search_patches(
-        table, pool, posed, moving, (flank, enough), span, offsets, neglect, facing, found, roots, count, work, passed
-    )
-    free = min(free, reach)
+    search = search_patches(
+        table, pool, posed, moving, (flank, enough), span, offsets, neglect, facing, found, roots, count, workspace.work,
+        workspace.passed,
+    )  # fmt: skip
+    free = min(search.bound, reach)
     if found == 0:
         # Nothing faces the other body within reach: the boxes tell how far that is so.
         trees = posed.trees
         free = max(
             free, least_distance(table, pool, trees[0], trees[1], posed.turn, posed.shift, math.inf, stack) - least
         )
-    return count, any_gone, free, fertile, ball, math.inf, found > 0
+    return PairSearch(search.count, free, search.ball_bound, search.ball, math.inf), any_gone, found > 0
 
 
 @kernel(inner=True)
-def search_by_spines(table, pool, watch, memory, p, posed, moving, reach, offsets, tracked, rooms, roots):
+def search_by_spines(table, pool, watch, memory, p, posed, moving, reach, offsets, tracked, workspace, roots):
     """The same for two round wires, by their spines."""
     manager = manager_at(table, watch)
-    stack, _candidates, _distances, _passed, work, pairs, boxes, marks = rooms
+    stack, pairs, boxes = workspace.stack, workspace.pairs, workspace.boxes
     lengths = lengths_at(pool, manager.lengths)
     minimum = pair_at(table, manager.pair_table + PAIR_RECORD * p).minimum
     asked = pair_lengths_at(pool, minimum)
@@ -206,25 +209,25 @@ def search_by_spines(table, pool, watch, memory, p, posed, moving, reach, offset
         reach *= 0.5
         waiting = near_parts(table, pool, at_list, p, posed, moving, radii + reach, ring, stack, pairs, boxes)
     pair_state_at(memory, memory_places(table, watch)[0] + PAIR_MEMORY * p).reach = reach
-    count, any_gone = known_roots(table, pool, watch, memory, p, posed, offsets, tracked, roots, work)
+    count, any_gone = known_roots(table, pool, watch, memory, p, posed, offsets, tracked, roots, workspace.work)
     if waiting < 0:
         # There is no room for what is as near as it should not be.
         memory_header_at(memory, 0).crowded = 1.0
-        return count, any_gone, 0.0, math.inf, NO_BALL, math.inf, True
+        return PairSearch(count, 0.0, math.inf, NO_BALL, math.inf), any_gone, True
     if waiting == 0:
         beyond = parts_beyond(table, pool, posed, radii + reach, stack, pairs) - radii
-        return count, any_gone, beyond, math.inf, NO_BALL, math.inf, False
+        return PairSearch(count, beyond, math.inf, NO_BALL, math.inf), any_gone, False
     # No tangent turns by more than a motion over this.
-    rho = min(2.0 * (radii + reach), 0.99 * node_at(pool, tree_at(table, moving[1]).node_pool).radius)
-    count, free, fertile, ball, sure = search_spines(
+    rho = min(2.0 * (radii + reach), 0.99 * node_at(pool, tree_at(table, moving.tree).node_pool).radius)
+    search = search_spines(
         table, pool, posed, moving, rho, (least, TAKE * reach, reach, flank), lengths.neglect, boxes, waiting,
-        marks, roots, count, work,
+        workspace.marks, roots, count, workspace.work,
     )  # fmt: skip
-    return count, any_gone, free, fertile, ball, sure, True
+    return search, any_gone, True
 
 
 @kernel(inner=True)
-def look_at_pair(table, pool, watch, memory, p, q, tracked, rooms, roots, asks):
+def look_at_pair(table, pool, watch, memory, p, q, tracked, workspace, roots, asks):
     """Find and list the roots of pair p; `asks` says whether it tells if the bodies cross elsewhere."""
     state = memory_header_at(memory, 0)
     manager = manager_at(table, watch)
@@ -240,18 +243,19 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, rooms, roots, asks):
     reach = reach_now(table, pool, watch, memory, p, moving)
     wires = posed.centerlines[0] >= 0
     if wires:
-        count, any_gone, free, fertile, ball, sure, found = search_by_spines(
-            table, pool, watch, memory, p, posed, moving, reach, offsets, tracked, rooms, roots
+        search, any_gone, found = search_by_spines(
+            table, pool, watch, memory, p, posed, moving, reach, offsets, tracked, workspace, roots
         )
     else:
-        count, any_gone, free, fertile, ball, sure, found = search_by_patches(
-            table, pool, watch, memory, p, posed, moving, reach, offsets, tracked, rooms, roots
+        search, any_gone, found = search_by_patches(
+            table, pool, watch, memory, p, posed, moving, reach, offsets, tracked, workspace, roots
         )
+    count, fertile, sure = search.count, search.ball_bound, search.accepted_bound
     if posed.surfaces[0] >= 0:
         seat_given(table, watch, memory, p, roots, count, tracked)
     elif manager.corners == 1:
         count = list_corners(
-            table, pool, watch, posed, known.reach, least, offsets, rooms[0], rooms[1], roots, count, rooms[4],
+            table, pool, watch, posed, known.reach, least, offsets, workspace.stack, workspace.candidates, roots, count, workspace.work,
             tracked,
         )  # fmt: skip
     if posed.surfaces[0] < 0 and any_deep(roots, count):
@@ -266,10 +270,22 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, rooms, roots, asks):
         known.crossed = 1.0 if lowest < -max(CROSSING, state.overlap) else 0.0
     elif asks == ALWAYS or (asks == WHERE_LOST and any_gone):
         crossed = crosses_elsewhere(
-            table, pool, watch, memory, p, posed, roots, count, least, offsets, rooms[0], rooms[1], tracked
+            table,
+            pool,
+            watch,
+            memory,
+            p,
+            posed,
+            roots,
+            count,
+            least,
+            offsets,
+            workspace.stack,
+            workspace.candidates,
+            tracked,
         )
         known.crossed = 1.0 if crossed else 0.0
-    known.allowance = max(min(rest, free), LEAST_ALLOWANCE)
+    known.allowance = max(min(rest, search.bound), LEAST_ALLOWANCE)
     known.part = 0.0
     known.doubt = 0.0
     if wires:
@@ -278,7 +294,7 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, rooms, roots, asks):
         low = nearest_fold(roots, count, least, known.reach)
         sure = 0.0 if low <= FLAT * lengths_at(pool, manager.lengths).first_reach else math.inf
         fertile = fertile if sure == 0.0 else min(fertile, low)
-    allow_ball(memory, at, ball, fertile, sure)
+    allow_ball(memory, at, search.ball, fertile, sure)
     listed = any_listed(table, watch, memory, p)
     known.state = float(TRACKING if listed else (NEAR if found else FAR))
     if wanting:
@@ -351,8 +367,17 @@ def look_at_due(table, pool, watch, memory, q, tracked, how, first, most):
         asks = WHERE_LOST if how & DOUBTFUL != 0 else NEVER
         if how & ~MEASURED == EVERYTHING or math.isnan(pair_state_at(memory, at + PAIR_MEMORY * p).turn[0]):
             asks = ALWAYS
-        rooms = (stack, candidates, distances, passed, work, pairs, boxes, marks)
-        look_at_pair(table, pool, watch, memory, p, q, tracked, rooms, roots, asks)
+        workspace = Workspace(
+            stack=stack,
+            candidates=candidates,
+            distances=distances,
+            passed=passed,
+            work=work,
+            pairs=pairs,
+            boxes=boxes,
+            marks=marks,
+        )
+        look_at_pair(table, pool, watch, memory, p, q, tracked, workspace, roots, asks)
 
 
 @kernel(signatures="(i8[::1], f8[::1], i8, f8[::1], f8[:, ::1], f8[:, ::1], i8)")

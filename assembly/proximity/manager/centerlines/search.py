@@ -39,6 +39,7 @@ from assembly.proximity.manager.extrema import (
     extremum_at,
     write,
 )
+from assembly.proximity.manager.motion_bounds import NO_BALL, MotionBall, PairSearch
 
 # Room: boxes that wait, six doubles each (part and lengths of f, then of g).
 BOXES, BOX = 2048, 6
@@ -217,16 +218,13 @@ def search_spines(table, pool, posed, moving, rho, lengths, neglect, boxes, wait
     fold. `moving` is the body that moves. There are `waiting` boxes; within the reach nothing is outside of them. The
     `rooms` are for marks of known roots, and for the minima of a box.
 
-    Returns
-    -------
-    How many roots there are; how far bodies may go for all that is not in the ball; how far what is in the ball on the
-    body that moves may go, infinite if there is none; that ball; how far it may, until a pose that stays is looked at.
+    Returns a PairSearch.
     """
     least, near, reach, flank = lengths
     f, g = posed.centerlines
     line = centerline_at(table, f)
     centerline = centerline_at(table, g)
-    side, _tree, _e, turn, shift = moving
+    side = moving.side
     radii = both_radii(table, pool, posed.centerlines) + least
     sharpest = max(wire_at(pool, line.numbers).sharpest, wire_at(pool, centerline.numbers).sharpest)
     known = count
@@ -278,8 +276,9 @@ def search_spines(table, pool, posed, moving, rho, lengths, neglect, boxes, wait
         fertile = min(fertile, allowed)
         lo, hi = around_box(pool, p if side == 1 else o, box, side, lo, hi)
     if not fertile < math.inf:
-        return count, free, fertile, ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0), sure
+        return PairSearch(count, free, fertile, NO_BALL, sure)
     d = sub(hi, lo)
     center = scale(0.5, add(lo, hi))
     radius = max(0.5 * math.sqrt(dot(d, d)), rho)
-    return count, free, fertile, (center, add(matvec(turn, center), shift), radius), sure
+    ball = MotionBall(center=center, place=add(matvec(moving.turn, center), moving.shift), radius=radius)
+    return PairSearch(count, free, fertile, ball, sure)
