@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from assembly.proximity.manager.posed_pair import PosedPair
 
 from assembly.geometry import shapes
 from assembly.geometry.faces.face import Face
@@ -163,3 +164,9 @@ def random_group(seed, kind_f, kind_g, count):
     tame = np.flatnonzero(np.abs(rates).max(axis=(1, 2)) < 30.0)
     assert tame.size >= count, f"{tame.size} of {many} random pairs are away from singular ones"
     return group.take(tame[:count])
+
+
+def posed(turn, shift, surfaces=(-1, -1), shells=(-1, -1)):
+    """A posed pair of bodies, of which kernels read no more than the pose and the shapes."""
+    none = (-1, -1)
+    return PosedPair(turn, shift, surfaces, shells, trees=none, centerlines=none, bodies=(0, 1), poses=None, track_solids=0)

@@ -140,9 +140,9 @@ def test_a_point_that_is_held_goes_back_to_the_bottom():
     rng = np.random.default_rng(8)
     for tilt in (0.0, 1e-6, 1e-3):
         turn, shift = tilted(rng, tilt, scale)
-        scene = (tuple(turn.ravel()), tuple(shift), (-1, -1, *shells))
+        pair = posed(tuple(turn.ravel()), tuple(shift), shells=tuple(shells))
         start = (0.0, 0.0, rng.uniform(0.0, u1), v0 + (0.75 + rng.uniform(-0.03, 0.03)) * (v1 - v0))
-        x = sunk(table, pool, scene, (top, 0), HELD_G, start)
+        x = sunk(table, pool, pair, (top, 0), HELD_G, start)
         p = surface.evaluate(x[2], x[3])
         low, _ = lowest_across(turn, shift, np.arctan2(p[1], p[0]), scale)
         assert (turn @ p / scale + shift)[2] == pytest.approx(low, abs=ARRIVED**2 + 1e-15 + MINOR * tilt**4)
@@ -151,11 +151,11 @@ def test_a_point_that_is_held_goes_back_to_the_bottom():
 def test_a_point_that_is_held_stays_where_its_bottom_is_over_a_hole():
     table, pool, scale, shells, top = ring_on_a_slab(asm.shapes.plate(4.0, 4.0, 0.5, [(MAJOR, 0.0, 0.2)]))
     _, (v0, v1) = asm.shapes.torus(MAJOR, MINOR).domain
-    scene = (tuple(np.eye(3).ravel()), (0.0, 0.0, 0.35 / scale), (-1, -1, *shells))
+    pair = posed(tuple(np.eye(3).ravel()), (0.0, 0.0, 0.35 / scale), shells=tuple(shells))
     start = (MAJOR, 0.0, 0.0, v0 + 0.77 * (v1 - v0))
     # Of the slab nothing is below it; of the ring there is.
-    assert sunk(table, pool, scene, (top, 0), HELD_F, start) == start
-    assert sunk(table, pool, scene, (top, 0), HELD_G, start)[3] == pytest.approx(v0 + 0.75 * (v1 - v0), abs=1e-9)
+    assert sunk(table, pool, pair, (top, 0), HELD_F, start) == start
+    assert sunk(table, pool, pair, (top, 0), HELD_G, start)[3] == pytest.approx(v0 + 0.75 * (v1 - v0), abs=1e-9)
 
 
 def test_few_of_a_continuum_are_held():

@@ -116,8 +116,8 @@ def write_list(table, pool, at, p, moving, reach, ring, found, count):
 def listed_pairs(table, pool, at, p, trees, turn, shift, moving, reach, ring, stack, candidates):
     """What `pairs_within` finds, from the list at `at`, which is made anew where it does not reach.
 
-    The pose is that of g seen from f; `moving` is the body whose motion is measured (`manager/motion_bounds.Mover`), and a new
-    list is for motions of it up to `ring`. -1 where there is no room for a list.
+    The pose is that of g seen from f; `moving` is a Mover (`manager/motion_bounds.py`), and
+    a new list is for motions of it up to `ring`. -1 where there is no room for a list.
     """
     fits = reaches(table, at, moved_since(table, pool, at, p, moving), reach)
     if fits < 0 or (fits == 0 and not can_be_listed(table, pool, moving, ring + reach)):

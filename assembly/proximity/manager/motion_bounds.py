@@ -35,8 +35,8 @@ STILL = 1e-8
 MOVES, MOVES_OF_WIRES = 12.0, 6.0
 
 
-# The body of a pair whose motion is measured. side: 0 if that is f, 1 g; tree: its tree; turn, shift: its pose seen from
-# the other body, a rotation matrix by rows and its origin; quaternion: the same turn.
+# The body of a pair whose motion is measured. side: 0 if that is f, 1 g; tree: its tree; turn, shift: its pose seen
+# from the other body, a rotation matrix by rows and its origin; quaternion: the same turn.
 Mover = namedtuple("Mover", "side tree quaternion turn shift")
 # A ball on it. center: in its axes; place: where that is, seen from the other body.
 MotionBall = namedtuple("MotionBall", "center place radius")

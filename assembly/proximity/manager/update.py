@@ -24,10 +24,11 @@ from assembly.proximity.bvh.neighbor_list import LIST_INTS
 from assembly.proximity.bvh.tree import least_distance, node_at, tree_at
 from assembly.proximity.features.solid_contact import CONTACT_RECORD, TRACK, tracked_at
 from assembly.proximity.manager.candidates import facing_pairs, near_enough
+from assembly.proximity.manager.centerlines.box import BOX
 from assembly.proximity.manager.centerlines.curve import both_radii
 from assembly.proximity.manager.centerlines.minima import MINIMA
 from assembly.proximity.manager.centerlines.parts import near_parts, parts_beyond
-from assembly.proximity.manager.centerlines.search import BOX, BOXES, search_spines
+from assembly.proximity.manager.centerlines.search import BOXES, MARK, search_spines
 from assembly.proximity.manager.extrema import (
     ELSEWHERE,
     GIVEN_CONTACT,
@@ -109,7 +110,7 @@ CROSSING = 1e-6
 
 
 @kernel(inner=True)
-def list_corners(table, pool, watch, posed, reach, least, offsets, stack, candidates, roots, count, work, tracked):
+def list_corners(table, pool, watch, posed, reach, least, offsets, workspace, roots, count, tracked):
     """Add corners over faces to the roots of a pair. Returns how many roots there are.
 
     A listed contact whose root is at one stays there.
@@ -118,6 +119,7 @@ def list_corners(table, pool, watch, posed, reach, least, offsets, stack, candid
     lengths = lengths_at(pool, manager.lengths)
     span = (-lengths.first_reach, reach + least)
     neglect = lengths.neglect
+    stack, candidates, work = workspace.stack, workspace.candidates, workspace.work
     count = add_corners(table, pool, posed, span, offsets, neglect, stack, candidates, roots, count, work)
     for k in range(count):
         extremum = extremum_at(roots, k)
@@ -178,8 +180,8 @@ def search_by_patches(table, pool, watch, memory, p, posed, moving, reach, offse
     neglect = lengths.neglect
     facing = (candidates, distances)
     search = search_patches(
-        table, pool, posed, moving, (flank, enough), span, offsets, neglect, facing, found, roots, count, workspace.work,
-        workspace.passed,
+        table, pool, posed, moving, (flank, enough), span, offsets, neglect, facing, found, roots, count,
+        workspace.work, workspace.passed,
     )  # fmt: skip
     free = min(search.bound, reach)
     if found == 0:
@@ -254,10 +256,7 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, workspace, roots, as
     if posed.surfaces[0] >= 0:
         seat_given(table, watch, memory, p, roots, count, tracked)
     elif manager.corners == 1:
-        count = list_corners(
-            table, pool, watch, posed, known.reach, least, offsets, workspace.stack, workspace.candidates, roots, count, workspace.work,
-            tracked,
-        )  # fmt: skip
+        count = list_corners(table, pool, watch, posed, known.reach, least, offsets, workspace, roots, count, tracked)
     if posed.surfaces[0] < 0 and any_deep(roots, count):
         drop_flush(table, pool, watch, memory, p, posed, roots, count, tracked)
     if manager.mark_address != 0 and least > 0.0 and pair.given_count > 0:
@@ -343,7 +342,7 @@ def look_at_due(table, pool, watch, memory, q, tracked, how, first, most):
     roots = np.empty((ROOTS, ROOT))
     pairs = np.empty((BOXES, 2), np.int64)
     boxes = np.empty((BOXES, BOX))
-    marks = (np.empty((ROOTS, 4)), np.empty((MINIMA, 2)))
+    marks = (np.empty((ROOTS, MARK)), np.empty((MINIMA, 2)))
     work = (np.empty((1, CONTACT_RECORD)), np.empty((1, TRACK)))
     with_patches = False
     candidates = stack

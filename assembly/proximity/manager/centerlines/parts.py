@@ -19,7 +19,7 @@ from assembly.proximity.bvh.neighbor_list import (
     write_list,
 )
 from assembly.proximity.bvh.tree import three_of
-from assembly.proximity.manager.centerlines.box import ROUNDING, segment_distance
+from assembly.proximity.manager.centerlines.box import ROUNDING, centerline_box_at, segment_distance
 from assembly.proximity.manager.centerlines.curve import (
     BALL,
     PART,
@@ -50,12 +50,13 @@ def parts_apart(pool, o, p, turn, shift):
 
 
 @kernel(inline=True)
-def whole_box(table, pool, spine, part, boxes, b, at):
-    """A side of box b: a whole part, from and to its ends."""
-    half = centerline_part_at(pool, centerline_at(table, spine).part_pool + PART * part).half
-    boxes[b, at] = float(part)
-    boxes[b, at + 1] = -half
-    boxes[b, at + 2] = half
+def whole_box(table, pool, spines, i, j, boxes, b):
+    """Box b: the whole parts i of f and j of g, from and to their ends."""
+    box = centerline_box_at(boxes, b)
+    half_f = centerline_part_at(pool, centerline_at(table, spines[0]).part_pool + PART * i).half
+    half_g = centerline_part_at(pool, centerline_at(table, spines[1]).part_pool + PART * j).half
+    box.part_f, box.from_f, box.to_f = float(i), -half_f, half_f
+    box.part_g, box.from_g, box.to_g = float(j), -half_g, half_g
 
 
 @kernel(inner=True)
@@ -152,7 +153,6 @@ def near_parts(table, pool, at, p, posed, moving, reach, ring, stack, out, boxes
             continue
         if count == boxes.shape[0]:
             return -1
-        whole_box(table, pool, f, i, boxes, count, 0)
-        whole_box(table, pool, g, j, boxes, count, 3)
+        whole_box(table, pool, spines, i, j, boxes, count)
         count += 1
     return count if many >= 0 else -1

@@ -14,10 +14,22 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly._record import record_dtype, record_view, size_of
 from assembly.geometry.vec import add, cross, dot, matvec, matvec_t, scale, sub
 from assembly.proximity.extrema.face_face import pair_frame
 from assembly.proximity.features.solid_contact import pair_parameters
-from assembly.proximity.manager.centerlines.box import BARREN, CONVEX, EMPTY, UNKNOWN, apart, box_of
+from assembly.proximity.manager.centerlines.box import (
+    BARREN,
+    BOX,
+    CONVEX,
+    EMPTY,
+    UNKNOWN,
+    FreeEnds,
+    Lengths,
+    apart,
+    box_of,
+    centerline_box_at,
+)
 from assembly.proximity.manager.centerlines.curve import (
     PART,
     both_radii,
@@ -41,8 +53,12 @@ from assembly.proximity.manager.extrema import (
 )
 from assembly.proximity.manager.motion_bounds import NO_BALL, MotionBall, PairSearch
 
-# Room: boxes that wait, six doubles each (part and lengths of f, then of g).
-BOXES, BOX = 2048, 6
+# Room for boxes that wait.
+BOXES = 2048
+# Where a known root is on the centerlines: part and length from its middle of either.
+KNOWN_PLACE = record_dtype("f8", part_f=1, at_f=1, part_g=1, at_g=1)
+known_place_at = record_view(KNOWN_PLACE)
+MARK = size_of(KNOWN_PLACE)
 # Boxes over half of which no tangent turns by more than this are thin enough for feet to tell.
 THIN = 0.025
 # So many boxes are halved only because they allow little, down to so many radians.
@@ -66,15 +82,15 @@ def open_ends(table, pool, f, g, box):
     centerline = centerline_at(table, g)
     free_f = line.closed == 0
     free_g = centerline.closed == 0
-    i = np.int64(box[0])
-    j = np.int64(box[3])
+    i = np.int64(box.part_f)
+    j = np.int64(box.part_g)
     half_f = centerline_part_at(pool, line.part_pool + PART * i).half
     half_g = centerline_part_at(pool, centerline.part_pool + PART * j).half
-    return (
-        free_f and i == 0 and box[1] <= -half_f,
-        free_f and i == line.parts - 1 and box[2] >= half_f,
-        free_g and j == 0 and box[4] <= -half_g,
-        free_g and j == centerline.parts - 1 and box[5] >= half_g,
+    return FreeEnds(
+        start_f=free_f and i == 0 and box.from_f <= -half_f,
+        end_f=free_f and i == line.parts - 1 and box.to_f >= half_f,
+        start_g=free_g and j == 0 and box.from_g <= -half_g,
+        end_g=free_g and j == centerline.parts - 1 and box.to_g >= half_g,
     )
 
 
@@ -87,29 +103,31 @@ def mark_known(table, pool, posed, roots, count, marks):
         x = pair_parameters(extremum_at(roots, k))
         i, s = spine_place(table, pool, f, surfaces[0], x[0], x[1])
         j, t = spine_place(table, pool, g, surfaces[1], x[2], x[3])
-        marks[k, 0] = float(i)
-        marks[k, 1] = s
-        marks[k, 2] = float(j)
-        marks[k, 3] = t
+        mark = known_place_at(marks, k)
+        mark.part_f, mark.at_f = float(i), s
+        mark.part_g, mark.at_g = float(j), t
         o = centerline_at(table, f).part_pool + PART * i
         p = centerline_at(table, g).part_pool + PART * j
-        d, tf, _bend_f, tg, _bend_g = apart(pool, o, p, posed.turn, posed.shift, s, t)
-        if extremum_at(roots, k).origin == USELESS or not abs(dot(d, tf)) + abs(dot(d, tg)) <= AT_ROOT * math.sqrt(
-            dot(d, d)
-        ):
+        there = apart(pool, o, p, posed.turn, posed.shift, s, t)
+        d = there.d
+        if extremum_at(roots, k).origin == USELESS or not abs(dot(d, there.tangent_f)) + abs(
+            dot(d, there.tangent_g)
+        ) <= AT_ROOT * math.sqrt(dot(d, d)):
             # Of far sides, at a half ball, or on its way to a root: what is there is looked for.
-            marks[k, 0] = math.nan
+            mark.part_f = math.nan
 
 
 @kernel(inner=True)
 def is_marked(boxes, b, marks, count):
     """Whether a known root is in box b."""
+    box = centerline_box_at(boxes, b)
     for k in range(count):
+        mark = known_place_at(marks, k)
         if (
-            marks[k, 0] == boxes[b, 0]
-            and marks[k, 2] == boxes[b, 3]
-            and boxes[b, 1] <= marks[k, 1] <= boxes[b, 2]
-            and boxes[b, 4] <= marks[k, 3] <= boxes[b, 5]
+            mark.part_f == box.part_f
+            and mark.part_g == box.part_g
+            and box.from_f <= mark.at_f <= box.to_f
+            and box.from_g <= mark.at_g <= box.to_g
         ):
             return True
     return False
@@ -135,9 +153,10 @@ def add_minimum(table, pool, posed, i, j, s, t, neglect, roots, count, work):
     f, g = posed.centerlines
     o = centerline_at(table, f).part_pool + PART * i
     p = centerline_at(table, g).part_pool + PART * j
-    d, tf, _bend_f, tg, _bend_g = apart(pool, o, p, posed.turn, posed.shift, s, t)
+    there = apart(pool, o, p, posed.turn, posed.shift, s, t)
+    d = there.d
     length = math.sqrt(dot(d, d))
-    way = scale(1.0 / length, d) if length >= MEETING else across_both(tf, tg)
+    way = scale(1.0 / length, d) if length >= MEETING else across_both(there.tangent_f, there.tangent_g)
     u_f, v_f = wire_parameters(table, pool, f, posed.surfaces[0], i, s, way)
     u_g, v_g = wire_parameters(table, pool, g, posed.surfaces[1], j, t, matvec_t(posed.turn, scale(-1.0, way)))
     start = (u_f, v_f, u_g, v_g)
@@ -164,7 +183,7 @@ def add_minimum(table, pool, posed, i, j, s, t, neglect, roots, count, work):
 @kernel(inline=True)
 def around_box(pool, o, box, side, lo, hi):
     """A box (lo, hi) made larger so that the part of one spine in a box of both is in it."""
-    begin, end = (box[1], box[2]) if side == 0 else (box[4], box[5])
+    begin, end = (box.from_f, box.to_f) if side == 0 else (box.from_g, box.to_g)
     half = 0.5 * (end - begin)
     middle = spine_point(pool, o, begin + half)[0]
     return (
@@ -176,27 +195,28 @@ def around_box(pool, o, box, side, lo, hi):
 @kernel(inline=True)
 def halves(boxes, b):
     """Box b is halved along the longer one of its sides; the second half is behind it."""
-    at = 1 if boxes[b, 2] - boxes[b, 1] >= boxes[b, 5] - boxes[b, 4] else 4
-    middle = 0.5 * (boxes[b, at] + boxes[b, at + 1])
     for m in range(BOX):
         boxes[b + 1, m] = boxes[b, m]
-    boxes[b, at + 1] = middle
-    boxes[b + 1, at] = middle
+    first, second = centerline_box_at(boxes, b), centerline_box_at(boxes, b + 1)
+    if first.to_f - first.from_f >= first.to_g - first.from_g:
+        first.to_f = second.from_f = 0.5 * (first.from_f + first.to_f)
+    else:
+        first.to_g = second.from_g = 0.5 * (first.from_g + first.to_g)
 
 
 @kernel(inner=True)
 def add_minima(table, pool, posed, box, ends, what, neglect, places, roots, count, work):
     """Add the minima that a box has. Returns how many roots there are, and whether these are all for certain."""
     f, g = posed.centerlines
-    i = np.int64(box[0])
-    j = np.int64(box[3])
+    i = np.int64(box.part_f)
+    j = np.int64(box.part_g)
     o = centerline_at(table, f).part_pool + PART * i
     p = centerline_at(table, g).part_pool + PART * j
-    part = (box[1], box[2], box[4], box[5])
+    part = Lengths(box.from_f, box.to_f, box.from_g, box.to_g)
     certain = True
     settled = False
     if what == CONVEX:
-        s, t = 0.5 * (box[1] + box[2]), 0.5 * (box[4] + box[5])
+        s, t = 0.5 * (box.from_f + box.to_f), 0.5 * (box.from_g + box.to_g)
         found, s, t, settled = convex_minimum(pool, o, p, posed.turn, posed.shift, part, ends, s, t)
         if found:
             count = add_minimum(table, pool, posed, i, j, s, t, neglect, roots, count, work)
@@ -238,10 +258,10 @@ def search_spines(table, pool, posed, moving, rho, lengths, neglect, boxes, wait
     hi = (-math.inf, -math.inf, -math.inf)
     while waiting > 0:
         b = waiting - 1
-        box = (boxes[b, 0], boxes[b, 1], boxes[b, 2], boxes[b, 3], boxes[b, 4], boxes[b, 5])
-        o = line.part_pool + PART * np.int64(box[0])
-        p = centerline.part_pool + PART * np.int64(box[3])
-        part = (box[1], box[2], box[4], box[5])
+        box = centerline_box_at(boxes, b)
+        o = line.part_pool + PART * np.int64(box.part_f)
+        p = centerline.part_pool + PART * np.int64(box.part_g)
+        part = Lengths(box.from_f, box.to_f, box.from_g, box.to_g)
         ends = open_ends(table, pool, f, g, box)
         low, what, margin = box_of(pool, o, p, posed.turn, posed.shift, part, ends, radii + reach, rho)
         low -= radii
@@ -251,7 +271,7 @@ def search_spines(table, pool, posed, moving, rho, lengths, neglect, boxes, wait
         if allowed >= reach and (low > near or hollow):
             waiting = b
             continue
-        bend = 0.5 * max(box[2] - box[1], box[5] - box[4]) * sharpest
+        bend = 0.5 * max(box.to_f - box.from_f, box.to_g - box.from_g) * sharpest
         halve = what == UNKNOWN and low <= near and bend > THIN
         if not halve and allowed < flank and refined < REFINED and bend > FINE:
             halve = True
