@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from assembly.proximity.manager.posed_pair import PosedPair
 
 from assembly.geometry import shapes
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.surface import NurbsSurface
+from assembly.proximity.manager.posed_pair import PosedPair
 from tests.laws.witness import Pairs, Stack, rotated
 
 
@@ -169,4 +169,6 @@ def random_group(seed, kind_f, kind_g, count):
 def posed(turn, shift, surfaces=(-1, -1), shells=(-1, -1)):
     """A posed pair of bodies, of which kernels read no more than the pose and the shapes."""
     none = (-1, -1)
-    return PosedPair(turn, shift, surfaces, shells, trees=none, centerlines=none, bodies=(0, 1), poses=None, track_solids=0)
+    return PosedPair(
+        turn, shift, surfaces, shells, trees=none, centerlines=none, bodies=(0, 1), poses=None, track_solids=0
+    )

@@ -28,6 +28,7 @@ from benchmarks.running import example
 from benchmarks.scenes import MAJOR, MINOR
 from benchmarks.watching import Watch
 from benchmarks.wire_oracle import WireOracle
+from tests.laws.scenes import posed
 
 IDENTITY = [1.0, 0.0, 0.0, 0.0]
 
@@ -177,7 +178,15 @@ def test_a_given_contact_stands_only_for_the_root_it_is_at(off, swapped):
     listed = len(table)
     found = np.full((4, roots.ROOT), np.nan)
     count = roots.add_given(
-        np.append(table, [0, swapped, 0, -1, -1, -1, -1]), pool, near_pair, tracked, listed, 1, 1e-6, found, (found, found)
+        np.append(table, [0, swapped, 0, -1, -1, -1, -1]),
+        pool,
+        near_pair,
+        tracked,
+        listed,
+        1,
+        1e-6,
+        found,
+        (found, found),
     )
     # A parameter of the ellipsoid is some tenth of a length long.
     assert count == (off < 1e-6)

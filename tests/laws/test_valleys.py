@@ -16,6 +16,7 @@ from assembly.proximity.manager.extrema import CODE_F, CODE_G, CORNER, LISTED, N
 from assembly.proximity.manager.near_singular import ARRIVED, across_valley, into_valley
 from assembly.proximity.manager.near_singular_points import hold_continua, is_next_in_valley, sunk
 from assembly.proximity.manager.state import PAIR_SHELL_F, PAIR_SHELL_G, PAIR_TABLE
+from tests.laws.scenes import posed
 
 MAJOR, MINOR = 0.7, 0.1
 WIDE = (np.inf, np.inf, np.inf, np.inf)
@@ -162,7 +163,7 @@ def test_few_of_a_continuum_are_held():
     table, pool, scale, shells, top = ring_on_a_slab()
     (_, u1), (v0, v1) = asm.shapes.torus(MAJOR, MINOR).domain
     turn, shift = tuple(np.eye(3).ravel()), (0.0, 0.0, 0.35 / scale)
-    looked_into = (turn, shift, (-1, -1, *shells), None, None)
+    looked_into = posed(turn, shift, shells=tuple(shells))
     # Eighths of the ring: two new ones a step apart, what is listed, what is of no use, an isolated one.
     states = [(0.0, NEW, 0.0), (0.05, NEW, 0.0), (2.0, LISTED, 0.0), (4.0, USELESS, 0.0), (4.0, NEW, 0.0)]
     states += [(6.0, NEW, 0.3), (6.05, NEW, 0.0)]
@@ -190,7 +191,7 @@ def test_what_lies_beside_a_point_is_in_another_valley():
     _found, x, _on_f, along = into_valley(table, pool, *surfaces, turn, shift, start, WIDE)
     roots = np.zeros((1, ROOT))
     roots[0, :4], roots[0, CODE_F], roots[0, ORIGIN], roots[0, CORNER] = x, top, NEW, HELD_G
-    scene = turn, shift, (-1, -1, *shells)
+    pair = posed(turn, shift, shells=tuple(shells))
     # The slab's parameters are lengths. More beside than along is another valley; a turn by 60 degrees is far, too.
     across = np.cross([0.0, 0.0, 1.0], along)
     turned = 0.4 * np.array(along) + np.sqrt(0.84) * across
@@ -201,4 +202,4 @@ def test_what_lies_beside_a_point_is_in_another_valley():
         (0.3 * turned, tuple(turned), True),
     ):
         there = (x[0] + way[0], x[1] + way[1], x[2], x[3])
-        assert is_next_in_valley(table, pool, scene, (top, 0), surfaces, there, direction, roots, 1) == other
+        assert is_next_in_valley(table, pool, pair, (top, 0), surfaces, there, direction, roots, 1) == other
