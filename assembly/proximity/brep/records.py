@@ -1,12 +1,12 @@
 """The features of a solid as kernels read them: records of faces, edges and vertices in one table of integers.
 
-A shell is a header of `SHELL` integers (how many faces, edges and vertices, and where their records begin), then the
-records. All offsets are absolute: into the table, or into the pool of doubles. Features are numbered faces first, then
-edges, then vertices; the coordinates of a feature are (u, v) of a face, (t, 0) of an edge, (0, 0) of a vertex.
+A shell is a header, then the records. All offsets are absolute: into the table, or into the pool of doubles. Features
+are numbered faces first, then edges, then vertices; the coordinates of a feature are (u, v) of a face, (t, 0) of an
+edge, (0, 0) of a vertex.
 
 An edge is the curve S_a(c_a(t)): a plane curve c_a in the parameters of a surface S_a, t in the curve's domain. With
-EDGE_SURFACE = -1 it is a curve in space, EDGE_CURVE itself. Where two faces meet, the second one's curve runs through
-the same points at t_b = m0 + m1 t, to first order. An edge that is closed smoothly has no vertices (-1 both).
+surface -1 it is a curve in space itself. Where two faces meet, the second one's curve runs through the same points at
+t_b = m0 + m1 t, to first order. An edge that is closed smoothly has no vertices (-1 both).
 """
 
 from __future__ import annotations

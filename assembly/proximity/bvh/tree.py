@@ -8,9 +8,9 @@ holds a pair where
     no n of the cone of f is within the cone of g turned around: angle(a_f, -a_g) > alpha_f + alpha_g,
     or d is farther than r_f + r_g, the radii of balls, from the double cone of the n of f, or of g.
 
-A tree is a header of `TREE` integers, then `NODE_INTS` a node; a node's doubles and those of an element stand in the
-pool. Nodes are numbered from the root, 0; the two children of a node follow each other. Everything is in the axes of
-f; the rotation and the shift are those of g relative to f.
+A tree is a header and the links of its nodes in the table; bounds of nodes, and elements, stand in the pool. Nodes are
+numbered from the root, 0; the two children of a node follow each other. Everything is in the axes of f; the rotation
+and the shift are those of g relative to f.
 """
 
 from __future__ import annotations

@@ -1,11 +1,6 @@
 """A contact of two solids as a solve tracks it: the pair of features that is closest, its coordinates, its normal.
 
-Of every contact a solve keeps `TRACK` numbers: the coordinates of the pair (4), the two features, the normal in the
-axes of body f, which tells on which side of each other two edges are where they touch, the gap, what the pair
-stays with: a corner over a face, which need not be the closest one (`proximity/manager/vertex_contacts.py`), has its
-features for good; of the
-end of a step, whether its row stays open there for certain (`solve/loop/predict.py`); and, of a clearance's contact, by
-how much its gap may be less than the least one, because it was where the solve began.
+A vertex contact, which need not be the closest one (`proximity/manager/vertex_contacts.py`), has its features for good.
 
 The kernels here are large, and few scenes need them: loops call them by address (`_address.call_address`).
 """
@@ -25,7 +20,7 @@ from assembly.proximity.extrema.rates import RECORD
 from assembly.proximity.features.global_search import CROSSING
 from assembly.proximity.features.holding import hold_features
 from assembly.proximity.features.nearest_query import PAIR, answer_at
-from assembly.proximity.features.switching import track_features
+from assembly.proximity.features.switching import FeatureTrack, track_features
 
 # What a solve keeps of a contact.
 TRACKED_PAIR = record_dtype(
@@ -47,8 +42,6 @@ STAYS = place_of(TRACKED_PAIR, "stays")
 IDLE = place_of(TRACKED_PAIR, "idle")
 ALLOWED = place_of(TRACKED_PAIR, "allowed")
 TRACK = size_of(TRACKED_PAIR)
-# Behind a record: whether surfaces do not cross at the pair, how far it is from a fold, and how far the bodies may move
-# until a row that is open needs its pair again.
 CONTACT_RECORD = RECORD + 3
 # The record of derivatives of a contact (`extrema/rates.py`), and what is behind it.
 CONTACT_DERIVATIVES = record_dtype(
@@ -60,7 +53,7 @@ CONTACT_DERIVATIVES = record_dtype(
 )
 contact_record_at = record_view(CONTACT_DERIVATIVES)
 SLACK = place_of(CONTACT_DERIVATIVES, "slack")
-# What `PROPER` is, beside 1 and 0, where the surfaces are equally near all around: then no point is that of a minimum.
+# What `proper` is, beside 1 and 0, where the surfaces are equally near all around: then no point is that of a minimum.
 CONFORMING = 2.0
 
 
@@ -94,7 +87,7 @@ def track_row(table, pool, shell_f, shell_g, relative, shift, start, r, patience
         status, x, frame = hold_features(
             table, pool, shell_f, shell_g, relative, shift, code_f, code_g, x, n, 1.0, patience, pair.stays
         )
-        return status, code_f, code_g, x, frame, 0
+        return FeatureTrack(status, code_f, code_g, x, frame, 0)
     return track_features(table, pool, shell_f, shell_g, relative, shift, code_f, code_g, x, n, 1.0, patience)
 
 
@@ -107,14 +100,13 @@ def track_solids(table, pool, shell_f, shell_g, i, j, q, start, patience, record
     contact = contact_record_at(records, r)
     turn = rotation(q, i)
     relative, shift = relative_pose(q, i, turn, j, rotation(q, j))
-    status, feature_f, feature_g, x, frame, _switches = track_row(
-        table, pool, shell_f, shell_g, relative, shift, start, r, patience
-    )
+    found = track_row(table, pool, shell_f, shell_g, relative, shift, start, r, patience)
+    status, frame = found.status, found.frame
     if status == CONVERGED or status == SINGULAR:
         feature_record(turn, shift, frame, records, r)
         contact.proper = CONFORMING if conforms(frame) else (1.0 if frame[14] else 0.0)
         contact.fold = frame[15]
-        write_tracked(x, feature_f, feature_g, frame[0], tracked, r)
+        write_tracked(found.x, found.f, found.g, frame[0], tracked, r)
         tracked_at(tracked, r).stays = tracked_at(start, r).stays
     return status
 

@@ -15,6 +15,7 @@ Leaving an edge or a vertex asks for more than rounding, entering one does not: 
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 from assembly._kernel import kernel
 from assembly.geometry.faces.trim import trim_side
@@ -161,6 +162,11 @@ def checked(table, pool, shell, code, a, b, held, n):
     return other, found, other != code
 
 
+# A pair of features that was tracked. f, g: the features, numbers; x: their coordinates; switches: how often it went on
+# to another feature.
+FeatureTrack = namedtuple("FeatureTrack", "status f g x frame switches")
+
+
 @kernel(inner=True)
 def track_features(table, pool, shell_f, shell_g, rotation, shift, code_f, code_g, x, n, size, turn):
     """Newton's method on a pair of features, and switching until no other feature beside them is closer.
@@ -232,4 +238,4 @@ def track_features(table, pool, shell_f, shell_g, rotation, shift, code_f, code_
         normal = own_frame(table, pool, feature_at(table, shell_g, code_g), x[2], x[3])[1]
         if dot(normal, matvec_t(rotation, n)) > 0.0:
             status = NOT_CONVERGED
-    return status, code_f, code_g, x, frame, switches
+    return FeatureTrack(status, code_f, code_g, x, frame, switches)

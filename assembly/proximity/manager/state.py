@@ -1,9 +1,8 @@
-"""What a watch (`proximity/manager/update.py`) knows: the layout of its record and its memory, places for contacts, and
-the log.
+"""What a contact manager (`proximity/manager/update.py`) knows: its records and its memory, slots for contacts, events.
 
-The record of a watch is in the table of integers, what it knows in a memory of doubles:
+Its record is in the table of integers, what it knows in a memory of doubles:
 
-    header | of every pair PAIR_MEMORY | of every place PLACE_MEMORY | events
+    header | of every pair a PAIR_STATE | of every slot a PLACE_STATE | events
 """
 
 from __future__ import annotations

@@ -1,9 +1,8 @@
 """Spines of round wires as kernels read them: points, and which parameters of the surface stand for a point.
 
-A spine (`geometry/shapes/centerline.py`) is a record of `SPINE` integers in the table. Its pieces, lines and arcs, are
-cut into
-parts that hardly turn, `PART` doubles each, run through by lengths from their middles; over the parts is a tree of
-balls, whose root is node 0 and where the two children of a node follow each other.
+A spine (`geometry/shapes/centerline.py`) is a record in the table. Its pieces, lines and arcs, are cut into parts that
+hardly turn, run through by lengths from their middles; over the parts is a tree of balls, whose root is node 0 and
+where the two children of a node follow each other.
 """
 
 from __future__ import annotations
