@@ -116,7 +116,7 @@ def test_no_valley_where_nothing_or_everything_is_level(shape, cases):
         turn, shift = tilted(rng, 0.1, scale)
         for other in others:
             x = lowest_start(table, pool, other, turn, shift)
-            assert not across_valley(table, pool, top, other, tuple(turn.ravel()), tuple(shift), x)[0]
+            assert not across_valley(table, pool, top, other, tuple(turn.ravel()), tuple(shift), x).found
 
 
 def ring_on_a_slab(slab=None):

@@ -104,11 +104,13 @@ def face_beside(table, pool, shell, code, u, v, turn, n):
     edge_record = edge_at(table, edge)
     surface = edge_record.surface
     face = edge_record.face_a
-    a, b, p, _along, m = on_surface(table, pool, surface, edge_record.curve, u)
+    on_edge = on_surface(table, pool, surface, edge_record.curve, u)
+    a, b, p, m = on_edge.u, on_edge.v, on_edge.point, on_edge.normal
     if edge_record.face_b >= 0:
         other = edge_record.surface_b
         s = other_parameter(table, pool, edge, u, p)
-        c, d, _p, _along, k = on_surface(table, pool, other, edge_record.curve_b, s)
+        on_edge = on_surface(table, pool, other, edge_record.curve_b, s)
+        c, d, k = on_edge.u, on_edge.v, on_edge.normal
         lean = float(surface_at(table, surface).sign) * dot(unit(matvec(turn, m)), n)
         if float(surface_at(table, other).sign) * dot(unit(matvec(turn, k)), n) > lean:
             return edge_record.face_b, c, d

@@ -9,6 +9,7 @@ stand out of it where it is hollow, so that a peg in a bore may cut them: of suc
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 import numpy as np
 
@@ -33,26 +34,31 @@ WIDER = 1.5
 FLAT = 1e-9
 
 
+# Where a segment cuts a triangle. hit: whether it does; part: which part of the way; q, r: the shares of these corners
+# there; turns: whether the segment goes to the side to which the corners turn left.
+TriangleCut = namedtuple("TriangleCut", "hit part q r turns")
+
+
 @kernel(inline=True)
 def cut_at(a, d, p, q, r, end, beside):
-    """Where a segment from a along d cuts a triangle (Möller and Trumbore): whether it does, which part of the way.
+    """Where a segment from a along d cuts a triangle (Möller and Trumbore).
 
-    And the shares of q and of r there, and whether it goes to the side to which the corners turn left. What is nearer
-    to an end than that part of the segment does not count; what passes `beside` the triangle by so small a part of its
-    sides does.
+    What is nearer to an end than that part of the segment does not count; what passes `beside` the triangle by so small
+    a part of its sides does.
     """
     e = sub(q, p)
     f = sub(r, p)
     h = cross(d, f)
     det = dot(e, h)
     if abs(det) < 1e-300:
-        return False, 0.0, 0.0, 0.0, False
+        return TriangleCut(False, 0.0, 0.0, 0.0, False)
     s = sub(a, p)
     u = dot(s, h) / det
     w = cross(s, e)
     v = dot(d, w) / det
     t = dot(f, w) / det
-    return min(u, v, 1.0 - u - v) >= -beside and end < t < 1.0 - end, t, u, v, det < 0.0
+    hit = min(u, v, 1.0 - u - v) >= -beside and end < t < 1.0 - end
+    return TriangleCut(hit=hit, part=t, q=u, r=v, turns=det < 0.0)
 
 
 @kernel(inner=True)
@@ -108,7 +114,8 @@ def goes_through(table, pool, tree, shell, e, a, b, margin):
     (u, v, wide, high), (p, q, s, t) = patch_corners(table, pool, r, patch)
     for k in range(2):
         second, third = (q, s) if k == 0 else (s, t)
-        hit, _way, x, y, _along = cut_at(a, sub(b, a), p, second, third, 0.0, 0.0)
+        cut = cut_at(a, sub(b, a), p, second, third, 0.0, 0.0)
+        hit, x, y = cut.hit, cut.q, cut.r
         n = cross(sub(second, p), sub(third, p))
         away = margin * math.sqrt(dot(n, n))
         if not hit or min(abs(dot(n, sub(a, p))), abs(dot(n, sub(b, p)))) <= away:

@@ -58,9 +58,8 @@ def is_next_in_valley(table, pool, posed, codes, surfaces, x, along, roots, coun
         alike = extremum.code_f == codes[0] and extremum.code_g == codes[1]
         if alike and extremum.origin != USELESS and not is_loose(roots, k):
             y = pair_parameters(extremum)
-            found, _there, _bend, _on_f, other = across_valley(
-                table, pool, surfaces[0], surfaces[1], posed.turn, posed.shift, y
-            )
+            step = across_valley(table, pool, surfaces[0], surfaces[1], posed.turn, posed.shift, y)
+            found, other = step.found, step.along
             way = sub(p, surface_point(table, pool, surfaces[0], y[0], y[1])[0])
             square = dot(way, way)
             part = dot(way, along)
@@ -78,7 +77,8 @@ def is_left_out(table, pool, posed, roots, k):
         return False
     surfaces = (feature_at(table, posed.shells[0], codes[0]), feature_at(table, posed.shells[1], codes[1]))
     x = pair_parameters(extremum)
-    found, _there, _bend, on_f, along = across_valley(table, pool, surfaces[0], surfaces[1], posed.turn, posed.shift, x)
+    step = across_valley(table, pool, surfaces[0], surfaces[1], posed.turn, posed.shift, x)
+    found, on_f, along = step.found, step.on_f, step.along
     if not found:
         return False
     if extremum.origin == NEW and not is_next_in_valley(table, pool, posed, codes, surfaces, x, along, roots, k):

@@ -123,7 +123,8 @@ def facets_cut(table, pool, tree, surface, shell, a, d, end, beside):
         e = tree_record.element_pool + ELEMENT * (-1 - child)
         (u, v, wide, high), (p, q, s, t) = patch_corners(table, pool, r, element_at(pool, e))
         for k in range(2):
-            hit, way, x, y, along = cut_at(a, d, p, q if k == 0 else s, s if k == 0 else t, end, beside)
+            cut = cut_at(a, d, p, q if k == 0 else s, s if k == 0 else t, end, beside)
+            hit, way, x, y, along = cut.hit, cut.part, cut.q, cut.r, cut.turns
             here = (u + (x + y if k == 0 else x) * wide, v + (y if k == 0 else x + y) * high)
             if hit and in_trim(table, pool, shell, code, here[0], here[1]):
                 count += 1

@@ -34,6 +34,8 @@ Lengths = namedtuple("Lengths", "from_f to_f from_g to_g")
 FreeEnds = namedtuple("FreeEnds", "start_f end_f start_g end_g")
 # d = g(t) - f(s), unit tangents and curvature vectors of both, in the axes of f.
 Difference = namedtuple("Difference", "d tangent_f curvature_f tangent_g curvature_g")
+# The least and the largest of F_ss, F_tt and |F_st| over a box.
+Hessian = namedtuple("Hessian", "ss_low ss_high tt_low tt_high st_low st_high")
 # What a box is: nothing is known, no slope zero in it, F convex over it, F'' indefinite over it.
 UNKNOWN, EMPTY, CONVEX, BARREN = 0, 1, 2, 3
 # Motions are no longer than this part of rho.
@@ -80,7 +82,8 @@ def shape_of(hessian, kf, kg, rho, straight, is_open):
 
     A motion by m changes them by kf m, kg m and m / rho. A free end may have a minimum where F'' is indefinite.
     """
-    ss_low, ss_high, tt_low, tt_high, st_low, st_high = hessian
+    ss_low, ss_high, tt_low, tt_high = hessian.ss_low, hessian.ss_high, hessian.tt_low, hessian.tt_high
+    st_low, st_high = hessian.st_low, hessian.st_high
     if straight:
         # F is convex wherever two lines are. Where these are all but parallel a motion takes its minimum anywhere, and
         # a contact does not follow there.
@@ -186,7 +189,12 @@ def box_of(pool, o, p, turn, shift, box, open_ends, reach, rho):
     sway = 1.0 + far / rho
     is_open = open_ends.start_f or open_ends.end_f or open_ends.start_g or open_ends.end_g
     what, margin = shape_of(
-        (ss_low, ss_high, tt_low, tt_high, st_low, st_high), sway * kf, sway * kg, rho, kf == 0.0 and kg == 0.0, is_open
+        Hessian(ss_low, ss_high, tt_low, tt_high, st_low, st_high),
+        sway * kf,
+        sway * kg,
+        rho,
+        kf == 0.0 and kg == 0.0,
+        is_open,
     )
     if what == CONVEX:
         # Where the curvature jumps at the border of the box a minimum may be born, and run into it, if F is not convex
@@ -196,7 +204,12 @@ def box_of(pool, o, p, turn, shift, box, open_ends, reach, rho):
         if bend_f >= 0.0 or bend_g >= 0.0:
             bend_f, bend_g = max(bend_f, kf), max(bend_g, kg)
             over, least_margin = shape_of(
-                (ss_low, ss_high, tt_low, tt_high, st_low, st_high), sway * bend_f, sway * bend_g, rho, False, True
+                Hessian(ss_low, ss_high, tt_low, tt_high, st_low, st_high),
+                sway * bend_f,
+                sway * bend_g,
+                rho,
+                False,
+                True,
             )
             margin = min(margin, least_margin) if over == CONVEX else 0.0
     slope /= sway
