@@ -166,9 +166,6 @@ def random_group(seed, kind_f, kind_g, count):
     return group.take(tame[:count])
 
 
-def posed(turn, shift, surfaces=(-1, -1), shells=(-1, -1)):
+def posed(turn, shift, surfaces=(-1, -1), shells=(-1, -1), trees=(-1, -1)):
     """A posed pair of bodies, of which kernels read no more than the pose and the shapes."""
-    none = (-1, -1)
-    return PosedPair(
-        turn, shift, surfaces, shells, trees=none, centerlines=none, bodies=(0, 1), poses=None, track_solids=0
-    )
+    return PosedPair(turn, shift, surfaces, shells, trees, (-1, -1), bodies=(0, 1), poses=None, track_solids=0)
