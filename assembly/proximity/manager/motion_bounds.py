@@ -40,11 +40,16 @@ MOVES, MOVES_OF_WIRES = 12.0, 6.0
 Mover = namedtuple("Mover", "side tree quaternion turn shift")
 # A ball on it. center: in its axes; place: where that is, seen from the other body.
 MotionBall = namedtuple("MotionBall", "center place radius")
-NO_BALL = MotionBall((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0)
 # What a search finds of a pair. count: number of extrema that are known; bound: how far the body may go for all that is
 # not in the ball; ball_bound: how far what is in the ball may go, because a contact may be created there, infinite if
 # there is no ball; accepted_bound: how far until a pose that is accepted needs an update.
 PairSearch = namedtuple("PairSearch", "count bound ball_bound ball accepted_bound")
+
+
+@kernel(inline=True)
+def no_ball():
+    """A ball where there is none."""
+    return MotionBall((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0)
 
 
 @kernel(inline=True)

@@ -41,12 +41,12 @@ from assembly.proximity.manager.extrema import (
 from assembly.proximity.manager.flush import any_deep, drop_flush
 from assembly.proximity.manager.motion_bounds import (
     LEAST_ALLOWANCE,
-    NO_BALL,
     STILL,
     PairSearch,
     allow_ball,
     largest_part,
     mover,
+    no_ball,
     reach_now,
     used_most,
 )
@@ -215,10 +215,10 @@ def search_by_spines(table, pool, watch, memory, p, posed, moving, reach, offset
     if waiting < 0:
         # There is no room for what is as near as it should not be.
         memory_header_at(memory, 0).crowded = 1.0
-        return PairSearch(count, 0.0, math.inf, NO_BALL, math.inf), any_gone, True
+        return PairSearch(count, 0.0, math.inf, no_ball(), math.inf), any_gone, True
     if waiting == 0:
         beyond = parts_beyond(table, pool, posed, radii + reach, stack, pairs) - radii
-        return PairSearch(count, beyond, math.inf, NO_BALL, math.inf), any_gone, False
+        return PairSearch(count, beyond, math.inf, no_ball(), math.inf), any_gone, False
     # No tangent turns by more than a motion over this.
     rho = min(2.0 * (radii + reach), 0.99 * node_at(pool, tree_at(table, moving.tree).node_pool).radius)
     search = search_spines(

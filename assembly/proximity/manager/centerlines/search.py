@@ -51,7 +51,7 @@ from assembly.proximity.manager.extrema import (
     extremum_at,
     write,
 )
-from assembly.proximity.manager.motion_bounds import NO_BALL, MotionBall, PairSearch
+from assembly.proximity.manager.motion_bounds import MotionBall, PairSearch, no_ball
 
 # Room for boxes that wait.
 BOXES = 2048
@@ -296,7 +296,7 @@ def search_spines(table, pool, posed, moving, rho, lengths, neglect, boxes, wait
         fertile = min(fertile, allowed)
         lo, hi = around_box(pool, p if side == 1 else o, box, side, lo, hi)
     if not fertile < math.inf:
-        return PairSearch(count, free, fertile, NO_BALL, sure)
+        return PairSearch(count, free, fertile, no_ball(), sure)
     d = sub(hi, lo)
     center = scale(0.5, add(lo, hi))
     radius = max(0.5 * math.sqrt(dot(d, d)), rho)
