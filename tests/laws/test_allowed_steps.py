@@ -10,7 +10,7 @@ import assembly as asm
 from assembly.constraints.program.records import MOVING, WATCH, Iterate
 from assembly.proximity.brep.borders import feature_kind
 from assembly.proximity.brep.records import EDGE, FACE
-from assembly.proximity.bvh.tree import ELEMENT, ELEMENT_FEATURE, ELEMENT_POOL
+from assembly.proximity.bvh.tree import ELEMENT, ELEMENT_FEATURE, tree_at
 from assembly.proximity.features.holding import FEATURES, NOTHING, POINT
 from assembly.proximity.features.solid_contact import TRACK
 from assembly.proximity.manager import update as watch
@@ -25,20 +25,16 @@ from assembly.proximity.manager.state import (
     PAIR_G,
     PAIR_MEMORY,
     PAIR_RECORD,
-    PAIR_SHELL_F,
-    PAIR_SHELL_G,
-    PAIR_SURFACE_F,
-    PAIR_SURFACE_G,
     PAIR_TABLE,
     PAIRS,
     SMALLER,
     SURE,
-    TREE_F,
-    TREE_G,
     memory_places,
+    pair_at,
 )
 from assembly.solve.loop.clearances import allowed_share
 from assembly.solve.loop.residuals import move
+from tests.laws.scenes import posed
 
 RINGS = 4
 
@@ -142,14 +138,12 @@ def test_a_point_that_stays_on_an_edge_is_no_root():
     scene.constrain(asm.Clearance())
     packed = scene.packed()
     table, pool = packed.table, packed.pool
-    pair = table[table[WATCH] + PAIR_TABLE]
-    trees = (table[pair + TREE_F], table[pair + TREE_G])
-    shells = (table[pair + PAIR_SHELL_F], table[pair + PAIR_SHELL_G])
-    there = (table[pair + PAIR_SURFACE_F], table[pair + PAIR_SURFACE_G], *shells)
-    looked_into = (None, None, there, trees, None)
+    pair = pair_at(table, table[table[WATCH] + PAIR_TABLE])
+    trees, shells = (pair.tree_f, pair.tree_g), (pair.shell_f, pair.shell_g)
+    looked_into = posed(None, None, (pair.surface_f, pair.surface_g), shells, trees)
     elements = [
-        [(k, *pool[table[tree + ELEMENT_POOL] + ELEMENT * k :][:ELEMENT]) for k in range(table[tree + 3])]
-        for tree in trees
+        [(k, *pool[tree.element_pool + ELEMENT * k :][:ELEMENT]) for k in range(tree.elements)]
+        for tree in (tree_at(table, at) for at in trees)
     ]
     seen = 0
     for e in elements[0]:

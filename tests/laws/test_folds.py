@@ -20,7 +20,7 @@ from assembly.proximity.manager import extrema as roots
 from assembly.proximity.manager import motion_bounds as allowances
 from assembly.proximity.manager import state as watch_memory
 from assembly.proximity.manager import update as watch
-from assembly.proximity.manager.motion_bounds import allow_ball, mover
+from assembly.proximity.manager.motion_bounds import MotionBall, allow_ball, mover
 from assembly.solve.loop.clearances import look_again, look_around, place_guards
 from assembly.solve.loop.violation import untouched
 from benchmarks.center_lines import torus_wire
@@ -28,6 +28,7 @@ from benchmarks.running import example
 from benchmarks.scenes import MAJOR, MINOR
 from benchmarks.watching import Watch
 from benchmarks.wire_oracle import WireOracle
+from tests.laws.scenes import posed
 
 IDENTITY = [1.0, 0.0, 0.0, 0.0]
 
@@ -62,13 +63,13 @@ def test_what_a_gap_gains_by_tangency():
 
 
 def root_at(table, pool, q, start):
-    """A root, and the scene it is of."""
+    """A root, and the posed pair it is of."""
     turn, shift = relative_pose(q, 0, rotation(q, 0), 1, rotation(q, 1))
-    scene = (turn, shift, (0, SURFACE_RECORD))
+    pair = posed(turn, shift, surfaces=(0, SURFACE_RECORD))
     out = np.full((1, roots.ROOT), np.nan)
-    assert roots.surfaces_root(table, pool, scene, tuple(start), out, 0) != roots.NOTHING
+    assert roots.surfaces_root(table, pool, pair, tuple(start), out, 0) != roots.NOTHING
     assert np.isnan(out[0, roots.ROOT_BEYOND])
-    return scene, out[0]
+    return pair, out[0]
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
@@ -89,9 +90,9 @@ def test_a_fold_beyond_a_knot_line_is_that_of_the_pair_there(side):
         offset *= side
         along_line = clip.evaluate(line + offset, 0.0) - clip.evaluate(line, 0.0)
         q = np.array([[0.0, 0.0, 0.0, *IDENTITY], [*(ring[1] + 0.1 * outward + along_line), *IDENTITY]])
-        scene, root = root_at(table, pool, q, extremal_pair(clip, q[0], ball, q[1]).parameters)
+        near_pair, root = root_at(table, pool, q, extremal_pair(clip, q[0], ball, q[1]).parameters)
         near = (0.05, -1.0, -1.0, -1.0)  # no other knot lines
-        folds.append((root[roots.ROOT_FOLD], fold_beyond(table, pool, scene, tuple(root[:4]), near)))
+        folds.append((root[roots.ROOT_FOLD], fold_beyond(table, pool, near_pair, tuple(root[:4]), near)))
     (here, beyond), (there, behind) = folds
     assert abs(here - there) > 0.05
     # The two places are 2e-6 apart, where curvatures change by some hundreds a unit.
@@ -171,13 +172,21 @@ def test_a_given_contact_stands_only_for_the_root_it_is_at(off, swapped):
     table, pool = packed_pair(f, g)
     q = np.array([[0.0, 0.0, 0.0, *IDENTITY], [0.5, 0.3, 0.2, *IDENTITY]])
     pair = extremal_pair(f, q[0], g, q[1])
-    scene, root = root_at(table, pool, q, pair.parameters)
+    near_pair, root = root_at(table, pool, q, pair.parameters)
     tracked = np.zeros((1, TRACK))
     tracked[0, :4] = np.roll(pair.parameters + [off, 0.0, 0.0, 0.0], 2 * swapped)
     listed = len(table)
     found = np.full((4, roots.ROOT), np.nan)
     count = roots.add_given(
-        np.append(table, [0, swapped, 0, -1, -1, -1, -1]), pool, scene, tracked, listed, 1, 1e-6, found, (found, found)
+        np.append(table, [0, swapped, 0, -1, -1, -1, -1]),
+        pool,
+        near_pair,
+        tracked,
+        listed,
+        1,
+        1e-6,
+        found,
+        (found, found),
     )
     # A parameter of the ellipsoid is some tenth of a length long.
     assert count == (off < 1e-6)
@@ -308,7 +317,7 @@ def test_pairs_are_looked_at_that_need_it(by_spines, part, as_needed, in_turns, 
             # A ball of no size: it goes where the body's origin does.
             at = watch_memory.MEMORY_HEADER + watch_memory.PAIR_MEMORY * p
             origin = (0.0, 0.0, 0.0)
-            place = mover(table, watch_at, p, clips.q)[4]
-            allow_ball(clips.memory, at, (origin, place, 0.0), np.inf, allowances.STILL * 1e-3)
+            place = mover(table, watch_at, p, clips.q).shift
+            allow_ball(clips.memory, at, MotionBall(origin, place, 0.0), np.inf, allowances.STILL * 1e-3)
         clips.q[1, 2] += 1e-3 * part
         assert clips.looked(how) == count

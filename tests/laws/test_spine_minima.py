@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import brentq
 
 from assembly.geometry.vec import dot
-from assembly.proximity.manager.centerlines.box import apart
+from assembly.proximity.manager.centerlines.box import FreeEnds, Lengths, apart
 from assembly.proximity.manager.centerlines.curve import HALF, PART_BEND
 from assembly.proximity.manager.centerlines.minima import MINIMA, valley_minima
 from assembly.proximity.manager.centerlines.search import THIN
@@ -113,7 +113,9 @@ def compare(two, box, open_ends):
         # Of a level valley rounding tells where it has minima.
         return None
     places = np.empty((MINIMA, 2))
-    count, _level, certain = valley_minima(two.pool, two.o, two.p, *two.pose(), box, open_ends, places)
+    count, _level, certain = valley_minima(
+        two.pool, two.o, two.p, *two.pose(), Lengths(*box), FreeEnds(*open_ends), places
+    )
     assert certain
     found = places[:count]
     # Slopes of 1e-15 place a minimum by as much over the curvature of the valley, which may be 1e-4 here.

@@ -14,7 +14,7 @@ from assembly.geometry.shapes.centerline import spine_of
 from assembly.geometry.shapes.path import Path
 from assembly.geometry.vec import dot
 from assembly.proximity.manager import state as watch_memory
-from assembly.proximity.manager.centerlines.box import BARREN, CONVEX, EMPTY, apart, box_of
+from assembly.proximity.manager.centerlines.box import BARREN, CONVEX, EMPTY, FreeEnds, Lengths, apart, box_of
 from assembly.proximity.manager.centerlines.curve import (
     HALF,
     PART,
@@ -165,7 +165,7 @@ class Two:
         return tuple(self.turn.as_matrix().ravel().tolist()), tuple(self.shift.tolist())
 
     def told(self, ends=(False, False, False, False)):
-        return box_of(self.pool, self.o, self.p, *self.pose(), self.box, ends, np.inf, self.rho)
+        return box_of(self.pool, self.o, self.p, *self.pose(), Lengths(*self.box), FreeEnds(*ends), np.inf, self.rho)
 
     def at(self, s, t):
         """Distances, slopes F_s, F_t and second derivatives F_ss, F_st, F_tt at arrays of places."""

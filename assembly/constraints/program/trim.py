@@ -201,7 +201,8 @@ def vector_rows(table, pool, first, loose, point):
     turn = turn_f if side == 0 else turn_g
     surface = own_surface(table, row)
     at, rate, _bend = curve_point(table, pool, curve, t)
-    _u, _v, c, along, _normal = on_surface(table, pool, surface, curve, t)
+    on_edge = on_surface(table, pool, surface, curve, t)
+    c, along = on_edge.point, on_edge.tangent
     p, pu, pv, puu, puv, pvv = surface_point(table, pool, surface, x[o], x[o + 1])
     there, du, dv, _uu, _uv, _vv = surface_point(table, pool, other_surface(table, row), x[2 - o], x[3 - o])
     away = turn_g if side == 0 else turn_f

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import namedtuple
+
 from assembly._kernel import kernel
 from assembly.geometry.faces.trim_nearest import trim_nearest
 from assembly.geometry.faces.trim_pieces import trim_at
@@ -49,15 +51,20 @@ def feature_at(table, shell, code):
     return solid.vertex_table + VERTEX_RECORD * (code - faces - edges)
 
 
+# A point of an edge on one of its faces. u, v: in the domain; point: of the surface; tangent: of the edge, by the
+# curve's parameter; normal: Su x Sv.
+EdgePoint = namedtuple("EdgePoint", "u v point tangent normal")
+
+
 @kernel(inline=True)
 def on_surface(table, pool, surface, curve, t):
-    """The plane curve's point in the domain, the surface point there, the tangent, and Su x Sv."""
+    """The EdgePoint of a plane curve at t."""
     c, ct, _ctt = curve_lanes(table, pool, curve, t)
     at = xyz(c)
     along = xyz(ct)
     u, v, _held = into_domain(table, pool, surface, at[0], at[1])
     p, su, sv, _uu, _uv, _vv = surface_point(table, pool, surface, u, v)
-    return u, v, p, blend(along[0], su, along[1], sv), cross(su, sv)
+    return EdgePoint(u=u, v=v, point=p, tangent=blend(along[0], su, along[1], sv), normal=cross(su, sv))
 
 
 @kernel(inline=True)
@@ -84,7 +91,8 @@ def other_parameter(table, pool, edge, t, p):
     s = clamp_to_curve(table, pool, curve, pool[at] + pool[at + 1] * t)
     # The map is of first order; its error is smaller than the steps below can take away.
     for _ in range(3):
-        _u, _v, b, along, _normal = on_surface(table, pool, surface, curve, s)
+        on_edge = on_surface(table, pool, surface, curve, s)
+        b, along = on_edge.point, on_edge.tangent
         square = dot(along, along)
         if not square > 0.0:
             break
@@ -99,7 +107,8 @@ def first_parameter(table, pool, edge, t, p):
     curve = edge_record.curve
     t = clamp_to_curve(table, pool, curve, t)
     for _ in range(3):
-        _u, _v, a, along, _normal = on_surface(table, pool, edge_record.surface, curve, t)
+        on_edge = on_surface(table, pool, edge_record.surface, curve, t)
+        a, along = on_edge.point, on_edge.tangent
         square = dot(along, along)
         if not square > 0.0:
             break
@@ -133,7 +142,8 @@ def nearest_edge(table, pool, shell, code, u, v):
     edge_record = edge_at(table, edge)
     if edge_record.curve != trim_record.first + CURVE_RECORD * k:
         # The edge is measured on its other face.
-        _u, _v, p, _along, _normal = on_surface(table, pool, face.surface, trim_record.first + CURVE_RECORD * k, t)
+        on_edge = on_surface(table, pool, face.surface, trim_record.first + CURVE_RECORD * k, t)
+        p = on_edge.point
         at = edge_record.map
         t = first_parameter(table, pool, edge, (t - pool[at]) / pool[at + 1], p)
     return solid.faces + number, (t, 0.0)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._record import rows_of
 from assembly.errors import positive
 from assembly.geometry.faces.face import Face
 from assembly.geometry.faces.trim_pieces import TRIM_FIRST
@@ -47,65 +49,56 @@ def pack_shell(topology: Topology, scale: float, table_at: int = 0, pool_at: int
     writer = Writer(table_at, pool_at)
     header = np.zeros(shell.SHELL, dtype=np.int64)
     offset, _ = writer.add(header)
-    faces, places = [], []
-    for face, flags, edges in zip(topology.faces, parts.flags, topology.face_edges, strict=True):
-        record, curves = _face(writer, face, flags, edges, 1.0 / scale)
-        faces.append(record)
-        places.append(curves)
+    faces = np.zeros((len(topology.faces), shell.FACE_RECORD), dtype=np.int64)
+    places = [
+        _face(writer, face, flags, edges, 1.0 / scale, shell.face_at(faces, k))
+        for k, (face, flags, edges) in enumerate(zip(topology.faces, parts.flags, topology.face_edges, strict=True))
+    ]
     cells = [rows * [1.0, 1.0, *[1.0 / scale] * 4] for rows in parts.cells]
-    edge_rows = []
-    for edge, rows in zip(topology.edges, cells, strict=True):
-        _, map_at = writer.add(pool=edge.map_b)
-        _, cells_at = writer.add(pool=rows)
-        other = edge.face_b
-        second = -1 if other is None else faces[other][shell.FACE_SURFACE]
-        second_curve = -1 if other is None or edge.curve_b is None else places[other] + CURVE_RECORD * edge.curve_b
-        edge_rows.append(
-            [
-                faces[edge.face_a][shell.FACE_SURFACE],
-                places[edge.face_a] + CURVE_RECORD * edge.curve_a,
-                edge.face_a,
-                -1 if other is None else other,
-                second,
-                second_curve,
-                map_at,
-                -1 if edge.start is None else edge.start,
-                -1 if edge.end is None else edge.end,
-                cells_at,
-                len(rows),
-            ]
-        )
-    vertex_rows = []
-    for vertex in topology.vertices:
-        ends, point = writer.add(np.array(vertex.edges, dtype=np.int64), vertex.point / scale)
-        around, _ = writer.add(vertex.faces)
-        vertex_rows.append([point, len(vertex.edges), ends, len(vertex.faces), around])
-    header[shell.FACES], header[shell.EDGES], header[shell.VERTICES] = len(faces), len(edge_rows), len(vertex_rows)
-    header[shell.FACE_TABLE], _ = writer.add([field for row in faces for field in row])
-    header[shell.EDGE_TABLE], _ = writer.add([field for row in edge_rows for field in row])
-    header[shell.VERTEX_TABLE], _ = writer.add([field for row in vertex_rows for field in row])
+    edges = np.zeros((len(topology.edges), shell.EDGE_RECORD), dtype=np.int64)
+    surfaces = rows_of(shell.FACE_DTYPE, faces).surface
+    for k, (edge, rows) in enumerate(zip(topology.edges, cells, strict=True)):
+        record, other = shell.edge_at(edges, k), edge.face_b
+        _, record.map = writer.add(pool=edge.map_b)
+        _, record.cells = writer.add(pool=rows)
+        record.cell_count = len(rows)
+        record.surface, record.curve = surfaces[edge.face_a], places[edge.face_a] + CURVE_RECORD * edge.curve_a
+        record.face_a, record.face_b = edge.face_a, -1 if other is None else other
+        record.surface_b = -1 if other is None else surfaces[other]
+        record.curve_b = -1 if other is None or edge.curve_b is None else places[other] + CURVE_RECORD * edge.curve_b
+        record.start = -1 if edge.start is None else edge.start
+        record.end = -1 if edge.end is None else edge.end
+    vertices = np.zeros((len(topology.vertices), shell.VERTEX_RECORD), dtype=np.int64)
+    for k, vertex in enumerate(topology.vertices):
+        record = shell.vertex_at(vertices, k)
+        record.edges, record.faces = len(vertex.edges), len(vertex.faces)
+        record.edge_list, record.point = writer.add(np.array(vertex.edges, dtype=np.int64), vertex.point / scale)
+        record.face_list, _ = writer.add(vertex.faces)
+    record = shell.shell_at(header, 0)
+    record.faces, record.edges, record.vertices = len(faces), len(edges), len(vertices)
+    record.face_table, _ = writer.add(faces)
+    record.edge_table, _ = writer.add(edges)
+    record.vertex_table, _ = writer.add(vertices)
     return *writer.arrays(), offset
 
 
-def _face(
-    writer: Writer, face: Face, flags: Array, edges: Sequence[int | None], factor: float
-) -> tuple[list[int], int]:
-    """Pack a face: its record, and where the records of its boundary curves begin."""
+def _face(writer: Writer, face: Face, flags: Array, edges: Sequence[int | None], factor: float, packed: Any) -> int:
+    """Pack a face into its record; where the records of its boundary curves begin."""
     record, pool = face.packed()
     record, pool = record.copy(), pool.copy()
     coefficients, cells = record[COEFFICIENTS], record[CELLS]
     pool[coefficients:cells].reshape(-1, 4)[:, :3] *= factor
     pool[cells:].reshape(-1, CELL_SIZE)[:, 2:9] *= factor
     record[list(OFFSETS)] += writer.pool_at
-    surface_place, _ = writer.add(record, pool)
-    trim_place = curves = -1
+    packed.surface, _ = writer.add(record, pool)
+    packed.trim = curves = -1
     if face.boundary:
         table, pool = face.packed_trim(writer.table_at, writer.pool_at)
         curves = int(table[TRIM_FIRST])
-        trim_place, _ = writer.add(table, pool)
-    listed, _ = writer.add([-1 if edge is None else edge for edge in edges])
-    _, flags_at = writer.add(pool=flags)
-    return [surface_place, trim_place, listed, flags_at], curves
+        packed.trim, _ = writer.add(table, pool)
+    packed.edges, _ = writer.add([-1 if edge is None else edge for edge in edges])
+    _, packed.cell_flags = writer.add(pool=flags)
+    return curves
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._record import rows_of
 from assembly.errors import positive
 from assembly.proximity.bvh import tree as layout
 from assembly.proximity.bvh.facet_tree import FacetTree
@@ -40,29 +41,28 @@ def pack_tree(tree: FacetTree, scale: float, table_at: int = 0, pool_at: int = 0
     count, elements = len(nodes.child), len(tree.feature)
     table = np.zeros(layout.TREE + layout.NODE_INTS * count, dtype=np.int64)
     pool = np.zeros(layout.NODE * count + layout.ELEMENT * elements)
-    table[layout.NODES], table[layout.ELEMENTS] = count, elements
-    table[layout.NODE_TABLE] = table_at + layout.TREE
-    table[layout.NODE_POOL], table[layout.ELEMENT_POOL] = pool_at, pool_at + layout.NODE * count
-    ints = table[layout.TREE :].reshape(count, layout.NODE_INTS)
-    ints[:, layout.CHILD] = nodes.child
+    header = layout.tree_at(table, 0)
+    header.nodes, header.elements = count, elements
+    header.node_table = table_at + layout.TREE
+    header.node_pool, header.element_pool = pool_at, pool_at + layout.NODE * count
+    links = rows_of(layout.NODE_LINKS, table[layout.TREE :].reshape(count, layout.NODE_INTS))
+    links.child = nodes.child
     leaf = nodes.child < 0
-    ints[:, layout.FEATURE] = -1
-    ints[leaf, layout.FEATURE] = tree.feature[-1 - nodes.child[leaf]]
-    doubles = pool[: layout.NODE * count].reshape(count, layout.NODE)
+    links.feature = -1
+    links.feature[leaf] = tree.feature[-1 - nodes.child[leaf]]
+    bounds = rows_of(layout.NODE_BOUNDS, pool[: layout.NODE * count].reshape(count, layout.NODE))
     center = 0.5 * factor * (nodes.low + nodes.high)
     half = 0.5 * factor * (nodes.high - nodes.low)
     half += _ROUNDING * (np.abs(center) + 2.0 * half)
-    doubles[:, layout.CENTER : layout.CENTER + 3] = center
-    doubles[:, layout.HALF : layout.HALF + 3] = half
-    doubles[:, layout.AXIS : layout.AXIS + 3] = nodes.axis
+    bounds.center, bounds.half, bounds.axis = center, half, nodes.axis
     full = nodes.half_angle >= np.pi
-    doubles[:, layout.COS] = np.where(full, -1.0, np.cos(nodes.half_angle))
-    doubles[:, layout.SIN] = np.where(full, 0.0, np.sin(nodes.half_angle))
-    doubles[:, layout.RADIUS] = factor * nodes.radius + 4.0 * _ROUNDING * np.linalg.norm(np.abs(center) + half, axis=1)
+    bounds.cosine = np.where(full, -1.0, np.cos(nodes.half_angle))
+    bounds.sine = np.where(full, 0.0, np.sin(nodes.half_angle))
+    bounds.radius = factor * nodes.radius + 4.0 * _ROUNDING * np.linalg.norm(np.abs(center) + half, axis=1)
     box = tree.parameters
-    rows = pool[layout.NODE * count :].reshape(elements, layout.ELEMENT)
-    rows[:, :2] = 0.5 * (box[:, ::2] + box[:, 1::2])
-    rows[:, 2:4] = 0.5 * (box[:, 1::2] - box[:, ::2])
-    rows[:, layout.ELEMENT_FEATURE] = tree.feature
-    rows[-1 - nodes.child[leaf], layout.ELEMENT_NODE] = np.flatnonzero(leaf)
+    rows = rows_of(layout.ELEMENT_DTYPE, pool[layout.NODE * count :].reshape(elements, layout.ELEMENT))
+    rows.middle = 0.5 * (box[:, ::2] + box[:, 1::2])
+    rows.half = 0.5 * (box[:, 1::2] - box[:, ::2])
+    rows.feature = tree.feature
+    rows.node[-1 - nodes.child[leaf]] = np.flatnonzero(leaf)
     return table, pool, table_at

@@ -8,9 +8,9 @@ holds a pair where
     no n of the cone of f is within the cone of g turned around: angle(a_f, -a_g) > alpha_f + alpha_g,
     or d is farther than r_f + r_g, the radii of balls, from the double cone of the n of f, or of g.
 
-A tree is a header of `TREE` integers, then `NODE_INTS` a node; a node's doubles and those of an element stand in the
-pool. Nodes are numbered from the root, 0; the two children of a node follow each other. Everything is in the axes of
-f; the rotation and the shift are those of g relative to f.
+A tree is a header and the links of its nodes in the table; bounds of nodes, and elements, stand in the pool. Nodes are
+numbered from the root, 0; the two children of a node follow each other. Everything is in the axes of f; the rotation
+and the shift are those of g relative to f.
 """
 
 from __future__ import annotations
@@ -23,68 +23,64 @@ from assembly._kernel import kernel
 from assembly._record import place_of, record_dtype, record_view, size_of
 from assembly.geometry.vec import add, dot, matvec, matvec_t, neg, scale, sub
 
-# Header: how many nodes, where their integers and their doubles begin, how many elements, where theirs begin.
-TREE_RECORD = record_dtype(
+# The header of a tree in the table.
+TREE_DTYPE = record_dtype(
     "i8",
-    nodes=1,
-    node_table=1,
-    node_pool=1,
-    elements=1,
-    element_pool=1,
+    nodes=1,  # number of nodes
+    node_table=1,  # where their NODE_LINKS begin in the table
+    node_pool=1,  # where their NODE_BOUNDS begin in the pool
+    elements=1,  # number of elements
+    element_pool=1,  # where these begin in the pool
 )
-tree_at = record_view(TREE_RECORD)
-NODES = place_of(TREE_RECORD, "nodes")
-NODE_TABLE = place_of(TREE_RECORD, "node_table")
-NODE_POOL = place_of(TREE_RECORD, "node_pool")
-ELEMENTS = place_of(TREE_RECORD, "elements")
-ELEMENT_POOL = place_of(TREE_RECORD, "element_pool")
-TREE = size_of(TREE_RECORD)
-# A node: its first child, or -1 - element; the feature of the element, -1 of a node with children.
+tree_at = record_view(TREE_DTYPE)
+NODES = place_of(TREE_DTYPE, "nodes")
+NODE_TABLE = place_of(TREE_DTYPE, "node_table")
+NODE_POOL = place_of(TREE_DTYPE, "node_pool")
+ELEMENT_POOL = place_of(TREE_DTYPE, "element_pool")
+TREE = size_of(TREE_DTYPE)
+# A node in the table.
 NODE_LINKS = record_dtype(
     "i8",
-    child=1,
-    feature=1,
+    child=1,  # its first child, or -1 - element
+    feature=1,  # the feature of the element; -1: a node with children
 )
 node_links_at = record_view(NODE_LINKS)
-CHILD = place_of(NODE_LINKS, "child")
-FEATURE = place_of(NODE_LINKS, "feature")
 NODE_INTS = size_of(NODE_LINKS)
-# Box (center and half widths), cone (axis, cosine and sine of its half angle), radius of a ball.
+# A node in the pool: box, cone of outward normals, ball around the center.
 NODE_BOUNDS = record_dtype(
     "f8",
-    center=3,
-    half=3,
-    axis=3,
-    cosine=1,
+    center=3,  # [length over the size of the scene]
+    half=3,  # half widths
+    axis=3,  # of the cone, a unit vector
+    cosine=1,  # of the cone's half angle; -1: all directions
     sine=1,
-    radius=1,
+    radius=1,  # of the ball
 )
 node_at = record_view(NODE_BOUNDS)
 CENTER = place_of(NODE_BOUNDS, "center")
-HALF = place_of(NODE_BOUNDS, "half")
-AXIS = place_of(NODE_BOUNDS, "axis")
 COS = place_of(NODE_BOUNDS, "cosine")
 SIN = place_of(NODE_BOUNDS, "sine")
 RADIUS = place_of(NODE_BOUNDS, "radius")
 NODE = size_of(NODE_BOUNDS)
-# Of an element: the middle of its box in (u, v), or (t, 0), half the widths, its feature, and its node.
-ELEMENT_RECORD = record_dtype(
+# An element in the pool: a patch of a face, a part of an edge, or a vertex.
+ELEMENT_DTYPE = record_dtype(
     "f8",
-    before=4,
-    feature=1,
-    node=1,
+    middle=2,  # of its box of parameters: (u, v), or (t, 0)
+    half=2,  # half widths of it
+    feature=1,  # its feature
+    node=1,  # its node
 )
-element_at = record_view(ELEMENT_RECORD)
-ELEMENT_FEATURE = place_of(ELEMENT_RECORD, "feature")
-ELEMENT_NODE = place_of(ELEMENT_RECORD, "node")
-ELEMENT = size_of(ELEMENT_RECORD)
+element_at = record_view(ELEMENT_DTYPE)
+ELEMENT_FEATURE = place_of(ELEMENT_DTYPE, "feature")
+ELEMENT = size_of(ELEMENT_DTYPE)
 # Rounding of unit vectors and of coordinates, relative: what is in doubt is kept.
 ROUNDING = 1e-13
 
 
 @kernel(inline=True)
-def three(pool, o):
-    return (pool[o], pool[o + 1], pool[o + 2])
+def three_of(field):
+    """Three numbers of a record's field."""
+    return (field[0], field[1], field[2])
 
 
 @kernel(inline=True)
@@ -151,8 +147,8 @@ def beside_cone(d, axis, c, s, ho, hp, rotation, slack):
 @kernel(inline=True)
 def seen_from(pool, p, rotation, bulk, shift):
     """The node at p as another tree sees it: center, half widths of a box around its own, axis."""
-    center = add(matvec(rotation, three(pool, p + CENTER)), shift)
-    return center, matvec(bulk, three(pool, p + HALF)), matvec(rotation, three(pool, p + AXIS))
+    center = add(matvec(rotation, three_of(node_at(pool, p).center)), shift)
+    return center, matvec(bulk, three_of(node_at(pool, p).half)), matvec(rotation, three_of(node_at(pool, p).axis))
 
 
 @kernel(inline=True)
@@ -165,26 +161,26 @@ def admits(pool, o, p, seen, rotation, bulk, reach, slack, tilt):
     node = node_at(pool, o)
     node_bounds = node_at(pool, p)
     center, around, axis_p = seen
-    axis_o = three(pool, o + AXIS)
+    axis_o = three_of(node_at(pool, o).axis)
     co = node.cosine
     so = node.sine
     cp = node_bounds.cosine
     sp = node_bounds.sine
     if so * cp + co * sp > ROUNDING and -dot(axis_o, axis_p) < co * cp - so * sp - tilt:
         return False
-    d = sub(center, three(pool, o + CENTER))
+    d = sub(center, three_of(node_at(pool, o).center))
     dd = dot(d, d)
     r = node.radius + node_bounds.radius + slack
     if dd > (r + reach) * (r + reach):
         return False
     square = reach * reach
-    ho = three(pool, o + HALF)
+    ho = three_of(node_at(pool, o).half)
     if excess(d, ho, around) > square:
         return False
     r += tilt * (r + reach)
     if off_axis(d, dd, axis_o, co, so, r) or off_axis(d, dd, axis_p, cp, sp, r):
         return False
-    return excess(matvec_t(rotation, d), matvec_t(bulk, ho), three(pool, p + HALF)) <= square
+    return excess(matvec_t(rotation, d), matvec_t(bulk, ho), three_of(node_at(pool, p).half)) <= square
 
 
 @kernel(inner=True)
@@ -192,12 +188,12 @@ def facing(pool, o, p, rotation, shift, slack):
     """Whether leaves at o of f and at p of g, admitted, still may hold a pair when their boxes are looked at closer."""
     node = node_at(pool, o)
     node_bounds = node_at(pool, p)
-    d = sub(add(matvec(rotation, three(pool, p + CENTER)), shift), three(pool, o + CENTER))
-    ho = three(pool, o + HALF)
-    hp = three(pool, p + HALF)
-    if beside_cone(d, three(pool, o + AXIS), node.cosine, node.sine, ho, hp, rotation, slack):
+    d = sub(add(matvec(rotation, three_of(node_at(pool, p).center)), shift), three_of(node_at(pool, o).center))
+    ho = three_of(node_at(pool, o).half)
+    hp = three_of(node_at(pool, p).half)
+    if beside_cone(d, three_of(node_at(pool, o).axis), node.cosine, node.sine, ho, hp, rotation, slack):
         return False
-    axis = matvec(rotation, three(pool, p + AXIS))
+    axis = matvec(rotation, three_of(node_at(pool, p).axis))
     return not beside_cone(d, axis, node_bounds.cosine, node_bounds.sine, ho, hp, rotation, slack)
 
 
@@ -212,8 +208,8 @@ def node_of(table, pool, tree, e):
 def rounding(pool, root_f, root_g, shift):
     """By how much coordinates may be off."""
     size = node_at(pool, root_f).radius + node_at(pool, root_g).radius
-    c = three(pool, root_f + CENTER)
-    e = three(pool, root_g + CENTER)
+    c = three_of(node_at(pool, root_f).center)
+    e = three_of(node_at(pool, root_g).center)
     size += math.sqrt(dot(c, c)) + math.sqrt(dot(e, e)) + math.sqrt(dot(shift, shift))
     return ROUNDING * size
 
@@ -326,10 +322,10 @@ def facing_pairs(table, pool, tree_f, tree_g, rotation, shift, reach, stack, out
 @kernel(inline=True)
 def box_distance(pool, o, p, seen, rotation, bulk):
     """The square of a lower bound of the distance of the boxes at o and at p; see `admits`."""
-    ho = three(pool, o + HALF)
-    d = sub(seen[0], three(pool, o + CENTER))
+    ho = three_of(node_at(pool, o).half)
+    d = sub(seen[0], three_of(node_at(pool, o).center))
     along = excess(d, ho, seen[1])
-    return max(along, excess(matvec_t(rotation, d), matvec_t(bulk, ho), three(pool, p + HALF)))
+    return max(along, excess(matvec_t(rotation, d), matvec_t(bulk, ho), three_of(node_at(pool, p).half)))
 
 
 @kernel(inner=True)

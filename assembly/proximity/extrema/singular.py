@@ -47,12 +47,12 @@ def across(table, pool, r, breaks, spans, closed, x, most):
 
 
 @kernel(inner=True)
-def fold_beyond(table, pool, scene, x, half):
+def fold_beyond(table, pool, posed, x, half):
     """The least distance from a fold of a root with the curvatures beyond knot lines within BESIDE half widths.
 
     Across them the curvature of a smooth surface may jump, as where a straight wire begins to bend.
     """
-    f, g = scene[2][0], scene[2][1]
+    f, g = posed.surfaces[0], posed.surfaces[1]
     y = (
         across(table, pool, f, BREAKS_U, SPANS_U, CLOSED_U, x[0], BESIDE * half[0]),
         across(table, pool, f, BREAKS_V, SPANS_V, CLOSED_V, x[1], BESIDE * half[1]),
@@ -70,7 +70,7 @@ def fold_beyond(table, pool, scene, x, half):
             t = y[3] if j >= 2 else x[3]
             if (i == 0 and j == 0) or (j > 0 and (s, t) == (x[2], x[3])):
                 continue
-            frame = pair_frame(table, pool, f, g, scene[0], scene[1], (u, v, s, t))
+            frame = pair_frame(table, pool, f, g, posed.turn, posed.shift, (u, v, s, t))
             if frame[11]:
                 least = min(least, fold_of(pair_matrix(frame[7], frame[8], frame[10], 1e-9)[1]))
     return least

@@ -7,6 +7,7 @@ is grown in the axes of the first one.
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 from assembly._kernel import kernel
 from assembly._record import place_of, record_dtype, record_view, size_of
@@ -41,27 +42,22 @@ from assembly.proximity.features.quadratic_model import (
     vertex_model,
 )
 
-# Integers of a node: what it is, its feature's kind, number and record, its children (-1: none yet), how many; of a
-# face's cell where it is from the trim; whether it has its model.
+# The integers of a node.
 CELL_NODE = record_dtype(
     "i8",
-    level=1,
-    kind=1,
-    feature=1,
-    record=1,
-    child=1,
-    children=1,
-    side=1,
-    has_model=1,
+    level=1,  # WHOLE, PART, GROUP or CELL
+    kind=1,  # its feature: FACE, EDGE or VERTEX,
+    feature=1,  # its number
+    record=1,  # and where its record is in the table
+    child=1,  # its first child; -1: none yet
+    children=1,  # how many
+    side=1,  # of a face's cell, where it is from the trim: UNKNOWN, INSIDE, OUTSIDE or MIXED_SIDE
+    has_model=1,  # 1: its quadratic model is made
 )
 cell_node_at = record_view(CELL_NODE)
 LEVEL = place_of(CELL_NODE, "level")
 KIND = place_of(CELL_NODE, "kind")
-FEATURE = place_of(CELL_NODE, "feature")
 RECORD = place_of(CELL_NODE, "record")
-CHILD = place_of(CELL_NODE, "child")
-CHILDREN = place_of(CELL_NODE, "children")
-SIDE = place_of(CELL_NODE, "side")
 HAS_MODEL = place_of(CELL_NODE, "has_model")
 INFO = size_of(CELL_NODE)
 # Levels.
@@ -78,21 +74,27 @@ SPANS = 4
 PARTS = 8192
 
 
+# The cells of a feature. kind: FACE, EDGE or VERTEX; record: where its record is in the table; count: how many cells;
+# pool: where they begin in the pool; stride: numbers of a cell; ball: where its ball is among them.
+FeatureCells = namedtuple("FeatureCells", "kind record count pool stride ball")
+
+
 @kernel(inner=True)
 def feature_cells(table, shell, k):
-    """Kind and record of feature k, how many cells it has, where in the pool, how long a row, and where its ball is."""
+    """The FeatureCells of feature k."""
     solid = shell_at(table, shell)
     faces = solid.faces
     edges = solid.edges
     if k < faces:
         record = solid.face_table + FACE_RECORD * k
         surface = surface_at(table, face_at(table, record).surface)
-        return FACE, record, surface.cell_count, surface.cells, CELL_SIZE, 5
+        return FeatureCells(FACE, record, surface.cell_count, surface.cells, CELL_SIZE, ball=5)
     if k < faces + edges:
         record = solid.edge_table + EDGE_RECORD * (k - faces)
-        return EDGE, record, edge_at(table, record).cell_count, edge_at(table, record).cells, EDGE_CELL_SIZE, 2
+        edge = edge_at(table, record)
+        return FeatureCells(EDGE, record, edge.cell_count, edge.cells, EDGE_CELL_SIZE, ball=2)
     record = solid.vertex_table + VERTEX_RECORD * (k - faces - edges)
-    return VERTEX, record, 1, vertex_at(table, record).point, 3, 0
+    return FeatureCells(VERTEX, record, 1, vertex_at(table, record).point, 3, ball=0)
 
 
 @kernel(inner=True)
@@ -102,7 +104,7 @@ def room(table, pool, shell):
     features = solid.faces + solid.edges + solid.vertices
     count = 1 + features + PARTS
     for k in range(features):
-        cells = feature_cells(table, shell, k)[2]
+        cells = feature_cells(table, shell, k).count
         count += cells + cells // TOGETHER + 1
     return count
 
@@ -158,7 +160,8 @@ def plant(table, pool, shell, turn, shift, nodes, info):
     cell.child = 1
     cell.children = features
     for k in range(features):
-        kind, record, cells, at, size, ball = feature_cells(table, shell, k)
+        own = feature_cells(table, shell, k)
+        kind, record, cells, at, size, ball = own.kind, own.record, own.count, own.pool, own.stride, own.ball
         i = 1 + k
         model = model_at(nodes, i)
         new_node(info, i, PART, kind, k, record)
@@ -267,7 +270,8 @@ def span_count(table, kind, record):
 def open_feature(table, pool, shell, turn, shift, nodes, info, i, count):
     """Groups and cells of a feature. Returns the number of nodes."""
     cell = cell_node_at(info, i)
-    kind, record, cells, at, size, ball = feature_cells(table, shell, cell.feature)
+    own = feature_cells(table, shell, cell.feature)
+    kind, record, cells, at, size, ball = own.kind, own.record, own.count, own.pool, own.stride, own.ball
     used = 0
     for c in range(cells):
         if used_cell(table, pool, record, kind, c):

@@ -31,7 +31,7 @@ from assembly.proximity.extrema.crossing import tangents
 from assembly.proximity.extrema.face_face import CONVERGED, SINGULAR
 from assembly.proximity.extrema.feature_pair import solve_features
 from assembly.proximity.features.ball_tree import feature_cells, used_cell
-from assembly.proximity.features.global_search import CROSSING, search
+from assembly.proximity.features.global_search import CROSSING, FoundPair, search
 from assembly.proximity.features.separating_normals import WAYS, add_ways
 
 # Points of shells that are deeper in each other than this part of the size tell a crossing from conforming faces.
@@ -49,7 +49,8 @@ def middle_of(table, pool, shell):
     center = (0.0, 0.0, 0.0)
     for step in range(2):
         for k in range(shell_at(table, shell).faces):
-            kind, record, count, cells, stride, ball = feature_cells(table, shell, k)
+            own = feature_cells(table, shell, k)
+            kind, record, count, cells, stride, ball = own.kind, own.record, own.count, own.pool, own.stride, own.ball
             for i in range(count):
                 if not used_cell(table, pool, record, kind, i):
                     continue
@@ -103,11 +104,13 @@ def face_beside(table, pool, shell, code, u, v, turn, n):
     edge_record = edge_at(table, edge)
     surface = edge_record.surface
     face = edge_record.face_a
-    a, b, p, _along, m = on_surface(table, pool, surface, edge_record.curve, u)
+    on_edge = on_surface(table, pool, surface, edge_record.curve, u)
+    a, b, p, m = on_edge.u, on_edge.v, on_edge.point, on_edge.normal
     if edge_record.face_b >= 0:
         other = edge_record.surface_b
         s = other_parameter(table, pool, edge, u, p)
-        c, d, _p, _along, k = on_surface(table, pool, other, edge_record.curve_b, s)
+        on_edge = on_surface(table, pool, other, edge_record.curve_b, s)
+        c, d, k = on_edge.u, on_edge.v, on_edge.normal
         lean = float(surface_at(table, surface).sign) * dot(unit(matvec(turn, m)), n)
         if float(surface_at(table, other).sign) * dot(unit(matvec(turn, k)), n) > lean:
             return edge_record.face_b, c, d
@@ -132,10 +135,7 @@ def conforming_pair(table, pool, shell_f, shell_g, turn, shift, size):
     """The pair at which two shells that have points in common touch along conforming faces.
 
     Made smaller, a shell within the other one's material is free as well: there normals do not oppose each other.
-
-    Returns
-    -------
-    Whether there is one, features, coordinates, normal, gap: not deeper than `NEARLY` of the size.
+    It is not deeper than `NEARLY` of the size.
     """
     none = (0.0, 0.0, 0.0)
     same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
@@ -147,13 +147,14 @@ def conforming_pair(table, pool, shell_f, shell_g, turn, shift, size):
         about = add(matvec(turn, center), shift) if side == 0 else center
         part = NEARLY * size / reach
         other, place = grown(turn, shift, about, 1.0 - part if side == 0 else 1.0 / (1.0 - part))
-        status, f, g, x, _gap, _lower, _effort = search(table, pool, shell_f, shell_g, other, place, size, ROUGH)
-        if status == CROSSING or f < 0:
+        nearest = search(table, pool, shell_f, shell_g, other, place, size, ROUGH)
+        f, g, x = nearest.f, nearest.g, nearest.x
+        if nearest.status == CROSSING or f < 0:
             continue
         kind_f = feature_kind(table, shell_f, f)
         kind_g = feature_kind(table, shell_g, g)
-        p = tangents(table, pool, kind_f, feature_cells(table, shell_f, f)[1], same, none, x[0], x[1])[0]
-        q = tangents(table, pool, kind_g, feature_cells(table, shell_g, g)[1], other, place, x[2], x[3])[0]
+        p = tangents(table, pool, kind_f, feature_cells(table, shell_f, f).record, same, none, x[0], x[1])[0]
+        q = tangents(table, pool, kind_g, feature_cells(table, shell_g, g).record, other, place, x[2], x[3])[0]
         d = sub(q, p)
         length = math.sqrt(dot(d, d))
         if not length > 0.0:
@@ -171,5 +172,5 @@ def conforming_pair(table, pool, shell_f, shell_g, turn, shift, size):
             g, s, w = face_beside(table, pool, shell_g, g, x[2], x[3], turn, scale(-1.0, n))
             found, y, m, gap = pair_from(table, pool, shells, pose, (f, g), (u, v, s, w), n, size)
         if found:
-            return True, f, g, y, m, gap
-    return False, -1, -1, (0.0, 0.0, 0.0, 0.0), none, 0.0
+            return FoundPair(True, f, g, y, m, gap)
+    return FoundPair(False, -1, -1, (0.0, 0.0, 0.0, 0.0), none, 0.0)

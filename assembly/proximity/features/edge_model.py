@@ -116,7 +116,7 @@ def wide_remainder(table, pool, r, u0, v0, a, b, s0, p, q, l, m, k, work):
                     if meets(pool, bv, iv, move_v, v0, b):
                         u = u0 - move_u
                         v = v0 - move_v
-                        e = remainder(table, pool, r, iu, iv, u, v, a, b, s0, p, q, l, m, k, none, work)[0]
+                        e = remainder(table, pool, r, iu, iv, u, v, a, b, s0, p, q, l, m, k, none, work).rest
                         most = max(most, e)
     return most
 

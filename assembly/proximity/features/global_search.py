@@ -17,6 +17,7 @@ crossing points are found by Newton's method for d = 0, and the search ends.
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 import numpy as np
 
@@ -44,7 +45,16 @@ from assembly.proximity.features.quadratic_model import (
     model_at,
     pair_bound,
 )
-from assembly.proximity.features.region_tests import FAR, excluded, is_feasible, is_known, relative_curvature, side_of
+from assembly.proximity.features.region_tests import (
+    FAR,
+    KNOWN,
+    excluded,
+    is_feasible,
+    is_known,
+    known_extremum_at,
+    relative_curvature,
+    side_of,
+)
 
 # What became of a search: apart, all other pairs excluded; shells cross; out of room, the best pair known.
 APART, CROSSING, UNPROVEN = 0, 1, 2
@@ -95,9 +105,13 @@ def drop_first(keys, slots, count):
     slots[i] = slot
 
 
+# Where Newton's method leads. curvature: the least of g relative to f; stretch: 1 over the least of f's metric K.
+NearExtremum = namedtuple("NearExtremum", "status x gap curvature stretch")
+
+
 @kernel(inner=True)
 def extremum_near(table, pool, kind_f, f, kind_g, g, turn, shift, x, n, size):
-    """Newton from x: whether it led to an extremum, its coordinates, gap, least relative curvature, stretch of f's."""
+    """Newton's method from x; its status says whether it led to an extremum."""
     face = face_at(table, f)
     face_record = face_at(table, g)
     if kind_f == FACE and kind_g == FACE:
@@ -105,11 +119,11 @@ def extremum_near(table, pool, kind_f, f, kind_g, g, turn, shift, x, n, size):
             table, pool, face.surface, face_record.surface, turn, shift, x, size, 1.5, 0.0, False
         )
         least, stretch = relative_curvature(curvature[0], curvature[1], frame[10])
-        return status, y, frame[10], least, stretch
+        return NearExtremum(status, y, frame[10], least, stretch)
     af = face.surface if kind_f == FACE else f
     ag = face_record.surface if kind_g == FACE else g
     status, y, frame = solve_features(table, pool, kind_f, af, kind_g, ag, turn, shift, x, n, size, 1.5)
-    return status, y, frame[5], 0.0, 1.0
+    return NearExtremum(status, y, frame[5], 0.0, 1.0)
 
 
 @kernel(inner=True)
@@ -137,25 +151,17 @@ def ball_bound(a, i, b, j):
     return math.sqrt(dot(d, d)) - model_at(a, i).radius - model_at(b, j).radius
 
 
+# What a search for the nearest points of two shells finds. status: APART, CROSSING (at the point) or UNPROVEN; f, g:
+# numbers of the features; x: their coordinates, (u, v) of f, then of g; gap: n.(g - f), n the outward normal of a face
+# of f, else of g, else from f to g; lower: no points are nearer than this; effort: pairs looked at.
+ShellSearch = namedtuple("ShellSearch", "status f g x gap lower effort")
+# A pair of features, or none. normal: near that of the pair, or zero where it is not known.
+FoundPair = namedtuple("FoundPair", "found f g x normal gap")
+
+
 @kernel(inner=True, allocates=True)
 def search(table, pool, shell_f, shell_g, turn, shift, size, rough):
-    """The nearest points of two shells, g seen from f, or any that are farther by a part of that, `rough`, at most.
-
-    Returns
-    -------
-    status
-        APART: all else is excluded. CROSSING: the shells cross at the point returned. UNPROVEN: out of room.
-    code_f, code_g
-        Numbers of the features.
-    x
-        Their coordinates, (u_f, v_f, u_g, v_g).
-    gap
-        n.(g - f), n the outward normal of a face of f, else of g, else from f to g.
-    lower
-        No points are nearer than this.
-    effort
-        Pairs looked at.
-    """
+    """The nearest points of two shells, g seen from f, or any that are farther by a part of that, `rough`, at most."""
     same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
     origin = (0.0, 0.0, 0.0)
     most_f = room(table, pool, shell_f)
@@ -175,7 +181,7 @@ def search(table, pool, shell_f, shell_g, turn, shift, size, rough):
     released = 0
     used = 0
     waiting = 0
-    extrema = np.empty((EXTREMA, 6))
+    extrema = np.empty((EXTREMA, KNOWN))
     owners = np.empty((EXTREMA, 2), np.int64)
     known = 0
     tolerance = 1e-13 * size
@@ -285,10 +291,9 @@ def search(table, pool, shell_f, shell_g, turn, shift, size, rough):
                 continue
             # Beside an extremum Newton's method would find that one again.
             if ready == 2 or (max(model_at(a, i).bend, model_at(b, j).bend) < SMOOTH and beside > FAR):
-                found, x, beta, least, stretch = extremum_near(
-                    table, pool, kind_f, f, kind_g, g, turn, shift, start, n, size
-                )
-                if found == CONVERGED or found == SINGULAR:
+                near = extremum_near(table, pool, kind_f, f, kind_g, g, turn, shift, start, n, size)
+                if near.status == CONVERGED or near.status == SINGULAR:
+                    x, beta = near.x, near.gap
                     if (
                         abs(beta) < upper
                         and is_feasible(table, pool, kind_f, f, x[0], x[1])
@@ -299,9 +304,11 @@ def search(table, pool, shell_f, shell_g, turn, shift, size, rough):
                         at = x
                         gap = beta
                     if known < EXTREMA:
-                        extrema[known, 0], extrema[known, 1], extrema[known, 2], extrema[known, 3] = x
-                        extrema[known, 4] = least
-                        extrema[known, 5] = stretch
+                        extremum = known_extremum_at(extrema, known)
+                        for l in range(4):
+                            extremum.parameters[l] = x[l]
+                        extremum.curvature = near.curvature
+                        extremum.stretch = near.stretch
                         owners[known, 0] = cell_node_at(ai, i).feature
                         owners[known, 1] = cell_node_at(bi, j).feature
                         known += 1
@@ -372,4 +379,4 @@ def search(table, pool, shell_f, shell_g, turn, shift, size, rough):
         # Out of room before any point inside the trims: where the search began.
         best = (cell_node_at(ai, first_f).feature, cell_node_at(bi, first_g).feature)
         at = (model.u0, model.v0, model_record.u0, model_record.v0)
-    return status, best[0], best[1], at, gap, max(min(lower, uncut), 0.0), effort
+    return ShellSearch(status, best[0], best[1], at, gap, max(min(lower, uncut), 0.0), effort)

@@ -43,7 +43,7 @@ def lean_of(table, pool, shell, kind, code, t, s, n):
         if kind == EDGE:
             return lean
         edge = edge_at(table, feature_at(table, shell, code))
-        along = on_surface(table, pool, edge.surface, edge.curve, t)[3]
+        along = on_surface(table, pool, edge.surface, edge.curve, t).tangent
         return max(lean, abs(dot(n, unit(along))))
     return from_vertex(table, pool, shell, code, n)[2] if kind == VERTEX else 0.0
 

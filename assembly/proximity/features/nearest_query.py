@@ -21,18 +21,17 @@ from assembly.proximity.features.penetration import PENETRATING, TOUCHING, deepe
 from assembly.proximity.features.separating_normals import WAYS, overlap_at
 from assembly.proximity.features.switching import track_features
 
-# What is written of a pair: parameters (4), point of f, point of g, normal, gap, lower bound, pairs of cells looked
-# at, switches.
+# What is written of a pair, in world axes.
 FEATURE_ANSWER = record_dtype(
     "f8",
-    parameters=4,
+    parameters=4,  # coordinates on the features of f, then of g
     point_f=3,
     point_g=3,
-    normal=3,
+    normal=3,  # from f to g
     gap=1,
-    lower=1,
-    effort=1,
-    switches=1,
+    lower=1,  # lower bound of the distance
+    effort=1,  # pairs of cells looked at
+    switches=1,  # of features
 )
 answer_at = record_view(FEATURE_ANSWER)
 PARAMETERS = place_of(FEATURE_ANSWER, "parameters")
@@ -47,6 +46,13 @@ PAIR = size_of(FEATURE_ANSWER)
 PROVEN = 1e-9
 # Statuses of a tracked pair, beside those of a search.
 TRACKED, LOST = 4, 5
+
+
+@kernel(inline=True)
+def answer_parameters(out):
+    """The coordinates of the pair in an answer."""
+    answer = answer_at(out, 0)
+    return (answer.parameters[0], answer.parameters[1], answer.parameters[2], answer.parameters[3])
 
 
 @kernel(inner=True)
@@ -82,8 +88,8 @@ def write_features(table, pool, shell_f, shell_g, q, turn_f, turn, shift, f, g, 
     # A crossing, or an apex where Newton's method has no tangent to go on: the points themselves.
     same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
     none = (0.0, 0.0, 0.0)
-    pf = tangents(table, pool, kind_f, feature_cells(table, shell_f, f)[1], same, none, x[0], x[1])[0]
-    pg = tangents(table, pool, kind_g, feature_cells(table, shell_g, g)[1], turn, shift, x[2], x[3])[0]
+    pf = tangents(table, pool, kind_f, feature_cells(table, shell_f, f).record, same, none, x[0], x[1])[0]
+    pg = tangents(table, pool, kind_g, feature_cells(table, shell_g, g).record, turn, shift, x[2], x[3])[0]
     d = sub(pg, pf)
     length = math.sqrt(dot(d, d))
     write_pair(q, turn_f, x, pf, pg, scale(1.0 / length, d) if length > 1e-9 * size else frame[0], length, out)
@@ -95,24 +101,25 @@ def find_nearest(table, pool, shell_f, shell_g, q, size, codes, out):
     answer = answer_at(out, 0)
     turn_f = rotation(q, 0)
     turn, shift = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
-    status, f, g, x, gap, lower, effort = search(table, pool, shell_f, shell_g, turn, shift, size, 0.0)
+    nearest = search(table, pool, shell_f, shell_g, turn, shift, size, 0.0)
+    status, f, g = nearest.status, nearest.f, nearest.g
+    x, gap = nearest.x, nearest.gap
     none = (0.0, 0.0, 0.0)
     if status == UNPROVEN:
         # The search was over before it came to the nearest one; beside what it found there may be nearer ones.
-        found, near_f, near_g, y, frame, _switches = track_features(
-            table, pool, shell_f, shell_g, turn, shift, f, g, x, none, size, math.inf
-        )
-        if (found == CONVERGED or found == SINGULAR) and lower <= abs(frame[5]) < abs(gap):
-            f, g, x, gap = near_f, near_g, y, frame[5]
-        if abs(gap) - lower <= PROVEN * size:
+        beside = track_features(table, pool, shell_f, shell_g, turn, shift, f, g, x, none, size, math.inf)
+        off = beside.frame[5]
+        if (beside.status == CONVERGED or beside.status == SINGULAR) and nearest.lower <= abs(off) < abs(gap):
+            f, g, x, gap = beside.f, beside.g, beside.x, off
+        if abs(gap) - nearest.lower <= PROVEN * size:
             status = APART
     if status == APART and abs(gap) <= TOUCHING * size:
         # Solids whose faces are flush have points in common before a search comes to where they cross.
         if overlap_at(table, pool, shell_f, shell_g, turn, f, g, x, size, np.empty((WAYS, 3))):
             status = CROSSING
     write_features(table, pool, shell_f, shell_g, q, turn_f, turn, shift, f, g, x, none, gap, size, codes, out)
-    answer.lower = lower
-    answer.effort = effort
+    answer.lower = nearest.lower
+    answer.effort = nearest.effort
     return status
 
 
@@ -125,16 +132,19 @@ def find_deepest(table, pool, shell_f, shell_g, q, size, codes, out):
     """
     turn_f = rotation(q, 0)
     turn, shift = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
-    x = (out[0], out[1], out[2], out[3])
-    found, f, g, y, n, gap = deepest(table, pool, shell_f, shell_g, turn, shift, codes[0], codes[1], x, size)
-    if not found or gap < -NEARLY * size:
-        touches, near_f, near_g, z, m, off = conforming_pair(table, pool, shell_f, shell_g, turn, shift, size)
-        if touches:
-            found, f, g, y, n, gap = True, near_f, near_g, z, m, off
-    if not found:
+    x = answer_parameters(out)
+    pair = deepest(table, pool, shell_f, shell_g, turn, shift, codes[0], codes[1], x, size)
+    if not pair.found or pair.gap < -NEARLY * size:
+        touching = conforming_pair(table, pool, shell_f, shell_g, turn, shift, size)
+        if touching.found:
+            pair = touching
+    if not pair.found:
         return CROSSING
-    write_features(table, pool, shell_f, shell_g, q, turn_f, turn, shift, f, g, y, n, gap, size, codes, out)
-    return PENETRATING if gap < 0.0 else APART
+    write_features(
+        table, pool, shell_f, shell_g, q, turn_f, turn, shift, pair.f, pair.g, pair.x, pair.normal, pair.gap, size,
+        codes, out,
+    )  # fmt: skip
+    return PENETRATING if pair.gap < 0.0 else APART
 
 
 @kernel(signatures="(i8[::1], f8[::1], i8, i8, f8[:, ::1], f8, i8[::1], f8[::1])")
@@ -144,17 +154,16 @@ def follow_nearest(table, pool, shell_f, shell_g, q, size, codes, out):
     turn_f = rotation(q, 0)
     turn, shift = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
     n = matvec_t(turn_f, (answer.normal[0], answer.normal[1], answer.normal[2]))
-    x = (out[0], out[1], out[2], out[3])
-    status, f, g, y, frame, switches = track_features(
-        table, pool, shell_f, shell_g, turn, shift, codes[0], codes[1], x, n, size, 1.0
-    )
+    x = answer_parameters(out)
+    found = track_features(table, pool, shell_f, shell_g, turn, shift, codes[0], codes[1], x, n, size, 1.0)
+    status, frame = found.status, found.frame
     # An edge may have become the farthest one of its neighborhood, surfaces may cross beside their points. In a
     # continuum, of flush faces say, nothing tells.
     if not (status == SINGULAR or (status == CONVERGED and frame[14])):
         return LOST
-    codes[0] = f
-    codes[1] = g
-    write_pair(q, turn_f, y, frame[3], frame[4], frame[0], frame[5], out)
+    codes[0] = found.f
+    codes[1] = found.g
+    write_pair(q, turn_f, found.x, frame[3], frame[4], frame[0], frame[5], out)
     answer.lower = math.nan
-    answer.switches += switches
+    answer.switches += found.switches
     return TRACKED

@@ -17,9 +17,9 @@ from assembly._kernel import kernel
 from assembly.geometry.vec import add, blend, dot, scale
 from assembly.proximity.brep.borders import feature_at
 from assembly.proximity.brep.records import face_at, shell_at
-from assembly.proximity.extrema.face_face import CONVERGED, NOT_CONVERGED, SINGULAR
+from assembly.proximity.extrema.face_face import CONVERGED, SINGULAR
 from assembly.proximity.extrema.global_start import global_start
-from assembly.proximity.features.global_search import CROSSING, search
+from assembly.proximity.features.global_search import CROSSING, FoundPair, search
 from assembly.proximity.features.separating_normals import WAYS, add_end_ways, add_way, add_ways
 from assembly.proximity.features.switching import track_features
 
@@ -48,7 +48,7 @@ def has_one_face(table, shell):
 
 @kernel(inner=True)
 def walk_back(table, pool, shell_f, shell_g, turn, shift, away, f, g, x, size):
-    """The pair of g moved by `away`, followed until g is back: status, features, coordinates, normal, gap."""
+    """The pair of g moved by `away`, followed until g is back."""
     none = (0.0, 0.0, 0.0)
     done = 0.0
     step = 1.0 / STEPS
@@ -58,32 +58,25 @@ def walk_back(table, pool, shell_f, shell_g, turn, shift, away, f, g, x, size):
     while done < 1.0:
         part = min(done + step, 1.0)
         place = blend(1.0, shift, 1.0 - part, away)
-        status, next_f, next_g, y, frame, _switches = track_features(
-            table, pool, shell_f, shell_g, turn, place, f, g, x, n, size, 1.0
-        )
-        if status != CONVERGED and status != SINGULAR:
+        there = track_features(table, pool, shell_f, shell_g, turn, place, f, g, x, n, size, 1.0)
+        if there.status != CONVERGED and there.status != SINGULAR:
             if halved == HALVINGS:
-                return NOT_CONVERGED, f, g, x, n, gap
+                return FoundPair(False, f, g, x, n, gap)
             halved += 1
             step *= 0.5
             continue
-        f = next_f
-        g = next_g
-        x = y
-        n = frame[0]
-        gap = frame[5]
+        f = there.f
+        g = there.g
+        x = there.x
+        n = there.frame[0]
+        gap = there.frame[5]
         done = part
-    return CONVERGED, f, g, x, n, gap
+    return FoundPair(True, f, g, x, n, gap)
 
 
 @kernel(inner=True, allocates=True)
 def deepest(table, pool, shell_f, shell_g, turn, shift, f, g, x, size):
-    """The pair of two shells that cross at x of features f and g.
-
-    Returns
-    -------
-    Whether it was found, features, coordinates, a normal near that of the pair (zero: none), gap.
-    """
+    """The pair of two shells that cross at x of features f and g."""
     none = (0.0, 0.0, 0.0)
     if has_one_face(table, shell_f) and has_one_face(table, shell_g):
         a = feature_at(table, shell_f, 0)
@@ -91,7 +84,7 @@ def deepest(table, pool, shell_f, shell_g, turn, shift, f, g, x, size):
         status, y, gap = global_start(table, pool, a, b, turn, shift, size)
         # The far side of a thin body may be nearer than where it is in the other one.
         if (status == CONVERGED or status == SINGULAR) and gap <= TOUCHING * size:
-            return True, 0, 0, y, none, gap
+            return FoundPair(True, 0, 0, y, none, gap)
     same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
     ways = np.empty((WAYS, 3))
     count = add_ways(table, pool, shell_f, f, x[0], x[1], same, 1.0, size, ways, 0)
@@ -104,7 +97,7 @@ def deepest(table, pool, shell_f, shell_g, turn, shift, f, g, x, size):
     # Flush bodies meet all along edges, also where another face leads out sooner.
     count = add_end_ways(table, pool, shell_f, f, x[0], x[1], same, 1.0, size, ways, count)
     count = add_end_ways(table, pool, shell_g, g, x[2], x[3], turn, -1.0, size, ways, count)
-    best = (False, f, g, x, none, -math.inf)
+    best = FoundPair(False, f, g, x, none, -math.inf)
     other = best
     for attempt in range(2):
         if attempt == 1:
@@ -116,27 +109,26 @@ def deepest(table, pool, shell_f, shell_g, turn, shift, f, g, x, size):
             for k in range(count):
                 away = scale(reach, (ways[k, 0], ways[k, 1], ways[k, 2]))
                 place = add(shift, away)
-                status, cf, cg, y, _gap, lower, _effort = search(
-                    table, pool, shell_f, shell_g, turn, place, size, ROUGH
-                )
-                if status == CROSSING or not lower > 0.0:
+                out = search(table, pool, shell_f, shell_g, turn, place, size, ROUGH)
+                if out.status == CROSSING or not out.lower > 0.0:
                     continue
-                found, cf, cg, y, n, gap = walk_back(table, pool, shell_f, shell_g, turn, shift, away, cf, cg, y, size)
-                if found != CONVERGED or not TOUCHING * size >= gap > best[5]:
+                back = walk_back(table, pool, shell_f, shell_g, turn, shift, away, out.f, out.g, out.x, size)
+                gap = back.gap
+                if not back.found or not TOUCHING * size >= gap > best.gap:
                     continue
                 if gap < -reach:
                     # The way back went off to another pair: it is not so far as that.
-                    if gap > other[5]:
-                        other = (True, cf, cg, y, n, gap)
+                    if gap > other.gap:
+                        other = back
                     continue
                 if gap >= -TOUCHING * size:
                     # They touch here. If that is all, the least move parts them. Where they touch along a line or
                     # all over a face a search so near may not come to its proof: that none is found has to do.
                     place = add(shift, scale(PARTED / reach * size, away))
-                    if search(table, pool, shell_f, shell_g, turn, place, size, ROUGH)[0] == CROSSING:
+                    if search(table, pool, shell_f, shell_g, turn, place, size, ROUGH).status == CROSSING:
                         continue
-                best = (True, cf, cg, y, n, gap)
-            if best[0]:
+                best = back
+            if best.found:
                 return best
             reach *= 2.0
     return other

@@ -16,6 +16,7 @@ for every unit n: quadratically, towards each other convex ones cubically, close
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 from assembly._kernel import kernel
 from assembly._record import place_of, record_dtype, record_view, size_of
@@ -26,29 +27,27 @@ from assembly.geometry.splines.evaluate import (
 )
 from assembly.geometry.vec import add, cross, dot, matvec, scale, sub
 
-# A node: box, model (S0, then the vectors p, q, l, m, k and e), sphere, unit normal of the linear part.
-# What of e is along that normal; the length of all terms but the linear ones; how much the normal turns over the box,
-# in radians, and how much curvatures change.
+# A node: box, model and sphere. Lengths are over the size of the scene.
 QUADRATIC_MODEL = record_dtype(
     "f8",
-    u0=1,
+    u0=1,  # middle of the box
     v0=1,
-    half_u=1,
+    half_u=1,  # half its widths: a, b
     half_v=1,
-    point=3,
-    linear_u=3,
-    linear_v=3,
-    square_u=3,
-    mixed=3,
-    square_v=3,
-    rest=1,
-    center=3,
+    point=3,  # S0
+    linear_u=3,  # p
+    linear_v=3,  # q
+    square_u=3,  # l
+    mixed=3,  # m
+    square_v=3,  # k
+    rest=1,  # e
+    center=3,  # of the sphere
     radius=1,
-    normal=3,
-    rest_n=1,
-    curved=1,
-    bend=1,
-    change=1,
+    normal=3,  # unit normal of the linear part
+    rest_n=1,  # what of e is along that normal
+    curved=1,  # length of all terms but the linear ones
+    bend=1,  # how much the normal turns over the box [rad]
+    change=1,  # how much curvatures change over it
 )
 model_at = record_view(QUADRATIC_MODEL)
 U0 = place_of(QUADRATIC_MODEL, "u0")
@@ -66,9 +65,6 @@ CENTER = place_of(QUADRATIC_MODEL, "center")
 RADIUS = place_of(QUADRATIC_MODEL, "radius")
 NORMAL = place_of(QUADRATIC_MODEL, "normal")
 REST_N = place_of(QUADRATIC_MODEL, "rest_n")
-CURVED = place_of(QUADRATIC_MODEL, "curved")
-BEND = place_of(QUADRATIC_MODEL, "bend")
-CHANGE = place_of(QUADRATIC_MODEL, "change")
 NODE = size_of(QUADRATIC_MODEL)
 # Where weights vary by more than this over a box it has no model: e is infinite and its sphere is what bounds it.
 LEAST_WEIGHT = 0.1
@@ -98,13 +94,16 @@ def vanish(pool, o, stride, count):
     return True
 
 
+# How far a surface is off a quadratic. rest: bound of the length; rest_n: of the part along n; sss, sst, stt, ttt: the
+# terms of third order along n; beyond: bound of the others along n.
+Remainder = namedtuple("Remainder", "rest rest_n sss sst stt ttt beyond")
+
+
 @kernel(inner=True)
 def remainder(table, pool, r, iu, iv, u0, v0, a, b, origin, p, q, l, m, k, n, work):
     """How far a piece of the surface may be off the quadratic over a box; `work` holds 4 by 16 by 16 numbers.
 
-    Returns the bound of the length, that of the part along n, the four terms of third order along n (s^3, s^2 t, ...),
-    and a bound of the others along n. The piece may be one beside the middle of the box: then terms of low order
-    remain too.
+    The piece may be one beside the middle of the box: then terms of low order remain too.
     """
     patch = surface_at(table, r)
     ou = patch.breaks_u + iu
@@ -151,7 +150,7 @@ def remainder(table, pool, r, iu, iv, u0, v0, a, b, origin, p, q, l, m, k, n, wo
         for j in range(nv + 1):
             least -= abs(work[3, i, j])
     if not least > LEAST_WEIGHT * work[3, 0, 0]:
-        return math.inf, math.inf, 0.0, 0.0, 0.0, 0.0, math.inf
+        return Remainder(math.inf, math.inf, 0.0, 0.0, 0.0, 0.0, math.inf)
     ex = 0.0
     ey = 0.0
     ez = 0.0
@@ -212,7 +211,7 @@ def remainder(table, pool, r, iu, iv, u0, v0, a, b, origin, p, q, l, m, k, n, wo
                 c03 = height
     w = 1.0 / work[3, 0, 0]
     e = math.sqrt(ex * ex + ey * ey + ez * ez) / least
-    return e, along / least, c30 * w, c21 * w, c12 * w, c03 * w, beyond / least
+    return Remainder(e, along / least, c30 * w, c21 * w, c12 * w, c03 * w, beyond / least)
 
 
 @kernel(inner=True)
@@ -235,18 +234,18 @@ def face_model(table, pool, r, turn, shift, nodes, i, work):
     n = cross(p, q)
     nn = dot(n, n)
     n = scale(1.0 / math.sqrt(nn), n) if nn > 1e-20 * dot(p, p) * dot(q, q) and nn > 0.0 else (0.0, 0.0, 0.0)
-    e, along, c30, c21, c12, c03, beyond = remainder(table, pool, r, iu, iv, u0, v0, a, b, s0, p, q, l, m, k, n, work)
+    left = remainder(table, pool, r, iu, iv, u0, v0, a, b, s0, p, q, l, m, k, n, work)
     noise = ROUNDING * (abs(s0[0]) + abs(s0[1]) + abs(s0[2]) + abs(shift[0]) + abs(shift[1]) + abs(shift[2]))
-    place_model(turn, shift, s0, p, q, l, m, k, e + noise, nodes, i)
+    place_model(turn, shift, s0, p, q, l, m, k, left.rest + noise, nodes, i)
     if nn > 0.0 and model.bend < math.inf:
-        model.rest_n = along + noise
-        change = curvature_change(p, q, l, m, k, n, c30, c21, c12, c03)
+        model.rest_n = left.rest_n + noise
+        change = curvature_change(p, q, l, m, k, n, left)
         across = nn / max(dot(p, p), dot(q, q))
-        model.change = (change + 12.0 * beyond) / across
+        model.change = (change + 12.0 * left.beyond) / across
 
 
 @kernel(inner=True)
-def curvature_change(p, q, l, m, k, n, c30, c21, c12, c03):
+def curvature_change(p, q, l, m, k, n, left):
     """How much the second fundamental form changes over a box, in its half widths, whatever the parameters do.
 
     The covariant derivative h_ij;k = n.S_ijk - G^l_ij h_kl - G^l_ki h_lj - G^l_kj h_il, with G the tangential parts of
@@ -272,10 +271,10 @@ def curvature_change(p, q, l, m, k, n, c30, c21, c12, c03):
     h = 2.0 * dot(l, n)
     i = dot(m, n)
     j = 2.0 * dot(k, n)
-    uuu = abs(6.0 * c30 - 3.0 * (a1 * h + a2 * i))
-    uuv = abs(2.0 * c21 - (a1 * i + a2 * j) - 2.0 * (b1 * h + b2 * i))
-    uvv = abs(2.0 * c12 - (d1 * h + d2 * i) - 2.0 * (b1 * i + b2 * j))
-    vvv = abs(6.0 * c03 - 3.0 * (d1 * i + d2 * j))
+    uuu = abs(6.0 * left.sss - 3.0 * (a1 * h + a2 * i))
+    uuv = abs(2.0 * left.sst - (a1 * i + a2 * j) - 2.0 * (b1 * h + b2 * i))
+    uvv = abs(2.0 * left.stt - (d1 * h + d2 * i) - 2.0 * (b1 * i + b2 * j))
+    vvv = abs(6.0 * left.ttt - 3.0 * (d1 * i + d2 * j))
     return max(max(uuu + uuv, uuv + uvv), uvv + vvv)
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
+from assembly._record import record_dtype, record_view, size_of
 from assembly.geometry.faces.trim import trim_side
 from assembly.geometry.faces.trim_nearest import trim_nearest
 from assembly.geometry.faces.trim_pieces import trim_at
@@ -191,6 +192,17 @@ def from_middles(table, pool, a, ai, i, b, bi, j, x):
     return max(s, off_middle(x[3], model_record.v0, model_record.half_v, pv))
 
 
+# An extremum of two faces that is known.
+KNOWN_EXTREMUM = record_dtype(
+    "f8",
+    parameters=4,  # (u, v) of f, then of g
+    curvature=1,  # least relative curvature
+    stretch=1,  # 1 / the least eigenvalue of K of f
+)
+known_extremum_at = record_view(KNOWN_EXTREMUM)
+KNOWN = size_of(KNOWN_EXTREMUM)
+
+
 @kernel(inner=True)
 def is_known(table, pool, a, ai, i, b, bi, j, extrema, owners, count):
     """Whether the only extremum that two cells may hold is one that is known; half widths from the nearest one."""
@@ -201,12 +213,13 @@ def is_known(table, pool, a, ai, i, b, bi, j, extrema, owners, count):
     for k in range(count):
         if owners[k, 0] != cell_node_at(ai, i).feature or owners[k, 1] != cell_node_at(bi, j).feature:
             continue
-        s = from_middles(table, pool, a, ai, i, b, bi, j, (extrema[k, 0], extrema[k, 1], extrema[k, 2], extrema[k, 3]))
+        extremum = known_extremum_at(extrema, k)
+        s = from_middles(table, pool, a, ai, i, b, bi, j, extremum.parameters)
         nearest = min(nearest, s)
         if s <= BESIDE and bend <= TRUSTED:
             return True, s
         if s <= FAR:
-            change = model.change * extrema[k, 5] * extrema[k, 5] + model_record.change
-            if extrema[k, 4] > 1.5 * max(s, 1.0) * change:
+            change = model.change * extremum.stretch * extremum.stretch + model_record.change
+            if extremum.curvature > 1.5 * max(s, 1.0) * change:
                 return True, s
     return False, nearest

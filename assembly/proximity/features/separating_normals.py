@@ -54,12 +54,14 @@ def add_edge_ways(table, pool, edge, t, turn, side, ways, count):
     surface = edge_record.surface
     if surface < 0:
         return count
-    _u, _v, p, _along, n = on_surface(table, pool, surface, edge_record.curve, t)
+    on_edge = on_surface(table, pool, surface, edge_record.curve, t)
+    p, n = on_edge.point, on_edge.normal
     count = add_way(scale(side * float(surface_at(table, surface).sign), matvec(turn, n)), ways, count)
     if edge_record.face_b >= 0:
         surface = edge_record.surface_b
         s = other_parameter(table, pool, edge, t, p)
-        _u, _v, _p, _along, n = on_surface(table, pool, surface, edge_record.curve_b, s)
+        on_edge = on_surface(table, pool, surface, edge_record.curve_b, s)
+        n = on_edge.normal
         count = add_way(scale(side * float(surface_at(table, surface).sign), matvec(turn, n)), ways, count)
     return count
 

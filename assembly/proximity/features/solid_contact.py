@@ -1,11 +1,6 @@
 """A contact of two solids as a solve tracks it: the pair of features that is closest, its coordinates, its normal.
 
-Of every contact a solve keeps `TRACK` numbers: the coordinates of the pair (4), the two features, the normal in the
-axes of body f, which tells on which side of each other two edges are where they touch, the gap, what the pair
-stays with: a corner over a face, which need not be the closest one (`proximity/manager/vertex_contacts.py`), has its
-features for good; of the
-end of a step, whether its row stays open there for certain (`solve/loop/predict.py`); and, of a clearance's contact, by
-how much its gap may be less than the least one, because it was where the solve began.
+A vertex contact, which need not be the closest one (`proximity/manager/vertex_contacts.py`), has its features for good.
 
 The kernels here are large, and few scenes need them: loops call them by address (`_address.call_address`).
 """
@@ -25,51 +20,55 @@ from assembly.proximity.extrema.rates import RECORD
 from assembly.proximity.features.global_search import CROSSING
 from assembly.proximity.features.holding import hold_features
 from assembly.proximity.features.nearest_query import PAIR, answer_at
-from assembly.proximity.features.switching import track_features
+from assembly.proximity.features.switching import FeatureTrack, track_features
 
+# What a solve keeps of a contact.
 TRACKED_PAIR = record_dtype(
     "f8",
-    before=4,
+    parameters=4,  # coordinates of the pair on the features of f, then of g; NaN: it is lost
     feature_f=1,
     feature_g=1,
-    normal=3,
-    gap=1,
-    stays=1,
-    idle=1,
-    allowed=1,
+    normal=3,  # in the axes of body f; it tells on which side of each other two edges are where they touch
+    gap=1,  # signed distance [over the size of the scene]
+    stays=1,  # what the pair stays with: a vertex contact need not be the closest one (`manager/vertex_contacts.py`)
+    idle=1,  # of the end of a step: 1: its row stays open there for certain (`solve/loop/predict.py`)
+    allowed=1,  # of a clearance: its gap may be less than the least one by this, because it was where the solve began
 )
 tracked_at = record_view(TRACKED_PAIR)
 FEATURE_F = place_of(TRACKED_PAIR, "feature_f")
 FEATURE_G = place_of(TRACKED_PAIR, "feature_g")
-PAIR_NORMAL = place_of(TRACKED_PAIR, "normal")
 PAIR_GAP = place_of(TRACKED_PAIR, "gap")
 STAYS = place_of(TRACKED_PAIR, "stays")
 IDLE = place_of(TRACKED_PAIR, "idle")
 ALLOWED = place_of(TRACKED_PAIR, "allowed")
 TRACK = size_of(TRACKED_PAIR)
-# Behind a record: whether surfaces do not cross at the pair, how far it is from a fold, and how far the bodies may move
-# until a row that is open needs its pair again.
 CONTACT_RECORD = RECORD + 3
+# The record of derivatives of a contact (`extrema/rates.py`), and what is behind it.
 CONTACT_DERIVATIVES = record_dtype(
     "f8",
-    before=90,
-    proper=1,
-    fold=1,
-    slack=1,
+    derivatives=RECORD,  # GAP_DERIVATIVES
+    proper=1,  # 1: the surfaces do not cross at the pair, 0: they do, or CONFORMING
+    fold=1,  # how far the pair is from a fold
+    slack=1,  # how far the bodies may move until a row that is open needs its pair again
 )
 contact_record_at = record_view(CONTACT_DERIVATIVES)
-PROPER = place_of(CONTACT_DERIVATIVES, "proper")
-FOLD = place_of(CONTACT_DERIVATIVES, "fold")
 SLACK = place_of(CONTACT_DERIVATIVES, "slack")
-# What `PROPER` is, beside 1 and 0, where the surfaces are equally near all around: then no point is that of a minimum.
+# What `proper` is, beside 1 and 0, where the surfaces are equally near all around: then no point is that of a minimum.
 CONFORMING = 2.0
+
+
+@kernel(inline=True)
+def pair_parameters(record):
+    """The coordinates of a pair, of a tracked one or of an extremum: two on f, two on g."""
+    return (record.parameters[0], record.parameters[1], record.parameters[2], record.parameters[3])
 
 
 @kernel(inline=True)
 def write_tracked(x, feature_f, feature_g, n, tracked, r):
     """Parameters, features and normal of a pair."""
     pair = tracked_at(tracked, r)
-    tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3] = x
+    for k in range(4):
+        pair.parameters[k] = x[k]
     pair.feature_f = float(feature_f)
     pair.feature_g = float(feature_g)
     for i in range(3):
@@ -82,13 +81,13 @@ def track_row(table, pool, shell_f, shell_g, relative, shift, start, r, patience
     pair = tracked_at(start, r)
     code_f = np.int64(pair.feature_f)
     code_g = np.int64(pair.feature_g)
-    x = (start[r, 0], start[r, 1], start[r, 2], start[r, 3])
+    x = pair_parameters(pair)
     n = (pair.normal[0], pair.normal[1], pair.normal[2])
     if pair.stays > 0.0:
         status, x, frame = hold_features(
             table, pool, shell_f, shell_g, relative, shift, code_f, code_g, x, n, 1.0, patience, pair.stays
         )
-        return status, code_f, code_g, x, frame, 0
+        return FeatureTrack(status, code_f, code_g, x, frame, 0)
     return track_features(table, pool, shell_f, shell_g, relative, shift, code_f, code_g, x, n, 1.0, patience)
 
 
@@ -101,14 +100,13 @@ def track_solids(table, pool, shell_f, shell_g, i, j, q, start, patience, record
     contact = contact_record_at(records, r)
     turn = rotation(q, i)
     relative, shift = relative_pose(q, i, turn, j, rotation(q, j))
-    status, feature_f, feature_g, x, frame, _switches = track_row(
-        table, pool, shell_f, shell_g, relative, shift, start, r, patience
-    )
+    found = track_row(table, pool, shell_f, shell_g, relative, shift, start, r, patience)
+    status, frame = found.status, found.frame
     if status == CONVERGED or status == SINGULAR:
         feature_record(turn, shift, frame, records, r)
         contact.proper = CONFORMING if conforms(frame) else (1.0 if frame[14] else 0.0)
         contact.fold = frame[15]
-        write_tracked(x, feature_f, feature_g, frame[0], tracked, r)
+        write_tracked(found.x, found.f, found.g, frame[0], tracked, r)
         tracked_at(tracked, r).stays = tracked_at(start, r).stays
     return status
 

@@ -15,6 +15,7 @@ Leaving an edge or a vertex asks for more than rounding, entering one does not: 
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 from assembly._kernel import kernel
 from assembly.geometry.faces.trim import trim_side
@@ -52,7 +53,8 @@ ACROSS = 0.3
 @kernel(inner=True)
 def lean_into(table, pool, surface, curve, t, n):
     """n.m, m the unit direction from a boundary curve into its face: material is on the left in (u, v)."""
-    _u, _v, _p, along, normal = on_surface(table, pool, surface, curve, t)
+    on_edge = on_surface(table, pool, surface, curve, t)
+    along, normal = on_edge.tangent, on_edge.normal
     return dot(n, unit(cross(normal, along)))
 
 
@@ -67,7 +69,8 @@ def from_edge(table, pool, shell, code, t, n):
     curve = edge_record.curve
     lean = lean_into(table, pool, surface, curve, t, n)
     if edge_record.face_b >= 0:
-        _u, _v, p, _along, _normal = on_surface(table, pool, surface, curve, t)
+        on_edge = on_surface(table, pool, surface, curve, t)
+        p = on_edge.point
         s = other_parameter(table, pool, edge, t, p)
         other = lean_into(table, pool, edge_record.surface_b, edge_record.curve_b, s, n)
         if other > lean:
@@ -76,7 +79,8 @@ def from_edge(table, pool, shell, code, t, n):
             surface = edge_record.surface_b
             curve = edge_record.curve_b
             t = s
-    u, v, _p, _along, _normal = on_surface(table, pool, surface, curve, t)
+    on_edge = on_surface(table, pool, surface, curve, t)
+    u, v = on_edge.u, on_edge.v
     return lean, face, (u, v)
 
 
@@ -87,8 +91,8 @@ def between_edges(table, pool, shell_f, shell_g, rotation, code_f, code_g, t_f, 
     shell_record = shell_at(table, shell_g)
     edge_f = edge_at(table, solid.edge_table + EDGE_RECORD * (code_f - solid.faces))
     edge_g = edge_at(table, shell_record.edge_table + EDGE_RECORD * (code_g - shell_record.faces))
-    along_f = on_surface(table, pool, edge_f.surface, edge_f.curve, t_f)[3]
-    along_g = on_surface(table, pool, edge_g.surface, edge_g.curve, t_g)[3]
+    along_f = on_surface(table, pool, edge_f.surface, edge_f.curve, t_f).tangent
+    along_g = on_surface(table, pool, edge_g.surface, edge_g.curve, t_g).tangent
     n = unit(cross(along_f, matvec(rotation, along_g)))
     m = matvec_t(rotation, n)
     there = max(
@@ -114,7 +118,8 @@ def from_vertex(table, pool, shell, code, n):
         edge = solid.edge_table + EDGE_RECORD * table[at]
         edge_record = edge_at(table, edge)
         t = edge_end(table, pool, edge, table[at + 1])
-        _u, _v, _p, along, _normal = on_surface(table, pool, edge_record.surface, edge_record.curve, t)
+        on_edge = on_surface(table, pool, edge_record.surface, edge_record.curve, t)
+        along = on_edge.tangent
         lean = dot(n, unit(along))
         if table[at + 1] == 1:
             lean = -lean
@@ -159,6 +164,11 @@ def checked(table, pool, shell, code, a, b, held, n):
         return (face, found, True) if lean > LEAN else (code, (a, b), False)
     other, found, _lean = from_vertex(table, pool, shell, code, n)
     return other, found, other != code
+
+
+# A pair of features that was tracked. f, g: the features, numbers; x: their coordinates; switches: how often it went on
+# to another feature.
+FeatureTrack = namedtuple("FeatureTrack", "status f g x frame switches")
 
 
 @kernel(inner=True)
@@ -232,4 +242,4 @@ def track_features(table, pool, shell_f, shell_g, rotation, shift, code_f, code_
         normal = own_frame(table, pool, feature_at(table, shell_g, code_g), x[2], x[3])[1]
         if dot(normal, matvec_t(rotation, n)) > 0.0:
             status = NOT_CONVERGED
-    return status, code_f, code_g, x, frame, switches
+    return FeatureTrack(status, code_f, code_g, x, frame, switches)

@@ -15,8 +15,6 @@ from assembly._kernel import kernel
 from assembly.geometry.vec import add, dot, scale, sub
 from assembly.proximity.bvh.neighbor_list import LIST_INTS, listed_pairs
 from assembly.proximity.bvh.tree import (
-    AXIS,
-    CENTER,
     ELEMENT,
     NODE,
     box_distance,
@@ -25,7 +23,7 @@ from assembly.proximity.bvh.tree import (
     node_at,
     pairs_within,
     seen_from,
-    three,
+    three_of,
     tree_at,
 )
 from assembly.proximity.manager.motion_bounds import LEAST_ALLOWANCE
@@ -36,6 +34,7 @@ from assembly.proximity.manager.state import (
     manager_at,
     memory_header_at,
     pair_at,
+    pair_lengths_at,
 )
 
 # Lists of patches that face each other are for motions up to so many first reaches.
@@ -50,7 +49,7 @@ def element_ball(table, pool, tree, e):
     """Center and radius of a ball around an element, in the axes of its body."""
     tree_record = tree_at(table, tree)
     o = tree_record.node_pool + NODE * np.int64(element_at(pool, tree_record.element_pool + ELEMENT * e).node)
-    return three(pool, o + CENTER), node_at(pool, o).radius
+    return three_of(node_at(pool, o).center), node_at(pool, o).radius
 
 
 @kernel(inline=True)
@@ -61,7 +60,7 @@ def along_normal(pool, o, p, axis_g, apart, n):
     """
     node = node_at(pool, o)
     node_bounds = node_at(pool, p)
-    off_f = sub(n, three(pool, o + AXIS))
+    off_f = sub(n, three_of(node_at(pool, o).axis))
     off_g = add(n, axis_g)
     thick = node.radius * (node.sine + math.sqrt(dot(off_f, off_f)))
     thick += node_bounds.radius * (node_bounds.sine + math.sqrt(dot(off_g, off_g)))
@@ -83,8 +82,8 @@ def element_distance(table, pool, trees, turn, shift, bulk, e, d):
     distance = math.sqrt(box_distance(pool, o, p, seen, turn, bulk))
     if node_at(pool, o).cosine <= 0.0 or node_at(pool, p).cosine <= 0.0:
         return distance
-    apart = sub(seen[0], three(pool, o + CENTER))
-    axis = three(pool, o + AXIS)
+    apart = sub(seen[0], three_of(node_at(pool, o).center))
+    axis = three_of(node_at(pool, o).axis)
     mean = sub(axis, seen[2])
     length = math.sqrt(dot(mean, mean))
     if length < 1.0:
@@ -98,15 +97,15 @@ def element_distance(table, pool, trees, turn, shift, bulk, e, d):
 
 
 @kernel(inner=True)
-def facing_pairs(table, pool, watch, memory, p, scene, moving, reach, stack, candidates):
+def facing_pairs(table, pool, watch, memory, p, posed, moving, reach, stack, candidates):
     """The patches of the two bodies of pair p that face each other within its reach, into `candidates`.
 
     Returns how many pairs there are, and the reach: it is less where there is no room for all.
     """
     manager = manager_at(table, watch)
     pair = manager.pair_table + PAIR_RECORD * p
-    turn, shift, trees = scene[0], scene[1], scene[3]
-    least = pool[pair_at(table, pair).minimum]
+    turn, shift, trees = posed.turn, posed.shift, posed.trees
+    least = pair_lengths_at(pool, pair_at(table, pair).minimum).least
     found = np.int64(-1)
     lists = manager.lists
     ring = RINGS * lengths_at(pool, manager.lengths).first_reach
@@ -130,17 +129,19 @@ def facing_pairs(table, pool, watch, memory, p, scene, moving, reach, stack, can
 
 
 @kernel(inner=True)
-def near_enough(table, pool, scene, least, reach, flank, candidates, found, distances):
+def near_enough(table, pool, posed, least, reach, flank, candidates, found, distances):
     """A distance within which so few of the pairs of patches are that each can be looked into; fills `distances`.
 
     What is within a part of the flank, or in the wrong order, is looked into in any case.
     """
-    bulk = magnitudes(scene[0])
+    bulk = magnitudes(posed.turn)
     enough = max(TAKE * reach, flank)
     lowest = CROWDED_PART * flank
     for c in range(found):
         distances[c] = (
-            element_distance(table, pool, scene[3], scene[0], scene[1], bulk, candidates[c, 0], candidates[c, 1])
+            element_distance(
+                table, pool, posed.trees, posed.turn, posed.shift, bulk, candidates[c, 0], candidates[c, 1]
+            )
             - least
         )
     for _ in range(6):

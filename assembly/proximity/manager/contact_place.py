@@ -15,7 +15,6 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly.geometry.splines.evaluate import surface_point
 from assembly.geometry.vec import add, dot, matvec, matvec_t, scale, sub
-from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.brep.borders import feature_at, feature_kind
 from assembly.proximity.brep.records import EDGE, VERTEX
 from assembly.proximity.bvh.tree import (
@@ -25,6 +24,7 @@ from assembly.proximity.bvh.tree import (
     element_at,
     node_at,
     node_links_at,
+    three_of,
     tree_at,
 )
 from assembly.proximity.extrema.feature_jets import edge_jet, vertex_point
@@ -40,11 +40,13 @@ from assembly.proximity.manager.extrema import (
     given_at,
 )
 from assembly.proximity.manager.overlap import DEPTH, foot_at, surface_of, with_children
+from assembly.proximity.manager.posed_pair import posed_pair
 from assembly.proximity.manager.state import (
     PAIR_RECORD,
     lengths_at,
     manager_at,
     pair_at,
+    pair_lengths_at,
 )
 
 # A way from one pair to another one has so many strides, were it straight; so many it may have at most.
@@ -117,7 +119,8 @@ def nearest_point(table, pool, tree, surface, shell, y, reach, stack):
             if not found:
                 continue
         elif feature_kind(table, shell, code) == EDGE:
-            middle, half = pool[at], pool[at + 2]
+            element = element_at(pool, at)
+            middle, half = element.middle[0], element.half[0]
             p = point_on_edge(table, pool, feature_at(table, shell, code), middle - half, middle + half, y)
         else:
             p = vertex_point(table, pool, feature_at(table, shell, code))
@@ -129,19 +132,19 @@ def nearest_point(table, pool, tree, surface, shell, y, reach, stack):
 
 
 @kernel(inner=True)
-def between_bodies(table, pool, scene, c, reach, stack):
+def between_bodies(table, pool, posed, c, reach, stack):
     """The middle of the nearest points of both bodies to c, how far these are apart, and whether both are in reach."""
-    turn, shift, surfaces, trees = scene
-    p, found_f = nearest_point(table, pool, trees[0], surfaces[0], surfaces[2], c, reach, stack)
+    turn, shift = posed.turn, posed.shift
+    p, found_f = nearest_point(table, pool, posed.trees[0], posed.surfaces[0], posed.shells[0], c, reach, stack)
     at_g = matvec_t(turn, sub(c, shift))
-    q, found_g = nearest_point(table, pool, trees[1], surfaces[1], surfaces[3], at_g, reach, stack)
+    q, found_g = nearest_point(table, pool, posed.trees[1], posed.surfaces[1], posed.shells[1], at_g, reach, stack)
     q = add(matvec(turn, q), shift)
     d = sub(q, p)
     return scale(0.5, add(p, q)), math.sqrt(dot(d, d)), found_f and found_g
 
 
 @kernel(inner=True)
-def leads_to(table, pool, scene, begin, end, level, stack):
+def leads_to(table, pool, posed, begin, end, level, stack):
     """Whether a way between the bodies leads from one point to another one, along which they are nearer than a level.
 
     It goes straight for the end, and after every stride back to where both bodies are equally far.
@@ -156,7 +159,7 @@ def leads_to(table, pool, scene, begin, end, level, stack):
         c = add(c, scale(stride / left, sub(end, c)))
         near = False
         for _centering in range(CENTERINGS):
-            c, gap, found = between_bodies(table, pool, scene, c, stride + level, stack)
+            c, gap, found = between_bodies(table, pool, posed, c, stride + level, stack)
             if not found:
                 return False
             near = gap < level
@@ -170,32 +173,28 @@ def leads_to(table, pool, scene, begin, end, level, stack):
 
 
 @kernel(inner=True)
-def contact_points(table, pool, scene, given, tracked):
+def contact_points(table, pool, posed, given, tracked):
     """The pair of points of a given contact, in the axes of body f of its pair of bodies."""
     given_record = given_at(table, given)
-    r = given_record.row
-    pair = tracked_at(tracked, r)
+    pair = tracked_at(tracked, given_record.row)
     a = point_of(
         table, pool, given_record.surface[0], given_record.shell[0], np.int64(pair.feature_f),
-        tracked[r, 0], tracked[r, 1],
+        pair.parameters[0], pair.parameters[1],
     )  # fmt: skip
     b = point_of(
         table, pool, given_record.surface[1], given_record.shell[1],
-        np.int64(pair.feature_g), tracked[r, 2], tracked[r, 3],
+        np.int64(pair.feature_g), pair.parameters[2], pair.parameters[3],
     )  # fmt: skip
     if given_record.swapped == 1:
         a, b = b, a
-    return a, add(matvec(scene[0], b), scene[1])
+    return a, add(matvec(posed.turn, b), posed.shift)
 
 
 @kernel(inline=True)
 def root_points(roots, k):
     """The pair of points of a root."""
     extremum = extremum_at(roots, k)
-    return (
-        (extremum.point_f[0], extremum.point_f[1], extremum.point_f[2]),
-        (extremum.point_g[0], extremum.point_g[1], extremum.point_g[2]),
-    )
+    return three_of(extremum.point_f), three_of(extremum.point_g)
 
 
 @kernel(inline=True)
@@ -206,7 +205,7 @@ def apart(a, b):
 
 
 @kernel(inner=True, allocates=True)
-def spread(table, pool, scene, roots, count, begin, limits, stack):
+def spread(table, pool, posed, roots, count, begin, limits, stack):
     """Mark the roots in the place of a contact whose points have their middle at `begin`.
 
     From root to root, the nearest first: each is tried from the nearest point that is known to be in the place. The
@@ -237,7 +236,7 @@ def spread(table, pool, scene, roots, count, begin, limits, stack):
         tried[best] = nearest[best]
         start = (source[best, 0], source[best, 1], source[best, 2])
         end = (middles[best, 0], middles[best, 1], middles[best, 2])
-        if not leads_to(table, pool, scene, start, end, level, stack):
+        if not leads_to(table, pool, posed, start, end, level, stack):
             continue
         extremum_at(roots, best).place = BESIDE_CONTACT
         eligible[best] = False
@@ -253,16 +252,8 @@ def mark_places(table, pool, watch, p, q, tracked, roots, count):
     """Mark the roots of pair p that are a given contact's pair, or in its place; how many contacts have one."""
     manager = manager_at(table, watch)
     pair = pair_at(table, manager.pair_table + PAIR_RECORD * p)
-    i, j = pair.body_f, pair.body_g
-    turn, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
-    surfaces = (
-        pair.surface_f,
-        pair.surface_g,
-        pair.shell_f,
-        pair.shell_g,
-    )
-    scene = (turn, shift, surfaces, (pair.tree_f, pair.tree_g))
-    least = pool[pair.minimum]
+    posed = posed_pair(manager, pair, q)
+    least = pair_lengths_at(pool, pair.minimum).least
     neglect = lengths_at(pool, manager.lengths).neglect
     stack = np.empty(DEPTH, np.int64)
     known = 0
@@ -270,10 +261,10 @@ def mark_places(table, pool, watch, p, q, tracked, roots, count):
         given = pair.given + GIVEN_RECORD * c
         given_record = given_at(table, given)
         r = given_record.row
-        if math.isnan(tracked[r, 0]):
+        if math.isnan(tracked_at(tracked, r).parameters[0]):
             continue
         known += 1
-        a, b = contact_points(table, pool, scene, given, tracked)
+        a, b = contact_points(table, pool, posed, given, tracked)
         for k in range(count):
             p_f, p_g = root_points(roots, k)
             if max(apart(p_f, a), apart(p_g, b)) <= neglect:
@@ -282,5 +273,5 @@ def mark_places(table, pool, watch, p, q, tracked, roots, count):
         # A contact that may stay open, and is by more than the least gap, excuses nothing that is nearer.
         lowest = least if given_record.opens == 1 and gap >= least else -math.inf
         limits = (gap + least, lowest)
-        spread(table, pool, scene, roots, count, scale(0.5, add(a, b)), limits, stack)
+        spread(table, pool, posed, roots, count, scale(0.5, add(a, b)), limits, stack)
     return known

@@ -9,6 +9,7 @@ stand out of it where it is hollow, so that a peg in a bore may cut them: of suc
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 import numpy as np
 
@@ -33,26 +34,31 @@ WIDER = 1.5
 FLAT = 1e-9
 
 
+# Where a segment cuts a triangle. hit: whether it does; part: which part of the way; q, r: the shares of these corners
+# there; turns: whether the segment goes to the side to which the corners turn left.
+TriangleCut = namedtuple("TriangleCut", "hit part q r turns")
+
+
 @kernel(inline=True)
 def cut_at(a, d, p, q, r, end, beside):
-    """Where a segment from a along d cuts a triangle (Möller and Trumbore): whether it does, which part of the way.
+    """Where a segment from a along d cuts a triangle (Möller and Trumbore).
 
-    And the shares of q and of r there, and whether it goes to the side to which the corners turn left. What is nearer
-    to an end than that part of the segment does not count; what passes `beside` the triangle by so small a part of its
-    sides does.
+    What is nearer to an end than that part of the segment does not count; what passes `beside` the triangle by so small
+    a part of its sides does.
     """
     e = sub(q, p)
     f = sub(r, p)
     h = cross(d, f)
     det = dot(e, h)
     if abs(det) < 1e-300:
-        return False, 0.0, 0.0, 0.0, False
+        return TriangleCut(False, 0.0, 0.0, 0.0, False)
     s = sub(a, p)
     u = dot(s, h) / det
     w = cross(s, e)
     v = dot(d, w) / det
     t = dot(f, w) / det
-    return min(u, v, 1.0 - u - v) >= -beside and end < t < 1.0 - end, t, u, v, det < 0.0
+    hit = min(u, v, 1.0 - u - v) >= -beside and end < t < 1.0 - end
+    return TriangleCut(hit=hit, part=t, q=u, r=v, turns=det < 0.0)
 
 
 @kernel(inner=True)
@@ -82,12 +88,12 @@ def is_well_inside(table, pool, trim, u, v, du, dv):
 
 
 @kernel(inline=True)
-def patch_corners(table, pool, surface, e):
-    """The first (u, v) of the patch at e and its widths, and its corners, counterclockwise in (u, v) from there."""
-    u = pool[e] - pool[e + 2]
-    v = pool[e + 1] - pool[e + 3]
-    wide = 2.0 * pool[e + 2]
-    high = 2.0 * pool[e + 3]
+def patch_corners(table, pool, surface, patch):
+    """The first (u, v) of a patch and its widths, and its corners, counterclockwise in (u, v) from there."""
+    u = patch.middle[0] - patch.half[0]
+    v = patch.middle[1] - patch.half[1]
+    wide = 2.0 * patch.half[0]
+    high = 2.0 * patch.half[1]
     p = surface_point(table, pool, surface, u, v)[0]
     q = surface_point(table, pool, surface, u + wide, v)[0]
     s = surface_point(table, pool, surface, u + wide, v + high)[0]
@@ -101,14 +107,15 @@ def goes_through(table, pool, tree, shell, e, a, b, margin):
     node = node_at(pool, node_of(table, pool, tree, e))
     if node.cosine <= 0.0 or node.sine > FLAT:
         return False
-    o = tree_at(table, tree).element_pool + ELEMENT * e
-    code = np.int64(element_at(pool, o).feature)
+    patch = element_at(pool, tree_at(table, tree).element_pool + ELEMENT * e)
+    code = np.int64(patch.feature)
     face = face_at(table, shell_at(table, shell).face_table + FACE_RECORD * code)
     r = feature_at(table, shell, code)
-    (u, v, wide, high), (p, q, s, t) = patch_corners(table, pool, r, o)
+    (u, v, wide, high), (p, q, s, t) = patch_corners(table, pool, r, patch)
     for k in range(2):
         second, third = (q, s) if k == 0 else (s, t)
-        hit, _way, x, y, _along = cut_at(a, sub(b, a), p, second, third, 0.0, 0.0)
+        cut = cut_at(a, sub(b, a), p, second, third, 0.0, 0.0)
+        hit, x, y = cut.hit, cut.q, cut.r
         n = cross(sub(second, p), sub(third, p))
         away = margin * math.sqrt(dot(n, n))
         if not hit or min(abs(dot(n, sub(a, p))), abs(dot(n, sub(b, p)))) <= away:
@@ -127,24 +134,25 @@ def goes_through(table, pool, tree, shell, e, a, b, margin):
 
 
 @kernel(inner=True)
-def pierces(table, pool, scene, pair, margin, offsets):
+def pierces(table, pool, posed, pair, margin, offsets):
     """Whether of two elements, of f and of g, one is a part of an edge that goes through the other, a patch."""
     for side in range(2):
-        tree, shell = scene[3][side], scene[2][2 + side]
-        other, other_shell = scene[3][1 - side], scene[2][3 - side]
+        tree, shell = posed.trees[side], posed.shells[side]
+        other, other_shell = posed.trees[1 - side], posed.shells[1 - side]
         o = tree_at(table, tree).element_pool + ELEMENT * pair[side]
         p = tree_at(table, other).element_pool + ELEMENT * pair[1 - side]
-        code = np.int64(element_at(pool, o).feature)
+        part = element_at(pool, o)
+        code = np.int64(part.feature)
         patch = np.int64(element_at(pool, p).feature)
         if feature_kind(table, shell, code) != EDGE or feature_kind(table, other_shell, patch) != FACE:
             continue
-        a, b, bent = chord_of(table, pool, feature_at(table, shell, code), pool[o], pool[o + 2])
+        a, b, bent = chord_of(table, pool, feature_at(table, shell, code), part.middle[0], part.half[0])
         if side == 0:
-            a = matvec_t(scene[0], sub(a, scene[1]))
-            b = matvec_t(scene[0], sub(b, scene[1]))
+            a = matvec_t(posed.turn, sub(a, posed.shift))
+            b = matvec_t(posed.turn, sub(b, posed.shift))
         else:
-            a = add(matvec(scene[0], a), scene[1])
-            b = add(matvec(scene[0], b), scene[1])
+            a = add(matvec(posed.turn, a), posed.shift)
+            b = add(matvec(posed.turn, b), posed.shift)
         if goes_through(table, pool, other, other_shell, pair[1 - side], a, b, margin + 2.0 * bent + offsets[1 - side]):
             return True
     return False

@@ -8,6 +8,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._record import rows_of
 from assembly.proximity.manager import state as watch_memory
 
 __all__ = ["Event", "EventKind", "EventReason", "PairState", "events_of", "fresh_memory", "listed_places"]
@@ -79,9 +80,12 @@ def fresh_memory(pairs: int, places: int, reach: float) -> Array:
     places_at = pairs_at + watch_memory.PAIR_MEMORY * pairs
     events_at = places_at + watch_memory.PLACE_MEMORY * places
     memory = np.zeros(events_at + watch_memory.EVENT * watch_memory.EVENTS)
-    memory[pairs_at + watch_memory.TURN : places_at : watch_memory.PAIR_MEMORY] = np.nan
-    memory[pairs_at + watch_memory.REACH : places_at : watch_memory.PAIR_MEMORY] = reach
-    memory[places_at : events_at : watch_memory.PLACE_MEMORY] = -1.0
+    states = memory[pairs_at:places_at].reshape(pairs, watch_memory.PAIR_MEMORY)
+    known = rows_of(watch_memory.PAIR_STATE, states)
+    known.turn[:, 0] = np.nan
+    known.reach = reach
+    slots = memory[places_at:events_at].reshape(places, watch_memory.PLACE_MEMORY)
+    rows_of(watch_memory.PLACE_STATE, slots).pair = -1.0
     return memory
 
 
@@ -104,7 +108,7 @@ def events_of(memory: Array, names: list[tuple[str, str]], scale: float, since: 
         Length of one.
     since : int
     """
-    count = int(memory[watch_memory.EVENT_COUNT])
+    count = int(watch_memory.memory_header_at(memory, 0).event_count)
     rows = memory[-watch_memory.EVENT * watch_memory.EVENTS :].reshape(-1, watch_memory.EVENT)
     return tuple(
         Event(_KINDS[int(kind)], _REASONS[int(reason)], names[int(pair)], int(contact), gap * scale)

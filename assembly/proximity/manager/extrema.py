@@ -23,6 +23,7 @@ from assembly.geometry.vec import add, dot, matvec, matvec_t, scale, sub
 from assembly.kinematics.motion import rotation
 from assembly.proximity.brep.borders import feature_at
 from assembly.proximity.brep.records import shell_at
+from assembly.proximity.bvh.tree import three_of
 from assembly.proximity.extrema.face_face import CONVERGED, NOT_CONVERGED, SINGULAR, pair_frame, solve_pair
 from assembly.proximity.extrema.feedback import descend_pair
 from assembly.proximity.extrema.global_start import opposed
@@ -30,27 +31,25 @@ from assembly.proximity.extrema.rates import derivatives_at
 from assembly.proximity.extrema.singular import ALONE, fold_of
 from assembly.proximity.features.solid_contact import (
     contact_record_at,
+    pair_parameters,
     tracked_at,
 )
 
-# A root: parameters, features, normal in the axes of f, gap, where it is from, its points in the axes of f, how far it
-# is from a fold (det H / |H|^2), how far so beyond the knot lines beside it (NaN: not looked at), what it holds on to
-# if it is no root, but a corner (`proximity/manager/vertex_contacts.py`), and whether it is in the place of a contact
-# (`contact_place.py`).
+# An extremum of the distance of two bodies. Points and the normal are in the axes of f.
 EXTREMUM = record_dtype(
     "f8",
-    before=4,
-    code_f=1,
+    parameters=4,  # (u, v) of f, then of g
+    code_f=1,  # features of shells
     code_g=1,
-    normal=3,
-    gap=1,
-    origin=1,
+    normal=3,  # unit normal of f
+    gap=1,  # signed distance [over the size of the scene]
+    origin=1,  # where it is from: USELESS, NEW, a slot or a given contact
     point_f=3,
     point_g=3,
-    fold=1,
-    beyond=1,
-    corner=1,
-    place=1,
+    fold=1,  # how far it is from a fold, det H / |H|^2
+    beyond=1,  # the same, the least beyond the knot lines beside it; NaN: not looked at
+    corner=1,  # what it holds on to if it is a vertex contact (`vertex_contacts.py`), else 0
+    place=1,  # ELSEWHERE, or where it is to given contacts (`contact_place.py`)
 )
 extremum_at = record_view(EXTREMUM)
 CODE_F = place_of(EXTREMUM, "code_f")
@@ -59,31 +58,23 @@ ROOT_NORMAL = place_of(EXTREMUM, "normal")
 GAP = place_of(EXTREMUM, "gap")
 ORIGIN = place_of(EXTREMUM, "origin")
 POINT_F = place_of(EXTREMUM, "point_f")
-POINT_G = place_of(EXTREMUM, "point_g")
 ROOT_FOLD = place_of(EXTREMUM, "fold")
 ROOT_BEYOND = place_of(EXTREMUM, "beyond")
 CORNER = place_of(EXTREMUM, "corner")
-ROOT_PLACE = place_of(EXTREMUM, "place")
 ROOT = size_of(EXTREMUM)
 # Where it is from: of no use, new, from LISTED on the place it has, down from GIVEN_CONTACT which given contact it is.
 USELESS, NEW, LISTED, GIVEN_CONTACT = -2.0, -1.0, 0, -3.0
-# A given contact of two bodies: its row, 1 if the bodies are the other way round there, 1 if its gap may be open, and
-# the surfaces of its sides, or else (-1) their shells.
-GIVEN_FIELDS = record_dtype(
+# A given contact of two bodies in the table.
+GIVEN_DTYPE = record_dtype(
     "i8",
-    row=1,
-    swapped=1,
-    opens=1,
-    surface=2,
-    shell=2,
+    row=1,  # its row of `tracked`
+    swapped=1,  # 1: the bodies are the other way round there
+    opens=1,  # 1: its gap may be open
+    surface=2,  # the surfaces of its sides, or -1
+    shell=2,  # their B-rep bodies, or -1
 )
-given_at = record_view(GIVEN_FIELDS)
-GIVEN_ROW = place_of(GIVEN_FIELDS, "row")
-SWAPPED = place_of(GIVEN_FIELDS, "swapped")
-OPENS = place_of(GIVEN_FIELDS, "opens")
-GIVEN_SURFACE = place_of(GIVEN_FIELDS, "surface")
-GIVEN_SHELL = place_of(GIVEN_FIELDS, "shell")
-GIVEN_RECORD = size_of(GIVEN_FIELDS)
+given_at = record_view(GIVEN_DTYPE)
+GIVEN_RECORD = size_of(GIVEN_DTYPE)
 # Of a root: in no contact's place, in one beside the contact's own pair, that pair.
 ELSEWHERE, BESIDE_CONTACT, OF_CONTACT = 0.0, 1.0, 2.0
 # What became of a start: nothing there, a root that is known, a saddle, a minimum.
@@ -119,40 +110,41 @@ def square_to(a, b):
 
 
 @kernel(inner=True)
-def are_one(table, pool, scene, roots, i, k, neglect):
+def are_one(table, pool, posed, roots, i, k, neglect):
     """Whether roots i and k are the same contact."""
     square = neglect * neglect
+    one, other = extremum_at(roots, i), extremum_at(roots, k)
+    codes, other_codes = (one.code_f, one.code_g), (other.code_f, other.code_g)
+    points = (three_of(one.point_f), three_of(one.point_g))
+    other_points = (three_of(other.point_f), three_of(other.point_g))
+    x, y = pair_parameters(one), pair_parameters(other)
     for side in range(2):
-        o = POINT_F + 3 * side
-        a = (roots[i, o], roots[i, o + 1], roots[i, o + 2])
-        b = (roots[k, o], roots[k, o + 1], roots[k, o + 2])
-        if roots[i, CODE_F + side] != roots[k, CODE_F + side] or square_to(a, b) > square:
+        a, b = points[side], other_points[side]
+        if codes[side] != other_codes[side] or square_to(a, b) > square:
             return False
-        surface = scene[2][side]
+        surface = posed.surfaces[side]
         if surface < 0:
-            shell = scene[2][2 + side]
-            if roots[i, CODE_F + side] >= shell_at(table, shell).faces:
+            shell = posed.shells[side]
+            if codes[side] >= shell_at(table, shell).faces:
                 continue
-            surface = feature_at(table, shell, np.int64(roots[i, CODE_F + side]))
-        u, v = between(
-            table, pool, surface, roots[i, 2 * side], roots[i, 2 * side + 1], roots[k, 2 * side], roots[k, 2 * side + 1]
-        )
+            surface = feature_at(table, shell, np.int64(codes[side]))
+        u, v = between(table, pool, surface, x[2 * side], x[2 * side + 1], y[2 * side], y[2 * side + 1])
         p = surface_point(table, pool, surface, u, v)[0]
         if side == 1:
-            p = add(matvec(scene[0], p), scene[1])
+            p = add(matvec(posed.turn, p), posed.shift)
         if square_to(p, a) > square and square_to(p, b) > square:
             return False
     return True
 
 
 @kernel(inner=True)
-def surfaces_root(table, pool, scene, start, roots, k):
+def surfaces_root(table, pool, posed, start, roots, k):
     """Newton on two surfaces from `start`, the controller where it fails; fills root k.
 
     Returns NOTHING, SADDLE or MINIMUM_FOUND.
     """
-    turn, shift = scene[0], scene[1]
-    f, g = scene[2][0], scene[2][1]
+    turn, shift = posed.turn, posed.shift
+    f, g = posed.surfaces[0], posed.surfaces[1]
     status, x, _count, frame, curvature = solve_pair(table, pool, f, g, turn, shift, start, 1.0, math.inf, 0.0, True)
     if status == NOT_CONVERGED:
         # The controller leads down from anywhere, to a minimum of the distance.
@@ -169,30 +161,33 @@ def surfaces_root(table, pool, scene, start, roots, k):
 
 
 @kernel(inner=True)
-def solids_root(table, pool, scene, codes, start, n, roots, k, work, corner):
+def solids_root(table, pool, posed, codes, start, n, roots, k, work, corner):
     """Switching and Newton on the features of two solids, or Newton alone for a corner; fills root k."""
-    i, j, q, track_at = scene[4]
+    i, j = posed.bodies
+    q = posed.poses
     records, tracked = work
     pair = tracked_at(tracked, 0)
     derivatives = derivatives_at(records, 0)
     contact = contact_record_at(records, 0)
-    tracked[0, 0], tracked[0, 1], tracked[0, 2], tracked[0, 3] = start
+    for l in range(4):
+        pair.parameters[l] = start[l]
     pair.feature_f = float(codes[0])
     pair.feature_g = float(codes[1])
     pair.stays = corner
     for l in range(3):
         pair.normal[l] = n[l]
     status = call_address(
-        track_at, (table, pool, scene[2][2], scene[2][3], i, j, q, tracked, math.inf, records, tracked, 0)
+        posed.track_solids,
+        (table, pool, posed.shells[0], posed.shells[1], i, j, q, tracked, math.inf, records, tracked, 0),
     )
     if status != CONVERGED and (status != SINGULAR or corner > 0.0):
         # An edge along another one, or along a face, is no corner: its ends are.
         return NOTHING
     turn = rotation(q, i)
-    m = (pair.normal[0], pair.normal[1], pair.normal[2])
-    pg = matvec_t(turn, (derivatives.arm_f[0], derivatives.arm_f[1], derivatives.arm_f[2]))
+    m = three_of(pair.normal)
+    pg = matvec_t(turn, three_of(derivatives.arm_f))
     gap = derivatives.gap
-    x = (tracked[0, 0], tracked[0, 1], tracked[0, 2], tracked[0, 3])
+    x = pair_parameters(pair)
     write(roots, k, x, pair.feature_f, pair.feature_g, m, gap, sub(pg, scale(gap, m)), pg, contact.fold)
     extremum_at(roots, k).corner = corner
     return MINIMUM_FOUND if contact.proper == 1.0 else SADDLE
@@ -201,7 +196,8 @@ def solids_root(table, pool, scene, codes, start, n, roots, k, work, corner):
 @kernel(inline=True)
 def write(roots, k, x, code_f, code_g, n, gap, pf, pg, fold):
     extremum = extremum_at(roots, k)
-    roots[k, 0], roots[k, 1], roots[k, 2], roots[k, 3] = x
+    for l in range(4):
+        extremum.parameters[l] = x[l]
     extremum.code_f = float(code_f)
     extremum.code_g = float(code_g)
     extremum.normal[0], extremum.normal[1], extremum.normal[2] = n
@@ -216,28 +212,28 @@ def write(roots, k, x, code_f, code_g, n, gap, pf, pg, fold):
 
 
 @kernel(inner=True)
-def add_root(table, pool, scene, codes, start, n, neglect, roots, count, work, corner):
+def add_root(table, pool, posed, codes, start, n, neglect, roots, count, work, corner):
     """Look for a root from a start and add it, as USELESS, if it is none of the known ones; a corner where it holds on
     to something.
 
     Returns how many roots there are, and NOTHING, ALIKE, SADDLE or MINIMUM_FOUND.
     """
-    if scene[2][0] >= 0:
-        found = surfaces_root(table, pool, scene, start, roots, count)
+    if posed.surfaces[0] >= 0:
+        found = surfaces_root(table, pool, posed, start, roots, count)
     else:
-        found = solids_root(table, pool, scene, codes, start, n, roots, count, work, corner)
+        found = solids_root(table, pool, posed, codes, start, n, roots, count, work, corner)
     if found == NOTHING:
         return count, found
     for k in range(count):
         # One of far sides, or a saddle, hides no contact beside it.
         radius = min(neglect, SAME) if extremum_at(roots, k).origin == USELESS else neglect
-        if are_one(table, pool, scene, roots, count, k, radius):
+        if are_one(table, pool, posed, roots, count, k, radius):
             return count, ALIKE
     return count + 1, found
 
 
 @kernel(inner=True)
-def add_given(table, pool, scene, tracked, listed, many, neglect, roots, work):
+def add_given(table, pool, posed, tracked, listed, many, neglect, roots, work):
     """Add the roots at which given contacts of the two bodies are now. Returns how many.
 
     A contact whose coordinates are unknowns of a solve may be on its way to another root than Newton's method goes to
@@ -246,22 +242,21 @@ def add_given(table, pool, scene, tracked, listed, many, neglect, roots, work):
     count = 0
     for c in range(many):
         given = given_at(table, listed + GIVEN_RECORD * c)
-        r = given.row
-        x = (tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3])
+        x = pair_parameters(tracked_at(tracked, given.row))
         if math.isnan(x[0]) or count == roots.shape[0]:
             continue
         if given.swapped == 1:
             x = (x[2], x[3], x[0], x[1])
         before = count
-        count, found = add_root(table, pool, scene, (0, 0), x, (0.0, 0.0, 0.0), 0.0, roots, count, work, 0.0)
-        if scene[2][0] >= 0 and (found == NOTHING or (count > before and count < roots.shape[0])):
-            frame = pair_frame(table, pool, scene[2][0], scene[2][1], scene[0], scene[1], x)
+        count, found = add_root(table, pool, posed, (0, 0), x, (0.0, 0.0, 0.0), 0.0, roots, count, work, 0.0)
+        if posed.surfaces[0] >= 0 and (found == NOTHING or (count > before and count < roots.shape[0])):
+            frame = pair_frame(table, pool, posed.surfaces[0], posed.surfaces[1], posed.turn, posed.shift, x)
             if frame[11]:
                 write(roots, count, x, 0, 0, frame[0], frame[10], frame[3], frame[4], 0.0)
             if found != NOTHING:
-                same = frame[11] and are_one(table, pool, scene, roots, before, count, neglect)
+                same = frame[11] and are_one(table, pool, posed, roots, before, count, neglect)
                 count = count if same else before
-            elif frame[11] and opposed(frame, scene[0], table, pool, scene[2][1], x):
+            elif frame[11] and opposed(frame, posed.turn, table, pool, posed.surfaces[1], x):
                 # At a fold Newton's method may find nothing: there the contact still is.
                 count += 1
         if count > before:

@@ -17,6 +17,7 @@ from assembly.proximity.bvh.tree import (
     NODE_INTS,
     node_at,
     node_links_at,
+    three_of,
     tree_at,
 )
 from assembly.proximity.manager.extrema import LISTED, NEW, USELESS, extremum_at
@@ -68,18 +69,19 @@ def faces_about(table, pool, tree, shell, y, reach, stack, normals):
 
 
 @kernel(inner=True)
-def is_between_flush_faces(table, pool, scene, roots, k, stack, normals):
+def is_between_flush_faces(table, pool, posed, roots, k, stack, normals):
     """Whether the middle of root k, with a negative gap, is between two faces that all but touch there."""
     extremum = extremum_at(roots, k)
-    turn, shift = scene[0], scene[1]
-    a = (extremum.point_f[0], extremum.point_f[1], extremum.point_f[2])
-    b = (extremum.point_g[0], extremum.point_g[1], extremum.point_g[2])
+    turn, shift = posed.turn, posed.shift
+    a, b = three_of(extremum.point_f), three_of(extremum.point_g)
     c = scale(0.5, add(a, b))
     reach = -SHORT * extremum.gap
-    many = faces_about(table, pool, scene[3][0], scene[2][2], c, reach, stack, normals[0])
+    many = faces_about(table, pool, posed.trees[0], posed.shells[0], c, reach, stack, normals[0])
     if many == 0:
         return False
-    others = faces_about(table, pool, scene[3][1], scene[2][3], matvec_t(turn, sub(c, shift)), reach, stack, normals[1])
+    others = faces_about(
+        table, pool, posed.trees[1], posed.shells[1], matvec_t(turn, sub(c, shift)), reach, stack, normals[1]
+    )
     for i in range(others):
         n = matvec(turn, (normals[1, i, 0], normals[1, i, 1], normals[1, i, 2]))
         for l in range(many):
@@ -89,7 +91,7 @@ def is_between_flush_faces(table, pool, scene, roots, k, stack, normals):
 
 
 @kernel(inner=True, allocates=True)
-def drop_flush(table, pool, watch, memory, p, scene, roots, count, tracked):
+def drop_flush(table, pool, watch, memory, p, posed, roots, count, tracked):
     """Make those roots of pair p useless that run between flush faces; listed ones give up their places."""
     stack = np.empty(DEPTH, np.int64)
     normals = np.empty((2, FACES_ABOUT, 3))
@@ -99,7 +101,7 @@ def drop_flush(table, pool, watch, memory, p, scene, roots, count, tracked):
         origin = np.int64(extremum.origin)
         if not extremum.gap < -ROUNDING or not (extremum.origin == NEW or origin >= LISTED):
             continue
-        if not is_between_flush_faces(table, pool, scene, roots, k, stack, normals):
+        if not is_between_flush_faces(table, pool, posed, roots, k, stack, normals):
             continue
         if origin >= LISTED:
             number = place_at(memory, places + PLACE_MEMORY * (origin - LISTED)).number

@@ -9,25 +9,21 @@ its own.
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 from assembly._kernel import kernel
 from assembly.geometry.vec import add, dot, matvec, matvec_t, quaternion_matrix, quaternion_product, sub
 from assembly.kinematics.motion import rotation
-from assembly.proximity.bvh.tree import CENTER, node_at, three, tree_at
+from assembly.proximity.bvh.tree import node_at, three_of, tree_at
 from assembly.proximity.manager.state import (
-    BALL,
-    BALL_PLACE,
-    PAIR_F,
     PAIR_MEMORY,
     PAIR_RECORD,
-    PART,
-    PLACE,
-    TREE_F,
     lengths_at,
     manager_at,
     memory_header_at,
     memory_places,
     pair_at,
+    pair_lengths_at,
     pair_state_at,
 )
 
@@ -39,6 +35,23 @@ STILL = 1e-8
 MOVES, MOVES_OF_WIRES = 12.0, 6.0
 
 
+# The body of a pair whose motion is measured. side: 0 if that is f, 1 g; tree: its tree; turn, shift: its pose seen
+# from the other body, a rotation matrix by rows and its origin; quaternion: the same turn.
+Mover = namedtuple("Mover", "side tree quaternion turn shift")
+# A ball on it. center: in its axes; place: where that is, seen from the other body.
+MotionBall = namedtuple("MotionBall", "center place radius")
+# What a search finds of a pair. count: number of extrema that are known; bound: how far the body may go for all that is
+# not in the ball; ball_bound: how far what is in the ball may go, because a contact may be created there, infinite if
+# there is no ball; accepted_bound: how far until a pose that is accepted needs an update.
+PairSearch = namedtuple("PairSearch", "count bound ball_bound ball accepted_bound")
+
+
+@kernel(inline=True)
+def no_ball():
+    """A ball where there is none."""
+    return MotionBall((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0)
+
+
 @kernel(inline=True)
 def quaternion_from(q, i, j):
     """The turn of body j seen from body i."""
@@ -47,17 +60,14 @@ def quaternion_from(q, i, j):
 
 @kernel(inner=True)
 def mover(table, watch, p, q):
-    """The body of pair p whose motion is measured: 0 if that is f, its tree, its pose seen from the other body.
-
-    The pose is a quaternion, and the same as a rotation and a shift.
-    """
-    pair = manager_at(table, watch).pair_table + PAIR_RECORD * p
-    side = pair_at(table, pair).smaller
-    i = table[pair + PAIR_F + 1 - side]
-    j = table[pair + PAIR_F + side]
+    """The body of pair p whose motion is measured, at poses q."""
+    pair = pair_at(table, manager_at(table, watch).pair_table + PAIR_RECORD * p)
+    side = pair.smaller
+    i, j, tree = (pair.body_f, pair.body_g, pair.tree_g) if side == 1 else (pair.body_g, pair.body_f, pair.tree_f)
     e = quaternion_from(q, i, j)
     shift = matvec_t(rotation(q, i), (q[j, 0] - q[i, 0], q[j, 1] - q[i, 1], q[j, 2] - q[i, 2]))
-    return side, table[pair + TREE_F + side], e, quaternion_matrix(e[0], e[1], e[2], e[3]), shift
+    turn = quaternion_matrix(e[0], e[1], e[2], e[3])
+    return Mover(side=side, tree=tree, quaternion=e, turn=turn, shift=shift)
 
 
 @kernel(inline=True)
@@ -79,10 +89,9 @@ def turned_by(memory, o, e):
 
 
 @kernel(inline=True)
-def moved_from(pool_or_memory, at, memory, was, turn, shift):
-    """How far a point of a body, its place on it and where it was in arrays, is from where it was."""
-    there = add(matvec(turn, three(pool_or_memory, at)), shift)
-    d = sub(there, three(memory, was))
+def moved_from(point, was, turn, shift):
+    """How far a point of a body is from where it was, by the body's pose."""
+    d = sub(add(matvec(turn, point), shift), was)
     return math.sqrt(dot(d, d))
 
 
@@ -91,26 +100,26 @@ def reach_now(table, pool, watch, memory, p, moving):
     """Keep where the bodies of pair p stand at this look. Returns its reach: for some moves as since the last one."""
     state = memory_header_at(memory, 0)
     manager = manager_at(table, watch)
-    _side, tree, e, turn, shift = moving
+    turn, shift = moving.turn, moving.shift
     at = memory_places(table, watch)[0] + PAIR_MEMORY * p
     known = pair_state_at(memory, at)
     lengths = lengths_at(pool, manager.lengths)
     reach = known.reach
     pair = pair_at(table, manager.pair_table + PAIR_RECORD * p)
-    root = tree_at(table, tree).node_pool
+    root = tree_at(table, moving.tree).node_pool
     if not math.isnan(known.turn[0]):
-        pace = moved_from(pool, root + CENTER, memory, at + PLACE, turn, shift)
-        pace += 2.0 * node_at(pool, root).radius * turned_by(memory, at, e)
+        pace = moved_from(three_of(node_at(pool, root).center), three_of(known.place), turn, shift)
+        pace += 2.0 * node_at(pool, root).radius * turned_by(memory, at, moving.quaternion)
         pace /= max(state.calls - known.called, 1.0)
         # After a step that was cut, as far as it was to go; but it goes no farther where contacts may be born.
         moves = MOVES if pair.spine_f < 0 else MOVES_OF_WIRES
-        asked = max(moves * pace, min(known.cut_short, pool[pair.minimum + 1]))
+        asked = max(moves * pace, min(known.cut_short, pair_lengths_at(pool, pair.minimum).curved_bound))
         reach = min(max(asked, lengths.first_reach), lengths.last_reach)
     known.cut_short = 0.0
     known.called = state.calls
-    center = add(matvec(turn, three(pool, root + CENTER)), shift)
+    center = add(matvec(turn, three_of(node_at(pool, root).center)), shift)
     for k in range(4):
-        known.turn[k] = e[k]
+        known.turn[k] = moving.quaternion[k]
     for k in range(3):
         known.place[k] = center[k]
     return reach
@@ -126,10 +135,10 @@ def allow_ball(memory, at, ball, allowance, sure):
     known.ball_allowance = allowance
     known.sure = sure
     if allowance < math.inf:
-        center, place, known.ball_radius = ball
+        known.ball_radius = ball.radius
         for k in range(3):
-            known.ball[k] = center[k]
-            known.ball_place[k] = place[k]
+            known.ball[k] = ball.center[k]
+            known.ball_place[k] = ball.place[k]
 
 
 @kernel(inner=True)
@@ -144,15 +153,21 @@ def part_used(table, pool, watch, memory, p, q):
     known.doubt = 0.0
     if math.isnan(known.turn[0]):
         return math.inf
-    _side, tree, e, turn, shift = mover(table, watch, p, q)
-    root = tree_at(table, tree).node_pool
-    angle = turned_by(memory, o, e)
-    moved = moved_from(pool, root + CENTER, memory, o + PLACE, turn, shift) + 2.0 * node_at(pool, root).radius * angle
+    moving = mover(table, watch, p, q)
+    turn, shift = moving.turn, moving.shift
+    root = tree_at(table, moving.tree).node_pool
+    angle = turned_by(memory, o, moving.quaternion)
+    moved = (
+        moved_from(three_of(node_at(pool, root).center), three_of(known.place), turn, shift)
+        + 2.0 * node_at(pool, root).radius * angle
+    )
     if not moved > 0.0:
         return 0.0
     part = moved / known.allowance
     if known.ball_allowance < known.allowance or 0.0 < known.sure < math.inf:
-        moved = moved_from(memory, o + BALL, memory, o + BALL_PLACE, turn, shift) + 2.0 * known.ball_radius * angle
+        moved = (
+            moved_from(three_of(known.ball), three_of(known.ball_place), turn, shift) + 2.0 * known.ball_radius * angle
+        )
         part = max(part, moved / known.ball_allowance)
         if known.sure > 0.0:
             known.doubt = moved / known.sure
@@ -164,21 +179,20 @@ def part_used(table, pool, watch, memory, p, q):
 @kernel(inner=True)
 def went(table, pool, watch, p, before, after):
     """How far a point of one body of pair p went at most, seen from the other one, between two poses of a scene."""
-    _side, tree, e, turn, shift = mover(table, watch, p, before)
-    _side, _tree, f, turned, shifted = mover(table, watch, p, after)
-    root = tree_at(table, tree).node_pool
-    center = three(pool, root + CENTER)
-    d = sub(add(matvec(turned, center), shifted), add(matvec(turn, center), shift))
-    return math.sqrt(dot(d, d)) + 2.0 * node_at(pool, root).radius * apart(e, f)
+    was, now = mover(table, watch, p, before), mover(table, watch, p, after)
+    root = tree_at(table, was.tree).node_pool
+    center = three_of(node_at(pool, root).center)
+    d = sub(add(matvec(now.turn, center), now.shift), add(matvec(was.turn, center), was.shift))
+    return math.sqrt(dot(d, d)) + 2.0 * node_at(pool, root).radius * apart(was.quaternion, now.quaternion)
 
 
 @kernel(inner=True)
 def used_most(table, watch, memory):
     """The pair that had used the largest part of its allowances when that was last measured."""
-    at = memory_places(table, watch)[0] + PART
+    at = memory_places(table, watch)[0]
     best = 0
     for p in range(1, manager_at(table, watch).pairs):
-        if memory[at + PAIR_MEMORY * p] > memory[at + PAIR_MEMORY * best]:
+        if pair_state_at(memory, at + PAIR_MEMORY * p).part > pair_state_at(memory, at + PAIR_MEMORY * best).part:
             best = p
     return best
 
@@ -186,11 +200,11 @@ def used_most(table, watch, memory):
 @kernel(inner=True)
 def largest_part(table, pool, watch, memory, q):
     """The pair that used the largest part of its allowances at poses q, and that part."""
-    at = memory_places(table, watch)[0] + PART
+    at = memory_places(table, watch)[0]
     for p in range(manager_at(table, watch).pairs):
-        memory[at + PAIR_MEMORY * p] = part_used(table, pool, watch, memory, p, q)
+        pair_state_at(memory, at + PAIR_MEMORY * p).part = part_used(table, pool, watch, memory, p, q)
     best = used_most(table, watch, memory)
-    return best, memory[at + PAIR_MEMORY * best]
+    return best, pair_state_at(memory, at + PAIR_MEMORY * best).part
 
 
 @kernel(signatures="(i8[::1], f8[::1], i8, f8[::1], i8, i8, f8[:, ::1])")
@@ -199,9 +213,9 @@ def measure_parts(table, pool, watch, memory, first, end, q):
 
     Returns the pair that had used most, of all, when it was last measured. A solve calls this by its address.
     """
-    at = memory_places(table, watch)[0] + PART
+    at = memory_places(table, watch)[0]
     for p in range(first, end):
-        memory[at + PAIR_MEMORY * p] = part_used(table, pool, watch, memory, p, q)
+        pair_state_at(memory, at + PAIR_MEMORY * p).part = part_used(table, pool, watch, memory, p, q)
     return used_most(table, watch, memory)
 
 

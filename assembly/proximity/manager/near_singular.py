@@ -8,6 +8,7 @@ over all small turns, wherever the least gap runs.
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 from assembly._kernel import kernel
 from assembly.geometry.splines.evaluate import surface_at
@@ -33,17 +34,19 @@ def toward_end(table, pool, r, du, dv):
     return math.copysign(1.0, du if abs(du) >= abs(dv) else dv)
 
 
+# A step across a valley. found: whether there is one; there: where it leads; bend: by how much it turns a normal [rad];
+# on_f: whether f is the surface that is bent more across; along: the valley's direction in the axes of f, so that the
+# faster parameter of that surface grows.
+ValleyStep = namedtuple("ValleyStep", "found there bend on_f along")
+
+
 @kernel(inner=True)
 def across_valley(table, pool, f, g, turn, shift, x):
-    """A step from parameters x across the valley there, if there is one.
-
-    Returns whether there is; where the step leads; by how much it turns a normal; whether f is the surface that is bent
-    more across; and the valley's direction in the axes of f, so that the faster parameter of that surface grows.
-    """
+    """A step from parameters x across the valley there, if there is one."""
     none = (0.0, 0.0, 0.0)
     _n, tx, ty, _pf, _pg, e, t, a, c, r, beta, regular = pair_frame(table, pool, f, g, turn, shift, x)
     if not regular:
-        return False, x, FAR, False, none
+        return ValleyStep(False, x, FAR, False, none)
     k, h, _inverse, _isolated = pair_matrix(a, c, beta, FLAT)
     # -H is how the surfaces part, symmetric at beta = 0.
     middle = -0.5 * (h[0] + h[3])
@@ -55,7 +58,7 @@ def across_valley(table, pool, f, g, turn, shift, x):
         not most > max(STEEP * (curvature_bound(a) + curvature_bound(c)), FLAT)
         or not abs(middle - radius) <= LEVEL * most
     ):
-        return False, x, FAR, False, none
+        return ValleyStep(False, x, FAR, False, none)
     across = (half + radius, mixed) if half >= 0.0 else (mixed, radius - half)
     length = math.sqrt(across[0] * across[0] + across[1] * across[1])
     across = (across[0] / length, across[1] / length)
@@ -80,7 +83,8 @@ def across_valley(table, pool, f, g, turn, shift, x):
         sense = toward_end(table, pool, f, e[0] * w[0] + e[1] * w[1], e[2] * w[1])
     else:
         sense = toward_end(table, pool, g, t[0] * w[0] + t[1] * w[1], t[2] * w[0] + t[3] * w[1])
-    return True, there, max(bend_f, bend_g), bent_f >= bent_g, blend(sense * w[0], tx, sense * w[1], ty)
+    along = blend(sense * w[0], tx, sense * w[1], ty)
+    return ValleyStep(True, there, max(bend_f, bend_g), bent_f >= bent_g, along)
 
 
 @kernel(inner=True)
@@ -94,7 +98,8 @@ def into_valley(table, pool, f, g, turn, shift, x, half):
     along = (0.0, 0.0, 0.0)
     on_f = False
     for _ in range(STEPS):
-        found, there, bend, on_f, along = across_valley(table, pool, f, g, turn, shift, x)
+        step = across_valley(table, pool, f, g, turn, shift, x)
+        found, there, bend, on_f, along = step.found, step.there, step.bend, step.on_f, step.along
         if not found or not is_beside(table, pool, (f, g), there, start, half, 1.0):
             return False, x, on_f, along
         x = there

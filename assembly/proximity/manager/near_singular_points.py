@@ -15,6 +15,7 @@ from assembly.proximity.brep.borders import feature_at, feature_kind
 from assembly.proximity.brep.records import FACE, FACE_RECORD, shell_at
 from assembly.proximity.features.holding import HELD_F, HELD_G
 from assembly.proximity.features.region_tests import is_feasible
+from assembly.proximity.features.solid_contact import pair_parameters
 from assembly.proximity.manager.extrema import (
     NEW,
     ROOT,
@@ -32,9 +33,9 @@ CONTINUUM = 1e-6
 
 
 @kernel(inner=True)
-def is_of_faces(table, scene, code_f, code_g):
+def is_of_faces(table, posed, code_f, code_g):
     """Whether both features are faces."""
-    return feature_kind(table, scene[2][2], code_f) == FACE and feature_kind(table, scene[2][3], code_g) == FACE
+    return feature_kind(table, posed.shells[0], code_f) == FACE and feature_kind(table, posed.shells[1], code_g) == FACE
 
 
 @kernel(inner=True)
@@ -45,7 +46,7 @@ def is_loose(roots, k):
 
 
 @kernel(inner=True)
-def is_next_in_valley(table, pool, scene, codes, surfaces, x, along, roots, count):
+def is_next_in_valley(table, pool, posed, codes, surfaces, x, along, roots, count):
     """Whether the point at x of a valley between two faces is to be held; `along` is the valley's direction there.
 
     So it is where the valley has turned far from all of the points that are known between these faces, or where these
@@ -56,10 +57,9 @@ def is_next_in_valley(table, pool, scene, codes, surfaces, x, along, roots, coun
         extremum = extremum_at(roots, k)
         alike = extremum.code_f == codes[0] and extremum.code_g == codes[1]
         if alike and extremum.origin != USELESS and not is_loose(roots, k):
-            y = (roots[k, 0], roots[k, 1], roots[k, 2], roots[k, 3])
-            found, _there, _bend, _on_f, other = across_valley(
-                table, pool, surfaces[0], surfaces[1], scene[0], scene[1], y
-            )
+            y = pair_parameters(extremum)
+            step = across_valley(table, pool, surfaces[0], surfaces[1], posed.turn, posed.shift, y)
+            found, other = step.found, step.along
             way = sub(p, surface_point(table, pool, surfaces[0], y[0], y[1])[0])
             square = dot(way, way)
             part = dot(way, along)
@@ -69,25 +69,26 @@ def is_next_in_valley(table, pool, scene, codes, surfaces, x, along, roots, coun
 
 
 @kernel(inner=True)
-def is_left_out(table, pool, scene, roots, k):
+def is_left_out(table, pool, posed, roots, k):
     """Whether root k, behind all that stay, is of a continuum and next to what is held; if not, it is held."""
     extremum = extremum_at(roots, k)
     codes = (np.int64(extremum.code_f), np.int64(extremum.code_g))
-    if extremum.origin == USELESS or not is_loose(roots, k) or not is_of_faces(table, scene, codes[0], codes[1]):
+    if extremum.origin == USELESS or not is_loose(roots, k) or not is_of_faces(table, posed, codes[0], codes[1]):
         return False
-    surfaces = (feature_at(table, scene[2][2], codes[0]), feature_at(table, scene[2][3], codes[1]))
-    x = (roots[k, 0], roots[k, 1], roots[k, 2], roots[k, 3])
-    found, _there, _bend, on_f, along = across_valley(table, pool, surfaces[0], surfaces[1], scene[0], scene[1], x)
+    surfaces = (feature_at(table, posed.shells[0], codes[0]), feature_at(table, posed.shells[1], codes[1]))
+    x = pair_parameters(extremum)
+    step = across_valley(table, pool, surfaces[0], surfaces[1], posed.turn, posed.shift, x)
+    found, on_f, along = step.found, step.on_f, step.along
     if not found:
         return False
-    if extremum.origin == NEW and not is_next_in_valley(table, pool, scene, codes, surfaces, x, along, roots, k):
+    if extremum.origin == NEW and not is_next_in_valley(table, pool, posed, codes, surfaces, x, along, roots, k):
         return True
     extremum.corner = HELD_F if on_f else HELD_G
     return False
 
 
 @kernel(inner=True)
-def hold_continua(table, pool, scene, roots, count):
+def hold_continua(table, pool, posed, roots, count):
     """Of a continuum of roots along a valley between two faces, hold those that are listed and few of the new ones.
 
     What Newton's method finds there are as many as it has starts, and may fill the room; one that is not next to what
@@ -98,26 +99,26 @@ def hold_continua(table, pool, scene, roots, count):
         for l in range(ROOT):
             roots[stay, l] = roots[k, l]
         stay += 1
-        if is_left_out(table, pool, scene, roots, stay - 1):
+        if is_left_out(table, pool, posed, roots, stay - 1):
             stay -= 1
     return stay
 
 
 @kernel(inner=True)
-def is_on_face(table, pool, scene, codes, side, x):
+def is_on_face(table, pool, posed, codes, side, x):
     """Whether the point at x of the face of one side is one of the body, within its boundary."""
-    face = shell_at(table, scene[2][2 + side]).face_table + FACE_RECORD * codes[side]
+    face = shell_at(table, posed.shells[side]).face_table + FACE_RECORD * codes[side]
     return is_feasible(table, pool, FACE, face, x[2 * side], x[2 * side + 1])
 
 
 @kernel(inner=True)
-def sunk(table, pool, scene, codes, held, x):
+def sunk(table, pool, posed, codes, held, x):
     """Where the bottom of the valley is, between two faces, across which x is; x where there is none in the faces.
 
     `held` says of which face it holds a point, HELD_F or HELD_G.
     """
-    f = feature_at(table, scene[2][2], codes[0])
-    g = feature_at(table, scene[2][3], codes[1])
+    f = feature_at(table, posed.shells[0], codes[0])
+    g = feature_at(table, posed.shells[1], codes[1])
     wide = (math.inf, math.inf, math.inf, math.inf)
-    found, there, _on_f, _along = into_valley(table, pool, f, g, scene[0], scene[1], x, wide)
-    return there if found and is_on_face(table, pool, scene, codes, 0 if held == HELD_F else 1, there) else x
+    found, there, _on_f, _along = into_valley(table, pool, f, g, posed.turn, posed.shift, x, wide)
+    return there if found and is_on_face(table, pool, posed, codes, 0 if held == HELD_F else 1, there) else x

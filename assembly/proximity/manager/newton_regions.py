@@ -11,12 +11,14 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly._record import record_dtype, record_view, size_of
 from assembly.geometry.splines.domain import is_within
 from assembly.proximity.bvh.tree import ELEMENT, element_at, tree_at
 from assembly.proximity.extrema.face_face import bent_at_most, move_pair, pair_frame, pair_step
 from assembly.proximity.extrema.pair_matrix import across_first, pair_matrix
 from assembly.proximity.extrema.singular import ALONE, BESIDE, fold_beyond
 from assembly.proximity.features.holding import POINT
+from assembly.proximity.features.solid_contact import pair_parameters
 from assembly.proximity.manager.extrema import extremum_at, is_alone
 
 # Steps; and below so many radians, that a step turns a normal, it is as good as there.
@@ -25,17 +27,24 @@ STEPS, CLOSE = 6, 0.02
 FLAT = 1e-9
 # What became of it.
 LEFT, STAYED = -1, -2
-# Sequences whose first steps lead as close together as this part of a patch go the same way. Of one that was followed:
-# where its first step led, and whether it came to no root of its own.
-TOGETHER, BARREN, PASSED = 0.25, 4, 5
+# Sequences whose first steps lead as close together as this part of a patch go the same way.
+TOGETHER = 0.25
+# A sequence that was followed.
+NEWTON_WAY = record_dtype(
+    "f8",
+    parameters=4,  # where its first step led
+    barren=1,  # 1: it came to no extremum of its own
+)
+newton_way_at = record_view(NEWTON_WAY)
+PASSED = size_of(NEWTON_WAY)
 
 
 @kernel(inline=True)
 def half_widths(table, pool, trees, pair):
     """Half the widths, in parameters, of the patches of a pair of elements."""
-    o = tree_at(table, trees[0]).element_pool + ELEMENT * pair[0]
-    p = tree_at(table, trees[1]).element_pool + ELEMENT * pair[1]
-    return (pool[o + 2], pool[o + 3], pool[p + 2], pool[p + 3])
+    f = element_at(pool, tree_at(table, trees[0]).element_pool + ELEMENT * pair[0])
+    g = element_at(pool, tree_at(table, trees[1]).element_pool + ELEMENT * pair[1])
+    return (f.half[0], f.half[1], g.half[0], g.half[1])
 
 
 @kernel(inline=True)
@@ -48,16 +57,16 @@ def is_beside(table, pool, surfaces, x, y, half, part):
 
 
 @kernel(inner=True)
-def is_known(table, pool, scene, e, d, roots, count):
+def is_known(table, pool, posed, e, d, roots, count):
     """The features of elements e and d, the parameters of their middles, whether a known root is all there is.
 
     And whether one is there that is near a fold, on this side of a knot line or beyond: a second root may be beside it.
     """
-    o = tree_at(table, scene[3][0]).element_pool + ELEMENT * e
-    p = tree_at(table, scene[3][1]).element_pool + ELEMENT * d
-    codes = (np.int64(element_at(pool, o).feature), np.int64(element_at(pool, p).feature))
-    start = (pool[o], pool[o + 1], pool[p], pool[p + 1])
-    half = half_widths(table, pool, scene[3], (e, d))
+    f = element_at(pool, tree_at(table, posed.trees[0]).element_pool + ELEMENT * e)
+    g = element_at(pool, tree_at(table, posed.trees[1]).element_pool + ELEMENT * d)
+    codes = (np.int64(f.feature), np.int64(g.feature))
+    start = (f.middle[0], f.middle[1], g.middle[0], g.middle[1])
+    half = half_widths(table, pool, posed.trees, (e, d))
     folds = False
     for k in range(count):
         extremum = extremum_at(roots, k)
@@ -66,12 +75,12 @@ def is_known(table, pool, scene, e, d, roots, count):
         if not extremum.fold > ALONE or extremum.corner >= POINT:
             # A point that stays where it is is no root: where the edge, or the face, is nearest may be beside it.
             continue
-        x = (roots[k, 0], roots[k, 1], roots[k, 2], roots[k, 3])
-        if not is_beside(table, pool, scene[2], x, start, half, BESIDE):
+        x = pair_parameters(extremum)
+        if not is_beside(table, pool, posed.surfaces, x, start, half, BESIDE):
             continue
-        if scene[2][0] >= 0 and math.isnan(extremum.beyond):
+        if posed.surfaces[0] >= 0 and math.isnan(extremum.beyond):
             # Beyond a knot line curvatures may be others.
-            extremum.beyond = fold_beyond(table, pool, scene, x, half)
+            extremum.beyond = fold_beyond(table, pool, posed, x, half)
         if is_alone(roots, k):
             return codes, start, True, False
         folds = True
@@ -106,11 +115,13 @@ def stays(table, pool, surfaces, turn, shift, start, half, passed, count):
             return LEFT, x, count
         if step == 0:
             for way in range(count):
-                there = (passed[way, 0], passed[way, 1], passed[way, 2], passed[way, 3])
+                there = pair_parameters(newton_way_at(passed, way))
                 if is_beside(table, pool, surfaces, x, there, half, TOGETHER):
                     return way, x, count
             if count < passed.shape[0]:
-                passed[count, 0], passed[count, 1], passed[count, 2], passed[count, 3] = x
-                passed[count, BARREN] = 0.0
+                led = newton_way_at(passed, count)
+                for l in range(4):
+                    led.parameters[l] = x[l]
+                led.barren = 0.0
                 count += 1
     return STAYED, x, count

@@ -21,7 +21,6 @@ from assembly.proximity.brep.borders import feature_at
 from assembly.proximity.brep.records import FACE_RECORD, face_at, shell_at
 from assembly.proximity.bvh.tree import (
     ELEMENT,
-    ELEMENT_FEATURE,
     NODE,
     NODE_INTS,
     element_at,
@@ -122,9 +121,10 @@ def facets_cut(table, pool, tree, surface, shell, a, d, end, beside):
         if r < 0:
             continue
         e = tree_record.element_pool + ELEMENT * (-1 - child)
-        (u, v, wide, high), (p, q, s, t) = patch_corners(table, pool, r, e)
+        (u, v, wide, high), (p, q, s, t) = patch_corners(table, pool, r, element_at(pool, e))
         for k in range(2):
-            hit, way, x, y, along = cut_at(a, d, p, q if k == 0 else s, s if k == 0 else t, end, beside)
+            cut = cut_at(a, d, p, q if k == 0 else s, s if k == 0 else t, end, beside)
+            hit, way, x, y, along = cut.hit, cut.part, cut.q, cut.r, cut.turns
             here = (u + (x + y if k == 0 else x) * wide, v + (y if k == 0 else x + y) * high)
             if hit and in_trim(table, pool, shell, code, here[0], here[1]):
                 count += 1
@@ -141,17 +141,18 @@ def foot_at(table, pool, tree, surface, shell, e, y):
     A foot that Newton's method did not reach is none: off the foot of a point outside, the tangent plane of a bulge has
     it inside. One farther off than BESIDE may be on the far side.
     """
-    o = tree_at(table, tree).element_pool + ELEMENT * e
-    code = np.int64(element_at(pool, o).feature)
+    patch = element_at(pool, tree_at(table, tree).element_pool + ELEMENT * e)
+    code = np.int64(patch.feature)
     f = surface_of(table, shell, surface, code)
     if f < 0:
         return 0.0, y, False
-    s, t, distance, n, settled = foot_of(table, pool, f, y, pool[o], pool[o + 1])
+    u, v = patch.middle[0], patch.middle[1]
+    s, t, distance, n, settled = foot_of(table, pool, f, y, u, v)
     for _ in range(FEET):
         if settled:
             break
         s, t, distance, n, settled = foot_of(table, pool, f, y, s, t)
-    beside = is_within(table, pool, f, s, t, pool[o], pool[o + 1], BESIDE * pool[o + 2], BESIDE * pool[o + 3])
+    beside = is_within(table, pool, f, s, t, u, v, BESIDE * patch.half[0], BESIDE * patch.half[1])
     return distance, n, settled and beside and in_trim(table, pool, shell, code, s, t)
 
 
@@ -201,11 +202,12 @@ def is_inside_at(table, pool, tree, surface, shell, e, y, margin, offset):
 
 
 @kernel(inner=True)
-def is_deep(table, pool, scene, e, d, margin, offsets):
+def is_deep(table, pool, posed, e, d, margin, offsets):
     """Whether the middle of a patch of f is farther than a margin inside g at a patch, or the other way round."""
-    turn, shift = scene[0], scene[1]
-    tree_f, tree_g = scene[3]
-    f, g, shell_f, shell_g = scene[2]
+    turn, shift = posed.turn, posed.shift
+    tree_f, tree_g = posed.trees
+    f, g = posed.surfaces
+    shell_f, shell_g = posed.shells
     a, some = middle(table, pool, tree_f, f, shell_f, e)
     a = matvec_t(turn, sub(a, shift))
     if some and is_inside_at(table, pool, tree_g, g, shell_g, d, a, margin, offsets[1]):
@@ -218,12 +220,12 @@ def is_deep(table, pool, scene, e, d, margin, offsets):
 @kernel(inner=True)
 def middle(table, pool, tree, surface, shell, e):
     """The middle of a patch, in the axes of its body, and whether it is one of a face and within its boundary."""
-    o = tree_at(table, tree).element_pool + ELEMENT * e
-    code = np.int64(element_at(pool, o).feature)
+    patch = element_at(pool, tree_at(table, tree).element_pool + ELEMENT * e)
+    code = np.int64(patch.feature)
     f = surface_of(table, shell, surface, code)
-    if f < 0 or not in_trim(table, pool, shell, code, pool[o], pool[o + 1]):
+    if f < 0 or not in_trim(table, pool, shell, code, patch.middle[0], patch.middle[1]):
         return (0.0, 0.0, 0.0), False
-    return surface_point(table, pool, f, pool[o], pool[o + 1])[0], True
+    return surface_point(table, pool, f, patch.middle[0], patch.middle[1])[0], True
 
 
 @kernel(inner=True)
@@ -234,31 +236,31 @@ def below_part(table, pool, tree, surface, shell, k, below):
     """
     tree_record = tree_at(table, tree)
     solid = shell_at(table, shell)
-    first = tree_record.element_pool + ELEMENT_FEATURE
+    first = tree_record.element_pool
     elements = tree_record.elements
     patches = 0
     for e in range(elements):
-        patches += int(shell < 0 or pool[first + ELEMENT * e] < solid.faces)
+        patches += int(shell < 0 or element_at(pool, first + ELEMENT * e).feature < solid.faces)
     passed = 0
     for e in range(elements):
-        if shell < 0 or pool[first + ELEMENT * e] < solid.faces:
+        if shell < 0 or element_at(pool, first + ELEMENT * e).feature < solid.faces:
             if passed >= patches * k // 3:
                 a, some = middle(table, pool, tree, surface, shell, e)
                 if some:
-                    o = tree_record.element_pool + ELEMENT * e
-                    f = surface_of(table, shell, surface, np.int64(element_at(pool, o).feature))
-                    _p, su, sv, _uu, _uv, _vv = surface_point(table, pool, f, pool[o], pool[o + 1])
+                    patch = element_at(pool, first + ELEMENT * e)
+                    f = surface_of(table, shell, surface, np.int64(patch.feature))
+                    _p, su, sv, _uu, _uv, _vv = surface_point(table, pool, f, patch.middle[0], patch.middle[1])
                     return sub(a, scale(float(surface_at(table, f).sign) * below, unit(cross(su, sv)))), True
             passed += 1
     return (0.0, 0.0, 0.0), False
 
 
 @kernel(inner=True)
-def is_wholly_inside(table, pool, scene, side, below):
+def is_wholly_inside(table, pool, posed, side, below):
     """Whether f (side 0) is wholly inside g, or g in f: by rays, each another way, from three points `below` it."""
-    turn, shift = scene[0], scene[1]
-    tree, other = scene[3][side], scene[3][1 - side]
-    surface, shell = scene[2][side], scene[2][2 + side]
+    turn, shift = posed.turn, posed.shift
+    tree, other = posed.trees[side], posed.trees[1 - side]
+    surface, shell = posed.surfaces[side], posed.shells[side]
     # Some direction that no face is likely to lie along, and far enough.
     far = 10.0 * (
         node_at(pool, tree_at(table, tree).node_pool).radius + node_at(pool, tree_at(table, other).node_pool).radius
@@ -273,7 +275,7 @@ def is_wholly_inside(table, pool, scene, side, below):
         elif k == 2:
             ray = (0.5218 * far, -0.8125 * far, -0.2601 * far)
         a = matvec_t(turn, sub(a, shift)) if side == 0 else add(matvec(turn, a), shift)
-        cut, leaves = facets_cut(table, pool, other, scene[2][1 - side], scene[2][3 - side], a, ray, 0.0, 0.0)
+        cut, leaves = facets_cut(table, pool, other, posed.surfaces[1 - side], posed.shells[1 - side], a, ray, 0.0, 0.0)
         # In a bore that is open at its ends a ray goes into the material.
         if cut % 2 == 0 or not leaves:
             return False
@@ -281,39 +283,45 @@ def is_wholly_inside(table, pool, scene, side, below):
 
 
 @kernel(inner=True)
-def crosses(table, pool, scene, stack, candidates, margin, offsets):
+def crosses(table, pool, posed, stack, candidates, margin, offsets):
     """Whether two bodies are in each other by more than a margin, or wholly, whatever extrema there are.
 
     Facets of f and of g are up to `offsets` beside their surfaces.
     """
-    count = overlapping(table, pool, scene[3][0], scene[3][1], scene[0], scene[1], stack, candidates)
+    count = overlapping(table, pool, posed.trees[0], posed.trees[1], posed.turn, posed.shift, stack, candidates)
     for c in range(count):
-        if is_deep(table, pool, scene, candidates[c, 0], candidates[c, 1], margin, offsets):
+        if is_deep(table, pool, posed, candidates[c, 0], candidates[c, 1], margin, offsets):
             return True
-        if scene[2][0] < 0 and pierces(table, pool, scene, (candidates[c, 0], candidates[c, 1]), margin, offsets):
+        if posed.surfaces[0] < 0 and pierces(table, pool, posed, (candidates[c, 0], candidates[c, 1]), margin, offsets):
             return True
-    return is_wholly_inside(table, pool, scene, 0, BELOW + 2.0 * offsets[1]) or is_wholly_inside(
-        table, pool, scene, 1, BELOW + 2.0 * offsets[0]
+    return is_wholly_inside(table, pool, posed, 0, BELOW + 2.0 * offsets[1]) or is_wholly_inside(
+        table, pool, posed, 1, BELOW + 2.0 * offsets[0]
     )
 
 
 @kernel(inner=True)
-def is_outside(table, pool, scene, roots, k, offsets):
+def is_outside(table, pool, posed, roots, k, offsets):
     """Whether root k, of a negative gap, is one of far sides: then a surface is between its points.
 
     Facets of f and of g are up to `offsets` beside their surfaces; gaps of no more are taken for true.
     """
     extremum = extremum_at(roots, k)
     depth = -extremum.gap
-    turn, shift = scene[0], scene[1]
+    turn, shift = posed.turn, posed.shift
     a = (extremum.point_f[0], extremum.point_f[1], extremum.point_f[2])
     b = (extremum.point_g[0], extremum.point_g[1], extremum.point_g[2])
     end = offsets[0] / depth
-    if end < 0.5 and facets_cut(table, pool, scene[3][0], scene[2][0], scene[2][2], a, sub(b, a), end, BETWEEN)[0] > 0:
+    if (
+        end < 0.5
+        and facets_cut(table, pool, posed.trees[0], posed.surfaces[0], posed.shells[0], a, sub(b, a), end, BETWEEN)[0]
+        > 0
+    ):
         return True
     a = matvec_t(turn, sub(a, shift))
     b = matvec_t(turn, sub(b, shift))
     end = offsets[1] / depth
     return (
-        end < 0.5 and facets_cut(table, pool, scene[3][1], scene[2][1], scene[2][3], a, sub(b, a), end, BETWEEN)[0] > 0
+        end < 0.5
+        and facets_cut(table, pool, posed.trees[1], posed.surfaces[1], posed.shells[1], a, sub(b, a), end, BETWEEN)[0]
+        > 0
     )

@@ -1,9 +1,8 @@
-"""What a watch (`proximity/manager/update.py`) knows: the layout of its record and its memory, places for contacts, and
-the log.
+"""What a contact manager (`proximity/manager/update.py`) knows: its records and its memory, slots for contacts, events.
 
-The record of a watch is in the table of integers, what it knows in a memory of doubles:
+Its record is in the table of integers, what it knows in a memory of doubles:
 
-    header | of every pair PAIR_MEMORY | of every place PLACE_MEMORY | events
+    header | of every pair a PAIR_STATE | of every slot a PLACE_STATE | events
 """
 
 from __future__ import annotations
@@ -14,8 +13,10 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly._record import place_of, record_dtype, record_view, size_of
+from assembly.proximity.bvh.tree import three_of
 from assembly.proximity.features.holding import HELD_F
 from assembly.proximity.features.solid_contact import (
+    pair_parameters,
     tracked_at,
 )
 from assembly.proximity.manager.centerlines.curve import both_radii
@@ -37,151 +38,136 @@ from assembly.proximity.manager.extrema import (
 from assembly.proximity.manager.near_singular_points import sunk
 from assembly.proximity.manager.overlap import is_outside
 
-# The record of a watch: counts; where pairs begin; the row of `tracked` that is the first place; address of
-# `track_solids`; where its lengths are in the pool; how many lists there are, where they begin; whether corners are
-# listed (`proximity/manager/vertex_contacts.py`); address of what tells the time, 0 where looks have as much as they
-# need; address of
-# `mark_places` (`contact_place.py`), 0 where no contact's bodies have a least gap above zero; address of what says
-# between two parts of a long look whether it is to go on, 0 where nobody is asked.
-GO_ON_AT = 11
-MANAGER_RECORD = record_dtype(
+# The record of a contact manager in the table. Places of the pool and the table are absolute.
+MANAGER_DTYPE = record_dtype(
     "i8",
-    pairs=1,
-    places=1,
-    pair_table=1,
-    first=1,
-    track_solids=1,
-    lengths=1,
-    lists=1,
-    list_table=1,
-    corners=1,
-    clock=1,
-    mark_address=2,
+    pairs=1,  # number of pairs of bodies
+    places=1,  # number of slots for contacts, of all pairs
+    pair_table=1,  # where the records of pairs begin in the table
+    first=1,  # row of `tracked` that is the first slot
+    track_solids=1,  # address of `features/solid_contact.track_solids`
+    lengths=1,  # where its lengths are in the pool
+    lists=1,  # number of neighbor lists
+    list_table=1,  # where these begin in the table
+    corners=1,  # 1: vertex contacts are listed as well (`vertex_contacts.py`)
+    clock=1,  # address of what tells the time; 0: updates take as long as they need
+    mark_address=1,  # address of `contact_place.mark_places`; 0: no contact's bodies have a least gap above zero
+    go_on_address=1,  # address of what says between two parts of a long update whether to go on; 0: nobody is asked
 )
-manager_at = record_view(MANAGER_RECORD)
-PAIRS = place_of(MANAGER_RECORD, "pairs")
-PLACES = place_of(MANAGER_RECORD, "places")
-PAIR_TABLE = place_of(MANAGER_RECORD, "pair_table")
-FIRST = place_of(MANAGER_RECORD, "first")
-TRACK_SOLIDS = place_of(MANAGER_RECORD, "track_solids")
-LENGTHS = place_of(MANAGER_RECORD, "lengths")
-LISTS = place_of(MANAGER_RECORD, "lists")
-LIST_TABLE = place_of(MANAGER_RECORD, "list_table")
-CORNERS = place_of(MANAGER_RECORD, "corners")
-CLOCK = place_of(MANAGER_RECORD, "clock")
-MARK_AT = place_of(MANAGER_RECORD, "mark_address")
-WATCH_RECORD = size_of(MANAGER_RECORD)
+manager_at = record_view(MANAGER_DTYPE)
+PAIRS = place_of(MANAGER_DTYPE, "pairs")
+PLACES = place_of(MANAGER_DTYPE, "places")
+PAIR_TABLE = place_of(MANAGER_DTYPE, "pair_table")
+FIRST = place_of(MANAGER_DTYPE, "first")
+TRACK_SOLIDS = place_of(MANAGER_DTYPE, "track_solids")
+LENGTHS = place_of(MANAGER_DTYPE, "lengths")
+LISTS = place_of(MANAGER_DTYPE, "lists")
+LIST_TABLE = place_of(MANAGER_DTYPE, "list_table")
+CORNERS = place_of(MANAGER_DTYPE, "corners")
+CLOCK = place_of(MANAGER_DTYPE, "clock")
+MARK_AT = place_of(MANAGER_DTYPE, "mark_address")
+WATCH_RECORD = size_of(MANAGER_DTYPE)
 # Nanoseconds between two questions whether to go on, and answers: on, to an end with what there is, or nowhere, because
 # an exception throws all away.
 SLICE = 50_000_000
 GOES_ON, ENDS, ABORTED = 0, 1, 2
-# Its lengths: roots nearer to each other than the first, and along the surfaces, are one; the reach of a first look;
-# the largest.
-LENGTHS_RECORD = record_dtype(
+# The lengths of a contact manager in the pool [over the size of the scene].
+LENGTHS_DTYPE = record_dtype(
     "f8",
-    neglect=1,
-    first_reach=1,
-    last_reach=1,
+    neglect=1,  # merge radius: extrema nearer to each other, and along the surfaces, are one
+    first_reach=1,  # query margin of a first update, and the least one
+    last_reach=1,  # the largest query margin
 )
-lengths_at = record_view(LENGTHS_RECORD)
-NEGLECT = place_of(LENGTHS_RECORD, "neglect")
-FIRST_REACH = place_of(LENGTHS_RECORD, "first_reach")
-LAST_REACH = place_of(LENGTHS_RECORD, "last_reach")
-LENGTH_COUNT = size_of(LENGTHS_RECORD)
-# A pair: bodies, trees, surfaces or else (-1) shells, where its least gap is in the pool (behind it how far it may
-# go between looks where contacts may be born, how far facets of either are from their surfaces, and how far either
-# reaches from its origin; behind these the same with a least gap of zero, for what is in the place of a contact), its
-# places from and to, given contacts between the two (`extrema.py`), whether it is f (0) or g (1) that is the smaller
-# one, and the spines of two round wires (-1: others).
-PAIR_FIELDS = record_dtype(
+lengths_at = record_view(LENGTHS_DTYPE)
+NEGLECT = place_of(LENGTHS_DTYPE, "neglect")
+FIRST_REACH = place_of(LENGTHS_DTYPE, "first_reach")
+LAST_REACH = place_of(LENGTHS_DTYPE, "last_reach")
+LENGTH_COUNT = size_of(LENGTHS_DTYPE)
+# A pair of bodies f and g in the table: two single surfaces, or else two B-rep bodies.
+PAIR_DTYPE = record_dtype(
     "i8",
-    body_f=1,
+    body_f=1,  # rows of the poses
     body_g=1,
-    tree_f=1,
+    tree_f=1,  # records of the trees of patches
     tree_g=1,
-    surface_f=1,
+    surface_f=1,  # records of the surfaces, or -1
     surface_g=1,
-    shell_f=1,
+    shell_f=1,  # records of the B-rep bodies, or -1
     shell_g=1,
-    minimum=1,
-    low=1,
-    high=1,
-    given=1,
+    minimum=1,  # where PAIR_LENGTHS are in the pool
+    low=1,  # its slots: the first one
+    high=1,  # and the one behind the last
+    given=1,  # where the records of given contacts between the two begin (`extrema.py`)
     given_count=1,
-    smaller=1,
-    spine_f=1,
+    smaller=1,  # which body's motion is measured: 0 f, 1 g, the smaller one
+    spine_f=1,  # records of the centerlines of two round wires, or -1
     spine_g=1,
 )
-pair_at = record_view(PAIR_FIELDS)
-PAIR_F = place_of(PAIR_FIELDS, "body_f")
-PAIR_G = place_of(PAIR_FIELDS, "body_g")
-TREE_F = place_of(PAIR_FIELDS, "tree_f")
-TREE_G = place_of(PAIR_FIELDS, "tree_g")
-PAIR_SURFACE_F = place_of(PAIR_FIELDS, "surface_f")
-PAIR_SURFACE_G = place_of(PAIR_FIELDS, "surface_g")
-PAIR_SHELL_F = place_of(PAIR_FIELDS, "shell_f")
-PAIR_SHELL_G = place_of(PAIR_FIELDS, "shell_g")
-PAIR_MINIMUM = place_of(PAIR_FIELDS, "minimum")
-LOW = place_of(PAIR_FIELDS, "low")
-HIGH = place_of(PAIR_FIELDS, "high")
-GIVEN = place_of(PAIR_FIELDS, "given")
-GIVEN_COUNT = place_of(PAIR_FIELDS, "given_count")
-SMALLER = place_of(PAIR_FIELDS, "smaller")
-SPINE_F = place_of(PAIR_FIELDS, "spine_f")
-SPINE_G = place_of(PAIR_FIELDS, "spine_g")
-PAIR_RECORD = size_of(PAIR_FIELDS)
-# How far behind a pair's least gap that of zero is.
-IN_PLACE = 6
-# Memory. Header: events, looks and contacts so far, the time of the caller, whether a near root ever found no place,
-# calls so far; of a tick with a budget, when a look is to end after the pair that it is at, and how many looks there
-# were before it; what bodies may be in each other and still touch: by so much less than the least gap a new contact may
-# stay, as where a solve begins.
-MEMORY_HEADER_RECORD = record_dtype(
+pair_at = record_view(PAIR_DTYPE)
+PAIR_F = place_of(PAIR_DTYPE, "body_f")
+PAIR_G = place_of(PAIR_DTYPE, "body_g")
+PAIR_SURFACE_F = place_of(PAIR_DTYPE, "surface_f")
+PAIR_SHELL_F = place_of(PAIR_DTYPE, "shell_f")
+PAIR_SHELL_G = place_of(PAIR_DTYPE, "shell_g")
+PAIR_MINIMUM = place_of(PAIR_DTYPE, "minimum")
+LOW = place_of(PAIR_DTYPE, "low")
+GIVEN = place_of(PAIR_DTYPE, "given")
+GIVEN_COUNT = place_of(PAIR_DTYPE, "given_count")
+SMALLER = place_of(PAIR_DTYPE, "smaller")
+SPINE_F = place_of(PAIR_DTYPE, "spine_f")
+PAIR_RECORD = size_of(PAIR_DTYPE)
+# Lengths of a pair in the pool [over the size of the scene]. Where contacts are given the same follow IN_PLACE behind
+# with a least gap of zero, for what is in the place of a contact.
+PAIR_LENGTHS = record_dtype(
     "f8",
-    event_count=1,
-    looks=1,
-    born=1,
-    time=1,
-    crowded=1,
-    calls=1,
-    deadline=1,
-    earlier=1,
-    overlap=1,
+    least=1,  # least gap
+    curved_bound=1,  # curvature-limited motion bound: how far it may go between updates where contacts may be born
+    offset=2,  # how far facets of f, and of g, are from their surfaces
+    far=2,  # how far f, and g, reach from their origins
 )
-memory_header_at = record_view(MEMORY_HEADER_RECORD)
-EVENT_COUNT = place_of(MEMORY_HEADER_RECORD, "event_count")
-LOOKS = place_of(MEMORY_HEADER_RECORD, "looks")
-CROWDED = place_of(MEMORY_HEADER_RECORD, "crowded")
-CALLS = place_of(MEMORY_HEADER_RECORD, "calls")
-DEADLINE = place_of(MEMORY_HEADER_RECORD, "deadline")
-EARLIER = place_of(MEMORY_HEADER_RECORD, "earlier")
-OVERLAP = place_of(MEMORY_HEADER_RECORD, "overlap")
-MEMORY_HEADER = size_of(MEMORY_HEADER_RECORD)
-# Of a pair: how the smaller body was turned, seen from the other, at its last look (a quaternion, NaN before there was
-# one), and where the middle of its tree was; how far it may go from there, its reach, its state, calls at its last
-# look; a ball on it, where its middle was, and how far what is in it may go; which part of its allowances is used;
-# how far what is in the ball may go until a pose that stays is looked at, because a contact may be born at a fold
-# beside one that touches; whether the bodies are in each other where no contact says so (NaN: its last look did not
-# ask); whether a near root found no place at the last look; how far a step was to go that was cut since; which part of
-# what poses that stay may go is used.
+pair_lengths_at = record_view(PAIR_LENGTHS)
+IN_PLACE = size_of(PAIR_LENGTHS)
+# The header of a memory.
+MEMORY_DTYPE = record_dtype(
+    "f8",
+    event_count=1,  # events so far
+    looks=1,  # updates of a pair so far
+    born=1,  # contacts so far: the number of the last one
+    time=1,  # that of the caller
+    crowded=1,  # 1: a near extremum once found no slot
+    calls=1,  # calls so far
+    deadline=1,  # of a tick with a budget: when an update ends, after the pair that it is at
+    earlier=1,  # updates of a pair before that tick
+    overlap=1,  # by so much less than the least gap a new contact may stay, as where a solve begins
+)
+memory_header_at = record_view(MEMORY_DTYPE)
+EVENT_COUNT = place_of(MEMORY_DTYPE, "event_count")
+LOOKS = place_of(MEMORY_DTYPE, "looks")
+CROWDED = place_of(MEMORY_DTYPE, "crowded")
+CALLS = place_of(MEMORY_DTYPE, "calls")
+DEADLINE = place_of(MEMORY_DTYPE, "deadline")
+EARLIER = place_of(MEMORY_DTYPE, "earlier")
+OVERLAP = place_of(MEMORY_DTYPE, "overlap")
+MEMORY_HEADER = size_of(MEMORY_DTYPE)
+# What is known of a pair of bodies since its last update. Motion is that of the smaller body, seen from the other.
 PAIR_STATE = record_dtype(
     "f8",
-    turn=4,
-    place=3,
-    allowance=1,
-    reach=1,
-    state=1,
-    called=1,
-    ball=3,
+    turn=4,  # how that body was turned, a quaternion; NaN before the first update
+    place=3,  # where the middle of its tree was
+    allowance=1,  # motion bound: until a point of it went so far, nothing that is not listed can touch
+    reach=1,  # query margin
+    state=1,  # FAR, NEAR or TRACKING
+    called=1,  # calls at the last update
+    ball=3,  # motion ball: its middle on the body
     ball_radius=1,
-    ball_place=3,
-    ball_allowance=1,
-    part=1,
-    sure=1,
-    crossed=1,
-    wanting=1,
-    cut_short=1,
-    doubt=1,
+    ball_place=3,  # where its middle was
+    ball_allowance=1,  # motion bound of what is in the ball; infinite: there is no ball
+    part=1,  # which part of its motion bounds is used
+    sure=1,  # how far what is in the ball may go until an accepted pose needs an update, as folds may have contacts
+    crossed=1,  # 1: the bodies are in each other where no contact says so; NaN: the last update did not ask
+    wanting=1,  # 1: a near extremum found no slot at the last update
+    cut_short=1,  # how far a step was to go that was cut since
+    doubt=1,  # which part of what accepted poses may go is used
 )
 pair_state_at = record_view(PAIR_STATE)
 TURN = place_of(PAIR_STATE, "turn")
@@ -190,9 +176,6 @@ ALLOWANCE = place_of(PAIR_STATE, "allowance")
 REACH = place_of(PAIR_STATE, "reach")
 STATE = place_of(PAIR_STATE, "state")
 CALLED = place_of(PAIR_STATE, "called")
-BALL = place_of(PAIR_STATE, "ball")
-BALL_RADIUS = place_of(PAIR_STATE, "ball_radius")
-BALL_PLACE = place_of(PAIR_STATE, "ball_place")
 BALL_ALLOWANCE = place_of(PAIR_STATE, "ball_allowance")
 PART = place_of(PAIR_STATE, "part")
 SURE = place_of(PAIR_STATE, "sure")
@@ -201,20 +184,29 @@ CUT_SHORT = place_of(PAIR_STATE, "cut_short")
 DOUBT = place_of(PAIR_STATE, "doubt")
 PAIR_MEMORY = size_of(PAIR_STATE)
 FAR, NEAR, TRACKING = 0, 1, 2
-# Of a place: its pair (-1: none), the number of its contact, and 1 where that is in the place of a given contact.
+# A slot for a contact.
 PLACE_STATE = record_dtype(
     "f8",
-    pair=1,
-    number=1,
-    given=1,
+    pair=1,  # its pair of bodies, or -1: it is free
+    number=1,  # number of its contact
+    given=1,  # 1: that is in the place of a given contact
 )
 place_at = record_view(PLACE_STATE)
 PLACE_PAIR = place_of(PLACE_STATE, "pair")
 PLACE_NUMBER = place_of(PLACE_STATE, "number")
-PLACE_GIVEN = place_of(PLACE_STATE, "given")
 PLACE_MEMORY = size_of(PLACE_STATE)
-# An event: kind, reason, pair, number of the contact, gap, time. The last so many are kept.
-EVENT, EVENTS = 6, 64
+# An event; the last EVENTS are kept.
+EVENT_DTYPE = record_dtype(
+    "f8",
+    kind=1,  # ADDED, ...
+    reason=1,  # CAME_NEAR, ...
+    pair=1,  # number of the pair of bodies
+    number=1,  # of the contact
+    gap=1,  # [over the size of the scene]
+    time=1,  # that of the caller
+)
+event_at = record_view(EVENT_DTYPE)
+EVENT, EVENTS = size_of(EVENT_DTYPE), 64
 ADDED, REMOVED, HANDED_OFF, MERGED, REFUSED = 0, 1, 2, 3, 4
 CAME_NEAR, WENT_AWAY, LOST, SAME_ROOT, NO_PLACE = 0, 1, 2, 3, 4
 # Roots nearer than this part of the reach are listed; those that are, stay so up to the second.
@@ -239,13 +231,13 @@ def memory_places(table, watch):
 def note(table, watch, memory, kind, reason, p, number, gap):
     """Write an event into the log."""
     state = memory_header_at(memory, 0)
-    at = memory_places(table, watch)[2] + EVENT * (np.int64(state.event_count) % EVENTS)
-    memory[at] = float(kind)
-    memory[at + 1] = float(reason)
-    memory[at + 2] = float(p)
-    memory[at + 3] = number
-    memory[at + 4] = gap
-    memory[at + 5] = state.time
+    event = event_at(memory, memory_places(table, watch)[2] + EVENT * (np.int64(state.event_count) % EVENTS))
+    event.kind = float(kind)
+    event.reason = float(reason)
+    event.pair = float(p)
+    event.number = number
+    event.gap = gap
+    event.time = state.time
     state.event_count += 1.0
 
 
@@ -255,7 +247,7 @@ def any_listed(table, watch, memory, p):
     pair = pair_at(table, manager_at(table, watch).pair_table + PAIR_RECORD * p)
     places = memory_places(table, watch)[1]
     for k in range(pair.low, pair.high):
-        if memory[places + PLACE_MEMORY * k] == p:
+        if place_at(memory, places + PLACE_MEMORY * k).pair == p:
             return True
     return False
 
@@ -267,7 +259,9 @@ def any_lost(table, watch, memory, p, tracked):
     pair = pair_at(table, manager.pair_table + PAIR_RECORD * p)
     places = memory_places(table, watch)[1]
     for k in range(pair.low, pair.high):
-        if memory[places + PLACE_MEMORY * k] == p and math.isnan(tracked[manager.first + k, 0]):
+        if place_at(memory, places + PLACE_MEMORY * k).pair == p and math.isnan(
+            tracked_at(tracked, manager.first + k).parameters[0]
+        ):
             return True
     return False
 
@@ -277,7 +271,7 @@ def release(table, watch, memory, k, tracked):
     """Make place k free."""
     o = memory_places(table, watch)[1] + PLACE_MEMORY * k
     place_at(memory, o).pair = -1.0
-    tracked[manager_at(table, watch).first + k, 0] = math.nan
+    tracked_at(tracked, manager_at(table, watch).first + k).parameters[0] = math.nan
 
 
 @kernel(inner=True)
@@ -286,7 +280,7 @@ def free_place(table, watch, memory, pair):
     pair_record = pair_at(table, pair)
     places = memory_places(table, watch)[1]
     for k in range(pair_record.low, pair_record.high):
-        if memory[places + PLACE_MEMORY * k] < 0.0:
+        if place_at(memory, places + PLACE_MEMORY * k).pair < 0.0:
             return k
     return -1
 
@@ -297,7 +291,7 @@ def write_root(roots, i, tracked, r):
     extremum = extremum_at(roots, i)
     pair = tracked_at(tracked, r)
     for k in range(4):
-        tracked[r, k] = roots[i, k]
+        pair.parameters[k] = extremum.parameters[k]
     pair.feature_f = extremum.code_f
     pair.feature_g = extremum.code_g
     for k in range(3):
@@ -308,15 +302,15 @@ def write_root(roots, i, tracked, r):
 
 
 @kernel(inner=True)
-def is_of_far_sides(table, pool, scene, roots, k, offsets):
+def is_of_far_sides(table, pool, posed, roots, k, offsets):
     """Whether root k, with a negative gap, is of sides that are turned away from each other."""
-    if scene[5][0] >= 0:
-        return extremum_at(roots, k).gap < -both_radii(table, pool, scene[5])
-    return is_outside(table, pool, scene, roots, k, offsets)
+    if posed.centerlines[0] >= 0:
+        return extremum_at(roots, k).gap < -both_radii(table, pool, posed.centerlines)
+    return is_outside(table, pool, posed, roots, k, offsets)
 
 
 @kernel(inner=True)
-def known_roots(table, pool, watch, memory, p, scene, offsets, tracked, roots, work):
+def known_roots(table, pool, watch, memory, p, posed, offsets, tracked, roots, work):
     """The roots that contacts of pair p have now: given ones, then listed ones.
 
     A listed contact that lost its root, or came to that of another one or to the far sides, gives up its place. Returns
@@ -327,34 +321,33 @@ def known_roots(table, pool, watch, memory, p, scene, offsets, tracked, roots, w
     places = memory_places(table, watch)[1]
     neglect = lengths_at(pool, manager.lengths).neglect
     # A contact that is to close a gap would contradict a clearance that asks for one, where both stood for one root.
-    radius = neglect if pool[pair.minimum] == 0.0 else math.inf
-    many = pair.given_count if scene[2][0] >= 0 else 0
-    count = add_given(table, pool, scene, tracked, pair.given, many, radius, roots, work)
+    radius = neglect if pair_lengths_at(pool, pair.minimum).least == 0.0 else math.inf
+    many = pair.given_count if posed.surfaces[0] >= 0 else 0
+    count = add_given(table, pool, posed, tracked, pair.given, many, radius, roots, work)
     first, last = pair.low, pair.high
     any_gone = False
     # Roots first, then corners, which give way to them.
     for step in range(2 * (last - first)):
         k = first + step % (last - first)
-        o = places + PLACE_MEMORY * k
-        slot = place_at(memory, o)
+        slot = place_at(memory, places + PLACE_MEMORY * k)
         r = manager.first + k
         tracked_pair = tracked_at(tracked, r)
         corner = tracked_pair.stays if tracked_pair.stays > 0.0 else 0.0
-        if memory[o] != p or (corner > 0.0) != (step >= last - first):
+        if slot.pair != p or (corner > 0.0) != (step >= last - first):
             continue
-        lost = math.isnan(tracked[r, 0])
+        lost = math.isnan(tracked_pair.parameters[0])
         before = count
         extremum = extremum_at(roots, before)
         if not lost and count < ROOTS:
-            start = (tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3])
+            start = pair_parameters(tracked_pair)
             codes = (np.int64(tracked_pair.feature_f), np.int64(tracked_pair.feature_g))
-            n = (tracked_pair.normal[0], tracked_pair.normal[1], tracked_pair.normal[2])
+            n = three_of(tracked_pair.normal)
             if corner >= HELD_F:
-                start = sunk(table, pool, scene, codes, corner, start)
-            count, found = add_root(table, pool, scene, codes, start, n, neglect, roots, count, work, corner)
+                start = sunk(table, pool, posed, codes, corner, start)
+            count, found = add_root(table, pool, posed, codes, start, n, neglect, roots, count, work, corner)
             lost = found != ALIKE and found != MINIMUM_FOUND
             if count > before and corner == 0.0 and extremum.gap < 0.0:
-                lost = lost or is_of_far_sides(table, pool, scene, roots, before, offsets)
+                lost = lost or is_of_far_sides(table, pool, posed, roots, before, offsets)
         if count > before and not lost:
             extremum.origin = LISTED + k
             if corner >= HELD_F and extremum.gap < tracked_pair.gap - SUNK:
@@ -412,7 +405,7 @@ def list_roots(table, pool, watch, memory, p, roots, count, tracked):
     pair = manager.pair_table + PAIR_RECORD * p
     at = pair_state_at(memory, memory_places(table, watch)[0] + PAIR_MEMORY * p)
     places, reach = memory_places(table, watch)[1], at.reach
-    least = pool[pair_at(table, pair).minimum]
+    least = pair_lengths_at(pool, pair_at(table, pair).minimum).least
     rest = math.inf
     lowest = math.inf
     for i in range(count):
@@ -497,11 +490,11 @@ def seat_given(table, watch, memory, p, roots, count, tracked):
             continue
         c = np.int64(GIVEN_CONTACT - extremum.origin)
         given_record = given_at(table, given + GIVEN_RECORD * c)
-        r = given_record.row
+        pair = tracked_at(tracked, given_record.row)
         swap = 2 * given_record.swapped
         for l in range(4):
-            tracked[r, l] = roots[k, (l + swap) % 4]
-        tracked_at(tracked, r).gap = root_record.gap
+            pair.parameters[l] = root_record.parameters[(l + swap) % 4]
+        pair.gap = root_record.gap
         if root_record.origin == NEW:
             note(table, watch, memory, HANDED_OFF, LOST, p, 0.0, root_record.gap)
         else:

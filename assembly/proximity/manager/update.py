@@ -14,20 +14,21 @@ may move by less (`motion_bounds.py`). Which patches a look goes into is in `can
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 import numpy as np
 
 from assembly._address import call_address
 from assembly._kernel import kernel
-from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.bvh.neighbor_list import LIST_INTS
 from assembly.proximity.bvh.tree import least_distance, node_at, tree_at
 from assembly.proximity.features.solid_contact import CONTACT_RECORD, TRACK, tracked_at
 from assembly.proximity.manager.candidates import facing_pairs, near_enough
+from assembly.proximity.manager.centerlines.box import BOX
 from assembly.proximity.manager.centerlines.curve import both_radii
 from assembly.proximity.manager.centerlines.minima import MINIMA
 from assembly.proximity.manager.centerlines.parts import near_parts, parts_beyond
-from assembly.proximity.manager.centerlines.search import BOX, BOXES, search_spines
+from assembly.proximity.manager.centerlines.search import BOXES, MARK, search_spines
 from assembly.proximity.manager.extrema import (
     ELSEWHERE,
     GIVEN_CONTACT,
@@ -41,19 +42,21 @@ from assembly.proximity.manager.flush import any_deep, drop_flush
 from assembly.proximity.manager.motion_bounds import (
     LEAST_ALLOWANCE,
     STILL,
+    PairSearch,
     allow_ball,
     largest_part,
     mover,
+    no_ball,
     reach_now,
     used_most,
 )
 from assembly.proximity.manager.newton_regions import PASSED
 from assembly.proximity.manager.overlap import crosses
+from assembly.proximity.manager.posed_pair import posed_pair
 from assembly.proximity.manager.search import search_patches
 from assembly.proximity.manager.state import (
     ABORTED,
     FAR,
-    GO_ON_AT,
     NEAR,
     PAIR_MEMORY,
     PAIR_RECORD,
@@ -71,7 +74,9 @@ from assembly.proximity.manager.state import (
     memory_header_at,
     memory_places,
     pair_at,
+    pair_lengths_at,
     pair_state_at,
+    place_at,
     release_given,
     seat_given,
 )
@@ -91,7 +96,10 @@ CANDIDATES, STACK = 8192, 1024
 FLAT = 0.2
 # Lists of parts of spines that are near are for motions up to so many first reaches.
 SPINE_RINGS = 4.0
-NO_BALL = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0)
+# Arrays of an update. stack: nodes of both trees that wait, (k, 2); candidates: pairs of patches, (k, 2), and their
+# distances; passed: ways of Newton's method, (WAYS, PASSED); work: one record of derivatives, one tracked pair; pairs:
+# parts of centerlines, (k, 2); boxes: of both (`centerlines/search.py`); marks: of known roots, and minima of a box.
+Workspace = namedtuple("Workspace", "stack candidates distances passed work pairs boxes marks")
 # Ways of Newton's method that are remembered in a look.
 WAYS = 64
 # Whether a look tells if bodies cross where no contact says so. A contact that lost its root is a reason to ask in a
@@ -102,7 +110,7 @@ CROSSING = 1e-6
 
 
 @kernel(inner=True)
-def list_corners(table, pool, watch, scene, reach, least, offsets, stack, candidates, roots, count, work, tracked):
+def list_corners(table, pool, watch, posed, reach, least, offsets, workspace, roots, count, tracked):
     """Add corners over faces to the roots of a pair. Returns how many roots there are.
 
     A listed contact whose root is at one stays there.
@@ -111,7 +119,8 @@ def list_corners(table, pool, watch, scene, reach, least, offsets, stack, candid
     lengths = lengths_at(pool, manager.lengths)
     span = (-lengths.first_reach, reach + least)
     neglect = lengths.neglect
-    count = add_corners(table, pool, scene, span, offsets, neglect, stack, candidates, roots, count, work)
+    stack, candidates, work = workspace.stack, workspace.candidates, workspace.work
+    count = add_corners(table, pool, posed, span, offsets, neglect, stack, candidates, roots, count, work)
     for k in range(count):
         extremum = extremum_at(roots, k)
         place = np.int64(extremum.origin)
@@ -132,7 +141,7 @@ def nearest_fold(roots, count, least, reach):
 
 
 @kernel(inner=True)
-def crosses_elsewhere(table, pool, watch, memory, p, scene, roots, count, least, offsets, stack, candidates, tracked):
+def crosses_elsewhere(table, pool, watch, memory, p, posed, roots, count, least, offsets, stack, candidates, tracked):
     """Whether the bodies of pair p are in each other where no contact says so."""
     manager = manager_at(table, watch)
     pair = pair_at(table, manager.pair_table + PAIR_RECORD * p)
@@ -145,129 +154,113 @@ def crosses_elsewhere(table, pool, watch, memory, p, scene, roots, count, least,
         )
         deep = deep or (extremum_at(roots, k).gap < asked - margin and extremum_at(roots, k).origin != USELESS)
     for k in range(pair.low, pair.high):
-        if memory[places + PLACE_MEMORY * k] == p:
+        if place_at(memory, places + PLACE_MEMORY * k).pair == p:
             deep = deep or tracked_at(tracked, manager.first + k).gap < -margin
-    return not deep and crosses(table, pool, scene, stack, candidates, margin, offsets)
+    return not deep and crosses(table, pool, posed, stack, candidates, margin, offsets)
 
 
 @kernel(inner=True)
-def search_by_patches(table, pool, watch, memory, p, scene, moving, reach, offsets, tracked, rooms, roots):
-    """Find the roots of pair p by patches that face each other; what a look knows of the pair then.
+def search_by_patches(table, pool, watch, memory, p, posed, moving, reach, offsets, tracked, workspace, roots):
+    """Find the roots of pair p by patches that face each other.
 
-    Returns
-    -------
-    How many roots there are; whether a listed one was lost; how far bodies may go for what is not listed;
-    how far what is in a ball may go, and that ball; how far, until a pose that stays is looked at; whether there is
-    anything within reach.
+    Returns a PairSearch, whether a listed root was lost, and whether there is anything within reach.
     """
     manager = manager_at(table, watch)
-    stack, candidates, distances, passed, work, _pairs, _boxes, _marks = rooms
+    stack, candidates, distances = workspace.stack, workspace.candidates, workspace.distances
     lengths = lengths_at(pool, manager.lengths)
     minimum = pair_at(table, manager.pair_table + PAIR_RECORD * p).minimum
-    least, flank = pool[minimum], pool[minimum + 1]
+    asked = pair_lengths_at(pool, minimum)
+    least, flank = asked.least, asked.curved_bound
     at = memory_places(table, watch)[0] + PAIR_MEMORY * p
-    found, reach = facing_pairs(table, pool, watch, memory, p, scene, moving, reach, stack, candidates)
+    found, reach = facing_pairs(table, pool, watch, memory, p, posed, moving, reach, stack, candidates)
     pair_state_at(memory, at).reach = reach
-    count, any_gone = known_roots(table, pool, watch, memory, p, scene, offsets, tracked, roots, work)
-    enough = near_enough(table, pool, scene, least, reach, flank, candidates, found, distances)
+    count, any_gone = known_roots(table, pool, watch, memory, p, posed, offsets, tracked, roots, workspace.work)
+    enough = near_enough(table, pool, posed, least, reach, flank, candidates, found, distances)
     span = (-lengths.last_reach, reach + least)
     neglect = lengths.neglect
     facing = (candidates, distances)
-    count, free, fertile, ball = search_patches(
-        table, pool, scene, moving, (flank, enough), span, offsets, neglect, facing, found, roots, count, work, passed
-    )
-    free = min(free, reach)
+    search = search_patches(
+        table, pool, posed, moving, (flank, enough), span, offsets, neglect, facing, found, roots, count,
+        workspace.work, workspace.passed,
+    )  # fmt: skip
+    free = min(search.bound, reach)
     if found == 0:
         # Nothing faces the other body within reach: the boxes tell how far that is so.
-        trees = scene[3]
-        free = max(free, least_distance(table, pool, trees[0], trees[1], scene[0], scene[1], math.inf, stack) - least)
-    return count, any_gone, free, fertile, ball, math.inf, found > 0
+        trees = posed.trees
+        free = max(
+            free, least_distance(table, pool, trees[0], trees[1], posed.turn, posed.shift, math.inf, stack) - least
+        )
+    return PairSearch(search.count, free, search.ball_bound, search.ball, math.inf), any_gone, found > 0
 
 
 @kernel(inner=True)
-def search_by_spines(table, pool, watch, memory, p, scene, moving, reach, offsets, tracked, rooms, roots):
+def search_by_spines(table, pool, watch, memory, p, posed, moving, reach, offsets, tracked, workspace, roots):
     """The same for two round wires, by their spines."""
     manager = manager_at(table, watch)
-    stack, _candidates, _distances, _passed, work, pairs, boxes, marks = rooms
+    stack, pairs, boxes = workspace.stack, workspace.pairs, workspace.boxes
     lengths = lengths_at(pool, manager.lengths)
     minimum = pair_at(table, manager.pair_table + PAIR_RECORD * p).minimum
-    least, flank = pool[minimum], pool[minimum + 1]
-    radii = both_radii(table, pool, scene[5]) + least
+    asked = pair_lengths_at(pool, minimum)
+    least, flank = asked.least, asked.curved_bound
+    radii = both_radii(table, pool, posed.centerlines) + least
     ring = SPINE_RINGS * lengths.first_reach
     at_list = manager.list_table + LIST_INTS * (p % manager.lists)
-    waiting = near_parts(table, pool, at_list, p, scene, moving, radii + reach, ring, stack, pairs, boxes)
+    waiting = near_parts(table, pool, at_list, p, posed, moving, radii + reach, ring, stack, pairs, boxes)
     while waiting < 0 and reach > LEAST_ALLOWANCE:
         # Out of room: what is nearer is looked at more often.
         reach *= 0.5
-        waiting = near_parts(table, pool, at_list, p, scene, moving, radii + reach, ring, stack, pairs, boxes)
+        waiting = near_parts(table, pool, at_list, p, posed, moving, radii + reach, ring, stack, pairs, boxes)
     pair_state_at(memory, memory_places(table, watch)[0] + PAIR_MEMORY * p).reach = reach
-    count, any_gone = known_roots(table, pool, watch, memory, p, scene, offsets, tracked, roots, work)
+    count, any_gone = known_roots(table, pool, watch, memory, p, posed, offsets, tracked, roots, workspace.work)
     if waiting < 0:
         # There is no room for what is as near as it should not be.
         memory_header_at(memory, 0).crowded = 1.0
-        return count, any_gone, 0.0, math.inf, NO_BALL, math.inf, True
+        return PairSearch(count, 0.0, math.inf, no_ball(), math.inf), any_gone, True
     if waiting == 0:
-        beyond = parts_beyond(table, pool, scene, radii + reach, stack, pairs) - radii
-        return count, any_gone, beyond, math.inf, NO_BALL, math.inf, False
+        beyond = parts_beyond(table, pool, posed, radii + reach, stack, pairs) - radii
+        return PairSearch(count, beyond, math.inf, no_ball(), math.inf), any_gone, False
     # No tangent turns by more than a motion over this.
-    rho = min(2.0 * (radii + reach), 0.99 * node_at(pool, tree_at(table, moving[1]).node_pool).radius)
-    count, free, fertile, ball, sure = search_spines(
-        table, pool, scene, moving, rho, (least, TAKE * reach, reach, flank), lengths.neglect, boxes, waiting,
-        marks, roots, count, work,
+    rho = min(2.0 * (radii + reach), 0.99 * node_at(pool, tree_at(table, moving.tree).node_pool).radius)
+    search = search_spines(
+        table, pool, posed, moving, rho, (least, TAKE * reach, reach, flank), lengths.neglect, boxes, waiting,
+        workspace.marks, roots, count, workspace.work,
     )  # fmt: skip
-    return count, any_gone, free, fertile, ball, sure, True
+    return search, any_gone, True
 
 
 @kernel(inner=True)
-def look_at_pair(table, pool, watch, memory, p, q, tracked, rooms, roots, asks):
+def look_at_pair(table, pool, watch, memory, p, q, tracked, workspace, roots, asks):
     """Find and list the roots of pair p; `asks` says whether it tells if the bodies cross elsewhere."""
     state = memory_header_at(memory, 0)
     manager = manager_at(table, watch)
     pair = pair_at(table, manager.pair_table + PAIR_RECORD * p)
     at = memory_places(table, watch)[0] + PAIR_MEMORY * p
     known = pair_state_at(memory, at)
-    i = pair.body_f
-    j = pair.body_g
-    turn, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
-    scene = (
-        turn,
-        shift,
-        (
-            pair.surface_f,
-            pair.surface_g,
-            pair.shell_f,
-            pair.shell_g,
-        ),
-        (pair.tree_f, pair.tree_g),
-        (i, j, q, manager.track_solids),
-        (pair.spine_f, pair.spine_g),
-    )
+    posed = posed_pair(manager, pair, q)
     state.looks += 1.0
-    minimum = pair.minimum
-    least = pool[minimum]
-    offsets = (pool[minimum + 2], pool[minimum + 3])
+    asked = pair_lengths_at(pool, pair.minimum)
+    least = asked.least
+    offsets = (asked.offset[0], asked.offset[1])
     moving = mover(table, watch, p, q)
     reach = reach_now(table, pool, watch, memory, p, moving)
-    wires = scene[5][0] >= 0
+    wires = posed.centerlines[0] >= 0
     if wires:
-        count, any_gone, free, fertile, ball, sure, found = search_by_spines(
-            table, pool, watch, memory, p, scene, moving, reach, offsets, tracked, rooms, roots
+        search, any_gone, found = search_by_spines(
+            table, pool, watch, memory, p, posed, moving, reach, offsets, tracked, workspace, roots
         )
     else:
-        count, any_gone, free, fertile, ball, sure, found = search_by_patches(
-            table, pool, watch, memory, p, scene, moving, reach, offsets, tracked, rooms, roots
+        search, any_gone, found = search_by_patches(
+            table, pool, watch, memory, p, posed, moving, reach, offsets, tracked, workspace, roots
         )
-    if scene[2][0] >= 0:
+    count, fertile, sure = search.count, search.ball_bound, search.accepted_bound
+    if posed.surfaces[0] >= 0:
         seat_given(table, watch, memory, p, roots, count, tracked)
     elif manager.corners == 1:
-        count = list_corners(
-            table, pool, watch, scene, known.reach, least, offsets, rooms[0], rooms[1], roots, count, rooms[4],
-            tracked,
-        )  # fmt: skip
-    if scene[2][0] < 0 and any_deep(roots, count):
-        drop_flush(table, pool, watch, memory, p, scene, roots, count, tracked)
-    if manager.mark_address[0] != 0 and least > 0.0 and pair.given_count > 0:
-        call_address(manager.mark_address[0], (table, pool, watch, p, q, tracked, roots, count))
+        count = list_corners(table, pool, watch, posed, known.reach, least, offsets, workspace, roots, count, tracked)
+    if posed.surfaces[0] < 0 and any_deep(roots, count):
+        drop_flush(table, pool, watch, memory, p, posed, roots, count, tracked)
+    if manager.mark_address != 0 and least > 0.0 and pair.given_count > 0:
+        call_address(manager.mark_address, (table, pool, watch, p, q, tracked, roots, count))
         release_given(table, watch, memory, p, roots, count, tracked)
     rest, lowest, wanting = list_roots(table, pool, watch, memory, p, roots, count, tracked)
     known.crossed = math.nan
@@ -276,10 +269,22 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, rooms, roots, asks):
         known.crossed = 1.0 if lowest < -max(CROSSING, state.overlap) else 0.0
     elif asks == ALWAYS or (asks == WHERE_LOST and any_gone):
         crossed = crosses_elsewhere(
-            table, pool, watch, memory, p, scene, roots, count, least, offsets, rooms[0], rooms[1], tracked
+            table,
+            pool,
+            watch,
+            memory,
+            p,
+            posed,
+            roots,
+            count,
+            least,
+            offsets,
+            workspace.stack,
+            workspace.candidates,
+            tracked,
         )
         known.crossed = 1.0 if crossed else 0.0
-    known.allowance = max(min(rest, free), LEAST_ALLOWANCE)
+    known.allowance = max(min(rest, search.bound), LEAST_ALLOWANCE)
     known.part = 0.0
     known.doubt = 0.0
     if wires:
@@ -288,7 +293,7 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, rooms, roots, asks):
         low = nearest_fold(roots, count, least, known.reach)
         sure = 0.0 if low <= FLAT * lengths_at(pool, manager.lengths).first_reach else math.inf
         fertile = fertile if sure == 0.0 else min(fertile, low)
-    allow_ball(memory, at, ball, fertile, sure)
+    allow_ball(memory, at, search.ball, fertile, sure)
     listed = any_listed(table, watch, memory, p)
     known.state = float(TRACKING if listed else (NEAR if found else FAR))
     if wanting:
@@ -337,7 +342,7 @@ def look_at_due(table, pool, watch, memory, q, tracked, how, first, most):
     roots = np.empty((ROOTS, ROOT))
     pairs = np.empty((BOXES, 2), np.int64)
     boxes = np.empty((BOXES, BOX))
-    marks = (np.empty((ROOTS, 4)), np.empty((MINIMA, 2)))
+    marks = (np.empty((ROOTS, MARK)), np.empty((MINIMA, 2)))
     work = (np.empty((1, CONTACT_RECORD)), np.empty((1, TRACK)))
     with_patches = False
     candidates = stack
@@ -348,7 +353,7 @@ def look_at_due(table, pool, watch, memory, q, tracked, how, first, most):
         if p != first and not is_due(table, watch, memory, p, tracked, how, most):
             continue
         if p != first and manager.clock != 0 and call_address(manager.clock, ()) > state.deadline:
-            if table[watch + GO_ON_AT] == 0 or call_address(table[watch + GO_ON_AT], ()) == ABORTED:
+            if manager.go_on_address == 0 or call_address(manager.go_on_address, ()) == ABORTED:
                 # Who set it is told, and goes on in another call.
                 state.deadline = -1.0
                 break
@@ -361,8 +366,17 @@ def look_at_due(table, pool, watch, memory, q, tracked, how, first, most):
         asks = WHERE_LOST if how & DOUBTFUL != 0 else NEVER
         if how & ~MEASURED == EVERYTHING or math.isnan(pair_state_at(memory, at + PAIR_MEMORY * p).turn[0]):
             asks = ALWAYS
-        rooms = (stack, candidates, distances, passed, work, pairs, boxes, marks)
-        look_at_pair(table, pool, watch, memory, p, q, tracked, rooms, roots, asks)
+        workspace = Workspace(
+            stack=stack,
+            candidates=candidates,
+            distances=distances,
+            passed=passed,
+            work=work,
+            pairs=pairs,
+            boxes=boxes,
+            marks=marks,
+        )
+        look_at_pair(table, pool, watch, memory, p, q, tracked, workspace, roots, asks)
 
 
 @kernel(signatures="(i8[::1], f8[::1], i8, f8[::1], f8[:, ::1], f8[:, ::1], i8)")

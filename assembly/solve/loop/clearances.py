@@ -18,7 +18,6 @@ from assembly.constraints.program.records import (
 from assembly.proximity.features.solid_contact import TRACK, contact_record_at
 from assembly.proximity.manager.motion_bounds import STILL
 from assembly.proximity.manager.state import (
-    GO_ON_AT,
     IN_PLACE,
     PAIR_MEMORY,
     PAIR_RECORD,
@@ -119,7 +118,7 @@ def look_around(table, pool, memory, point, how):
     state = memory_header_at(memory, 0)
     watch = header.watch
     manager = manager_at(table, watch)
-    asks = table[watch + GO_ON_AT] != 0 and manager.clock != 0
+    asks = manager.go_on_address != 0 and manager.clock != 0
     if asks and state.deadline < 0.0:
         return True
     if asks:

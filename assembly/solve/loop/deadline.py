@@ -13,7 +13,6 @@ from assembly._address import call_address
 from assembly._kernel import kernel
 from assembly.constraints.program.records import header_at
 from assembly.proximity.manager.state import (
-    GO_ON_AT,
     manager_at,
     memory_header_at,
 )
@@ -60,7 +59,7 @@ def begin_tick(table, settings, results, memory):
         state.deadline = math.inf
         # Looks of ticks are short, and with a budget end by it.
         asks = limits.tick == 0.0
-        table[header.watch + GO_ON_AT] = int(limits.ask_address) if asks else 0
+        manager.go_on_address = int(limits.ask_address) if asks else 0
         if asks:
             manager.clock = header.clock_address
         if is_new:

@@ -11,7 +11,7 @@ from assembly.geometry.vec import matvec
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.extrema.pairs import _key, _packed, as_face, descend, extremal_pair
 from assembly.proximity.manager import extrema as roots
-from tests.laws.scenes import random_quaternion
+from tests.laws.scenes import posed, random_quaternion
 
 # Lengths are those of a packed scene, whose size is one.
 SHAPES = {
@@ -27,7 +27,7 @@ def root_of(f, q_f, g, q_g, start):
     turn, shift = relative_pose(q, 0, rotation(q, 0), 1, rotation(q, 1))
     table, pool = np.asarray(table), np.asarray(pool)
     out = np.full((1, roots.ROOT), np.nan)
-    found = roots.surfaces_root(table, pool, (turn, shift, (0, SURFACE_RECORD)), tuple(start), out, 0)
+    found = roots.surfaces_root(table, pool, posed(turn, shift, (0, SURFACE_RECORD)), tuple(start), out, 0)
     return found, out[0], rotation(q, 0)
 
 

@@ -15,16 +15,27 @@ m / rho.
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 from assembly._kernel import kernel
+from assembly._record import record_dtype, record_view, size_of
 from assembly.geometry.vec import add, blend, dot, matvec, matvec_t, sub
 from assembly.proximity.manager.centerlines.curve import (
-    BEYOND,
     centerline_part_at,
     spine_point,
-    three,
 )
 
+# A box: a part of either centerline, and the lengths from its middle where the box begins and ends.
+CENTERLINE_BOX = record_dtype("f8", part_f=1, from_f=1, to_f=1, part_g=1, from_g=1, to_g=1)
+centerline_box_at = record_view(CENTERLINE_BOX)
+BOX = size_of(CENTERLINE_BOX)
+# The lengths of a box; and at which free ends of the centerlines it is, yes or no.
+Lengths = namedtuple("Lengths", "from_f to_f from_g to_g")
+FreeEnds = namedtuple("FreeEnds", "start_f end_f start_g end_g")
+# d = g(t) - f(s), unit tangents and curvature vectors of both, in the axes of f.
+Difference = namedtuple("Difference", "d tangent_f curvature_f tangent_g curvature_g")
+# The least and the largest of F_ss, F_tt and |F_st| over a box.
+Hessian = namedtuple("Hessian", "ss_low ss_high tt_low tt_high st_low st_high")
 # What a box is: nothing is known, no slope zero in it, F convex over it, F'' indefinite over it.
 UNKNOWN, EMPTY, CONVEX, BARREN = 0, 1, 2, 3
 # Motions are no longer than this part of rho.
@@ -53,10 +64,16 @@ def segment_distance(d, f, g, h, k):
 
 @kernel(inline=True)
 def apart(pool, o, p, turn, shift, s, t):
-    """d = g(t) - f(s), tangents and curvature vectors of both, in the axes of f."""
+    """The Difference at lengths s and t along the parts at o and p."""
     pf, f, bend_f = spine_point(pool, o, s)
     q, g, bend_g = spine_point(pool, p, t)
-    return sub(add(matvec(turn, q), shift), pf), f, bend_f, matvec(turn, g), matvec(turn, bend_g)
+    return Difference(
+        d=sub(add(matvec(turn, q), shift), pf),
+        tangent_f=f,
+        curvature_f=bend_f,
+        tangent_g=matvec(turn, g),
+        curvature_g=matvec(turn, bend_g),
+    )
 
 
 @kernel(inline=True)
@@ -65,7 +82,8 @@ def shape_of(hessian, kf, kg, rho, straight, is_open):
 
     A motion by m changes them by kf m, kg m and m / rho. A free end may have a minimum where F'' is indefinite.
     """
-    ss_low, ss_high, tt_low, tt_high, st_low, st_high = hessian
+    ss_low, ss_high, tt_low, tt_high = hessian.ss_low, hessian.ss_high, hessian.tt_low, hessian.tt_high
+    st_low, st_high = hessian.st_low, hessian.st_high
     if straight:
         # F is convex wherever two lines are. Where these are all but parallel a motion takes its minimum anywhere, and
         # a contact does not follow there.
@@ -115,7 +133,7 @@ def beyond_joints(pool, o, low, high, d, sign, slack, least, bend):
     for side in range(2):
         at_border = low <= -half if side == 0 else high >= half
         if part.jumps[side] == 1.0 and at_border:
-            vector = three(pool, o + BEYOND + 3 * side)
+            vector = (part.beyond[side, 0], part.beyond[side, 1], part.beyond[side, 2])
             length = math.sqrt(dot(vector, vector))
             least = min(least, 1.0 + sign * dot(d, vector) - length * slack)
             sharpest = max(max(sharpest, length), bend)
@@ -124,7 +142,7 @@ def beyond_joints(pool, o, low, high, d, sign, slack, least, bend):
 
 @kernel(inline=True)
 def box_of(pool, o, p, turn, shift, box, open_ends, reach, rho):
-    """What a box (s from, to, t from, to) of the parts at o and p is.
+    """What a box, Lengths, of the parts at o and p is.
 
     One that is beyond the reach is EMPTY, for longer than that. `open_ends` are where F_s, and F_t, may have any value
     >= 0, and <= 0: whether the box is at a free end of f where it starts, or ends, and so of g.
@@ -133,9 +151,11 @@ def box_of(pool, o, p, turn, shift, box, open_ends, reach, rho):
     -------
     The least distance of the spines over it; what it is; a motion after which that may no longer be so.
     """
-    h = 0.5 * (box[1] - box[0])
-    k = 0.5 * (box[3] - box[2])
-    d, f, bend_f, g, bend_g = apart(pool, o, p, turn, shift, box[0] + h, box[2] + k)
+    h = 0.5 * (box.to_f - box.from_f)
+    k = 0.5 * (box.to_g - box.from_g)
+    middle = apart(pool, o, p, turn, shift, box.from_f + h, box.from_g + k)
+    d, f, g = middle.d, middle.tangent_f, middle.tangent_g
+    bend_f, bend_g = middle.curvature_f, middle.curvature_g
     kf = centerline_part_at(pool, o).bend
     kg = centerline_part_at(pool, p).bend
     turn_f = kf * h
@@ -160,26 +180,36 @@ def box_of(pool, o, p, turn, shift, box, open_ends, reach, rho):
     st_low, st_high = max(abs(st) - vary_st, 0.0), min(abs(st) + vary_st, 1.0)
     # Slopes: where a free end lets one of any value of a sign be a minimum's, only the other sign excludes.
     slope = abs(a) - h * max(ss_high, -ss_low) - k * st_high - ROUNDING
-    if (open_ends[0] and a > 0.0) or (open_ends[1] and a < 0.0):
+    if (open_ends.start_f and a > 0.0) or (open_ends.end_f and a < 0.0):
         slope = -1.0
     other = abs(b) - k * max(tt_high, -tt_low) - h * st_high - ROUNDING
-    if (open_ends[2] and b > 0.0) or (open_ends[3] and b < 0.0):
+    if (open_ends.start_g and b > 0.0) or (open_ends.end_g and b < 0.0):
         other = -1.0
     slope = max(slope, other)
     sway = 1.0 + far / rho
-    is_open = open_ends[0] or open_ends[1] or open_ends[2] or open_ends[3]
+    is_open = open_ends.start_f or open_ends.end_f or open_ends.start_g or open_ends.end_g
     what, margin = shape_of(
-        (ss_low, ss_high, tt_low, tt_high, st_low, st_high), sway * kf, sway * kg, rho, kf == 0.0 and kg == 0.0, is_open
+        Hessian(ss_low, ss_high, tt_low, tt_high, st_low, st_high),
+        sway * kf,
+        sway * kg,
+        rho,
+        kf == 0.0 and kg == 0.0,
+        is_open,
     )
     if what == CONVEX:
         # Where the curvature jumps at the border of the box a minimum may be born, and run into it, if F is not convex
         # beyond.
-        ss_low, bend_f = beyond_joints(pool, o, box[0], box[1], d, -1.0, h + k, ss_low, kf)
-        tt_low, bend_g = beyond_joints(pool, p, box[2], box[3], matvec_t(turn, d), 1.0, h + k, tt_low, kg)
+        ss_low, bend_f = beyond_joints(pool, o, box.from_f, box.to_f, d, -1.0, h + k, ss_low, kf)
+        tt_low, bend_g = beyond_joints(pool, p, box.from_g, box.to_g, matvec_t(turn, d), 1.0, h + k, tt_low, kg)
         if bend_f >= 0.0 or bend_g >= 0.0:
             bend_f, bend_g = max(bend_f, kf), max(bend_g, kg)
             over, least_margin = shape_of(
-                (ss_low, ss_high, tt_low, tt_high, st_low, st_high), sway * bend_f, sway * bend_g, rho, False, True
+                Hessian(ss_low, ss_high, tt_low, tt_high, st_low, st_high),
+                sway * bend_f,
+                sway * bend_g,
+                rho,
+                False,
+                True,
             )
             margin = min(margin, least_margin) if over == CONVEX else 0.0
     slope /= sway

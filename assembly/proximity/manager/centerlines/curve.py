@@ -1,9 +1,8 @@
 """Spines of round wires as kernels read them: points, and which parameters of the surface stand for a point.
 
-A spine (`geometry/shapes/centerline.py`) is a record of `SPINE` integers in the table. Its pieces, lines and arcs, are
-cut into
-parts that hardly turn, `PART` doubles each, run through by lengths from their middles; over the parts is a tree of
-balls, whose root is node 0 and where the two children of a node follow each other.
+A spine (`geometry/shapes/centerline.py`) is a record in the table. Its pieces, lines and arcs, are cut into parts that
+hardly turn, run through by lengths from their middles; over the parts is a tree of balls, whose root is node 0 and
+where the two children of a node follow each other.
 """
 
 from __future__ import annotations
@@ -14,86 +13,68 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly._record import place_of, record_dtype, record_view, size_of
-from assembly.geometry.splines.evaluate import BREAKS_U, BREAKS_V, SPANS_U, SPANS_V, find_span
+from assembly.geometry.splines.evaluate import find_span, surface_at
 from assembly.geometry.vec import add, blend, cross, dot, scale, sub
+from assembly.proximity.bvh.tree import three_of
 
-# Record: how many pieces and parts; where they, the integers and the doubles of nodes are; whether it is closed, or
-# else half balls are its ends; whether u (0) or v (1) runs along it; where its numbers are.
+# A centerline in the table.
 CENTERLINE = record_dtype(
     "i8",
-    pieces=1,
-    parts=1,
-    piece_pool=1,
-    part_pool=1,
-    node_table=1,
-    node_pool=1,
-    closed=1,
-    along=1,
-    numbers=1,
+    pieces=1,  # number of pieces
+    parts=1,  # number of parts
+    piece_pool=1,  # where the pieces begin in the pool
+    part_pool=1,  # where the parts begin
+    node_table=1,  # where the nodes' children begin in the table: the first child, or -1 - part
+    node_pool=1,  # where their balls begin in the pool
+    closed=1,  # 1: it is closed; 0: half balls are its ends
+    along=1,  # which parameter of the surface runs along it: 0 u, 1 v
+    numbers=1,  # where its WIRE is in the pool
 )
 centerline_at = record_view(CENTERLINE)
-PIECES = place_of(CENTERLINE, "pieces")
 PARTS = place_of(CENTERLINE, "parts")
-PIECE_POOL = place_of(CENTERLINE, "piece_pool")
 PART_POOL = place_of(CENTERLINE, "part_pool")
-NODE_TABLE = place_of(CENTERLINE, "node_table")
-NODE_POOL = place_of(CENTERLINE, "node_pool")
-CLOSED = place_of(CENTERLINE, "closed")
-ALONG = place_of(CENTERLINE, "along")
-NUMBERS = place_of(CENTERLINE, "numbers")
-SPINE = 9
-# Its numbers: the wire's radius, the largest curvature, which way the other parameter turns.
+SPINE = size_of(CENTERLINE)
+# Numbers of a wire.
 WIRE = record_dtype(
     "f8",
-    radius=1,
-    sharpest=1,
-    sense=1,
+    radius=1,  # [length over the size of the scene]
+    sharpest=1,  # the largest curvature of the centerline
+    sense=1,  # which way the other parameter turns: 1 or -1
 )
 wire_at = record_view(WIRE)
-SHARPEST = place_of(WIRE, "sharpest")
-# A piece: curvature, length, the angle from the normal to where the other parameter starts, its first part, how many.
+# A piece, a line or an arc.
 CENTERLINE_PIECE = record_dtype(
     "f8",
-    bend=1,
+    bend=1,  # curvature
     length=1,
-    turn=1,
-    first_part=1,
-    part_count=1,
+    turn=1,  # angle from the normal to where the other parameter starts [rad]
+    first_part=1,  # its parts: the first one
+    part_count=1,  # and how many
 )
 centerline_piece_at = record_view(CENTERLINE_PIECE)
 PIECE = size_of(CENTERLINE_PIECE)
-# A part, in its middle: point, tangent, normal; curvature, half its length, its piece, how far along that it is;
-# whether the curvature jumps where it starts, and where it ends; the curvature vectors beyond.
+# A part of a piece: what it is in its middle, and at its joints.
 CENTERLINE_PART = record_dtype(
     "f8",
     point=3,
     tangent=3,
     normal=3,
-    bend=1,
-    half=1,
-    owner=1,
-    place=1,
-    jumps=2,
-    beyond=6,
+    bend=1,  # curvature
+    half=1,  # half its length
+    owner=1,  # its piece
+    place=1,  # how far along the piece its middle is
+    jumps=2,  # 1: the curvature jumps where the part starts, or ends
+    beyond=(2, 3),  # the curvature vectors beyond these joints
 )
 centerline_part_at = record_view(CENTERLINE_PART)
-POINT = place_of(CENTERLINE_PART, "point")
-TANGENT = place_of(CENTERLINE_PART, "tangent")
-NORMAL = place_of(CENTERLINE_PART, "normal")
 PART_BEND = place_of(CENTERLINE_PART, "bend")
 HALF = place_of(CENTERLINE_PART, "half")
-JUMPS = place_of(CENTERLINE_PART, "jumps")
-BEYOND = place_of(CENTERLINE_PART, "beyond")
 PART = size_of(CENTERLINE_PART)
-# A node: its first child, or -1 - part; middle and radius of a ball.
-BALL_RADIUS, BALL = 3, 4
+# A node in the pool: a ball around its parts.
+CENTERLINE_NODE = record_dtype("f8", center=3, radius=1)
+ball_at = record_view(CENTERLINE_NODE)
+BALL = size_of(CENTERLINE_NODE)
 QUARTER = 0.5 * math.pi
-
-
-@kernel(inline=True)
-def three(pool, o):
-    """Three numbers of the pool."""
-    return (pool[o], pool[o + 1], pool[o + 2])
 
 
 @kernel(inline=True)
@@ -111,12 +92,12 @@ def turned(x):
 @kernel(inline=True)
 def spine_point(pool, o, s):
     """Point, unit tangent and curvature vector of the part at o, a length s from its middle."""
-    p = three(pool, o + POINT)
-    t = three(pool, o + TANGENT)
-    bend = centerline_part_at(pool, o).bend
+    part = centerline_part_at(pool, o)
+    p, t = three_of(part.point), three_of(part.tangent)
+    bend = part.bend
     if bend == 0.0:
         return add(p, scale(s, t)), t, (0.0, 0.0, 0.0)
-    n = three(pool, o + NORMAL)
+    n = three_of(part.normal)
     a, b = turned(bend * s)
     radius = 1.0 / bend
     point = add(p, blend(radius * a, t, radius * b, n))
@@ -158,7 +139,7 @@ def wire_parameters(table, pool, spine, surface, part, s, way):
     piece = centerline_piece_at(pool, line.piece_pool + PIECE * k)
     bend, length = piece.bend, piece.length
     _point, t, curvature = spine_point(pool, o, s)
-    n = scale(1.0 / bend, curvature) if bend > 0.0 else three(pool, o + NORMAL)
+    n = scale(1.0 / bend, curvature) if bend > 0.0 else three_of(part_record.normal)
     turn = piece.turn
     begin = blend(math.cos(turn), n, math.sin(turn), cross(t, n))
     ahead = dot(way, t)
@@ -167,9 +148,10 @@ def wire_parameters(table, pool, spine, surface, part, s, way):
     if phi < 0.0:
         phi += 4.0 * QUARTER
     along = line.along
-    breaks_u = table[surface + (BREAKS_V if along == 1 else BREAKS_U)]
-    breaks_v = table[surface + (BREAKS_U if along == 1 else BREAKS_V)]
-    spans_v = table[surface + (SPANS_U if along == 1 else SPANS_V)]
+    wire = surface_at(table, surface)
+    breaks_u = wire.breaks_v if along == 1 else wire.breaks_u
+    breaks_v = wire.breaks_u if along == 1 else wire.breaks_v
+    spans_v = wire.spans_u if along == 1 else wire.spans_v
     share = 4.0 * QUARTER / spans_v
     j = min(int(phi / share), spans_v - 1)
     v = in_span(pool, breaks_v, j, arc_place(phi - j * share, share))
@@ -193,8 +175,9 @@ def spine_place(table, pool, spine, surface, u, v):
     """The part of a wire's spine, and how far from its middle, where parameters of the surface are."""
     line = centerline_at(table, spine)
     along = line.along
-    breaks = table[surface + (BREAKS_V if along == 1 else BREAKS_U)]
-    spans = table[surface + (SPANS_V if along == 1 else SPANS_U)]
+    wire = surface_at(table, surface)
+    breaks = wire.breaks_v if along == 1 else wire.breaks_u
+    spans = wire.spans_v if along == 1 else wire.spans_u
     at = v if along == 1 else u
     span = find_span(pool, breaks, spans, at)
     k = min(max(span - (1 - line.closed), 0), line.pieces - 1)

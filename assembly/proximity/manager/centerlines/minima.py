@@ -12,10 +12,11 @@ and minima are where phi' goes from below zero to above. However level the valle
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 from assembly._kernel import kernel
 from assembly.geometry.vec import dot
-from assembly.proximity.manager.centerlines.box import apart
+from assembly.proximity.manager.centerlines.box import FreeEnds, Lengths, apart
 
 # Steps of Newton's method, of feet, and until an interval cannot be halved any more.
 STEPS, FEET, HALVINGS = 30, 12, 60
@@ -26,6 +27,8 @@ LEVEL, STILL = 1e-10, 1e-16
 NOISE = 1e-14
 # A foot is one where the last step toward it is shorter than this.
 SHORT = 1e-12
+# Slopes of F on both centerlines and its second derivatives: x along the followed one, y along the other one.
+Slopes = namedtuple("Slopes", "x y xx yy xy")
 # Room for the minima of a thin box: both ends, and three in each of the pieces between these and two kinks.
 MINIMA = 11
 
@@ -55,14 +58,15 @@ def convex_minimum(pool, o, p, turn, shift, box, open_ends, s, t):
     """
     last = math.inf
     for _ in range(STEPS):
-        d, f, bend_f, g, bend_g = apart(pool, o, p, turn, shift, s, t)
+        at = apart(pool, o, p, turn, shift, s, t)
+        d, f, g = at.d, at.tangent_f, at.tangent_g
         a = -dot(d, f)
         b = dot(d, g)
-        ss = 1.0 - dot(d, bend_f)
-        tt = 1.0 + dot(d, bend_g)
+        ss = 1.0 - dot(d, at.curvature_f)
+        tt = 1.0 + dot(d, at.curvature_g)
         st = -dot(f, g)
-        hold_s = (s <= box[0] and a > 0.0) or (s >= box[1] and a < 0.0)
-        hold_t = (t <= box[2] and b > 0.0) or (t >= box[3] and b < 0.0)
+        hold_s = (s <= box.from_f and a > 0.0) or (s >= box.to_f and a < 0.0)
+        hold_t = (t <= box.from_g and b > 0.0) or (t >= box.to_g and b < 0.0)
         if (hold_s or abs(a) <= STILL) and (hold_t or abs(b) <= STILL):
             # Along a valley that is all but level steps do not end.
             break
@@ -75,33 +79,35 @@ def convex_minimum(pool, o, p, turn, shift, box, open_ends, s, t):
             i = 1.0 / det if det > 1e-14 else 0.0
             x = i * (st * b - tt * a) if i > 0.0 else 0.5 * (-a)
             y = i * (st * a - ss * b) if i > 0.0 else 0.5 * (-b)
-        s_new = min(max(s + x, box[0]), box[1])
-        t_new = min(max(t + y, box[2]), box[3])
+        s_new = min(max(s + x, box.from_f), box.to_f)
+        t_new = min(max(t + y, box.from_g), box.to_g)
         size = abs(s_new - s) + abs(t_new - t)
         s = s_new
         t = t_new
         if size <= 1e-15 or (size < 1e-9 and size >= 0.5 * last):
             break
         last = size
-    d, f, _bend_f, g, _bend_g = apart(pool, o, p, turn, shift, s, t)
+    at = apart(pool, o, p, turn, shift, s, t)
+    d = at.d
     far = math.sqrt(dot(d, d))
-    ends_f = (open_ends[0] and s <= box[0], open_ends[1] and s >= box[1])
-    ends_g = (open_ends[2] and t <= box[2], open_ends[3] and t >= box[3])
-    a, b = -dot(d, f), dot(d, g)
-    ends = is_held(a, s, box[0], box[1], far) and is_held(b, t, box[2], box[3], far)
+    ends_f = (open_ends.start_f and s <= box.from_f, open_ends.end_f and s >= box.to_f)
+    ends_g = (open_ends.start_g and t <= box.from_g, open_ends.end_g and t >= box.to_g)
+    a, b = -dot(d, at.tangent_f), dot(d, at.tangent_g)
+    ends = is_held(a, s, box.from_f, box.to_f, far) and is_held(b, t, box.from_g, box.to_g, far)
     return is_least(a, far, ends_f) and is_least(b, far, ends_g), s, t, ends
 
 
 @kernel(inline=True)
 def slopes_of(pool, o, p, turn, shift, side, x, y):
-    """F_x, F_y, F_xx, F_yy, F_xy; on `side` 0 these are x along f and y along g, on side 1 the other way round."""
+    """The Slopes at x and y; on `side` 0 these are x along f and y along g, on side 1 the other way round."""
     s, t = (x, y) if side == 0 else (y, x)
-    d, f, bend_f, g, bend_g = apart(pool, o, p, turn, shift, s, t)
-    along = (-dot(d, f), 1.0 - dot(d, bend_f))
-    across = (dot(d, g), 1.0 + dot(d, bend_g))
+    at = apart(pool, o, p, turn, shift, s, t)
+    d, f, g = at.d, at.tangent_f, at.tangent_g
+    along = (-dot(d, f), 1.0 - dot(d, at.curvature_f))
+    across = (dot(d, g), 1.0 + dot(d, at.curvature_g))
     if side == 1:
         along, across = across, along
-    return along[0], across[0], along[1], across[1], -dot(f, g)
+    return Slopes(x=along[0], y=across[0], xx=along[1], yy=across[1], xy=-dot(f, g))
 
 
 @kernel(inner=True)
@@ -110,28 +116,28 @@ def foot_at(pool, o, p, turn, shift, side, held, x, y):
 
     There is none where F is not convex along the other spine.
     """
-    a, b, xx, yy, xy = slopes_of(pool, o, p, turn, shift, side, x, y)
+    at = slopes_of(pool, o, p, turn, shift, side, x, y)
     if held:
-        return a, xx, y, True
+        return at.x, at.xx, y, True
     step = math.inf
     for _ in range(FEET):
-        if not yy > 0.0:
-            return a, xx, y, False
-        step = -b / yy
+        if not at.yy > 0.0:
+            return at.x, at.xx, y, False
+        step = -at.y / at.yy
         y += step
-        a, b, xx, yy, xy = slopes_of(pool, o, p, turn, shift, side, x, y)
+        at = slopes_of(pool, o, p, turn, shift, side, x, y)
         if abs(step) <= 1e-15:
             break
-    found = yy > 0.0 and abs(step) <= SHORT
-    return a, xx - xy * xy / yy if found else xx, y, found
+    found = at.yy > 0.0 and abs(step) <= SHORT
+    return at.x, at.xx - at.xy * at.xy / at.yy if found else at.xx, y, found
 
 
 @kernel(inner=True)
 def held_at(pool, o, p, turn, shift, side, own, x):
     """Which end of the other spine's piece is nearest to x: -1 or 1; 0 if it is a point between."""
-    if slopes_of(pool, o, p, turn, shift, side, x, own[0])[1] >= 0.0:
+    if slopes_of(pool, o, p, turn, shift, side, x, own[0]).y >= 0.0:
         return -1
-    return 1 if slopes_of(pool, o, p, turn, shift, side, x, own[1])[1] <= 0.0 else 0
+    return 1 if slopes_of(pool, o, p, turn, shift, side, x, own[1]).y <= 0.0 else 0
 
 
 @kernel(inline=True)
@@ -143,10 +149,11 @@ def within(left, right, x):
 @kernel(inner=True)
 def kink_at(pool, o, p, turn, shift, side, end, left, right):
     """Where between two places the foot comes to an end of the other spine's piece: F_y = 0 there."""
-    rises = slopes_of(pool, o, p, turn, shift, side, right, end)[1] > 0.0
+    rises = slopes_of(pool, o, p, turn, shift, side, right, end).y > 0.0
     x = 0.5 * (left + right)
     for _ in range(HALVINGS):
-        _a, b, _xx, _yy, xy = slopes_of(pool, o, p, turn, shift, side, x, end)
+        at = slopes_of(pool, o, p, turn, shift, side, x, end)
+        b, xy = at.y, at.xy
         if abs(b) <= 1e-15 * abs(xy):
             break
         if (b > 0.0) == rises:
@@ -245,13 +252,18 @@ def valley_minima(pool, o, p, turn, shift, box, open_ends, places):
     -------
     How many there are; whether the valley is level; whether these are all for certain.
     """
-    _a, _b, ss, tt, _st = slopes_of(pool, o, p, turn, shift, 0, 0.5 * (box[0] + box[1]), 0.5 * (box[2] + box[3]))
-    side = 0 if tt >= ss else 1
-    left, right, other_left, other_right = box if side == 0 else (box[2], box[3], box[0], box[1])
-    ends = open_ends if side == 0 else (open_ends[2], open_ends[3], open_ends[0], open_ends[1])
+    middle = slopes_of(pool, o, p, turn, shift, 0, 0.5 * (box.from_f + box.to_f), 0.5 * (box.from_g + box.to_g))
+    side = 0 if middle.yy >= middle.xx else 1
+    # The followed one first.
+    own_box = box if side == 0 else Lengths(box.from_g, box.to_g, box.from_f, box.to_f)
+    ends = open_ends
+    if side == 1:
+        ends = FreeEnds(open_ends.start_g, open_ends.end_g, open_ends.start_f, open_ends.end_f)
+    left, right = own_box.from_f, own_box.to_f
+    other_left, other_right = own_box.from_g, own_box.to_g
     k = 0.5 * (other_right - other_left)
     # Feet may go on beyond the box along the same piece, but not beyond a free end.
-    own = (other_left if ends[2] else other_left - k, other_right if ends[3] else other_right + k)
+    own = (other_left if ends.start_g else other_left - k, other_right if ends.end_g else other_right + k)
     begin = held_at(pool, o, p, turn, shift, side, own, left)
     end = held_at(pool, o, p, turn, shift, side, own, right)
     count = 0
@@ -266,10 +278,10 @@ def valley_minima(pool, o, p, turn, shift, box, open_ends, places):
             # From the one end of the piece inward, or outward to the other one.
             at = own[0] if min(state, state + way) < 0 else own[1]
             new = kink_at(pool, o, p, turn, shift, side, at, x, right)
-        free = (state == 0) or (ends[2] if state < 0 else ends[3])
+        free = (state == 0) or (ends.start_g if state < 0 else ends.end_g)
         if free:
             y = 0.5 * (own[0] + own[1]) if state == 0 else (own[0] if state < 0 else own[1])
-            here = (ends[0] and x == left, ends[1] and state == end)
+            here = (ends.start_f and x == left, ends.end_f and state == end)
             count, slope, found = piece_minima(
                 pool, o, p, turn, shift, side, state != 0, x, new, y, here, places, count
             )

@@ -58,14 +58,15 @@ def pack_spine(spine: Spine, scale: float, table_at: int = 0, pool_at: int = 0) 
         for k, middle, reach in zip(owner, place, half, strict=True)
     ])  # fmt: skip
     children, balls = _tree(ends, scale)
-    record = np.zeros(layout.SPINE, dtype=np.int64)
-    record[layout.PIECES], record[layout.PARTS] = len(counts), len(owner)
-    record[layout.CLOSED], record[layout.ALONG] = spine.closed, spine.along
+    table = np.zeros(layout.SPINE, dtype=np.int64)
+    record = layout.centerline_at(table, 0)
+    record.pieces, record.parts = len(counts), len(owner)
+    record.closed, record.along = spine.closed, spine.along
     doubles = (numbers, pieces, parts, balls)
     at = pool_at + np.cumsum([0, *(block.size for block in doubles)])
-    record[[layout.NUMBERS, layout.PIECE_POOL, layout.PART_POOL, layout.NODE_POOL]] = at[:4]
-    record[layout.NODE_TABLE] = table_at + layout.SPINE
-    return np.append(record, children), np.concatenate([block.ravel() for block in doubles]), table_at
+    record.numbers, record.piece_pool, record.part_pool, record.node_pool = at[:4]
+    record.node_table = table_at + layout.SPINE
+    return np.append(table, children), np.concatenate([block.ravel() for block in doubles]), table_at
 
 
 def _beyond(spine: Spine, owner: NDArray[np.int64], scale: float) -> tuple[Array, Array]:

@@ -10,29 +10,31 @@ from assembly._kernel import kernel
 from assembly.geometry.vec import add, dot, matvec, sub
 from assembly.proximity.bvh.neighbor_list import (
     ENTRIES,
+    ENTRY,
     can_be_listed,
     moved_since,
     neighbor_list_at,
+    neighbors_at,
     reaches,
     write_list,
 )
-from assembly.proximity.manager.centerlines.box import ROUNDING, segment_distance
+from assembly.proximity.bvh.tree import three_of
+from assembly.proximity.manager.centerlines.box import ROUNDING, centerline_box_at, segment_distance
 from assembly.proximity.manager.centerlines.curve import (
     BALL,
-    BALL_RADIUS,
     PART,
-    TANGENT,
+    ball_at,
     centerline_at,
     centerline_part_at,
-    three,
 )
 
 
 @kernel(inline=True)
 def balls_apart(pool, o, p, turn, shift):
     """How far the balls at o and at p are apart, negative where they meet."""
-    d = sub(add(matvec(turn, three(pool, p)), shift), three(pool, o))
-    return math.sqrt(dot(d, d)) - pool[o + BALL_RADIUS] - pool[p + BALL_RADIUS]
+    f, g = ball_at(pool, o), ball_at(pool, p)
+    d = sub(add(matvec(turn, three_of(g.center)), shift), three_of(f.center))
+    return math.sqrt(dot(d, d)) - f.radius - g.radius
 
 
 @kernel(inline=True)
@@ -42,18 +44,19 @@ def parts_apart(pool, o, p, turn, shift):
     part_record = centerline_part_at(pool, p)
     h = part.half
     k = part_record.half
-    d = sub(add(matvec(turn, three(pool, p)), shift), three(pool, o))
-    least = segment_distance(d, three(pool, o + TANGENT), matvec(turn, three(pool, p + TANGENT)), h, k)
+    d = sub(add(matvec(turn, three_of(part_record.point)), shift), three_of(part.point))
+    least = segment_distance(d, three_of(part.tangent), matvec(turn, three_of(part_record.tangent)), h, k)
     return least - 0.5 * (part.bend * h * h + part_record.bend * k * k) - ROUNDING
 
 
 @kernel(inline=True)
-def whole_box(table, pool, spine, part, boxes, b, at):
-    """A side of box b: a whole part, from and to its ends."""
-    half = centerline_part_at(pool, centerline_at(table, spine).part_pool + PART * part).half
-    boxes[b, at] = float(part)
-    boxes[b, at + 1] = -half
-    boxes[b, at + 2] = half
+def whole_box(table, pool, spines, i, j, boxes, b):
+    """Box b: the whole parts i of f and j of g, from and to their ends."""
+    box = centerline_box_at(boxes, b)
+    half_f = centerline_part_at(pool, centerline_at(table, spines[0]).part_pool + PART * i).half
+    half_g = centerline_part_at(pool, centerline_at(table, spines[1]).part_pool + PART * j).half
+    box.part_f, box.from_f, box.to_f = float(i), -half_f, half_f
+    box.part_g, box.from_g, box.to_g = float(j), -half_g, half_g
 
 
 @kernel(inner=True)
@@ -99,7 +102,7 @@ def descend(table, pool, spines, turn, shift, reach, stack, out):
             continue
         if used + 2 > stack.shape[0]:
             return -1, 0.0
-        down_f = child_g < 0 or (child_f >= 0 and pool[o + BALL_RADIUS] >= pool[p + BALL_RADIUS])
+        down_f = child_g < 0 or (child_f >= 0 and ball_at(pool, o).radius >= ball_at(pool, p).radius)
         for k in range(2):
             stack[used, 0] = child_f + k if down_f else i
             stack[used, 1] = j if down_f else child_g + k
@@ -108,19 +111,19 @@ def descend(table, pool, spines, turn, shift, reach, stack, out):
 
 
 @kernel(inner=True)
-def parts_beyond(table, pool, scene, reach, stack, out):
+def parts_beyond(table, pool, posed, reach, stack, out):
     """How far two spines are apart at least, where no parts of them are within a reach of each other."""
-    return descend(table, pool, scene[5], scene[0], scene[1], reach, stack, out)[1]
+    return descend(table, pool, posed.centerlines, posed.turn, posed.shift, reach, stack, out)[1]
 
 
 @kernel(inner=True)
-def near_parts(table, pool, at, p, scene, moving, reach, ring, stack, out, boxes):
+def near_parts(table, pool, at, p, posed, moving, reach, ring, stack, out, boxes):
     """Boxes of parts of two spines that are within a reach of each other; how many, or -1 where there is no room.
 
     From the list at `at`, as `patch_list.listed_pairs` has patches.
     """
-    turn, shift = scene[0], scene[1]
-    spines = scene[5]
+    turn, shift = posed.turn, posed.shift
+    spines = posed.centerlines
     f, g = spines
     fits = reaches(table, at, moved_since(table, pool, at, p, moving), reach)
     if fits == 0 and can_be_listed(table, pool, moving, ring + reach):
@@ -129,8 +132,9 @@ def near_parts(table, pool, at, p, scene, moving, reach, ring, stack, out, boxes
     if fits == 1:
         many = neighbor_list_at(table, at).count
         for k in range(many):
-            out[k, 0] = table[at + ENTRIES + 2 * k]
-            out[k, 1] = table[at + ENTRIES + 2 * k + 1]
+            entry = neighbors_at(table, at + ENTRIES + ENTRY * k)
+            out[k, 0] = entry.f
+            out[k, 1] = entry.g
     else:
         many, _beyond = descend(table, pool, spines, turn, shift, reach, stack, out)
     count = 0
@@ -149,7 +153,6 @@ def near_parts(table, pool, at, p, scene, moving, reach, ring, stack, out, boxes
             continue
         if count == boxes.shape[0]:
             return -1
-        whole_box(table, pool, f, i, boxes, count, 0)
-        whole_box(table, pool, g, j, boxes, count, 3)
+        whole_box(table, pool, spines, i, j, boxes, count)
         count += 1
     return count if many >= 0 else -1

@@ -14,9 +14,22 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly._record import record_dtype, record_view, size_of
 from assembly.geometry.vec import add, cross, dot, matvec, matvec_t, scale, sub
 from assembly.proximity.extrema.face_face import pair_frame
-from assembly.proximity.manager.centerlines.box import BARREN, CONVEX, EMPTY, UNKNOWN, apart, box_of
+from assembly.proximity.features.solid_contact import pair_parameters
+from assembly.proximity.manager.centerlines.box import (
+    BARREN,
+    BOX,
+    CONVEX,
+    EMPTY,
+    UNKNOWN,
+    FreeEnds,
+    Lengths,
+    apart,
+    box_of,
+    centerline_box_at,
+)
 from assembly.proximity.manager.centerlines.curve import (
     PART,
     both_radii,
@@ -38,9 +51,14 @@ from assembly.proximity.manager.extrema import (
     extremum_at,
     write,
 )
+from assembly.proximity.manager.motion_bounds import MotionBall, PairSearch, no_ball
 
-# Room: boxes that wait, six doubles each (part and lengths of f, then of g).
-BOXES, BOX = 2048, 6
+# Room for boxes that wait.
+BOXES = 2048
+# Where a known root is on the centerlines: part and length from its middle of either.
+KNOWN_PLACE = record_dtype("f8", part_f=1, at_f=1, part_g=1, at_g=1)
+known_place_at = record_view(KNOWN_PLACE)
+MARK = size_of(KNOWN_PLACE)
 # Boxes over half of which no tangent turns by more than this are thin enough for feet to tell.
 THIN = 0.025
 # So many boxes are halved only because they allow little, down to so many radians.
@@ -64,49 +82,52 @@ def open_ends(table, pool, f, g, box):
     centerline = centerline_at(table, g)
     free_f = line.closed == 0
     free_g = centerline.closed == 0
-    i = np.int64(box[0])
-    j = np.int64(box[3])
+    i = np.int64(box.part_f)
+    j = np.int64(box.part_g)
     half_f = centerline_part_at(pool, line.part_pool + PART * i).half
     half_g = centerline_part_at(pool, centerline.part_pool + PART * j).half
-    return (
-        free_f and i == 0 and box[1] <= -half_f,
-        free_f and i == line.parts - 1 and box[2] >= half_f,
-        free_g and j == 0 and box[4] <= -half_g,
-        free_g and j == centerline.parts - 1 and box[5] >= half_g,
+    return FreeEnds(
+        start_f=free_f and i == 0 and box.from_f <= -half_f,
+        end_f=free_f and i == line.parts - 1 and box.to_f >= half_f,
+        start_g=free_g and j == 0 and box.from_g <= -half_g,
+        end_g=free_g and j == centerline.parts - 1 and box.to_g >= half_g,
     )
 
 
 @kernel(inner=True)
-def mark_known(table, pool, scene, roots, count, marks):
+def mark_known(table, pool, posed, roots, count, marks):
     """Where on the spines known roots are that are at a minimum: part and length of either; NaN for others."""
-    surfaces = scene[2]
-    f, g = scene[5]
+    surfaces = posed.surfaces
+    f, g = posed.centerlines
     for k in range(count):
-        i, s = spine_place(table, pool, f, surfaces[0], roots[k, 0], roots[k, 1])
-        j, t = spine_place(table, pool, g, surfaces[1], roots[k, 2], roots[k, 3])
-        marks[k, 0] = float(i)
-        marks[k, 1] = s
-        marks[k, 2] = float(j)
-        marks[k, 3] = t
+        x = pair_parameters(extremum_at(roots, k))
+        i, s = spine_place(table, pool, f, surfaces[0], x[0], x[1])
+        j, t = spine_place(table, pool, g, surfaces[1], x[2], x[3])
+        mark = known_place_at(marks, k)
+        mark.part_f, mark.at_f = float(i), s
+        mark.part_g, mark.at_g = float(j), t
         o = centerline_at(table, f).part_pool + PART * i
         p = centerline_at(table, g).part_pool + PART * j
-        d, tf, _bend_f, tg, _bend_g = apart(pool, o, p, scene[0], scene[1], s, t)
-        if extremum_at(roots, k).origin == USELESS or not abs(dot(d, tf)) + abs(dot(d, tg)) <= AT_ROOT * math.sqrt(
-            dot(d, d)
-        ):
+        there = apart(pool, o, p, posed.turn, posed.shift, s, t)
+        d = there.d
+        if extremum_at(roots, k).origin == USELESS or not abs(dot(d, there.tangent_f)) + abs(
+            dot(d, there.tangent_g)
+        ) <= AT_ROOT * math.sqrt(dot(d, d)):
             # Of far sides, at a half ball, or on its way to a root: what is there is looked for.
-            marks[k, 0] = math.nan
+            mark.part_f = math.nan
 
 
 @kernel(inner=True)
 def is_marked(boxes, b, marks, count):
     """Whether a known root is in box b."""
+    box = centerline_box_at(boxes, b)
     for k in range(count):
+        mark = known_place_at(marks, k)
         if (
-            marks[k, 0] == boxes[b, 0]
-            and marks[k, 2] == boxes[b, 3]
-            and boxes[b, 1] <= marks[k, 1] <= boxes[b, 2]
-            and boxes[b, 4] <= marks[k, 3] <= boxes[b, 5]
+            mark.part_f == box.part_f
+            and mark.part_g == box.part_g
+            and box.from_f <= mark.at_f <= box.to_f
+            and box.from_g <= mark.at_g <= box.to_g
         ):
             return True
     return False
@@ -125,32 +146,33 @@ def across_both(f, g):
 
 
 @kernel(inner=True)
-def add_minimum(table, pool, scene, i, j, s, t, neglect, roots, count, work):
+def add_minimum(table, pool, posed, i, j, s, t, neglect, roots, count, work):
     """Add the contact at lengths s and t along parts i and j, if it is none of the known ones. Returns how many."""
     if count == roots.shape[0]:
         return count
-    f, g = scene[5]
+    f, g = posed.centerlines
     o = centerline_at(table, f).part_pool + PART * i
     p = centerline_at(table, g).part_pool + PART * j
-    d, tf, _bend_f, tg, _bend_g = apart(pool, o, p, scene[0], scene[1], s, t)
+    there = apart(pool, o, p, posed.turn, posed.shift, s, t)
+    d = there.d
     length = math.sqrt(dot(d, d))
-    way = scale(1.0 / length, d) if length >= MEETING else across_both(tf, tg)
-    u_f, v_f = wire_parameters(table, pool, f, scene[2][0], i, s, way)
-    u_g, v_g = wire_parameters(table, pool, g, scene[2][1], j, t, matvec_t(scene[0], scale(-1.0, way)))
+    way = scale(1.0 / length, d) if length >= MEETING else across_both(there.tangent_f, there.tangent_g)
+    u_f, v_f = wire_parameters(table, pool, f, posed.surfaces[0], i, s, way)
+    u_g, v_g = wire_parameters(table, pool, g, posed.surfaces[1], j, t, matvec_t(posed.turn, scale(-1.0, way)))
     start = (u_f, v_f, u_g, v_g)
-    gap = length - both_radii(table, pool, scene[5])
+    gap = length - both_radii(table, pool, posed.centerlines)
     before = count
     extremum = extremum_at(roots, before)
-    count, found = add_root(table, pool, scene, (0, 0), start, (0.0, 0.0, 0.0), neglect, roots, count, work, 0.0)
+    count, found = add_root(table, pool, posed, (0, 0), start, (0.0, 0.0, 0.0), neglect, roots, count, work, 0.0)
     if found == NOTHING or not abs(extremum.gap - gap) <= ASTRAY:
         # At a fold Newton's method may find nothing, or go elsewhere: the minimum is known without it.
-        frame = pair_frame(table, pool, scene[2][0], scene[2][1], scene[0], scene[1], start)
+        frame = pair_frame(table, pool, posed.surfaces[0], posed.surfaces[1], posed.turn, posed.shift, start)
         if not frame[11]:
             return before
         write(roots, before, start, 0, 0, frame[0], frame[10], frame[3], frame[4], 0.0)
         for k in range(before):
             radius = min(neglect, SAME) if extremum_at(roots, k).origin == USELESS else neglect
-            if are_one(table, pool, scene, roots, before, k, radius):
+            if are_one(table, pool, posed, roots, before, k, radius):
                 return before
         count = before + 1
     if count > before:
@@ -161,7 +183,7 @@ def add_minimum(table, pool, scene, i, j, s, t, neglect, roots, count, work):
 @kernel(inline=True)
 def around_box(pool, o, box, side, lo, hi):
     """A box (lo, hi) made larger so that the part of one spine in a box of both is in it."""
-    begin, end = (box[1], box[2]) if side == 0 else (box[4], box[5])
+    begin, end = (box.from_f, box.to_f) if side == 0 else (box.from_g, box.to_g)
     half = 0.5 * (end - begin)
     middle = spine_point(pool, o, begin + half)[0]
     return (
@@ -173,63 +195,61 @@ def around_box(pool, o, box, side, lo, hi):
 @kernel(inline=True)
 def halves(boxes, b):
     """Box b is halved along the longer one of its sides; the second half is behind it."""
-    at = 1 if boxes[b, 2] - boxes[b, 1] >= boxes[b, 5] - boxes[b, 4] else 4
-    middle = 0.5 * (boxes[b, at] + boxes[b, at + 1])
     for m in range(BOX):
         boxes[b + 1, m] = boxes[b, m]
-    boxes[b, at + 1] = middle
-    boxes[b + 1, at] = middle
+    first, second = centerline_box_at(boxes, b), centerline_box_at(boxes, b + 1)
+    if first.to_f - first.from_f >= first.to_g - first.from_g:
+        first.to_f = second.from_f = 0.5 * (first.from_f + first.to_f)
+    else:
+        first.to_g = second.from_g = 0.5 * (first.from_g + first.to_g)
 
 
 @kernel(inner=True)
-def add_minima(table, pool, scene, box, ends, what, neglect, places, roots, count, work):
+def add_minima(table, pool, posed, box, ends, what, neglect, places, roots, count, work):
     """Add the minima that a box has. Returns how many roots there are, and whether these are all for certain."""
-    f, g = scene[5]
-    i = np.int64(box[0])
-    j = np.int64(box[3])
+    f, g = posed.centerlines
+    i = np.int64(box.part_f)
+    j = np.int64(box.part_g)
     o = centerline_at(table, f).part_pool + PART * i
     p = centerline_at(table, g).part_pool + PART * j
-    part = (box[1], box[2], box[4], box[5])
+    part = Lengths(box.from_f, box.to_f, box.from_g, box.to_g)
     certain = True
     settled = False
     if what == CONVEX:
-        s, t = 0.5 * (box[1] + box[2]), 0.5 * (box[4] + box[5])
-        found, s, t, settled = convex_minimum(pool, o, p, scene[0], scene[1], part, ends, s, t)
+        s, t = 0.5 * (box.from_f + box.to_f), 0.5 * (box.from_g + box.to_g)
+        found, s, t, settled = convex_minimum(pool, o, p, posed.turn, posed.shift, part, ends, s, t)
         if found:
-            count = add_minimum(table, pool, scene, i, j, s, t, neglect, roots, count, work)
+            count = add_minimum(table, pool, posed, i, j, s, t, neglect, roots, count, work)
     if not settled:
-        many, level, certain = valley_minima(pool, o, p, scene[0], scene[1], part, ends, places)
+        many, level, certain = valley_minima(pool, o, p, posed.turn, posed.shift, part, ends, places)
         if level:
             # All along it is as good: points here and there stand for it.
             neglect = max(neglect, SPARSE / max(centerline_part_at(pool, o).bend, centerline_part_at(pool, p).bend))
         for m in range(many):
-            count = add_minimum(table, pool, scene, i, j, places[m, 0], places[m, 1], neglect, roots, count, work)
+            count = add_minimum(table, pool, posed, i, j, places[m, 0], places[m, 1], neglect, roots, count, work)
     return count, certain
 
 
 @kernel(inner=True)
-def search_spines(table, pool, scene, moving, rho, lengths, neglect, boxes, waiting, rooms, roots, count, work):
+def search_spines(table, pool, posed, moving, rho, lengths, neglect, boxes, waiting, rooms, roots, count, work):
     """Look for all contacts of two wires with gaps up to `near`; known ones are the first `count` roots.
 
     The `lengths` are the least gap asked for, how near is near, the reach, and the flank: how far bodies may go at a
     fold. `moving` is the body that moves. There are `waiting` boxes; within the reach nothing is outside of them. The
     `rooms` are for marks of known roots, and for the minima of a box.
 
-    Returns
-    -------
-    How many roots there are; how far bodies may go for all that is not in the ball; how far what is in the ball on the
-    body that moves may go, infinite if there is none; that ball; how far it may, until a pose that stays is looked at.
+    Returns a PairSearch.
     """
     least, near, reach, flank = lengths
-    f, g = scene[5]
+    f, g = posed.centerlines
     line = centerline_at(table, f)
     centerline = centerline_at(table, g)
-    side, _tree, _e, turn, shift = moving
-    radii = both_radii(table, pool, scene[5]) + least
+    side = moving.side
+    radii = both_radii(table, pool, posed.centerlines) + least
     sharpest = max(wire_at(pool, line.numbers).sharpest, wire_at(pool, centerline.numbers).sharpest)
     known = count
     marks, places = rooms
-    mark_known(table, pool, scene, roots, known, marks)
+    mark_known(table, pool, posed, roots, known, marks)
     free = reach
     fertile = math.inf
     sure = math.inf
@@ -238,12 +258,12 @@ def search_spines(table, pool, scene, moving, rho, lengths, neglect, boxes, wait
     hi = (-math.inf, -math.inf, -math.inf)
     while waiting > 0:
         b = waiting - 1
-        box = (boxes[b, 0], boxes[b, 1], boxes[b, 2], boxes[b, 3], boxes[b, 4], boxes[b, 5])
-        o = line.part_pool + PART * np.int64(box[0])
-        p = centerline.part_pool + PART * np.int64(box[3])
-        part = (box[1], box[2], box[4], box[5])
+        box = centerline_box_at(boxes, b)
+        o = line.part_pool + PART * np.int64(box.part_f)
+        p = centerline.part_pool + PART * np.int64(box.part_g)
+        part = Lengths(box.from_f, box.to_f, box.from_g, box.to_g)
         ends = open_ends(table, pool, f, g, box)
-        low, what, margin = box_of(pool, o, p, scene[0], scene[1], part, ends, radii + reach, rho)
+        low, what, margin = box_of(pool, o, p, posed.turn, posed.shift, part, ends, radii + reach, rho)
         low -= radii
         # A minimum that a box may hold, and nobody looks for, is as near as the box.
         hollow = what == EMPTY or what == BARREN
@@ -251,7 +271,7 @@ def search_spines(table, pool, scene, moving, rho, lengths, neglect, boxes, wait
         if allowed >= reach and (low > near or hollow):
             waiting = b
             continue
-        bend = 0.5 * max(box[2] - box[1], box[5] - box[4]) * sharpest
+        bend = 0.5 * max(box.to_f - box.from_f, box.to_g - box.from_g) * sharpest
         halve = what == UNKNOWN and low <= near and bend > THIN
         if not halve and allowed < flank and refined < REFINED and bend > FINE:
             halve = True
@@ -261,7 +281,7 @@ def search_spines(table, pool, scene, moving, rho, lengths, neglect, boxes, wait
             waiting += 1
             continue
         if low <= near and not hollow and not (what == CONVEX and is_marked(boxes, b, marks, known)):
-            count, certain = add_minima(table, pool, scene, box, ends, what, neglect, places, roots, count, work)
+            count, certain = add_minima(table, pool, posed, box, ends, what, neglect, places, roots, count, work)
             if halve or count == roots.shape[0] or not certain:
                 # There may be one that is not known.
                 allowed = low
@@ -276,8 +296,9 @@ def search_spines(table, pool, scene, moving, rho, lengths, neglect, boxes, wait
         fertile = min(fertile, allowed)
         lo, hi = around_box(pool, p if side == 1 else o, box, side, lo, hi)
     if not fertile < math.inf:
-        return count, free, fertile, ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0), sure
+        return PairSearch(count, free, fertile, no_ball(), sure)
     d = sub(hi, lo)
     center = scale(0.5, add(lo, hi))
     radius = max(0.5 * math.sqrt(dot(d, d)), rho)
-    return count, free, fertile, (center, add(matvec(turn, center), shift), radius), sure
+    ball = MotionBall(center=center, place=add(matvec(moving.turn, center), moving.shift), radius=radius)
+    return PairSearch(count, free, fertile, ball, sure)
