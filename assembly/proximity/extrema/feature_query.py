@@ -37,21 +37,21 @@ def find_features(table, pool, kind_f, f, kind_g, g, q, x, n, size, turn, out):
     known = matvec_t(turn_f, (n[0], n[1], n[2]))
     status, y, frame = solve_features(table, pool, kind_f, f, kind_g, g, relative, shift, x, known, size, turn)
     origin = position(q, 0)
-    pf = add(matvec(turn_f, frame[3]), origin)
-    pg = add(matvec(turn_f, frame[4]), origin)
-    normal = matvec(turn_f, frame[0])
+    pf = add(matvec(turn_f, frame.point_f), origin)
+    pg = add(matvec(turn_f, frame.point_g), origin)
+    normal = matvec(turn_f, frame.normal)
     for k in range(3):
         out[POINT_F + k] = pf[k]
         out[POINT_G + k] = pg[k]
         out[NORMAL + k] = normal[k]
-    r = frame[11]
+    r = frame.residual
     for k in range(4):
         out[PARAMETERS + k] = y[k]
         out[RESIDUAL + k] = r[k]
-    out[GAP] = frame[5]
-    out[ISOLATED] = 1.0 if frame[13] else 0.0
-    out[PROPER] = 1.0 if frame[14] else 0.0
-    out[FOLD] = frame[15]
+    out[GAP] = frame.gap
+    out[ISOLATED] = 1.0 if frame.isolated else 0.0
+    out[PROPER] = 1.0 if frame.proper else 0.0
+    out[FOLD] = frame.fold
     return status
 
 
@@ -70,9 +70,9 @@ def feature_derivatives(table, pool, kind_f, f, kind_g, g, q, x, n, size, first,
     relative, shift = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
     known = matvec_t(turn_f, (n[0], n[1], n[2]))
     frame = features_at(table, pool, kind_f, f, kind_g, g, relative, shift, x, known, size)
-    if not frame[12]:
+    if not frame.regular:
         return math.inf, False
-    r = frame[11]
+    r = frame.residual
     error = max(abs(r[0]), abs(r[1])) / size + max(abs(r[2]), abs(r[3]))
     records = np.empty((1, RECORD))
     derivatives = derivatives_at(records, 0)
@@ -84,7 +84,7 @@ def feature_derivatives(table, pool, kind_f, f, kind_g, g, q, x, n, size, first,
         row[j] = gradient[0, j]
     into_quaternions(row, q, first, 4)
     for i in range(4):
-        rates = frame[8] if i < 2 else frame[9]
+        rates = frame.rates_f if i < 2 else frame.rates_g
         kind = kind_f if i < 2 else kind_g
         at_pole = kind == FACE and rates[0] == 0.0 and rates[1] == 0.0
         for j in range(12):
@@ -99,4 +99,4 @@ def feature_derivatives(table, pool, kind_f, f, kind_g, g, q, x, n, size, first,
     for i in range(12):
         for j in range(i):
             hessian[i, j] = hessian[j, i]
-    return error, frame[13]
+    return error, frame.isolated

@@ -17,6 +17,7 @@ edges, leads nearer: then Newton runs from where that ends.
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 import numpy as np
 
@@ -50,6 +51,17 @@ COARSE = 0.25
 CROSSING = 1e-3
 # w as a part of the square of the smaller extent.
 ALIGNMENT = 0.1
+
+# A pair that was found, with what it is judged by.
+RankedPair = namedtuple(
+    "RankedPair",
+    [
+        "rank",  # 0: solids face each other; 1: they do not; 2: no extremum, at the end of a patch; 3: none yet
+        "gap",  # signed
+        "status",
+        "parameters",  # (u_f, v_f, u_g, v_g)
+    ],
+)
 
 
 @kernel(inner=True)
@@ -102,8 +114,8 @@ def best_samples(a, b, weight, nearest, score):
 @kernel(inner=True)
 def opposed(frame, rotation, table, pool, g, x):
     """Whether the outward normal of g opposes that of f."""
-    normal = own_frame(table, pool, g, x[2], x[3])[1]
-    return dot(normal, matvec_t(rotation, frame[0])) < 0.0
+    normal = own_frame(table, pool, g, x[2], x[3]).normal
+    return dot(normal, matvec_t(rotation, frame.normal)) < 0.0
 
 
 @kernel(inner=True, allocates=True)
@@ -148,28 +160,28 @@ def approach(table, pool, f, g, rotation, shift, x):
 
 
 @kernel(inner=True)
-def is_near(status, frame, distance):
+def is_near(found, distance):
     """Whether Newton's result is no farther apart than points that are known; else it is another pair."""
-    if status == NOT_CONVERGED:
+    if found.status == NOT_CONVERGED:
         return False
-    if status == LEFT_PATCH:
-        d = sub(frame[4], frame[3])
+    if found.status == LEFT_PATCH:
+        d = sub(found.frame.point_g, found.frame.point_f)
         return dot(d, d) <= distance * distance
-    return abs(frame[10]) <= distance
+    return abs(found.frame.gap) <= distance
 
 
 @kernel(inner=True)
-def take(table, pool, g, rotation, status, x, frame, best):
-    """The better of a pair and the best one so far; both are (rank, |gap|, status, x).
+def take(table, pool, g, rotation, found, best):
+    """The better one, as a `RankedPair`, of a pair that Newton's method found and the best one so far.
 
     A true extremum beats a point held at the end of a patch, and one where solids face each other beats all.
     """
     rank = 2.0
-    if status == CONVERGED or status == SINGULAR:
-        rank = 0.0 if opposed(frame, rotation, table, pool, g, x) else 1.0
-    gap = frame[10]
-    if rank < best[0] or (rank == best[0] and abs(gap) < abs(best[1])):
-        return rank, gap, np.int64(status), x
+    if found.status == CONVERGED or found.status == SINGULAR:
+        rank = 0.0 if opposed(found.frame, rotation, table, pool, g, found.parameters) else 1.0
+    gap = found.frame.gap
+    if rank < best.rank or (rank == best.rank and abs(gap) < abs(best.gap)):
+        return RankedPair(rank, gap, np.int64(found.status), found.parameters)
     return best
 
 
@@ -212,7 +224,7 @@ def global_start(table, pool, f, g, rotation, shift, size):
     nearest = np.empty(nf, np.int64)
     score = np.empty(nf)
     best_samples(a, b, 0.0, nearest, score)
-    best = (3.0, math.inf, np.int64(NOT_CONVERGED), (0.0, 0.0, 0.0, 0.0))
+    best = RankedPair(3.0, math.inf, np.int64(NOT_CONVERGED), (0.0, 0.0, 0.0, 0.0))
     crossing = False
     upper = math.inf
     i = lowest(score)
@@ -222,20 +234,20 @@ def global_start(table, pool, f, g, rotation, shift, size):
         o = patch.cells + CELL_SIZE * i
         p = surface_record.cells + CELL_SIZE * nearest[i]
         # Cells whose spheres are farther apart than the best pair hold no nearer one.
-        if score[i] - 1.5 * (pool[o + 8] + pool[p + 8]) > min(abs(best[1]), upper):
+        if score[i] - 1.5 * (pool[o + 8] + pool[p + 8]) > min(abs(best.gap), upper):
             break
         start = (pool[o], pool[o + 1], pool[p], pool[p + 1])
         if attempt == 0:
-            best = (3.0, math.inf, np.int64(NOT_CONVERGED), start)
-        status, x, _count, frame, _h = solve_pair(table, pool, f, g, rotation, shift, start, size, math.inf, 0.0, False)
+            best = RankedPair(3.0, math.inf, np.int64(NOT_CONVERGED), start)
+        found = solve_pair(table, pool, f, g, rotation, shift, start, size, math.inf, 0.0, False)
         limit = score[i]
-        near = is_near(status, frame, limit)
+        near = is_near(found, limit)
         coarse = pool[o + 8] + pool[p + 8] > COARSE * extent
-        if near and coarse and status != LEFT_PATCH and frame[10] > 0.0:
+        if near and coarse and found.status != LEFT_PATCH and found.frame.gap > 0.0:
             # Samples are far apart: an extremum that is no minimum is nearer than they are, and others nearer yet.
-            start, limit = approach(table, pool, f, g, rotation, shift, x)
+            start, limit = approach(table, pool, f, g, rotation, shift, found.parameters)
             limit += 1e-12 * size
-            near = frame[10] <= limit
+            near = found.frame.gap <= limit
         elif not near:
             start, limit = approach(table, pool, f, g, rotation, shift, start)
             limit += 1e-12 * size
@@ -246,16 +258,14 @@ def global_start(table, pool, f, g, rotation, shift, size):
                 break
             # The minimum is no farther than the points found.
             upper = min(upper, limit)
-            status, x, _count, frame, _h = solve_pair(
-                table, pool, f, g, rotation, shift, start, size, math.inf, 0.0, False
-            )
-        if is_near(status, frame, limit):
-            best = take(table, pool, g, rotation, status, x, frame, best)
+            found = solve_pair(table, pool, f, g, rotation, shift, start, size, math.inf, 0.0, False)
+        if is_near(found, limit):
+            best = take(table, pool, g, rotation, found, best)
         i = next_candidate(table, pool, f, a, nearest, score, i)
     weight = ALIGNMENT * extent * extent
     for _ in range(3):
         # The surfaces overlap, or do not face each other; the deeper, the more the normals tell.
-        if not crossing and best[0] == 0.0 and best[1] >= 0.0:
+        if not crossing and best.rank == 0.0 and best.gap >= 0.0:
             break
         best_samples(a, b, weight, nearest, score)
         i = lowest(score)
@@ -265,16 +275,14 @@ def global_start(table, pool, f, g, rotation, shift, size):
             o = patch.cells + CELL_SIZE * i
             p = surface_record.cells + CELL_SIZE * nearest[i]
             start = (pool[o], pool[o + 1], pool[p], pool[p + 1])
-            status, x, _count, frame, _h = solve_pair(
-                table, pool, f, g, rotation, shift, start, size, math.inf, 0.0, False
-            )
-            if status != NOT_CONVERGED:
-                best = take(table, pool, g, rotation, status, x, frame, best)
+            found = solve_pair(table, pool, f, g, rotation, shift, start, size, math.inf, 0.0, False)
+            if found.status != NOT_CONVERGED:
+                best = take(table, pool, g, rotation, found, best)
             i = next_candidate(table, pool, f, a, nearest, score, i)
-        if best[0] == 0.0:
+        if best.rank == 0.0:
             break
         weight *= 5.0
-    return best[2], best[3], best[1]
+    return best.status, best.parameters, best.gap
 
 
 @kernel(signatures="(i8[::1], f8[::1], i8, i8, i8, i8, f8[:, ::1], f8[:, ::1], i8)")
@@ -298,11 +306,12 @@ def find_pair(table, pool, f, g, q, x, size, out):
         status, x, _gap = global_start(table, pool, f, g, turn, shift, size)
         frame = pair_frame(table, pool, f, g, turn, shift, x)
     else:
-        status, x, _count, frame, _h = solve_pair(table, pool, f, g, turn, shift, x, size, math.inf, 0.0, False)
+        found = solve_pair(table, pool, f, g, turn, shift, x, size, math.inf, 0.0, False)
+        status, x, frame = found.status, found.parameters, found.frame
     origin = position(q, 0)
     out[0], out[1], out[2], out[3] = x
-    out[4], out[5], out[6] = add(matvec(turn_f, frame[3]), origin)
-    out[7], out[8], out[9] = add(matvec(turn_f, frame[4]), origin)
-    out[10], out[11], out[12] = matvec(turn_f, frame[0])
-    out[13] = frame[10]
+    out[4], out[5], out[6] = add(matvec(turn_f, frame.point_f), origin)
+    out[7], out[8], out[9] = add(matvec(turn_f, frame.point_g), origin)
+    out[10], out[11], out[12] = matvec(turn_f, frame.normal)
+    out[13] = frame.gap
     return status

@@ -77,9 +77,9 @@ def is_extremal(table, pool, f, g, i, j, q, tracked, r, tolerance):
     turn, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
     x = (tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3])
     frame = pair_frame(table, pool, f, g, turn, shift, x)
-    residual = frame[9]
+    residual = frame.residual
     tilt = max(abs(residual[2]), abs(residual[3]))
-    holds = frame[11] and tilt <= 1e-9 and max(abs(residual[0]), abs(residual[1])) <= tolerance
+    holds = frame.regular and tilt <= 1e-9 and max(abs(residual[0]), abs(residual[1])) <= tolerance
     return 1 if holds else 0
 
 

@@ -70,8 +70,8 @@ def walk_back(table, pool, shell_f, shell_g, turn, shift, away, f, g, x, size):
         f = next_f
         g = next_g
         x = y
-        n = frame[0]
-        gap = frame[5]
+        n = frame.normal
+        gap = frame.gap
         done = part
     return CONVERGED, f, g, x, n, gap
 
