@@ -28,6 +28,7 @@ from assembly.proximity.extrema.face_face import (
     LEFT_PATCH,
     NOT_CONVERGED,
     SINGULAR,
+    PairSolution,
     advance,
     own_frame,
     pair_frame,
