@@ -25,6 +25,7 @@ from assembly._kernel import kernel
 from assembly.geometry.splines.domain import into_domain
 from assembly.geometry.splines.evaluate import (
     CELL_SIZE,
+    cell_at,
     surface_at,
     surface_point,
 )
@@ -71,8 +72,8 @@ def cell_samples(table, pool, r, turn, shift, samples):
     lo = (math.inf, math.inf, math.inf)
     hi = (-math.inf, -math.inf, -math.inf)
     for i in range(patch.cell_count):
-        o = patch.cells + CELL_SIZE * i
-        p, su, sv, _uu, _uv, _vv = surface_point(table, pool, r, pool[o], pool[o + 1])
+        cell = cell_at(pool, patch.cells + CELL_SIZE * i)
+        p, su, sv, _uu, _uv, _vv = surface_point(table, pool, r, cell.parameters[0], cell.parameters[1])
         normal = cross(su, sv)
         length = math.sqrt(dot(normal, normal))
         n = matvec(turn, scale(float(patch.sign) / length if length > 0.0 else 0.0, normal))
@@ -122,11 +123,11 @@ def opposed(frame, rotation, table, pool, g, x):
 def approach(table, pool, f, g, rotation, shift, x):
     """Parameters with a smaller distance, and it, by direct search: nine points of each surface around the best."""
     patch = surface_at(table, f)
-    surface_record = surface_at(table, g)
+    other = surface_at(table, g)
     fu = 0.03125 * (pool[patch.breaks_u + patch.spans_u] - pool[patch.breaks_u])
     fv = 0.03125 * (pool[patch.breaks_v + patch.spans_v] - pool[patch.breaks_v])
-    gu = 0.03125 * (pool[surface_record.breaks_u + surface_record.spans_u] - pool[surface_record.breaks_u])
-    gv = 0.03125 * (pool[surface_record.breaks_v + surface_record.spans_v] - pool[surface_record.breaks_v])
+    gu = 0.03125 * (pool[other.breaks_u + other.spans_u] - pool[other.breaks_u])
+    gv = 0.03125 * (pool[other.breaks_v + other.spans_v] - pool[other.breaks_v])
     finest = 1e-5 * fu
     points = np.empty((9, 3))
     at = np.empty((9, 2))
@@ -189,15 +190,22 @@ def take(table, pool, g, rotation, found, best):
 def next_candidate(table, pool, f, a, nearest, score, i):
     """The cell with the best score, after the neighbors of cell i, which lead to the same extremum, are struck out."""
     patch = surface_at(table, f)
-    o = patch.cells + CELL_SIZE * i
+    radius = cell_at(pool, patch.cells + CELL_SIZE * i).radius
     for k in range(a.shape[0]):
         dx = a[k, 0] - a[i, 0]
         dy = a[k, 1] - a[i, 1]
         dz = a[k, 2] - a[i, 2]
-        reach = pool[o + 8] + pool[patch.cells + CELL_SIZE * k + 8]
+        reach = radius + cell_at(pool, patch.cells + CELL_SIZE * k).radius
         if dx * dx + dy * dy + dz * dz <= reach * reach:
             score[k] = math.inf
     return lowest(score)
+
+
+@kernel(inline=True)
+def start_in(cell_f, cell_g):
+    """The parameters of two cells' points."""
+    u, v = cell_f.parameters[0], cell_f.parameters[1]
+    return u, v, cell_g.parameters[0], cell_g.parameters[1]
 
 
 @kernel(inner=True)
@@ -214,10 +222,10 @@ def lowest(score):
 def global_start(table, pool, f, g, rotation, shift, size):
     """Status, parameters and gap of the best extremal pair found; where there is none, the nearest points known."""
     patch = surface_at(table, f)
-    surface_record = surface_at(table, g)
+    other = surface_at(table, g)
     nf = patch.cell_count
     a = np.empty((nf, 6))
-    b = np.empty((surface_record.cell_count, 6))
+    b = np.empty((other.cell_count, 6))
     same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
     extent = cell_samples(table, pool, f, same, (0.0, 0.0, 0.0), a)
     extent = min(extent, cell_samples(table, pool, g, rotation, shift, b))
@@ -231,18 +239,18 @@ def global_start(table, pool, f, g, rotation, shift, size):
     for attempt in range(NEAREST):
         if score[i] == math.inf:
             break
-        o = patch.cells + CELL_SIZE * i
-        p = surface_record.cells + CELL_SIZE * nearest[i]
+        cell_f = cell_at(pool, patch.cells + CELL_SIZE * i)
+        cell_g = cell_at(pool, other.cells + CELL_SIZE * nearest[i])
         # Cells whose spheres are farther apart than the best pair hold no nearer one.
-        if score[i] - 1.5 * (pool[o + 8] + pool[p + 8]) > min(abs(best.gap), upper):
+        if score[i] - 1.5 * (cell_f.radius + cell_g.radius) > min(abs(best.gap), upper):
             break
-        start = (pool[o], pool[o + 1], pool[p], pool[p + 1])
+        start = start_in(cell_f, cell_g)
         if attempt == 0:
             best = RankedPair(3.0, math.inf, np.int64(NOT_CONVERGED), start)
         found = solve_pair(table, pool, f, g, rotation, shift, start, size, math.inf, 0.0, False)
         limit = score[i]
         near = is_near(found, limit)
-        coarse = pool[o + 8] + pool[p + 8] > COARSE * extent
+        coarse = cell_f.radius + cell_g.radius > COARSE * extent
         if near and coarse and found.status != LEFT_PATCH and found.frame.gap > 0.0:
             # Samples are far apart: an extremum that is no minimum is nearer than they are, and others nearer yet.
             start, limit = approach(table, pool, f, g, rotation, shift, found.parameters)
@@ -272,9 +280,9 @@ def global_start(table, pool, f, g, rotation, shift, size):
         for _ in range(ALIGNED):
             if score[i] == math.inf:
                 break
-            o = patch.cells + CELL_SIZE * i
-            p = surface_record.cells + CELL_SIZE * nearest[i]
-            start = (pool[o], pool[o + 1], pool[p], pool[p + 1])
+            cell_f = cell_at(pool, patch.cells + CELL_SIZE * i)
+            cell_g = cell_at(pool, other.cells + CELL_SIZE * nearest[i])
+            start = start_in(cell_f, cell_g)
             found = solve_pair(table, pool, f, g, rotation, shift, start, size, math.inf, 0.0, False)
             if found.status != NOT_CONVERGED:
                 best = take(table, pool, g, rotation, found, best)

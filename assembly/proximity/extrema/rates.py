@@ -26,18 +26,16 @@ from assembly.kinematics.motion import quaternion_columns, relative_pose, rotati
 from assembly.proximity.extrema.face_face import pair_frame
 from assembly.proximity.extrema.pair_matrix import pair_matrix
 
-# A record holds what the derivatives of one gap need, all in world axes: the gap, the normal, the arms from the bodies'
-# origins to the point of g, the (4, 4) map from z to parameter rates, the (4, 4) form of beta'', and z as (4, 12)
-# over the twists of f, then g.
+# What the derivatives of one gap need, in world axes.
 GAP_DERIVATIVES = record_dtype(
     "f8",
-    gap=1,
-    normal=3,
-    arm_f=3,
-    arm_g=3,
-    rates=(4, 4),
-    form=(4, 4),
-    zed=(4, 12),
+    gap=1,  # signed [length]
+    normal=3,  # unit normal from f towards g
+    arm_f=3,  # from the origin of body f to the point of g [length]
+    arm_g=3,  # from the origin of body g to the point of g [length]
+    rates=(4, 4),  # map from z to rates of the parameters (u_f, v_f, u_g, v_g)
+    form=(4, 4),  # beta'' is z.(form z), but for terms of rotation
+    zed=(4, 12),  # z over the twists of f, then g
 )
 derivatives_at = record_view(GAP_DERIVATIVES)
 GAP = place_of(GAP_DERIVATIVES, "gap")
@@ -45,7 +43,6 @@ NORMAL = place_of(GAP_DERIVATIVES, "normal")
 ARM_F = place_of(GAP_DERIVATIVES, "arm_f")
 ARM_G = place_of(GAP_DERIVATIVES, "arm_g")
 RATES = place_of(GAP_DERIVATIVES, "rates")
-FORM = place_of(GAP_DERIVATIVES, "form")
 ZED = place_of(GAP_DERIVATIVES, "zed")
 RECORD = size_of(GAP_DERIVATIVES)
 
