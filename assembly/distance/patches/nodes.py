@@ -120,8 +120,9 @@ def fill_patch(record, pool, ints, nodes, k):
     count = 4 * (patch.degree_u + 1) * (patch.degree_v + 1)
     o = patch_stride(record) * k
     node = patch_node_at(nodes, o)
+    rows = o + ROWS
     for j in range(count):
-        nodes[o + ROWS + j] = pool[patch.nets + count * k + j]
+        nodes[rows + j] = pool[patch.nets + count * k + j]
     node.away = bezier_head_at(pool, 0).error
     node.low_u = 0.0
     node.high_u = 1.0
@@ -152,8 +153,9 @@ def split_patch(record, pool, ints, nodes, k, low):
     for j in range(A0, ROWS):
         nodes[a + j] = nodes[o + j]
         nodes[b + j] = nodes[o + j]
+    rows, rows_b = o + ROWS, b + ROWS
     for j in range(4 * (p + 1) * (q + 1)):
-        nodes[b + ROWS + j] = nodes[o + ROWS + j]
+        nodes[rows_b + j] = nodes[rows + j]
     along_u = node.speed_u >= node.speed_v
     n = p if along_u else q
     step = 4 * (q + 1) if along_u else 4
