@@ -73,7 +73,6 @@ CURVE_NODE_LINKS = record_dtype(
     tree_node=1,  # box in the tree over the spans
 )
 curve_node_links_at = record_view(CURVE_NODE_LINKS)
-LEFT = place_of(CURVE_NODE_LINKS, "left")
 FIRST = place_of(CURVE_NODE_LINKS, "first")
 LAST = place_of(CURVE_NODE_LINKS, "last")
 DEPTH = place_of(CURVE_NODE_LINKS, "depth")

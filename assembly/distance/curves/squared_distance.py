@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly._record import place_of, record_dtype, record_view, size_of
+from assembly._record import record_dtype, record_view, size_of
 from assembly.distance.curves.bounds import least_change
 from assembly.distance.curves.nodes import length
 from assembly.geometry.splines.bezier_pieces import UNIT, bezier_curve_at
@@ -31,9 +31,6 @@ INTERVAL_RECORD = record_dtype(
     cuts=1,  # how often it was cut
 )
 interval_at = record_view(INTERVAL_RECORD)
-LOW = place_of(INTERVAL_RECORD, "low")
-HIGH = place_of(INTERVAL_RECORD, "high")
-CUTS = place_of(INTERVAL_RECORD, "cuts")
 SQUARE = size_of(INTERVAL_RECORD)
 
 

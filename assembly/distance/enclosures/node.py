@@ -73,9 +73,10 @@ SEARCH_ROOM = record_dtype(
     across=PIECE,  # a piece as seen across a feature of a hull
     rows=9,  # three, orthonormal or zero, that span what is across the feature
 )
-search_room_at = record_view(SEARCH_ROOM)
 VALUES = place_of(SEARCH_ROOM, "values")
 OTHER_VALUES = place_of(SEARCH_ROOM, "other_values")
+ACROSS = place_of(SEARCH_ROOM, "across")
+ROWS = place_of(SEARCH_ROOM, "rows")
 SCRATCH = size_of(SEARCH_ROOM)
 # Corners of a triangle and of a tetrahedron around zero, turned so that nothing made by hand is parallel to them, and
 # the sizes of their copies about a point, as parts of the hull's.
@@ -218,10 +219,10 @@ def hull_taylor(full, xa, oa, points, count, kept, values, at, new, s, state, ze
     """Bound by second derivatives across the feature in g, from values at s, and whether that is convex."""
     numbers = numbers_of(g)
     feature = (int(numbers[0]), int(numbers[1]) if kept > 1 else -1, int(numbers[2]) if kept > 2 else -1)
-    rows = search_room_at(state, 0).rows
+    rows = state[ROWS : ROWS + 9]
     if not feature_rows(full, points, feature, rows):
         return 0.0, False, False
-    y = search_room_at(state, 0).across
+    y = state[ACROSS : ACROSS + PIECE]
     worst = across_feature(xa, oa, points, count, feature, rows, y)
     f = 3 * feature[0]
     v = (points[f], points[f + 1], points[f + 2])

@@ -38,8 +38,6 @@ BEZIER_SURFACE = record_dtype(
     nets=1,
 )
 bezier_surface_at = record_view(BEZIER_SURFACE)
-DEGREE_U = place_of(BEZIER_SURFACE, "degree_u")
-DEGREE_V = place_of(BEZIER_SURFACE, "degree_v")
 PATCHES_U = place_of(BEZIER_SURFACE, "patches_u")
 PATCHES_V = place_of(BEZIER_SURFACE, "patches_v")
 RATIONAL = place_of(BEZIER_SURFACE, "rational")
@@ -75,7 +73,6 @@ E0 = place_of(PATCH_NODE, "e0")
 E1 = place_of(PATCH_NODE, "e1")
 E2 = place_of(PATCH_NODE, "e2")
 SPEED_U = place_of(PATCH_NODE, "speed_u")
-SPEED_V = place_of(PATCH_NODE, "speed_v")
 AWAY = place_of(PATCH_NODE, "away")
 LOW_U = place_of(PATCH_NODE, "low_u")
 HIGH_U = place_of(PATCH_NODE, "high_u")
@@ -90,8 +87,6 @@ PATCH_NODE_LINKS = record_dtype(
     depth=1,
 )
 patch_node_links_at = record_view(PATCH_NODE_LINKS)
-HALVES = place_of(PATCH_NODE_LINKS, "halves")
-PATCH = place_of(PATCH_NODE_LINKS, "patch")
 DEPTH = place_of(PATCH_NODE_LINKS, "depth")
 NODE_INTS = size_of(PATCH_NODE_LINKS)
 # Halvings after which a node is let go.

@@ -72,23 +72,11 @@ FORMULA_RANGE = record_dtype(
 formula_range_at = record_view(FORMULA_RANGE)
 
 
-@kernel(inline=True)
-def results_of(room):
-    """What a tape writes its results to."""
-    return room[RESULTS:]
-
-
-@kernel(inline=True)
-def work_of(room):
-    """What a tape works in."""
-    return room[WORK_AT:]
-
-
 @kernel(inner=True)
 def formula_point(table, pool, t, room):
     """C, C', C'' at t to the results of the room, nine doubles."""
     room[0] = t
-    run_tape(table, pool, formula_at(table, 0).point_tape, room, work_of(room), results_of(room))
+    run_tape(table, pool, formula_at(table, 0).point_tape, room, room[WORK_AT:], room[RESULTS:])
     results = formula_room_at(room, 0).results
     for k in range(3):
         results[k] -= formula_head_at(pool, 0).center[k]
@@ -131,7 +119,7 @@ def point_bounds(table, pool, t, room):
     """Intervals of C, C', C'' at t to the results of the room, nine pairs."""
     room[0] = t
     room[1] = t
-    told = run_bounds(table, pool, formula_at(table, 0).point_tape, room, work_of(room), results_of(room))
+    told = run_bounds(table, pool, formula_at(table, 0).point_tape, room, room[WORK_AT:], room[RESULTS:])
     settle(table, pool, room, told, 3)
 
 
@@ -141,7 +129,7 @@ def range_bounds(table, pool, lo, hi, room):
     formula = formula_at(table, 0)
     room[0] = lo
     room[1] = hi
-    told = run_bounds(table, pool, formula.range_tape, room, work_of(room), results_of(room))
+    told = run_bounds(table, pool, formula.range_tape, room, room[WORK_AT:], room[RESULTS:])
     if formula.has_range == 0:
         forget(table, room, 0, 1)
     settle(table, pool, room, told, 4)
@@ -181,13 +169,13 @@ def arc_bound(table, pool, lo, hi, room):
     if formula.arc_plain != 0:
         room[0] = lo
         room[1] = hi
-        run_tape(table, pool, formula.arc_tape, room, work_of(room), results_of(room))
+        run_tape(table, pool, formula.arc_tape, room, room[WORK_AT:], room[RESULTS:])
         return results[0] if results[0] >= 0.0 else math.inf
     room[0] = lo
     room[1] = lo
     room[2] = hi
     room[3] = hi
-    run_bounds(table, pool, formula.arc_tape, room, work_of(room), results_of(room))
+    run_bounds(table, pool, formula.arc_tape, room, room[WORK_AT:], room[RESULTS:])
     return results[1] if results[1] >= 0.0 else math.inf
 
 

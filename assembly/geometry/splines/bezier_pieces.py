@@ -28,14 +28,9 @@ BEZIER_CURVE = record_dtype(
 )
 bezier_curve_at = record_view(BEZIER_CURVE)
 DEGREE = place_of(BEZIER_CURVE, "degree")
-SPANS = place_of(BEZIER_CURVE, "spans")
 RATIONAL = place_of(BEZIER_CURVE, "rational")
 BREAKS = place_of(BEZIER_CURVE, "breaks")
-BINOMIALS = place_of(BEZIER_CURVE, "binomials")
-MIDDLE = place_of(BEZIER_CURVE, "middle")
 PIECES = place_of(BEZIER_CURVE, "pieces")
-TREE = place_of(BEZIER_CURVE, "tree")
-SQUARES = place_of(BEZIER_CURVE, "squares")
 RECORD = size_of(BEZIER_CURVE)
 # Doubles at the head of a pool: the largest distance of a control point from the center, how far the packed curve may
 # be from the one that was given, the center, the largest quotient of two weights.

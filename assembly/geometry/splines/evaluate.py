@@ -63,7 +63,6 @@ CURVE_DEGREE = place_of(CURVE, "degree")
 CURVE_SPANS = place_of(CURVE, "spans")
 CURVE_BREAKS = place_of(CURVE, "breaks")
 CURVE_COEFFICIENTS = place_of(CURVE, "coefficients")
-CURVE_CLOSED = place_of(CURVE, "closed")
 
 
 # So many spans are searched without a guess.

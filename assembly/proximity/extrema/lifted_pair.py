@@ -113,16 +113,9 @@ def has_stayed(table, pool, f, g, tracked, was, r, most):
     return 1 if stayed and moved_along(table, pool, g, tracked, was, r, 2) <= most else 0
 
 
-@kernel(inline=True)
-def variations_of(work):
-    """The blocks of a workspace (7, 3, 16)."""
-    return Variations(work[0], work[1], work[2], work[3], work[4], work[5], work[6])
-
-
 @kernel(inner=True)
-def variations(table, pool, f, g, i, j, q, x, s, work):
-    """Fill a workspace (7, 3, 16) with the `Variations`; returns the `PairVectors`."""
-    rates = variations_of(work)
+def variations(table, pool, f, g, i, j, q, x, s, rates):
+    """Fill the `Variations`; returns the `PairVectors`."""
     patch = surface_at(table, f)
     turn_f = rotation(q, i)
     turn_g = rotation(q, j)
@@ -134,10 +127,15 @@ def variations(table, pool, f, g, i, j, q, x, s, work):
     normal = scale(float(patch.sign), cross(fu, fv))
     length = math.sqrt(dot(normal, normal))
     n = scale(1.0 / length, normal)
-    for m in range(VECTORS):
-        for k in range(3):
-            for l in range(VARIABLES):
-                work[m, k, l] = 0.0
+    for k in range(3):
+        for l in range(VARIABLES):
+            rates.d[k, l] = 0.0
+            rates.f_u[k, l] = 0.0
+            rates.f_v[k, l] = 0.0
+            rates.g_u[k, l] = 0.0
+            rates.g_v[k, l] = 0.0
+            rates.normal[k, l] = 0.0
+            rates.unit[k, l] = 0.0
     for k in range(3):
         rates.d[k, k] = -1.0
         rates.d[k, 6 + k] = 1.0
@@ -170,8 +168,8 @@ def variations(table, pool, f, g, i, j, q, x, s, work):
 @kernel(inner=True)
 def free_rows(table, pool, f, g, i, j, q, x, s, work, residual, jacobian, r, e):
     """The gap into row r, the rows of tangency into rows e to e + 3, with their gradients."""
-    vectors = variations(table, pool, f, g, i, j, q, x, s, work)
-    rates = variations_of(work)
+    rates = Variations(work[0], work[1], work[2], work[3], work[4], work[5], work[6])
+    vectors = variations(table, pool, f, g, i, j, q, x, s, rates)
     d, n = vectors.d, vectors.n
     fu, fv, gu, gv = vectors.f_u, vectors.f_v, vectors.g_u, vectors.g_v
     beta = dot(n, d)
@@ -214,8 +212,8 @@ def add_second(y, a, a1, a2, a11, a12, a22, w, u, s1, s2, out):
 @kernel(inner=True)
 def free_hessian(table, pool, f, g, i, j, q, x, s, y, work, out):
     """Second derivative (16, 16) of y . rows, overwriting out."""
-    vectors = variations(table, pool, f, g, i, j, q, x, s, work)
-    rates = variations_of(work)
+    rates = Variations(work[0], work[1], work[2], work[3], work[4], work[5], work[6])
+    vectors = variations(table, pool, f, g, i, j, q, x, s, rates)
     d, n, length = vectors.d, vectors.n, vectors.length
     fu, fv, gu, gv = vectors.f_u, vectors.f_v, vectors.g_u, vectors.g_v
     sign = float(surface_at(table, f).sign)
