@@ -115,13 +115,11 @@ def test_a_valley_of_fourth_order_is_a_pair_after_few_steps():
     identity = rotation(np.array([[0.0, 0.0, 0.0, *IDENTITY]]), 0)
     for start in (0.3, 0.02):
         x = (start, 0.1, start, 0.1)
-        status, x, count, frame, _h = solve_pair(
-            table, pool, 0, SURFACE_RECORD, identity, (0.0, 0.0, 0.01), x, 1.0, np.inf, 0.0, False
-        )
-        assert status == SINGULAR
+        found = solve_pair(table, pool, 0, SURFACE_RECORD, identity, (0.0, 0.0, 0.01), x, 1.0, np.inf, 0.0, False)
+        assert found.status == SINGULAR
         # x^4 where the slope 4 x^3 is 1e-9.
-        assert frame[10] == pytest.approx(0.01, abs=2e-13)
-        assert count <= 25
+        assert found.frame.gap == pytest.approx(0.01, abs=2e-13)
+        assert found.steps <= 25
 
 
 @pytest.mark.parametrize("swapped", [0, 1])

@@ -50,21 +50,20 @@ def track_contact(table, pool, row, q, start, patience, records, k):
     turn = rotation(q, i)
     relative, shift = relative_pose(q, i, turn, j, rotation(q, j))
     f, g = contact.surface_f, contact.surface_g
-    status, x, _count, frame, curvature = solve_pair(
-        table, pool, f, g, relative, shift, start, 1.0, patience, CLOSE, False
-    )
-    apart = sub(frame[4], frame[3])
+    found = solve_pair(table, pool, f, g, relative, shift, start, 1.0, patience, CLOSE, False)
+    status, frame = found.status, found.frame
+    apart = sub(frame.point_g, frame.point_f)
     distance = math.sqrt(dot(apart, apart))
     if status == CONVERGED or status == SINGULAR:
-        store_record(turn, shift, frame, curvature, records, k)
+        store_record(turn, shift, frame, found.matrix, records, k)
         # Relative curvature -H (I + beta A)^-1: indefinite means the surfaces cross beside the point.
-        h = curvature[1]
+        h = found.matrix.h
         det = h[0] * h[3] - h[1] * h[2]
         norm2 = h[0] * h[0] + h[1] * h[1] + h[2] * h[2] + h[3] * h[3]
         proper = 1.0 if det > -1e-9 * norm2 and h[0] + h[3] <= 0.0 else 0.0
         contact_record.proper = CONFORMING if norm2 <= 1e-18 else proper
         contact_record.fold = det / norm2 if norm2 > 1e-18 else 0.0
-    return status, x, distance if frame[10] > 0.0 else -distance
+    return status, found.parameters, distance if frame.gap > 0.0 else -distance
 
 
 @kernel(inner=True)

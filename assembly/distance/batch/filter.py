@@ -26,7 +26,7 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly.distance.enclosures.enclosure import hull_support
-from assembly.distance.enclosures.gjk import INSIDE, OVERLAP, ROOM, WEIGHTS, gjk, support_point, witnesses
+from assembly.distance.enclosures.gjk import INSIDE, OVERLAP, POINT, ROOM, gjk, simplex_at, support_point, witnesses
 from assembly.geometry.interval import UNIT, down, up
 from assembly.geometry.vec import dot
 
@@ -156,9 +156,10 @@ def end_is_near(full, points, o, hulls, j, clearance, off, g):
     if in_polygon(points[o], points[o + 1], obstacles, polygons, j, off):
         return True
     first = from_center(points, o, boxes, j)
+    simplex = simplex_at(g, 0)
     for k in range(3):
-        g[WEIGHTS + 4 + k] = points[o + k]
-    how, v, kept = gjk(full, g, WEIGHTS + 4, 1, -1.0, obstacles, b, count, -1.0, first, clearance, 1e-12, g)
+        simplex.point[k] = points[o + k]
+    how, v, kept = gjk(full, g, POINT, 1, -1.0, obstacles, b, count, -1.0, first, clearance, 1e-12, g)
     if how == INSIDE:
         return True
     _a, _b = witnesses(g, kept)

@@ -28,24 +28,24 @@ from assembly.geometry.splines.bezier_pieces import (
 )
 from assembly.geometry.vec import dot
 
-# Doubles of a node: the segment's middle and extent, the radius; below zero for a node of nothing.
+# A node of a tree of capsules.
 CAPSULE = record_dtype(
     "f8",
-    position=3,
-    extent=3,
-    radius=1,
+    position=3,  # the segment's middle [length]
+    extent=3,  # from its first end to its last [length]
+    radius=1,  # below zero of a node of nothing [length]
     spare=1,
 )
 capsule_at = record_view(CAPSULE)
 EXTENT = place_of(CAPSULE, "extent")
 RADIUS = place_of(CAPSULE, "radius")
 STRIDE = size_of(CAPSULE)
-# Doubles of the head: the first leaf's number, the center and the size of the curve.
+# The head of such a tree.
 CAPSULE_HEAD = record_dtype(
     "f8",
-    leaves=1,
-    origin=3,
-    extent=1,
+    leaves=1,  # number of the first leaf
+    origin=3,  # center of the curve [length]
+    extent=1,  # size of the curve [length]
 )
 capsule_head_at = record_view(CAPSULE_HEAD)
 LEAVES = place_of(CAPSULE_HEAD, "leaves")

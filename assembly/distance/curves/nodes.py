@@ -32,22 +32,20 @@ from assembly.geometry.splines.bezier_pieces import (
     bezier_head_at,
 )
 
-# Doubles of a node: center and half extents of the box, the model, E0, E1, E2, the largest speed, how far the piece may
-# be from what it stands for, the interval on the span, then rows of (w x, w y, w z, w), then positions where weights
-# differ.
+# A piece of a curve, its doubles. Behind them stand rows of (w x, w y, w z, w), then positions where weights differ.
 CURVE_NODE = record_dtype(
     "f8",
-    box_center=3,
-    box_half=3,
-    a0=3,
+    box_center=3,  # [length]
+    box_half=3,  # half extents of the box [length]
+    a0=3,  # A0, A1 and A2 of the model above
     a1=3,
     a2=3,
-    e0=1,
+    e0=1,  # E0, E1 and E2, its errors
     e1=1,
     e2=1,
-    speed=1,
-    away=1,
-    begin=1,
+    speed=1,  # the largest |C'| [length]
+    away=1,  # how far the piece may be from what it stands for [length]
+    begin=1,  # its interval on the span
     end=1,
 )
 curve_node_at = record_view(CURVE_NODE)
@@ -64,18 +62,17 @@ AWAY = place_of(CURVE_NODE, "away")
 BEGIN = place_of(CURVE_NODE, "begin")
 END = place_of(CURVE_NODE, "end")
 ROWS = size_of(CURVE_NODE)
-# Integers: the halves (-1: not made yet), the spans [first, last), halvings, box in the tree over the spans.
+# The same piece, its integers.
 CURVE_NODE_LINKS = record_dtype(
     "i8",
-    left=1,
+    left=1,  # its halves; -1: not made yet
     right=1,
-    first=1,
+    first=1,  # the spans [first, last)
     last=1,
-    depth=1,
-    tree_node=1,
+    depth=1,  # halvings
+    tree_node=1,  # box in the tree over the spans
 )
 curve_node_links_at = record_view(CURVE_NODE_LINKS)
-LEFT = place_of(CURVE_NODE_LINKS, "left")
 FIRST = place_of(CURVE_NODE_LINKS, "first")
 LAST = place_of(CURVE_NODE_LINKS, "last")
 DEPTH = place_of(CURVE_NODE_LINKS, "depth")
@@ -126,8 +123,9 @@ def fill_spans(record, pool, ints, nodes, k, first, last, tree_node):
     if last - first == 1:
         n = curve.degree
         source = curve.pieces + 4 * (n + 1) * first
+        rows = o + ROWS
         for j in range(4 * (n + 1)):
-            nodes[o + ROWS + j] = pool[source + j]
+            nodes[rows + j] = pool[source + j]
         node.begin = 0.0
         node.end = 1.0
         return
@@ -180,13 +178,14 @@ def halve(record, pool, ints, nodes, k, left):
         c.depth = i.depth + 1
         c.tree_node = i.tree_node
     # de Casteljau at 1/2: the right half in place, the left half of first points.
+    rows, rows_a, rows_b = o + ROWS, a + ROWS, b + ROWS
     for j in range(4 * (n + 1)):
-        nodes[b + ROWS + j] = nodes[o + ROWS + j]
+        nodes[rows_b + j] = nodes[rows + j]
     for r in range(n + 1):
         for j in range(4):
-            nodes[a + ROWS + 4 * r + j] = nodes[b + ROWS + j]
+            nodes[rows_a + 4 * r + j] = nodes[rows_b + j]
         for j in range(4 * (n - r)):
-            nodes[b + ROWS + j] = 0.5 * (nodes[b + ROWS + j] + nodes[b + ROWS + j + 4])
+            nodes[rows_b + j] = 0.5 * (nodes[rows_b + j] + nodes[rows_b + j + 4])
     middle = 0.5 * (node.begin + node.end)
     node_record.begin = node.begin
     node_record.end = middle

@@ -40,22 +40,20 @@ from assembly.geometry.vec import dot
 
 # What a search ended with.
 CONVERGED, APART, NEAR, UNDECIDED, SPENT, MEETING = 0, 1, 2, 3, 4, 5
-# What it writes: bounds, parameters, the two points, pairs bounded.
+# What a search writes.
 CURVE_ANSWER = record_dtype(
     "f8",
-    lower=1,
+    lower=1,  # proven bounds of the distance [length]
     upper=1,
-    parameter_a=1,
+    parameter_a=1,  # of the points
     parameter_b=1,
-    point_a=3,
-    point_b=3,
-    count=1,
+    point_a=3,  # [length]
+    point_b=3,  # [length]
+    count=1,  # pairs bounded
 )
 curve_answer_at = record_view(CURVE_ANSWER)
 LOWER = place_of(CURVE_ANSWER, "lower")
 UPPER = place_of(CURVE_ANSWER, "upper")
-PARAMETER_A = place_of(CURVE_ANSWER, "parameter_a")
-PARAMETER_B = place_of(CURVE_ANSWER, "parameter_b")
 POINT_A = place_of(CURVE_ANSWER, "point_a")
 POINT_B = place_of(CURVE_ANSWER, "point_b")
 COUNT = place_of(CURVE_ANSWER, "count")

@@ -14,29 +14,33 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly._record import place_of, record_dtype, record_view, size_of
+from assembly._record import record_dtype, record_view, size_of
 from assembly.distance.curves.bounds import least_change
 from assembly.distance.curves.nodes import length
 from assembly.geometry.splines.bezier_pieces import UNIT, bezier_curve_at
 from assembly.geometry.vec import dot
 
-# One interval: error of the coefficients, of the two at its low and at its high end, its ends, its depth, then q and v.
+# One interval; the coefficients of q stand behind it, and those of v where weights differ.
 INTERVAL_RECORD = record_dtype(
     "f8",
-    error_all=1,
-    error_low=1,
-    error_high=1,
-    low=1,
+    error_all=1,  # of the coefficients [squared length]
+    error_low=1,  # of the two at its low end
+    error_high=1,  # of the two at its high end
+    low=1,  # its ends on the span, in [0, 1]
     high=1,
-    cuts=1,
+    cuts=1,  # how often it was cut
 )
 interval_at = record_view(INTERVAL_RECORD)
-ERROR_LOW = place_of(INTERVAL_RECORD, "error_low")
-ERROR_HIGH = place_of(INTERVAL_RECORD, "error_high")
-LOW = place_of(INTERVAL_RECORD, "low")
-HIGH = place_of(INTERVAL_RECORD, "high")
-CUTS = place_of(INTERVAL_RECORD, "cuts")
 SQUARE = size_of(INTERVAL_RECORD)
+
+
+@kernel(inline=True)
+def put_error(interval, end, error):
+    """Write the error of the two coefficients at the low end (0) or at the high one (1)."""
+    if end == 0:
+        interval.error_low = error
+    else:
+        interval.error_high = error
 
 
 @kernel(inner=True, exact=True)
@@ -47,6 +51,7 @@ def form_square(record, pool, span, p, reach, work):
     n = curve.degree
     m = 2 * n + 1
     s = curve.squares + 5 * m * span
+    o = SQUARE
     pp = dot(p, p)
     px = 2.0 * p[0]
     py = 2.0 * p[1]
@@ -54,10 +59,10 @@ def form_square(record, pool, span, p, reach, work):
     for k in range(m):
         v = pool[s + 4 * m + k]
         q = pool[s + k] - (px * pool[s + m + k] + py * pool[s + 2 * m + k] + pz * pool[s + 3 * m + k]) + pp * v
-        work[SQUARE + k] = q
+        work[o + k] = q
     if curve.rational == 1:
         for k in range(m):
-            work[SQUARE + m + k] = pool[s + 4 * m + k]
+            work[o + m + k] = pool[s + 4 * m + k]
     error = (4.0 * n + 32.0) * UNIT * reach * reach
     interval.error_all = error
     interval.low = 0.0
@@ -73,10 +78,10 @@ def form_square(record, pool, span, p, reach, work):
         a = pool[j + 3]
         y = (pool[j] - a * p[0], pool[j + 1] - a * p[1], pool[j + 2] - a * p[2])
         first = 2 * n * end
-        work[SQUARE + first] = dot(x, x)
-        work[SQUARE + first + 1 - 2 * end] = dot(x, y)
+        work[o + first] = dot(x, x)
+        work[o + first + 1 - 2 * end] = dot(x, y)
         # Y has three roundings of at most w M.
-        work[ERROR_LOW + end] = 16.0 * UNIT * reach * (length(x) / w + 4.0 * UNIT * reach)
+        put_error(interval, end, 16.0 * UNIT * reach * (length(x) / w + 4.0 * UNIT * reach))
 
 
 @kernel(inner=True, exact=True)
@@ -167,12 +172,13 @@ def mend(record, work, o, low, w, e, d, dw, error, reach):
         width = (interval.high - interval.low) * (1.0 - 2.0 * side) / n
         k = 0 if side == 0 else m - 1
         j = 1 if side == 0 else m - 2
-        v = work[a + SQUARE + m + j] if curve.rational == 1 else 1.0
-        work[a + SQUARE + k] = square
-        work[a + SQUARE + j] = square + slope * width
+        s = a + SQUARE
+        v = work[s + m + j] if curve.rational == 1 else 1.0
+        work[s + k] = square
+        work[s + j] = square + slope * width
         wrong = w * w * (2.0 * far + error) * error + abs(width) * w * (far * rough + error * (speed + rough))
         wrong += 16.0 * UNIT * (square + abs(slope * width))
-        work[a + (ERROR_LOW if side == 0 else ERROR_HIGH)] = wrong / min(v, w * w) * (1.0 + 1e-12)
+        put_error(interval, side, wrong / min(v, w * w) * (1.0 + 1e-12))
 
 
 @kernel(inner=True, exact=True)

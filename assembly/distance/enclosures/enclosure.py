@@ -46,46 +46,39 @@ from assembly.geometry.splines.bezier_ranges import (
 HULL, FORMULA, BEZIER = 0, 1, 2
 # Kinds of bounds; AUTO takes the least of all.
 AUTO, ELLIPSOID, CAPSULE, TAYLOR = 0, 1, 2, 3
-# Record of a piece: its interval, ends and middle point and how far these may be off, the width, the length of the
-# ellipsoid, the radius of the capsule, the Bezier piece, ranges (twelve pairs), values in the middle (nine pairs), and
-# whether its ends are ends of a smooth part of the curve.
-# How far the first end, the last and the middle may be off, each by itself; OFF is the largest.
+# A piece of a curve. Pairs are (low, high) of x, y and z.
 PIECE_RECORD = record_dtype(
     "f8",
-    t0=1,
+    t0=1,  # its interval
     t1=1,
-    p0=3,
+    p0=3,  # first end, last end, middle point [length]
     p1=3,
     pm=3,
-    off=1,
-    wide=1,
-    length=1,
-    radius=1,
-    span=1,
-    box=6,
-    speed=6,
-    bend=6,
-    jerk=6,
-    mid=6,
-    mid_speed=6,
-    mid_bend=6,
-    first_end=1,
+    off=1,  # how far these may be off, the largest of the three below [length]
+    wide=1,  # the width w of its ellipsoid, squared length
+    length=1,  # of the ellipsoid
+    radius=1,  # of the capsule
+    span=1,  # number of the smooth part of the curve
+    box=6,  # range of C over the interval: pairs
+    speed=6,  # of C'
+    bend=6,  # of C''
+    jerk=6,  # of C'''
+    mid=6,  # C in the middle: pairs
+    mid_speed=6,  # C'
+    mid_bend=6,  # C''
+    first_end=1,  # 1: its first end is one of the smooth part
     last_end=1,
-    off_0=1,
+    off_0=1,  # how far the first end may be off [length]
     off_1=1,
     off_mid=1,
 )
 enclosed_piece_at = record_view(PIECE_RECORD)
-T0 = place_of(PIECE_RECORD, "t0")
-T1 = place_of(PIECE_RECORD, "t1")
 P0 = place_of(PIECE_RECORD, "p0")
 P1 = place_of(PIECE_RECORD, "p1")
-PM = place_of(PIECE_RECORD, "pm")
 OFF = place_of(PIECE_RECORD, "off")
 WIDE = place_of(PIECE_RECORD, "wide")
 LENGTH = place_of(PIECE_RECORD, "length")
 RADIUS = place_of(PIECE_RECORD, "radius")
-SPAN = place_of(PIECE_RECORD, "span")
 BOX = place_of(PIECE_RECORD, "box")
 SPEED = place_of(PIECE_RECORD, "speed")
 BEND = place_of(PIECE_RECORD, "bend")
@@ -94,8 +87,6 @@ MID = place_of(PIECE_RECORD, "mid")
 MID_BEND = place_of(PIECE_RECORD, "mid_bend")
 FIRST_END = place_of(PIECE_RECORD, "first_end")
 LAST_END = place_of(PIECE_RECORD, "last_end")
-OFF_0 = place_of(PIECE_RECORD, "off_0")
-OFF_MID = place_of(PIECE_RECORD, "off_mid")
 PIECE = size_of(PIECE_RECORD)
 
 
@@ -206,6 +197,20 @@ def split_piece(kind, table, pool, room, x, o, p):
 
 
 @kernel(inner=True, exact=True)
+def fill_ends(kind, table, pool, room, span, x, o):
+    """The ends of the piece at x[o:], and how far they may be off."""
+    piece = enclosed_piece_at(x, o)
+    point_values(kind, table, pool, span, piece.t0, room, x, o + MID)
+    for k in range(3):
+        piece.p0[k] = middle_of(x, o + MID, k)
+    piece.off_0 = off_of(x, o + MID)
+    point_values(kind, table, pool, span, piece.t1, room, x, o + MID)
+    for k in range(3):
+        piece.p1[k] = middle_of(x, o + MID, k)
+    piece.off_1 = off_of(x, o + MID)
+
+
+@kernel(inner=True, exact=True)
 def first_pieces(kind, table, pool, room, x):
     """Records of the smooth parts of a curve to x. Returns how many."""
     head = formula_head_at(pool, 0)
@@ -218,11 +223,7 @@ def first_pieces(kind, table, pool, room, x):
         piece.span = i
         piece.first_end = 1.0
         piece.last_end = 1.0
-        for side in range(2):
-            point_values(kind, table, pool, i, x[o + T0 + side], room, x, o + MID)
-            for k in range(3):
-                (piece.p0 if side == 0 else piece.p1)[k] = middle_of(x, o + MID, k)
-            x[o + OFF_0 + side] = off_of(x, o + MID)
+        fill_ends(kind, table, pool, room, i, x, o)
         fill_piece(kind, table, pool, room, x, o)
     return count
 
@@ -321,11 +322,7 @@ def enclose(kind, table, pool, room, span, t0, t1, x):
     piece = enclosed_piece_at(x, 0)
     piece.t0, piece.t1, piece.span = t0, t1, span
     piece.first_end, piece.last_end = 1.0, 1.0
-    for side in range(2):
-        point_values(kind, table, pool, span, x[T0 + side], room, x, MID)
-        for k in range(3):
-            (piece.p0 if side == 0 else piece.p1)[k] = middle_of(x, MID, k)
-        x[OFF_0 + side] = off_of(x, MID)
+    fill_ends(kind, table, pool, room, span, x, 0)
     fill_piece(kind, table, pool, room, x, 0)
 
 

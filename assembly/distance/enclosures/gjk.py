@@ -14,12 +14,31 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
+from assembly._record import place_of, record_dtype, record_view, size_of
 from assembly.geometry.vec import blend, cross, dot, scale, sub
 
 # How it ended: at the nearest points; sets that touch or overlap; the origin inside a full simplex of differences.
 APART, OVERLAP, INSIDE = 0, 1, 2
-# A vertex of the simplex: difference, point of a, point of b, the latter's number; weights behind the four.
-VERTEX, WEIGHTS, ROOM = 10, 40, 48
+# A vertex of the simplex.
+SIMPLEX_VERTEX = record_dtype(
+    "f8",
+    difference=3,  # on_a - on_b
+    on_a=3,  # point of a
+    on_b=3,  # point of b
+    number=1,  # of the point of b, if b is the hull of points
+)
+simplex_vertex_at = record_view(SIMPLEX_VERTEX)
+VERTEX = size_of(SIMPLEX_VERTEX)
+# The simplex.
+SIMPLEX = record_dtype(
+    "f8",
+    vertices=(4, VERTEX),  # a `SIMPLEX_VERTEX` each
+    weights=4,  # of the vertices, in the point nearest to the origin
+    point=4,  # of who looks for the nearest point of a hull: it is the set a
+)
+simplex_at = record_view(SIMPLEX)
+POINT = place_of(SIMPLEX, "point")
+ROOM = size_of(SIMPLEX)
 _ROUNDS = 40
 # Nearer than this part of the farthest vertex counts as an overlap.
 _NEAR = 1e-14
@@ -53,13 +72,46 @@ def support_point(x, o, count, width, n):
 
 @kernel(inline=True)
 def vertex(g, k):
-    return (g[VERTEX * k], g[VERTEX * k + 1], g[VERTEX * k + 2])
+    """The difference that is vertex k of the simplex."""
+    y = simplex_vertex_at(g, VERTEX * k).difference
+    return (y[0], y[1], y[2])
+
+
+@kernel(inline=True)
+def on_b(g, k):
+    """The point of b at vertex k of the simplex."""
+    p = simplex_vertex_at(g, VERTEX * k).on_b
+    return (p[0], p[1], p[2])
+
+
+@kernel(inline=True)
+def numbers_of(g):
+    """Which points of a hull the first three vertices of the simplex are, those beyond its count too."""
+    first, second, third = simplex_vertex_at(g, 0), simplex_vertex_at(g, VERTEX), simplex_vertex_at(g, 2 * VERTEX)
+    return first.number, second.number, third.number
+
+
+@kernel(inline=True)
+def put_numbers(g, numbers):
+    """Write what `numbers_of` reads."""
+    for k in range(3):
+        simplex_vertex_at(g, VERTEX * k).number = numbers[k]
+
+
+@kernel(inline=True)
+def put_vertex(g, k, difference, a, b, number):
+    v = simplex_vertex_at(g, VERTEX * k)
+    for c in range(3):
+        v.difference[c] = difference[c]
+        v.on_a[c] = a[c]
+        v.on_b[c] = b[c]
+    v.number = number
 
 
 @kernel(inline=True)
 def move_vertex(g, source, target):
-    for k in range(VERTEX):
-        g[VERTEX * target + k] = g[VERTEX * source + k]
+    v = simplex_vertex_at(g, VERTEX * source)
+    put_vertex(g, target, v.difference, v.on_a, v.on_b, v.number)
 
 
 @kernel(inner=True)
@@ -69,6 +121,7 @@ def nearest_on_simplex(g, count, full):
     Returns the number of vertices kept, and the point. Every face with the newest vertex whose own nearest point is
     inside it is looked at, so that no rounding can leave without an answer.
     """
+    weight = simplex_at(g, 0).weights
     new = count - 1
     p = vertex(g, new)
     best = dot(p, p)
@@ -78,14 +131,14 @@ def nearest_on_simplex(g, count, full):
         length = dot(d, d)
         t = -dot(p, d) / length if length > 0.0 else 0.0
         if 0.0 < t < 1.0:
-            g[WEIGHTS] = t
-            g[WEIGHTS + 1] = 1.0 - t
+            weight[0] = t
+            weight[1] = 1.0 - t
             return 2, blend(1.0 - t, p, t, a)
         move_vertex(g, 1, 0)
-        g[WEIGHTS] = 1.0
+        weight[0] = 1.0
         return 1, p
     if count == 1:
-        g[WEIGHTS] = 1.0
+        weight[0] = 1.0
         return 1, p
     found = p
     keep = (-1, -1)
@@ -132,10 +185,10 @@ def nearest_on_simplex(g, count, full):
     for k in range(2):
         if order[k] >= 0:
             move_vertex(g, order[k], kept)
-            g[WEIGHTS + kept] = weights[1] if order[k] == keep[0] else weights[2]
+            weight[kept] = weights[1] if order[k] == keep[0] else weights[2]
             kept += 1
     move_vertex(g, new, kept)
-    g[WEIGHTS + kept] = weights[0]
+    weight[kept] = weights[0]
     return kept + 1, found
 
 
@@ -158,6 +211,7 @@ def inside_tetrahedron(g):
 @kernel(inner=True)
 def inside_weights(full, g):
     """Weights of the vertices of a full simplex that has the origin inside."""
+    weight = simplex_at(g, 0).weights
     total = 0.0
     for k in range(full):
         a = vertex(g, (k + 1) % full)
@@ -166,10 +220,10 @@ def inside_weights(full, g):
             part = abs(a[0] * b[1] - a[1] * b[0])
         else:
             part = abs(dot(a, cross(b, vertex(g, (k + 3) % full))))
-        g[WEIGHTS + k] = part
+        weight[k] = part
         total += part
     for k in range(full):
-        g[WEIGHTS + k] /= total
+        weight[k] /= total
 
 
 @kernel(inner=True)
@@ -202,11 +256,7 @@ def gjk(full, xa, oa, ca, wa, xb, ob, cb, wb, v, limit, part, g):
             again = again or (z[0] == y[0] and z[1] == y[1] and z[2] == y[2])
         if again:
             break
-        o = VERTEX * count
-        g[o], g[o + 1], g[o + 2] = y
-        g[o + 3], g[o + 4], g[o + 5] = a
-        g[o + 6], g[o + 7], g[o + 8] = b
-        g[o + 9] = number
+        put_vertex(g, count, y, a, b, number)
         count += 1
         farthest = max(farthest, dot(y, y))
         count, w = nearest_on_simplex(g, count, full)
@@ -230,8 +280,8 @@ def witnesses(g, count):
     a = (0.0, 0.0, 0.0)
     b = (0.0, 0.0, 0.0)
     for k in range(count):
-        o = VERTEX * k
-        w = g[WEIGHTS + k]
-        a = blend(1.0, a, w, (g[o + 3], g[o + 4], g[o + 5]))
-        b = blend(1.0, b, w, (g[o + 6], g[o + 7], g[o + 8]))
+        w = simplex_at(g, 0).weights[k]
+        p = simplex_vertex_at(g, VERTEX * k).on_a
+        a = blend(1.0, a, w, (p[0], p[1], p[2]))
+        b = blend(1.0, b, w, on_b(g, k))
     return a, b

@@ -8,10 +8,18 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly.distance.enclosures.enclosure import hull_support
-from assembly.distance.enclosures.gjk import INSIDE, ROOM, VERTEX, gjk, inside_weights, witnesses
+from assembly.distance.enclosures.gjk import (
+    INSIDE,
+    ROOM,
+    VERTEX,
+    gjk,
+    inside_weights,
+    simplex_vertex_at,
+    vertex,
+    witnesses,
+)
 from assembly.distance.enclosures.node import (
     NEAR_BY,
-    STATE,
     corner_around,
     inside_proven,
     search_state_at,
@@ -25,8 +33,9 @@ from assembly.geometry.vec import dot, sub
 def differences(g, count):
     """Put the differences that a simplex is made of where points of a hull are looked for."""
     for k in range(count):
+        v = simplex_vertex_at(g, VERTEX * k)
         for c in range(3):
-            g[VERTEX * k + 6 + c] = g[VERTEX * k + c]
+            v.on_b[c] = v.difference[c]
 
 
 @kernel(inner=True, allocates=True, exact=True)
@@ -78,7 +87,8 @@ def hull_distance(full, a, count_a, b, count_b, state):
         inside_weights(full, g)
         x, y = witnesses(g, kept)
         differences(g, kept)
-        off = 4.0 * UNIT * (abs(g[0]) + abs(g[1]) + abs(g[2])) + slack
+        y = vertex(g, 0)
+        off = 4.0 * UNIT * (abs(y[0]) + abs(y[1]) + abs(y[2])) + slack
         if inside_proven(full, g, (0.0, 0.0, 0.0), off):
             best.met = 1.0
     else:
@@ -98,6 +108,6 @@ def hull_distance(full, a, count_a, b, count_b, state):
         if overlap_proven(full, a, count_a, b, count_b, slack, g):
             best.met = 1.0
     best.upper = up(math.sqrt(dot(d, d)) * (1.0 + 8.0 * UNIT) + off)
-    state[STATE - 1] = min(lower, best.upper)
+    best.lower = min(lower, best.upper)
     best.count = 1.0
     return how == INSIDE

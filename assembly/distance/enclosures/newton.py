@@ -6,11 +6,10 @@ import math
 
 from assembly._kernel import kernel
 from assembly.distance.enclosures.enclosure import FORMULA, HULL
-from assembly.distance.enclosures.gjk import INSIDE, VERTEX, WEIGHTS, gjk, inside_weights
-from assembly.geometry.expression import formula
-from assembly.geometry.expression.formula import formula_point
+from assembly.distance.enclosures.gjk import INSIDE, POINT, gjk, inside_weights, on_b, simplex_at
+from assembly.geometry.expression.formula import formula_point, formula_room_at
 from assembly.geometry.interval import UNIT
-from assembly.geometry.splines.bezier_ranges import BEZIER_AT, piece_points, ranged_curve_at, value
+from assembly.geometry.splines.bezier_ranges import BEZIER_AT, piece_points, ranged_curve_at, value, weighted_point_at
 from assembly.geometry.vec import blend, dot, sub
 
 _ROUNDS = 24
@@ -21,27 +20,24 @@ def local_point(kind, table, pool, span, t, room):
     """C, C', C'' at t."""
     if kind == FORMULA:
         formula_point(table, pool, t, room)
-        o = formula.RESULTS
-        return (
-            (room[o], room[o + 1], room[o + 2]),
-            (room[o + 3], room[o + 4], room[o + 5]),
-            (room[o + 6], room[o + 7], room[o + 8]),
-        )
+        c = formula_room_at(room, 0).results
+        return (c[0], c[1], c[2]), (c[3], c[4], c[5]), (c[6], c[7], c[8])
+    found = weighted_point_at(room, BEZIER_AT)
     o, n = piece_points(table, span, 0)
     value(pool, o, n, t, room, BEZIER_AT)
-    w = room[BEZIER_AT + 3]
-    p = (room[BEZIER_AT], room[BEZIER_AT + 1], room[BEZIER_AT + 2])
+    w = found.weight
+    p = (found.position[0], found.position[1], found.position[2])
     o, n = piece_points(table, span, 1)
     value(pool, o, n, t, room, BEZIER_AT)
-    w1 = room[BEZIER_AT + 3]
-    d = (room[BEZIER_AT], room[BEZIER_AT + 1], room[BEZIER_AT + 2])
+    w1 = found.weight
+    d = (found.position[0], found.position[1], found.position[2])
     o, n = piece_points(table, span, 2)
     dd = (0.0, 0.0, 0.0)
     w2 = 0.0
     if n >= 0:
         value(pool, o, n, t, room, BEZIER_AT)
-        w2 = room[BEZIER_AT + 3]
-        dd = (room[BEZIER_AT], room[BEZIER_AT + 1], room[BEZIER_AT + 2])
+        w2 = found.weight
+        dd = (found.position[0], found.position[1], found.position[2])
     if ranged_curve_at(table, 0).rational == 0:
         return p, d, dd
     f = 1.0 / w
@@ -58,18 +54,18 @@ def hull_point(full, points, count, x, g):
     It is a vertex and parts of the differences to the others: off by half a unit of itself and some of those.
     """
     v = (x[0] - points[0], x[1] - points[1], x[2] - points[2])
-    g[WEIGHTS + 4], g[WEIGHTS + 5], g[WEIGHTS + 6] = x
-    how, _v, kept = gjk(full, g, WEIGHTS + 4, 1, -1.0, points, 0, count, -1.0, v, math.inf, 1e-15, g)
+    simplex = simplex_at(g, 0)
+    for c in range(3):
+        simplex.point[c] = x[c]
+    how, _v, kept = gjk(full, g, POINT, 1, -1.0, points, 0, count, -1.0, v, math.inf, 1e-15, g)
     if how == INSIDE:
         inside_weights(full, g)
-    o = VERTEX * (kept - 1) + 6
-    last = (g[o], g[o + 1], g[o + 2])
+    last = on_b(g, kept - 1)
     b = last
     off = 0.0
     for k in range(kept - 1):
-        o = VERTEX * k + 6
-        d = sub((g[o], g[o + 1], g[o + 2]), last)
-        b = blend(1.0, b, g[WEIGHTS + k], d)
+        d = sub(on_b(g, k), last)
+        b = blend(1.0, b, simplex.weights[k], d)
         off += 8.0 * (abs(d[0]) + abs(d[1]) + abs(d[2]))
     return b, kept, how == INSIDE, UNIT * (off + abs(b[0]) + abs(b[1]) + abs(b[2]))
 
@@ -79,14 +75,12 @@ def across(v, kept, full, g):
     """The part of v across the feature that carries a nearest point."""
     if kept == 1:
         return v
-    o = VERTEX
-    e = (g[o + 6] - g[6], g[o + 7] - g[7], g[o + 8] - g[8])
+    e = sub(on_b(g, 1), on_b(g, 0))
     size = dot(e, e)
     if size > 0.0:
         v = blend(1.0, v, -dot(v, e) / size, e)
     if kept == 3:
-        o = 2 * VERTEX
-        f = (g[o + 6] - g[6], g[o + 7] - g[7], g[o + 8] - g[8])
+        f = sub(on_b(g, 2), on_b(g, 0))
         if size > 0.0:
             f = blend(1.0, f, -dot(f, e) / size, e)
         size = dot(f, f)

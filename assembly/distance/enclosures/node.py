@@ -22,7 +22,7 @@ from assembly.distance.enclosures.enclosure import (
     point_values,
     separation_along,
 )
-from assembly.distance.enclosures.gjk import INSIDE, VERTEX, gjk
+from assembly.distance.enclosures.gjk import INSIDE, gjk, numbers_of, on_b, put_numbers
 from assembly.distance.enclosures.newton import hull_point, newton
 from assembly.distance.enclosures.taylor import (
     across_feature,
@@ -35,21 +35,21 @@ from assembly.geometry.expression.formula import formula_head_at
 from assembly.geometry.interval import UNIT, middle_of, off_of, up
 from assembly.geometry.vec import add, cross, dot, scale, sub
 
-# What the best points are: their distance rounded up, parameters and pieces, points, whether a meeting is proven, the
-# number of pairs bounded, and how far vertices of a hull may be off.
+# What a search knows of the distance, and the best points.
 SEARCH_STATE = record_dtype(
     "f8",
-    upper=1,
-    at_s=1,
+    upper=1,  # distance of the best points, rounded up [length]
+    at_s=1,  # their parameters and the smooth parts of the curves on which these are
     span_a=1,
     at_t=1,
     span_b=1,
-    point_a=3,
-    point_b=3,
-    met=1,
-    count=1,
-    slack=1,
-    spare=2,
+    point_a=3,  # [length]
+    point_b=3,  # [length]
+    met=1,  # 1: a meeting is proven
+    count=1,  # of the pairs bounded
+    slack=1,  # how far vertices of a hull may be off [length]
+    spare=1,
+    lower=1,  # proven lower bound of the distance [length]
 )
 search_state_at = record_view(SEARCH_STATE)
 UPPER = place_of(SEARCH_STATE, "upper")
@@ -63,8 +63,21 @@ MET = place_of(SEARCH_STATE, "met")
 COUNT = place_of(SEARCH_STATE, "count")
 SLACK = place_of(SEARCH_STATE, "slack")
 STATE = size_of(SEARCH_STATE)
-# Behind it: values at two parameters, a record across a feature, rows of the feature.
-VALUES, OTHER_VALUES, ACROSS, ROWS, SCRATCH = 16, 34, 52, 112, 128
+LOWER = place_of(SEARCH_STATE, "lower")
+# It is the beginning of the room of a search.
+SEARCH_ROOM = record_dtype(
+    "f8",
+    state=STATE,  # a `SEARCH_STATE`
+    values=18,  # of the first curve at a parameter: pairs of C, C', C''
+    other_values=18,  # of the second
+    across=PIECE,  # a piece as seen across a feature of a hull
+    rows=9,  # three, orthonormal or zero, that span what is across the feature
+)
+VALUES = place_of(SEARCH_ROOM, "values")
+OTHER_VALUES = place_of(SEARCH_ROOM, "other_values")
+ACROSS = place_of(SEARCH_ROOM, "across")
+ROWS = place_of(SEARCH_ROOM, "rows")
+SCRATCH = size_of(SEARCH_ROOM)
 # Corners of a triangle and of a tetrahedron around zero, turned so that nothing made by hand is parallel to them, and
 # the sizes of their copies about a point, as parts of the hull's.
 _TRIANGLE = ((0.765, 0.644, 0.0), (-0.94, 0.34, 0.0), (0.175, -0.984, 0.0))
@@ -75,9 +88,9 @@ NEAR_BY = (1e-4, 1e-8, 1e-12)
 @kernel(inner=True, exact=True)
 def inside_proven(full, g, x, off):
     """Whether a point, known up to `off`, is inside the simplex of vertices of b that g holds."""
-    p = sub((g[6], g[7], g[8]), x)
-    q = sub((g[VERTEX + 6], g[VERTEX + 7], g[VERTEX + 8]), x)
-    r = sub((g[2 * VERTEX + 6], g[2 * VERTEX + 7], g[2 * VERTEX + 8]), x)
+    p = sub(on_b(g, 0), x)
+    q = sub(on_b(g, 1), x)
+    r = sub(on_b(g, 2), x)
     a = math.sqrt(dot(p, p))
     b = math.sqrt(dot(q, q))
     c = math.sqrt(dot(r, r))
@@ -87,7 +100,7 @@ def inside_proven(full, g, x, off):
         w = cross(r, p)[2]
         least = 2.0 * off * (a + b + c) + 16.0 * UNIT * (a * b + b * c + c * a)
         return min(u, v, w) > least or max(u, v, w) < -least
-    s = sub((g[3 * VERTEX + 6], g[3 * VERTEX + 7], g[3 * VERTEX + 8]), x)
+    s = sub(on_b(g, 3), x)
     d = math.sqrt(dot(s, s))
     u = dot(q, cross(r, s))
     v = -dot(p, cross(r, s))
@@ -204,11 +217,8 @@ def domain_of(kind, pool):
 @kernel(inner=True, exact=True)
 def hull_taylor(full, xa, oa, points, count, kept, values, at, new, s, state, zero, g):
     """Bound by second derivatives across the feature in g, from values at s, and whether that is convex."""
-    feature = (
-        int(g[9]),
-        int(g[VERTEX + 9]) if kept > 1 else -1,
-        int(g[2 * VERTEX + 9]) if kept > 2 else -1,
-    )
+    numbers = numbers_of(g)
+    feature = (int(numbers[0]), int(numbers[1]) if kept > 1 else -1, int(numbers[2]) if kept > 2 else -1)
     rows = state[ROWS : ROWS + 9]
     if not feature_rows(full, points, feature, rows):
         return 0.0, False, False
@@ -244,7 +254,7 @@ def bound_node(
     span_a = int(piece.span)
     span_b = int(piece_record.span) if not hull else 0
     upper, b, kept = meet_points(full, kb, pb, count, a, piece.off_mid, b, off_b, state, g)
-    feature = (g[9], g[VERTEX + 9], g[2 * VERTEX + 9])
+    feature = numbers_of(g)
     better = note(state, upper, s, span_a, t, span_b, a, b)
     if best.met > 0.0:
         return 0.0, upper
@@ -294,7 +304,7 @@ def polished_bound(
     t0, t1, span_b = 0.0, 0.0, 0
     hessian = (0.0, 0.0, 0.0, False)
     if hull:
-        g[9], g[VERTEX + 9], g[2 * VERTEX + 9] = feature
+        put_numbers(g, feature)
         lower, convex, empty = hull_taylor(full, xa, oa, pb, count, kept, xa, oa + MID, False, s, state, zero, g)
         if empty:
             return math.inf

@@ -179,7 +179,7 @@ def _answer(
     answer = object.__new__(Separation)
     # What the initializer of a frozen dataclass does, at a third of its time.
     answer.__dict__.update(
-        lower=values[en.STATE - 1],
+        lower=values[en.LOWER],
         upper=values[en.UPPER],
         parameters=read_only(np.array(parameters)),
         points=read_only(points[:, :dimension]),
@@ -232,8 +232,8 @@ def _between_hulls(a: Operand, b: Operand, tolerance: float, clearance: float) -
     hull_pair.hull_distance(a.dimension + 1, a.pool, int(a.table[1]), b.pool, int(b.table[1]), state)
     met = state[en.MET] > 0.0
     if met:
-        state[en.UPPER] = state[en.STATE - 1] = 0.0
-    why = int(es.verdict(state[en.STATE - 1], state[en.UPPER], met, tolerance, 0.0, clearance))
+        state[en.UPPER] = state[en.LOWER] = 0.0
+    why = int(es.verdict(state[en.LOWER], state[en.UPPER], met, tolerance, 0.0, clearance))
     return _answer(why if why >= 0 else es.ROUNDED, state, state.tolist(), [], a.dimension, False)
 
 

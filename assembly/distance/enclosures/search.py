@@ -21,6 +21,7 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly._record import record_dtype, record_view, size_of
 from assembly.distance.enclosures.enclosure import (
     HULL,
     MID,
@@ -32,7 +33,6 @@ from assembly.distance.enclosures.enclosure import (
 )
 from assembly.distance.enclosures.gjk import ROOM
 from assembly.distance.enclosures.node import (
-    STATE,
     bound_node,
     domain_of,
     search_state_at,
@@ -44,7 +44,23 @@ from assembly.geometry.interval import UNIT
 CONVERGED, SEPARATED, NOT_SEPARATED, HIT, DISJOINT, UNDECIDED, BUDGET_SPENT, ROUNDED = range(8)
 # Bounds of nodes before what points may be off is believed.
 LOOKS = 8
-NODE = 4
+# A pair of pieces in the heap.
+PAIR_NODE = record_dtype(
+    "f8",
+    lower=1,  # bounds of its distance [length]
+    upper=1,
+    piece_a=1,  # numbers of the pieces' records
+    piece_b=1,
+)
+node_at = record_view(PAIR_NODE)
+NODE = size_of(PAIR_NODE)
+
+
+@kernel(inline=True)
+def put_node(heap, k, lower, upper, i, j):
+    """Write node k of the heap."""
+    node = node_at(heap, NODE * k)
+    node.lower, node.upper, node.piece_a, node.piece_b = lower, upper, i, j
 
 
 @kernel(inner=True)
@@ -53,13 +69,12 @@ def push(heap, size, lower, upper, i, j):
     k = size
     while k > 0:
         parent = (k - 1) // 2
-        o = NODE * parent
-        if heap[o] < lower or (heap[o] == lower and heap[o + 1] <= upper):
+        above = node_at(heap, NODE * parent)
+        if above.lower < lower or (above.lower == lower and above.upper <= upper):
             break
-        for c in range(NODE):
-            heap[NODE * k + c] = heap[o + c]
+        put_node(heap, k, above.lower, above.upper, above.piece_a, above.piece_b)
         k = parent
-    heap[NODE * k], heap[NODE * k + 1], heap[NODE * k + 2], heap[NODE * k + 3] = lower, upper, i, j
+    put_node(heap, k, lower, upper, i, j)
     return size + 1
 
 
@@ -67,23 +82,24 @@ def push(heap, size, lower, upper, i, j):
 def drop_top(heap, size):
     """Remove the top."""
     size -= 1
-    o = NODE * size
-    lower, upper, i, j = heap[o], heap[o + 1], heap[o + 2], heap[o + 3]
+    last = node_at(heap, NODE * size)
+    lower, upper, i, j = last.lower, last.upper, last.piece_a, last.piece_b
     k = 0
     while True:
         child = 2 * k + 1
         if child >= size:
             break
-        p = NODE * child
-        if child + 1 < size and (heap[p + NODE], heap[p + NODE + 1]) < (heap[p], heap[p + 1]):
-            child += 1
-            p += NODE
-        if (lower, upper) <= (heap[p], heap[p + 1]):
+        below = node_at(heap, NODE * child)
+        if child + 1 < size:
+            beside = node_at(heap, NODE * (child + 1))
+            if (beside.lower, beside.upper) < (below.lower, below.upper):
+                child += 1
+                below = beside
+        if (lower, upper) <= (below.lower, below.upper):
             break
-        for c in range(NODE):
-            heap[NODE * k + c] = heap[p + c]
+        put_node(heap, k, below.lower, below.upper, below.piece_a, below.piece_b)
         k = child
-    heap[NODE * k], heap[NODE * k + 1], heap[NODE * k + 2], heap[NODE * k + 3] = lower, upper, i, j
+    put_node(heap, k, lower, upper, i, j)
     return size
 
 
@@ -258,10 +274,11 @@ def search(
     stuck = math.inf
     crowded = False
     lower_bound = 0.0
+    top = node_at(heap, 0)
     while True:
-        while size > 0 and heap[0] >= best.upper:
+        while size > 0 and top.lower >= best.upper:
             size = 0
-        lowest = max(lowest, min(min(best.upper, stuck), heap[0] if size > 0 else math.inf))
+        lowest = max(lowest, min(min(best.upper, stuck), top.lower if size > 0 else math.inf))
         lowest = min(lowest, best.upper)
         if best.met > 0.0:
             lowest = 0.0
@@ -278,11 +295,11 @@ def search(
         if best.count >= budget:
             why = BUDGET_SPENT
             break
-        if size == 0 or heap[0] > stuck:
+        if size == 0 or top.lower > stuck:
             why = BUDGET_SPENT if crowded else ROUNDED
             break
-        i, j = int(heap[2]), int(heap[3])
-        parent = heap[0]
+        i, j = int(top.piece_a), int(top.piece_b)
+        parent = top.lower
         size = drop_top(heap, size)
         halve_a = longer(xa, PIECE * i, xb, PIECE * j)
         done = False
@@ -338,7 +355,7 @@ def search(
                 off_b = min(off_b, enclosed_piece_at(xb, PIECE * q).off)
             if lower < best.upper and best.met == 0.0:
                 size = push(heap, size, lower, upper, p, q)
-    state[STATE - 1] = lower_bound
+    best.lower = lower_bound
     for k in range(3):
         best.point_a[k] += center[k]
         best.point_b[k] += center[k]

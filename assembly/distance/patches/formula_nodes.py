@@ -28,6 +28,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
+from assembly._record import place_of, record_dtype, record_view
 from assembly.distance.patches.nodes import (
     DEEPEST,
     NODE_INTS,
@@ -37,13 +38,27 @@ from assembly.distance.patches.nodes import (
     patch_stride,
 )
 from assembly.distance.patches.pair import patch_work_at
-from assembly.geometry.expression import formula
-from assembly.geometry.expression.formula import formula_head_at, point_bounds, range_bounds, refine
+from assembly.geometry.expression.formula import (
+    RESULTS,
+    formula_head_at,
+    formula_room_at,
+    point_bounds,
+    range_bounds,
+    refine,
+)
 from assembly.geometry.interval import UNIT, idifference, magnitude, middle_of, most, off_of, up
+from assembly.geometry.splines.bezier_ranges import WEIGHTED, weighted_point_at
 
 NONE = 1e100
-# Pairs of a record for work: C, C', C'', C''' over the interval, then C, C', C'' in its middle.
-_SPEED, _BEND, _JERK, _MIDDLE = 6, 12, 18, 24
+# What is known of an interval.
+RANGES = record_dtype(
+    "f8",
+    over=24,  # pairs of C, C', C'', C''' over it
+    middle=18,  # pairs of C, C', C'' in its middle
+)
+ranges_at = record_view(RANGES)
+# Where the pairs of a derivative begin among them.
+_SPEED, _BEND, _JERK, _MIDDLE = 6, 12, 18, place_of(RANGES, "middle")
 
 
 @kernel(inline=True)
@@ -126,12 +141,14 @@ def describe_formula(curve, short, nodes, o, x):
     t1 = node.high_u
     half = half_width(t0, t1)
     h = 2.0 * half
+    ranges = ranges_at(x, 0)
+    results = formula_room_at(room, 0).results
     range_bounds(table, pool, t0, t1, room)
-    for k in range(_MIDDLE):
-        x[k] = room[formula.RESULTS + k]
+    for k in range(24):
+        ranges.over[k] = results[k]
     point_bounds(table, pool, 0.5 * (t0 + t1), room)
     for k in range(18):
-        x[_MIDDLE + k] = room[formula.RESULTS + k]
+        ranges.middle[k] = results[k]
     refine(x, 0, half, _MIDDLE)
     for k in range(3):
         c = known_middle(x, 0, k)
@@ -171,6 +188,9 @@ def describe_formula(curve, short, nodes, o, x):
     node.speed_v = dot
     # Products of h and the sums with rows are rounded, too.
     size = 0.0
+    begin = weighted_point_at(nodes, o + ROWS)
+    inner = weighted_point_at(nodes, o + ROWS + WEIGHTED)
+    end = weighted_point_at(nodes, o + ROWS + 2 * WEIGHTED)
     for k in range(3):
         a = known_middle(x, _MIDDLE, k)
         slope = j * known_middle(x, _MIDDLE + _SPEED, k)
@@ -181,12 +201,13 @@ def describe_formula(curve, short, nodes, o, x):
         node.kuu[k] = bend
         node.kuu[3 + k] = 0.0
         node.kuu[6 + k] = 0.0
-        nodes[o + ROWS + k] = a - 0.5 * slope + 0.125 * bend
-        nodes[o + ROWS + 4 + k] = a - 0.125 * bend
-        nodes[o + ROWS + 8 + k] = a + 0.5 * slope + 0.125 * bend
+        begin.position[k] = a - 0.5 * slope + 0.125 * bend
+        inner.position[k] = a - 0.125 * bend
+        end.position[k] = a + 0.5 * slope + 0.125 * bend
         size += abs(a) + abs(slope) + abs(bend)
-    for k in range(3):
-        nodes[o + ROWS + 4 * k + 3] = 1.0
+    begin.weight = 1.0
+    inner.weight = 1.0
+    end.weight = 1.0
     node.e0 = bounded(e0 * grow + 8.0 * UNIT * size)
     node.e1 = bounded(e1 * grow + 8.0 * UNIT * size)
     node.e2 = bounded(e2 * grow + 8.0 * UNIT * size)
@@ -206,7 +227,7 @@ def formula_derivatives(curve, nodes, o, x, w):
     h = 2.0 * half_width(t0, t1)
     t = formula_parameter(nodes, o, x)
     point_bounds(table, pool, t, room)
-    at = formula.RESULTS
+    at = RESULTS
     size = 0.0
     for k in range(3):
         work.patch_j[k] = h * known_middle(room, at + _SPEED, k)

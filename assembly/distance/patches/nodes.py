@@ -22,45 +22,42 @@ from assembly._record import place_of, record_dtype, record_view, size_of
 from assembly.distance.curves.nodes import length
 from assembly.geometry.splines.bezier_pieces import UNIT, bezier_head_at
 
-# Integers of a record: degrees, patches along u and v, 1 where weights differ, and where in the pool its tables are:
-# breaks, weights of the middles, binomials (as for curves, each direction), nets.
+# A surface of Bezier patches in the table.
 BEZIER_SURFACE = record_dtype(
     "i8",
     degree_u=1,
     degree_v=1,
-    patches_u=1,
+    patches_u=1,  # how many along u
     patches_v=1,
-    rational=1,
-    breaks_u=1,
+    rational=1,  # 1: weights differ
+    breaks_u=1,  # where in the pool the breaks in u begin
     breaks_v=1,
-    middle_u=1,
+    middle_u=1,  # where in the pool the weights of derivatives at the middle of u begin
     middle_v=1,
-    nets=1,
+    nets=1,  # where in the pool the control points of the patches begin
 )
 bezier_surface_at = record_view(BEZIER_SURFACE)
-DEGREE_U = place_of(BEZIER_SURFACE, "degree_u")
-DEGREE_V = place_of(BEZIER_SURFACE, "degree_v")
 PATCHES_U = place_of(BEZIER_SURFACE, "patches_u")
 PATCHES_V = place_of(BEZIER_SURFACE, "patches_v")
 RATIONAL = place_of(BEZIER_SURFACE, "rational")
 BREAKS_U = place_of(BEZIER_SURFACE, "breaks_u")
 BREAKS_V = place_of(BEZIER_SURFACE, "breaks_v")
 PATCH_RECORD = size_of(BEZIER_SURFACE)
-# Doubles of a node.
+# A patch, its doubles. Behind them stand rows of (w x, w y, w z, w), then positions where weights differ.
 PATCH_NODE = record_dtype(
     "f8",
-    box_center=3,
-    box_half=3,
-    a0=3,
-    ju=6,
-    kuu=9,
-    e0=1,
+    box_center=3,  # [length]
+    box_half=3,  # half extents of the box [length]
+    a0=3,  # A0 of the model above
+    ju=6,  # Ju, Jv
+    kuu=9,  # Kuu, Kuv, Kvv
+    e0=1,  # E0, E1 and E2, its errors
     e1=1,
     e2=1,
-    speed_u=1,
+    speed_u=1,  # the largest |S_u|; below zero in v: the piece counts as a point [length]
     speed_v=1,
-    away=1,
-    low_u=1,
+    away=1,  # how far the patch may be from what it stands for [length]
+    low_u=1,  # its box of parameters on the patch that it is of
     high_u=1,
     low_v=1,
     high_v=1,
@@ -75,23 +72,20 @@ E0 = place_of(PATCH_NODE, "e0")
 E1 = place_of(PATCH_NODE, "e1")
 E2 = place_of(PATCH_NODE, "e2")
 SPEED_U = place_of(PATCH_NODE, "speed_u")
-SPEED_V = place_of(PATCH_NODE, "speed_v")
 AWAY = place_of(PATCH_NODE, "away")
 LOW_U = place_of(PATCH_NODE, "low_u")
 HIGH_U = place_of(PATCH_NODE, "high_u")
 LOW_V = place_of(PATCH_NODE, "low_v")
 HIGH_V = place_of(PATCH_NODE, "high_v")
 ROWS = size_of(PATCH_NODE)
-# Integers: the halves (-1: not made yet), the patch, halvings.
+# The same patch, its integers.
 PATCH_NODE_LINKS = record_dtype(
     "i8",
-    halves=1,
-    patch=1,
-    depth=1,
+    halves=1,  # the first of its two halves; -1: not made yet
+    patch=1,  # which patch of the surface it is of
+    depth=1,  # halvings
 )
 patch_node_links_at = record_view(PATCH_NODE_LINKS)
-HALVES = place_of(PATCH_NODE_LINKS, "halves")
-PATCH = place_of(PATCH_NODE_LINKS, "patch")
 DEPTH = place_of(PATCH_NODE_LINKS, "depth")
 NODE_INTS = size_of(PATCH_NODE_LINKS)
 # Halvings after which a node is let go.
@@ -120,8 +114,9 @@ def fill_patch(record, pool, ints, nodes, k):
     count = 4 * (patch.degree_u + 1) * (patch.degree_v + 1)
     o = patch_stride(record) * k
     node = patch_node_at(nodes, o)
+    rows = o + ROWS
     for j in range(count):
-        nodes[o + ROWS + j] = pool[patch.nets + count * k + j]
+        nodes[rows + j] = pool[patch.nets + count * k + j]
     node.away = bezier_head_at(pool, 0).error
     node.low_u = 0.0
     node.high_u = 1.0
@@ -152,8 +147,9 @@ def split_patch(record, pool, ints, nodes, k, low):
     for j in range(A0, ROWS):
         nodes[a + j] = nodes[o + j]
         nodes[b + j] = nodes[o + j]
+    rows, rows_b = o + ROWS, b + ROWS
     for j in range(4 * (p + 1) * (q + 1)):
-        nodes[b + ROWS + j] = nodes[o + ROWS + j]
+        nodes[rows_b + j] = nodes[rows + j]
     along_u = node.speed_u >= node.speed_v
     n = p if along_u else q
     step = 4 * (q + 1) if along_u else 4

@@ -34,23 +34,22 @@ from assembly.distance.patches.nodes import (
 )
 from assembly.geometry.splines.bezier_pieces import UNIT
 
-# Doubles for work: D, J_i, K_ij (rows of four), Hessian, gradient, the place in the models and in the cube, a step, a
-# factor, what a patch gives, what a formula leaves open (`distance/patches/formula_nodes.py`), basis functions.
+# Doubles for work; basis functions stand behind them.
 PATCH_WORK = record_dtype(
     "f8",
-    d=3,
-    j=12,
-    k=48,
-    h=16,
-    g=4,
-    z=4,
-    place=4,
-    best=4,
-    step=4,
-    factor=16,
-    patch_j=6,
-    patch_k=9,
-    off=4,
+    d=3,  # D, the difference of two points [length]
+    j=12,  # J_i, its derivatives by the four parameters
+    k=48,  # K_ij, its second derivatives, rows of four
+    h=16,  # Hessian
+    g=4,  # gradient
+    z=4,  # a place in the models
+    place=4,  # a place in the unit cube
+    best=4,  # the best place so far
+    step=4,  # of Newton
+    factor=16,  # of the matrix of a step
+    patch_j=6,  # first derivatives of one patch
+    patch_k=9,  # second derivatives of one patch
+    off=4,  # what a formula leaves open (`distance/patches/formula_nodes.py`)
 )
 patch_work_at = record_view(PATCH_WORK)
 D = place_of(PATCH_WORK, "d")
@@ -60,7 +59,6 @@ H = place_of(PATCH_WORK, "h")
 G = place_of(PATCH_WORK, "g")
 Z = place_of(PATCH_WORK, "z")
 PLACE = place_of(PATCH_WORK, "place")
-BEST = place_of(PATCH_WORK, "best")
 STEP = place_of(PATCH_WORK, "step")
 FACTOR = place_of(PATCH_WORK, "factor")
 PATCH_J = place_of(PATCH_WORK, "patch_j")

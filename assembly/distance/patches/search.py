@@ -49,14 +49,14 @@ from assembly.distance.patches.pair import (
 )
 from assembly.geometry.splines.bezier_pieces import UNIT, bezier_head_at
 
-# What it writes: bounds, parameters of a and of b, the two points, pairs bounded.
+# What a search writes.
 PATCH_ANSWER_RECORD = record_dtype(
     "f8",
-    lower=1,
+    lower=1,  # proven bounds of the distance [length]
     upper=1,
-    parameters=4,
-    points=6,
-    count=1,
+    parameters=4,  # (u, v) of a, then of b
+    points=6,  # of a, then of b [length]
+    count=1,  # pairs bounded
 )
 patch_answer_at = record_view(PATCH_ANSWER_RECORD)
 PATCH_ANSWER = size_of(PATCH_ANSWER_RECORD)

@@ -14,9 +14,7 @@ from assembly._kernel import kernel
 from assembly.geometry.expression.tape import (
     ADD,
     CONST,
-    CONSTANTS,
     COS,
-    COUNT,
     DIV,
     EXP,
     HEAD,
@@ -31,6 +29,7 @@ from assembly.geometry.expression.tape import (
     SQRT,
     SUB,
     TWICE,
+    tape_at,
 )
 
 LANES = 64
@@ -39,12 +38,13 @@ LANES = 64
 @kernel(inner=True, allocates=True)
 def lane_constants(table, pool, o):
     """Work of a tape, a row a result, with its constants in their places."""
-    count = table[o + COUNT]
+    tape = tape_at(table, o)
+    count = tape.count
     work = np.empty((count, LANES))
     for k in range(count):
         p = o + HEAD + INSTRUCTION * k
         if table[p] == CONST:
-            work[k, :] = pool[table[o + CONSTANTS] + table[p + 2]]
+            work[k, :] = pool[tape.constants + table[p + 2]]
     return work
 
 
@@ -52,7 +52,7 @@ def lane_constants(table, pool, o):
 def run_lanes(table, o, lo, hi, first, work, out):
     """Run the tape at table[o] on the intervals [lo, hi] from the first on, to out; infinite where it is no length."""
     count = min(LANES, lo.size - first)
-    for k in range(table[o + COUNT]):
+    for k in range(tape_at(table, o).count):
         p = o + HEAD + INSTRUCTION * k
         code = table[p]
         if code == CONST:

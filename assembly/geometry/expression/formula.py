@@ -7,8 +7,6 @@ C is taken about a center, zero but for what measures distances.
 
 A natural interval extension is too wide by about the width of its argument. What the derivative tells over h = (t1 -
 t0) / 2 about the middle m, C in C(m) + [-h, h] C'([t0, t1]), is too wide by its square; the two are met.
-
-Room for a run: 4 doubles of arguments, 24 of results, then the work of the tape.
 """
 
 from __future__ import annotations
@@ -22,21 +20,17 @@ from assembly.geometry.expression.tape import run_tape
 from assembly.geometry.expression.tape_bounds import JUMP, KINK, SMOOTH, run_bounds
 from assembly.geometry.interval import down, idifference, magnitude, meet, up, widened
 
-# Record: dimension; where the tapes of points, of ranges and of the arc length begin (0: none); whether the range of C
-# itself is among the ranges; whether C itself has no operation that jumps, so that jumps are those of derivatives and
-# C' bounds C across them; doubles of room; whether the tape of the arc length is for plain doubles
-# (`geometry/expression/rounding.py`). In
-# the pool: the ends of the domain, how far C may be off, and the center that it is taken about.
+# A curve given by a formula, in the table.
 FORMULA = record_dtype(
     "i8",
-    dimension=1,
-    point_tape=1,
-    range_tape=1,
-    arc_tape=1,
-    has_range=1,
-    continuous=1,
-    room=1,
-    arc_plain=1,
+    dimension=1,  # 2 or 3
+    point_tape=1,  # where the tape of points begins
+    range_tape=1,  # where the tape of ranges begins
+    arc_tape=1,  # where the tape of the arc length begins; 0: none
+    has_range=1,  # 1: the range of C itself is among the ranges
+    continuous=1,  # 1: no operation of C jumps, so that jumps are those of derivatives and C' bounds C across them
+    room=1,  # doubles of room for a run
+    arc_plain=1,  # 1: the tape of the arc length is for plain doubles (`geometry/expression/rounding.py`)
 )
 formula_at = record_view(FORMULA)
 DIMENSION = place_of(FORMULA, "dimension")
@@ -48,36 +42,55 @@ CONTINUOUS = place_of(FORMULA, "continuous")
 ROOM = place_of(FORMULA, "room")
 ARC_PLAIN = place_of(FORMULA, "arc_plain")
 FORMULA_RECORD = size_of(FORMULA)
+# The same in the pool.
 FORMULA_HEAD = record_dtype(
     "f8",
-    domain=2,
-    error=1,
-    center=3,
+    domain=2,  # ends of the parameter
+    error=1,  # how far C may be off [length]
+    center=3,  # that C is taken about [length]
 )
 formula_head_at = record_view(FORMULA_HEAD)
 CENTER = place_of(FORMULA_HEAD, "center")
 FORMULA_POOL = size_of(FORMULA_HEAD)
-RESULTS, WORK_AT = 4, 28
+# Room for a run; the work of the tape stands behind it.
+FORMULA_ROOM = record_dtype(
+    "f8",
+    arguments=4,  # t, or ends of intervals
+    results=24,  # numbers, or pairs of intervals, of C, then of its derivatives
+)
+formula_room_at = record_view(FORMULA_ROOM)
+RESULTS = place_of(FORMULA_ROOM, "results")
+WORK_AT = size_of(FORMULA_ROOM)
+# Numbers of C, C', C'' at a point, and of C, C', C'', C''' over an interval; what is written of an interval.
 _VALUES, _ORDERS = 9, 12
+FORMULA_RANGE = record_dtype(
+    "f8",
+    over=2 * _ORDERS,  # pairs of C, C', C'', C''' over the interval
+    middle=2 * _VALUES,  # pairs of C, C', C'' at its middle
+    arc=1,  # the user's bound of the length of arc
+)
+formula_range_at = record_view(FORMULA_RANGE)
 
 
 @kernel(inner=True)
 def formula_point(table, pool, t, room):
-    """C, C', C'' at t to room[RESULTS:], nine doubles."""
+    """C, C', C'' at t to the results of the room, nine doubles."""
     room[0] = t
     run_tape(table, pool, formula_at(table, 0).point_tape, room, room[WORK_AT:], room[RESULTS:])
+    results = formula_room_at(room, 0).results
     for k in range(3):
-        room[RESULTS + k] -= formula_head_at(pool, 0).center[k]
+        results[k] -= formula_head_at(pool, 0).center[k]
 
 
 @kernel(inline=True)
 def forget(table, room, first, last):
     """The whole line for orders of the results, as far as there are coordinates."""
+    results = formula_room_at(room, 0).results
     for order in range(first, last):
         for k in range(formula_at(table, 0).dimension):
-            o = RESULTS + 6 * order + 2 * k
-            room[o] = -math.inf
-            room[o + 1] = math.inf
+            o = 6 * order + 2 * k
+            results[o] = -math.inf
+            results[o + 1] = math.inf
 
 
 @kernel(inline=True)
@@ -90,19 +103,20 @@ def settle(table, pool, room, told, orders):
     if told >= JUMP and formula.continuous == 0:
         forget(table, room, 1, 2)
     error = head.error
+    results = formula_room_at(room, 0).results
     for k in range(formula.dimension):
-        o = RESULTS + 2 * k
+        o = 2 * k
         if error > 0.0:
-            room[o] = down(room[o] - error)
-            room[o + 1] = up(room[o + 1] + error)
+            results[o] = down(results[o] - error)
+            results[o + 1] = up(results[o + 1] + error)
         c = head.center[k]
         if c != 0.0:
-            room[o], room[o + 1] = idifference((room[o], room[o + 1]), (c, c))
+            results[o], results[o + 1] = idifference((results[o], results[o + 1]), (c, c))
 
 
 @kernel(inner=True, exact=True)
 def point_bounds(table, pool, t, room):
-    """Intervals of C, C', C'' at t to room[RESULTS:], nine pairs."""
+    """Intervals of C, C', C'' at t to the results of the room, nine pairs."""
     room[0] = t
     room[1] = t
     told = run_bounds(table, pool, formula_at(table, 0).point_tape, room, room[WORK_AT:], room[RESULTS:])
@@ -111,7 +125,7 @@ def point_bounds(table, pool, t, room):
 
 @kernel(inner=True, exact=True)
 def range_bounds(table, pool, lo, hi, room):
-    """Intervals of C, C', C'', C''' over [lo, hi] to room[RESULTS:], twelve pairs."""
+    """Intervals of C, C', C'', C''' over [lo, hi] to the results of the room, twelve pairs."""
     formula = formula_at(table, 0)
     room[0] = lo
     room[1] = hi
@@ -149,29 +163,31 @@ def refine(values, o, half, m):
 def arc_bound(table, pool, lo, hi, room):
     """Upper bound of the length of arc over [lo, hi] by the user's expression; infinite where it has no length."""
     formula = formula_at(table, 0)
+    results = formula_room_at(room, 0).results
     if formula.arc_tape == 0:
         return math.inf
     if formula.arc_plain != 0:
         room[0] = lo
         room[1] = hi
         run_tape(table, pool, formula.arc_tape, room, room[WORK_AT:], room[RESULTS:])
-        return room[RESULTS] if room[RESULTS] >= 0.0 else math.inf
+        return results[0] if results[0] >= 0.0 else math.inf
     room[0] = lo
     room[1] = lo
     room[2] = hi
     room[3] = hi
     run_bounds(table, pool, formula.arc_tape, room, room[WORK_AT:], room[RESULTS:])
-    return room[RESULTS + 1] if room[RESULTS + 1] >= 0.0 else math.inf
+    return results[1] if results[1] >= 0.0 else math.inf
 
 
 @kernel(signatures="(i8[::1], f8[::1], f8[::1], f8[:, ::1], f8[::1])")
 def formula_points(table, pool, t, out, room):
     """C, C', C'' at every t to out (n, 9). Returns the first place where C is not finite, or -1."""
+    results = formula_room_at(room, 0).results
     bad = -1
     for i in range(t.size):
         formula_point(table, pool, t[i], room)
         for k in range(_VALUES):
-            out[i, k] = room[RESULTS + k]
+            out[i, k] = results[k]
         if bad < 0 and not math.isfinite(out[i, 0] + out[i, 1] + out[i, 2]):
             bad = i
     return bad
@@ -184,18 +200,19 @@ def formula_ranges(table, pool, lo, hi, out, room):
     Twelve pairs over the interval, nine pairs at its middle, and the user's bound of the length of arc. Returns what
     the runs tell, the worst of it.
     """
+    results = formula_room_at(room, 0).results
     told = SMOOTH
     for i in range(lo.size):
-        row = out[i]
+        row = formula_range_at(out, i)
         told = max(told, range_bounds(table, pool, lo[i], hi[i], room))
         for k in range(2 * _ORDERS):
-            row[k] = room[RESULTS + k]
+            row.over[k] = results[k]
         middle = 0.5 * (lo[i] + hi[i])
         point_bounds(table, pool, middle, room)
         for k in range(2 * _VALUES):
-            row[2 * _ORDERS + k] = room[RESULTS + k]
-        refine(row, 0, up(max(middle - lo[i], hi[i] - middle)), 2 * _ORDERS)
-        row[2 * (_ORDERS + _VALUES)] = arc_bound(table, pool, lo[i], hi[i], room)
+            row.middle[k] = results[k]
+        refine(out[i], 0, up(max(middle - lo[i], hi[i] - middle)), 2 * _ORDERS)
+        row.arc = arc_bound(table, pool, lo[i], hi[i], room)
     return told
 
 

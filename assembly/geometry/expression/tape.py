@@ -21,11 +21,30 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly._record import place_of, record_dtype, record_view, size_of
 
-# Head of a tape, and integers an instruction.
-COUNT, CONSTANTS, WORK, HEAD = 0, 1, 2, 3
-INSTRUCTION = 4
-_ONE, _TWO, _THREE = np.uint64(1), np.uint64(2), np.uint64(3)
+# Head of a tape in the table; its instructions stand behind it.
+TAPE = record_dtype(
+    "i8",
+    count=1,  # of instructions
+    constants=1,  # where in the pool its constants begin
+    work=1,  # size of the work array
+)
+tape_at = record_view(TAPE)
+COUNT = place_of(TAPE, "count")
+CONSTANTS = place_of(TAPE, "constants")
+WORK = place_of(TAPE, "work")
+HEAD = size_of(TAPE)
+# An instruction of a tape.
+TAPE_INSTRUCTION = record_dtype(
+    "i8",
+    code=1,  # operation
+    out=1,  # where the result goes
+    a=1,  # places of two arguments
+    b=1,
+)
+instruction_at = record_view(TAPE_INSTRUCTION)
+INSTRUCTION = size_of(TAPE_INSTRUCTION)
 
 # Names of CasADi's operations (without its OP_) in the order of our codes, the frequent ones first. LLVM makes a jump
 # table of codes without gaps.
@@ -82,15 +101,16 @@ def erfinv(x):
 @kernel(inner=True, exact=True)
 def run_tape(table, pool, o, x, work, y):
     """Run the tape that begins at table[o]: y of x. All of y that the tape knows is written."""
-    constants = np.uint64(table[o + CONSTANTS])
+    tape = tape_at(table, o)
+    constants = np.uint64(tape.constants)
     begin = o + HEAD
-    for k in range(begin, begin + INSTRUCTION * table[o + COUNT], INSTRUCTION):
+    for k in range(begin, begin + INSTRUCTION * tape.count, INSTRUCTION):
+        instruction = instruction_at(table, k)
+        code = instruction.code
         # Unsigned, because Numba tests a signed index for being counted from the end: a fifth of the time.
-        p = np.uint64(k)
-        code = table[p]
-        out = np.uint64(table[p + _ONE])
-        a = np.uint64(table[p + _TWO])
-        b = np.uint64(table[p + _THREE])
+        out = np.uint64(instruction.out)
+        a = np.uint64(instruction.a)
+        b = np.uint64(instruction.b)
         if code == MUL:
             work[out] = work[a] * work[b]
         elif code == ADD:

@@ -28,12 +28,10 @@ from assembly.geometry.expression.tape import (
     ATANH,
     CEIL,
     CONST,
-    CONSTANTS,
     CONSTPOW,
     COPYSIGN,
     COS,
     COSH,
-    COUNT,
     DIV,
     EQ,
     ERF,
@@ -74,6 +72,8 @@ from assembly.geometry.expression.tape import (
     TANH,
     TWICE,
     erfinv,
+    instruction_at,
+    tape_at,
 )
 from assembly.geometry.interval import (
     FAR,
@@ -301,17 +301,18 @@ def chosen(code, a, b, lo, hi, told):
 @kernel(inner=True, exact=True)
 def run_bounds(table, pool, o, x, work, y):
     """Run the tape that begins at table[o] on intervals: pairs (lo, hi) in x, work and y. Returns what it tells."""
-    constants = np.uint64(table[o + CONSTANTS])
+    tape = tape_at(table, o)
+    constants = np.uint64(tape.constants)
     begin = o + HEAD
     told = SMOOTH
     # Whether some value so far may be none.
     undefined = False
-    for k in range(begin, begin + INSTRUCTION * table[o + COUNT], INSTRUCTION):
-        p = np.uint64(k)
-        code = table[p]
-        out = np.uint64(2) * np.uint64(table[p + np.uint64(1)])
-        i = np.uint64(table[p + np.uint64(2)])
-        j = np.uint64(2) * np.uint64(table[p + np.uint64(3)])
+    for k in range(begin, begin + INSTRUCTION * tape.count, INSTRUCTION):
+        instruction = instruction_at(table, k)
+        code = instruction.code
+        out = np.uint64(2) * np.uint64(instruction.out)
+        i = np.uint64(instruction.a)
+        j = np.uint64(2) * np.uint64(instruction.b)
         if code == INPUT:
             work[out] = x[np.uint64(2) * i]
             work[out + np.uint64(1)] = x[np.uint64(2) * i + np.uint64(1)]

@@ -16,21 +16,19 @@ from assembly._kernel import kernel
 from assembly._lanes import lane, load_lanes
 from assembly._record import place_of, record_dtype, record_view, size_of
 
-# Fields of a trim record: boundary curves and where their records begin, pieces (all, then those of the boundary
-# alone), table and pool offsets of the pieces, table offset of the first piece of every curve, pool offset of the
-# frame, number and pool offset of the steps of w along the bottom.
+# A trim in the table: the boundary of a face in its parameters.
 TRIM = record_dtype(
     "i8",
-    curves=1,
-    first=1,
-    all_pieces=1,
-    pieces=1,
-    piece_table=1,
-    piece_pool=1,
-    curve_pieces=1,
-    frame=1,
-    steps=1,
-    step_pool=1,
+    curves=1,  # how many boundary curves
+    first=1,  # where in the table their records begin
+    all_pieces=1,  # how many pieces
+    pieces=1,  # how many of them are of the boundary alone
+    piece_table=1,  # where in the table the pieces begin
+    piece_pool=1,  # where in the pool the pieces begin
+    curve_pieces=1,  # where in the table the first piece of every curve stands
+    frame=1,  # where in the pool the frame stands
+    steps=1,  # how many steps of w along the bottom
+    step_pool=1,  # where in the pool the steps begin
 )
 trim_at = record_view(TRIM)
 TRIM_CURVES = place_of(TRIM, "curves")
@@ -44,18 +42,18 @@ TRIM_FRAME = place_of(TRIM, "frame")
 TRIM_STEPS = place_of(TRIM, "steps")
 TRIM_STEP_POOL = place_of(TRIM, "step_pool")
 TRIM_RECORD = size_of(TRIM)
-# The frame: cell or domain, periods (0: open), nearness that is "on", w at the bottom left, the size.
+# The frame of a trim in the pool; everything is in parameters.
 TRIM_FRAME_RECORD = record_dtype(
     "f8",
-    low_u=1,
+    low_u=1,  # the cell of a periodic surface, or the domain
     low_v=1,
     high_u=1,
     high_v=1,
-    period_u=1,
+    period_u=1,  # 0: open
     period_v=1,
-    on=1,
-    bottom=1,
-    extent=1,
+    on=1,  # points nearer to the boundary than this are on it
+    bottom=1,  # winding number w at the bottom left
+    extent=1,  # size of the cell or domain
 )
 trim_frame_at = record_view(TRIM_FRAME_RECORD)
 LOW_U = place_of(TRIM_FRAME_RECORD, "low_u")
@@ -64,48 +62,43 @@ HIGH_U = place_of(TRIM_FRAME_RECORD, "high_u")
 HIGH_V = place_of(TRIM_FRAME_RECORD, "high_v")
 PERIOD_U = place_of(TRIM_FRAME_RECORD, "period_u")
 PERIOD_V = place_of(TRIM_FRAME_RECORD, "period_v")
-ON = place_of(TRIM_FRAME_RECORD, "on")
 BOTTOM = place_of(TRIM_FRAME_RECORD, "bottom")
 SIZE = place_of(TRIM_FRAME_RECORD, "extent")
 FRAME = size_of(TRIM_FRAME_RECORD)
-# Integers of a piece: its curve, where its coefficients are, its degree, neighbors (-1: none), signs of u' and v',
-# and the coordinate that changes faster (0: u, 1: v).
+# A piece of a boundary curve, its integers.
 PIECE_LINKS = record_dtype(
     "i8",
-    curve=1,
-    coefficients=1,
+    curve=1,  # number of its boundary curve
+    coefficients=1,  # where in the pool its coefficients are
     degree=1,
-    before=1,
-    after=1,
-    sign_u=1,
-    sign_v=1,
-    major=1,
+    before=1,  # the piece before it; -1: none
+    after=1,  # the piece after it; -1: none
+    sign_u=1,  # of u' all along
+    sign_v=1,  # of v' all along
+    major=1,  # the coordinate that changes faster (0: u, 1: v)
 )
 piece_links_at = record_view(PIECE_LINKS)
 PIECE_CURVE = place_of(PIECE_LINKS, "curve")
 PIECE_COEFFICIENTS = place_of(PIECE_LINKS, "coefficients")
 PIECE_DEGREE = place_of(PIECE_LINKS, "degree")
-PIECE_BEFORE = place_of(PIECE_LINKS, "before")
-PIECE_AFTER = place_of(PIECE_LINKS, "after")
 PIECE_SIGN_U = place_of(PIECE_LINKS, "sign_u")
 PIECE_SIGN_V = place_of(PIECE_LINKS, "sign_v")
 PIECE_MAJOR = place_of(PIECE_LINKS, "major")
 PIECE_INTS = size_of(PIECE_LINKS)
-# Doubles of a piece: its box, its parameters, what moves its curve into the cell, the middle of its span, bounds on
-# |C'|, |C''|, |C'''|, and its ends.
+# The same piece, its doubles.
 PIECE_BOUNDS = record_dtype(
     "f8",
-    box=4,
-    t0=1,
+    box=4,  # low u, high u, low v, high v
+    t0=1,  # its interval on the curve
     t1=1,
-    shift_u=1,
+    shift_u=1,  # moves its curve into the cell
     shift_v=1,
-    middle=1,
-    bound_1=1,
-    bound_2=1,
-    bound_3=1,
-    start=2,
-    end=2,
+    middle=1,  # of its span
+    bound_1=1,  # on |C'|
+    bound_2=1,  # on |C''|
+    bound_3=1,  # on |C'''|
+    start=2,  # (u, v) at t0
+    end=2,  # (u, v) at t1
 )
 piece_bounds_at = record_view(PIECE_BOUNDS)
 PIECE_T0 = place_of(PIECE_BOUNDS, "t0")
@@ -114,7 +107,6 @@ SHIFT_U = place_of(PIECE_BOUNDS, "shift_u")
 SHIFT_V = place_of(PIECE_BOUNDS, "shift_v")
 MIDDLE = place_of(PIECE_BOUNDS, "middle")
 BOUND_1 = place_of(PIECE_BOUNDS, "bound_1")
-BOUND_2 = place_of(PIECE_BOUNDS, "bound_2")
 BOUND_3 = place_of(PIECE_BOUNDS, "bound_3")
 START = place_of(PIECE_BOUNDS, "start")
 END = place_of(PIECE_BOUNDS, "end")

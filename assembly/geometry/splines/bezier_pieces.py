@@ -12,39 +12,33 @@ from assembly._lanes import lane, load_lanes, store_xyz
 from assembly._record import place_of, record_dtype, record_view, size_of
 from assembly.geometry.splines.evaluate import find_span, into_domain
 
-# Integers of a record: degree, spans, 1 where weights differ, and where in the pool its tables are.
+# A curve of Bezier pieces in the table.
 BEZIER_CURVE = record_dtype(
     "i8",
     degree=1,
     spans=1,
-    rational=1,
-    breaks=1,
-    binomials=1,
-    middle=1,
-    pieces=1,
-    tree=1,
-    squares=1,
-    square_binomials=1,
+    rational=1,  # 1: weights differ
+    breaks=1,  # where in the pool the ends of the spans begin
+    binomials=1,  # where in the pool binomials of the degree begin
+    middle=1,  # where in the pool the weights of derivatives at the middle begin
+    pieces=1,  # where in the pool their rows (w x, w y, w z, w) begin
+    tree=1,  # where in the pool boxes of the tree over the spans begin
+    squares=1,  # where in the pool coefficients of |X|^2, w X and w^2 of every span begin
+    square_binomials=1,  # where in the pool binomials of twice the degree begin
 )
 bezier_curve_at = record_view(BEZIER_CURVE)
 DEGREE = place_of(BEZIER_CURVE, "degree")
-SPANS = place_of(BEZIER_CURVE, "spans")
 RATIONAL = place_of(BEZIER_CURVE, "rational")
 BREAKS = place_of(BEZIER_CURVE, "breaks")
-BINOMIALS = place_of(BEZIER_CURVE, "binomials")
-MIDDLE = place_of(BEZIER_CURVE, "middle")
 PIECES = place_of(BEZIER_CURVE, "pieces")
-TREE = place_of(BEZIER_CURVE, "tree")
-SQUARES = place_of(BEZIER_CURVE, "squares")
 RECORD = size_of(BEZIER_CURVE)
-# Doubles at the head of a pool: the largest distance of a control point from the center, how far the packed curve may
-# be from the one that was given, the center, the largest quotient of two weights.
+# The head of its pool.
 BEZIER_HEAD = record_dtype(
     "f8",
-    reach=1,
-    error=1,
-    center=3,
-    weight_ratio=1,
+    reach=1,  # the largest distance of a control point from the center [length]
+    error=1,  # how far the packed curve may be from the one that was given [length]
+    center=3,  # that positions are taken about [length]
+    weight_ratio=1,  # the largest quotient of two weights
 )
 bezier_head_at = record_view(BEZIER_HEAD)
 REACH = place_of(BEZIER_HEAD, "reach")

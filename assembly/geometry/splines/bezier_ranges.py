@@ -23,18 +23,17 @@ from assembly._kernel import kernel
 from assembly._record import place_of, record_dtype, record_view, size_of
 from assembly.geometry.interval import UNIT, idifference, iproduct, iquotient, up, widened
 
-# Record: dimension, degree, pieces, whether it is rational; where in the pool the points of C, C', C'', C''' begin
-# (four numbers each, (degree + 1 - order) a piece), then the largest of each order and R, the Gram matrix, the knots.
+# A curve of pieces in the table.
 RANGED_CURVE = record_dtype(
     "i8",
-    dimension=1,
+    dimension=1,  # 2 or 3
     degree=1,
-    pieces=1,
-    rational=1,
-    points=4,
-    largest=1,
-    gram=1,
-    breaks=1,
+    pieces=1,  # how many
+    rational=1,  # 1: weights differ
+    points=4,  # where in the pool those of C, C', C'', C''' begin: four numbers each, (degree + 1 - order) a piece
+    largest=1,  # where in the pool the largest number of each order begins, four of them, and R behind them
+    gram=1,  # where in the pool the Gram matrix begins
+    breaks=1,  # where in the pool the knots begin
 )
 ranged_curve_at = record_view(RANGED_CURVE)
 DIMENSION = place_of(RANGED_CURVE, "dimension")
@@ -46,21 +45,34 @@ LARGEST = place_of(RANGED_CURVE, "largest")
 GRAM = place_of(RANGED_CURVE, "gram")
 BREAKS = place_of(RANGED_CURVE, "breaks")
 BEZIER_RECORD = size_of(RANGED_CURVE)
-# Room: 24 numbers of the ranges, 18 of values in the middle, 3 + 3 of the ends, the width, then Bezier points.
+# Room for bounds; Bezier points stand behind it.
 RANGE_ROOM = record_dtype(
     "f8",
-    ranges=24,
-    middle=18,
-    first=3,
-    last=3,
-    width=1,
+    ranges=24,  # of C, C', C'', C''' over a part: pairs
+    middle=18,  # of C, C', C'' in its middle: pairs
+    first=3,  # point at its begin [length]
+    last=3,  # point at its end [length]
+    width=1,  # of its ellipsoid, squared length
     spare=3,
 )
 range_room_at = record_view(RANGE_ROOM)
 RANGES = place_of(RANGE_ROOM, "ranges")
 BEZIER_AT = size_of(RANGE_ROOM)
-# Of the largest numbers: that of the positions.
-_SIZE = 4
+# A point with its weight.
+WEIGHTED_POINT = record_dtype(
+    "f8",
+    position=3,  # times the weight
+    weight=1,
+)
+weighted_point_at = record_view(WEIGHTED_POINT)
+WEIGHTED = size_of(WEIGHTED_POINT)
+# The largest numbers of a curve.
+LARGEST_RECORD = record_dtype(
+    "f8",
+    orders=4,  # of the points of C, C', C'', C'''
+    position=1,  # R, of the points without their weights [length]
+)
+largest_at = record_view(LARGEST_RECORD)
 
 
 @kernel(inner=True, exact=True)
@@ -109,7 +121,7 @@ def piece_points(table, span, order):
 @kernel(inline=True)
 def error_of(table, pool, order):
     """How far values and Bezier points of a derivative may be off."""
-    return units(table) * pool[ranged_curve_at(table, 0).largest + order]
+    return units(table) * largest_at(pool, ranged_curve_at(table, 0).largest).orders[order]
 
 
 @kernel(inline=True)
@@ -122,7 +134,7 @@ def units(table):
 def project(table, pool, free, count, room, at):
     """Pairs of C and of w from homogeneous points at room[free:], to room[at:], eight numbers."""
     part = units(table)
-    off = 4.0 * part * pool[ranged_curve_at(table, 0).largest + _SIZE]
+    off = 4.0 * part * largest_at(pool, ranged_curve_at(table, 0).largest).position
     for k in range(4):
         lo = math.inf
         hi = -math.inf
@@ -261,5 +273,5 @@ def gram_width(table, pool, n, step, room, at, error):
     # Points are off by `error` each, and a mean by as much: in the norm of the variance, which is at most the largest
     # of them. Sums of (n + 1)^2 positive and negative terms are off by that many units of their absolute sum.
     root = math.sqrt(max(total, 0.0) + UNIT * (n + 2.0) * (n + 2.0) * off) * (1.0 + 8.0 * UNIT)
-    root += 2.0 * math.sqrt(3.0) * (error + UNIT * (n + 2.0) * pool[curve.largest + 1])
+    root += 2.0 * math.sqrt(3.0) * (error + UNIT * (n + 2.0) * largest_at(pool, curve.largest).orders[1])
     return up(up(step * root) * up(step * root))

@@ -7,8 +7,7 @@ A surface is packed as one power table per span: with s = u - (middle of the spa
 four lanes a coefficient, evaluated by Horner's rule with both derivatives at once. Degrees up to
 three share one unrolled bicubic path (missing powers are zero); higher degrees run in loops.
 
-A surface is a record of `SURFACE_RECORD` integers in the table, a curve one of `CURVE_RECORD`:
-offsets point into the pool of doubles.
+Records of surfaces and curves stand in the table of integers; what they point to is in the pool of doubles.
 """
 
 from __future__ import annotations
@@ -17,23 +16,22 @@ from assembly._kernel import kernel
 from assembly._lanes import lane, load_lanes, store_xyz
 from assembly._record import place_of, record_dtype, record_view, size_of
 
-# Fields of a surface record.
-# Edges of the domain that are one point: 1, 2, 4, 8 for the low and high end of u, then of v.
+# A surface in the table.
 SURFACE = record_dtype(
     "i8",
     degree_u=1,
     degree_v=1,
     spans_u=1,
     spans_v=1,
-    breaks_u=1,
+    breaks_u=1,  # where in the pool the ends of its spans in u begin
     breaks_v=1,
-    coefficients=1,
-    closed_u=1,
+    coefficients=1,  # where in the pool its power tables begin
+    closed_u=1,  # 1: periodic in u
     closed_v=1,
-    sign=1,
-    cells=1,
+    sign=1,  # of the outward normal, times S_u x S_v
+    cells=1,  # where in the pool its cells begin
     cell_count=1,
-    poles=1,
+    poles=1,  # edges of the domain that are one point: 1, 2, 4, 8 for the low and high end of u, then of v
 )
 surface_at = record_view(SURFACE)
 SURFACE_RECORD = size_of(SURFACE)
@@ -50,14 +48,14 @@ SIGN = place_of(SURFACE, "sign")
 CELLS = place_of(SURFACE, "cells")
 CELL_COUNT = place_of(SURFACE, "cell_count")
 POLES = place_of(SURFACE, "poles")
-# Fields of a curve record.
+# A curve in the table.
 CURVE = record_dtype(
     "i8",
     degree=1,
     spans=1,
-    breaks=1,
-    coefficients=1,
-    closed=1,
+    breaks=1,  # where in the pool the ends of its spans begin
+    coefficients=1,  # where in the pool its power tables begin
+    closed=1,  # 1: periodic
 )
 spline_curve_at = record_view(CURVE)
 CURVE_RECORD = size_of(CURVE)
@@ -65,7 +63,6 @@ CURVE_DEGREE = place_of(CURVE, "degree")
 CURVE_SPANS = place_of(CURVE, "spans")
 CURVE_BREAKS = place_of(CURVE, "breaks")
 CURVE_COEFFICIENTS = place_of(CURVE, "coefficients")
-CURVE_CLOSED = place_of(CURVE, "closed")
 
 
 # So many spans are searched without a guess.
@@ -364,8 +361,17 @@ def third_derivatives(table, pool, r, u, v):
     return xyz(6.0 * xuuu), xyz(2.0 * xuuv), xyz(2.0 * xuvv), xyz(6.0 * xvvv)
 
 
-CELL_SIZE = 11  # doubles a cell: u, v, point, sphere's center, radius, half widths in u and v
-
+# A cell of a surface: a small piece of it.
+CELL = record_dtype(
+    "f8",
+    parameters=2,  # (u, v) of a point of it
+    point=3,  # [length]
+    center=3,  # of a sphere that holds the piece [length]
+    radius=1,  # of the sphere [length]
+    half_widths=2,  # in u and v
+)
+cell_at = record_view(CELL)
+CELL_SIZE = size_of(CELL)
 
 # Fields of a surface record that are offsets into the pool.
 OFFSETS = (BREAKS_U, BREAKS_V, COEFFICIENTS, CELLS)

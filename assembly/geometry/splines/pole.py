@@ -13,6 +13,7 @@ up to third order in delta, A the shape operator at the pole. It is found from t
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 from assembly._kernel import kernel
 from assembly.geometry.splines.evaluate import (
@@ -23,6 +24,20 @@ from assembly.geometry.vec import add, blend, cross, dot, scale, sub
 
 # The polar chart is left for the pole's own within this part of the domain: its error is the third power.
 CHART = 1e-6
+
+# A surface's tangent plane at a point of it, in its body's axes: [S_u S_v] = [x y] E.
+SurfaceFrame = namedtuple(
+    "SurfaceFrame",
+    [
+        "point",
+        "normal",  # outward, of length one
+        "tangent_x",
+        "tangent_y",  # normal times tangent_x
+        "rates",  # E^-1 (11, 12, 22), upper triangular; zero at a pole
+        "shape",  # shape operator (11, 12, 22), +1/r on a ball
+        "regular",  # whether there is a tangent plane
+    ],
+)
 
 
 @kernel(inline=True)
@@ -86,7 +101,7 @@ def spoke_normal(table, r, edge, e, turn):
 
 @kernel(inner=True)
 def pole_frame(table, pool, r, edge, u, v):
-    """Near a pole: point, normal, tangents x and y, shape operator (11, 12, 22), whether there is a tangent plane."""
+    """The `SurfaceFrame` near a pole, whose coordinates have no rates."""
     across = 0 if edge <= 2 else 1
     lo, hi, _ = limits(table, pool, r, across)
     other_lo, other_hi, _ = limits(table, pool, r, 1 - across)
@@ -99,7 +114,7 @@ def pole_frame(table, pool, r, edge, u, v):
     ee = dot(e, e)
     zero = (0.0, 0.0, 0.0)
     if not (length > 0.0 and ee > 0.0):
-        return p, zero, zero, zero, zero, False
+        return SurfaceFrame(p, zero, zero, zero, zero, zero, False)
     n = scale(1.0 / length, n)
     x = scale(1.0 / math.sqrt(ee), e)
     y = cross(n, x)
@@ -131,7 +146,7 @@ def pole_frame(table, pool, r, edge, u, v):
         r2 += g2 * rest / ekk
     det = m11 * m22 - m12 * m12
     if not (smooth and det > 0.0):
-        return p, n, x, y, zero, False
+        return SurfaceFrame(p, n, x, y, zero, zero, False)
     a12 = (m22 * r1 - m12 * r2) / det
     a22 = (m11 * r2 - m12 * r1) / det
     # From the pole to the point, in the pole's own chart.
@@ -142,13 +157,14 @@ def pole_frame(table, pool, r, edge, u, v):
     q = add(p, add(blend(wx, x, wy, y), scale(-0.5 * (wx * lean_x + wy * lean_y), n)))
     # n + A w is longer than one in second order.
     stretch = 0.5 * (lean_x * lean_x + lean_y * lean_y)
-    return (
-        q,
-        add(scale(1.0 - stretch, n), blend(lean_x, x, lean_y, y)),
-        sub(x, scale(lean_x, n)),
-        sub(y, scale(lean_y, n)),
-        (a11, a12, a22),
-        True,
+    return SurfaceFrame(
+        point=q,
+        normal=add(scale(1.0 - stretch, n), blend(lean_x, x, lean_y, y)),
+        tangent_x=sub(x, scale(lean_x, n)),
+        tangent_y=sub(y, scale(lean_y, n)),
+        rates=zero,
+        shape=(a11, a12, a22),
+        regular=True,
     )
 
 

@@ -20,7 +20,7 @@ from assembly.geometry.splines.evaluate import BREAKS_U, BREAKS_V, CELLS, COEFFI
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.kinematics.body import BodyFace, Point
 from assembly.kinematics.pose import check_quaternion
-from assembly.proximity.controllers.laws import DISTANCE, ERROR, GAIN, LAW, MODE_F, MODE_G, ROW, run_control
+from assembly.proximity.controllers.laws import DISTANCE, ERROR, GAIN, MODE_F, MODE_G, ROW, ControlLaw, run_control
 
 __all__ = ["ControlRun", "ControlStatus", "Controller"]
 
@@ -170,14 +170,12 @@ class Controller:
         self._form = form_number(form)
         if gain is not None and rate is not None:
             raise InputError(f"gain is {gain} and rate is {rate}; expected one of them")
-        law = np.zeros(LAW)
-        law[:] = (
-            0.0 if gain is None else positive("gain", gain),
-            0.0 if rate is None else positive("rate", rate),
-            number("nearest", nearest),
-            float(bool(feedforward)),
+        self._law = ControlLaw(
+            gain=0.0 if gain is None else positive("gain", gain),
+            rate=0.0 if rate is None else positive("rate", rate),
+            nearest=number("nearest", nearest),
+            feed_forward=float(bool(feedforward)),
         )
-        self._law = law
         self._size = max(s.size for s in surfaces)
         self._tolerance = positive("tolerance", tolerance) * self._size
         tables = [s.packed() for s in surfaces]
@@ -259,7 +257,7 @@ class Controller:
             positive("dt", dt),
             steps,
             self._form,
-            self._law,
+            tuple(self._law),
             self._tolerance,
             _MEET * self._size,
             out,

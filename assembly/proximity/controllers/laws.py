@@ -15,6 +15,7 @@ the second derivative of |D|^2 / 2.
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 from assembly._kernel import kernel
 from assembly._record import place_of, record_dtype, record_view, size_of
@@ -31,13 +32,13 @@ from assembly.proximity.extrema.feedback import descent_step, end_of
 UNIT, COVARIANT, CONTRAVARIANT = 0, 1, 2
 # Statuses of a run.
 CLOSEST, ON_ITS_WAY, MEETING, IRREGULAR = 0, 1, 2, 3
-# What is written of a step: parameters (4), distance, error, modes (2: how many parameters are held), gain.
+# What is written of a step.
 STEP_ROW = record_dtype(
     "f8",
-    before=4,
-    distance=1,
-    error=1,
-    mode_f=1,
+    parameters=4,  # (u_f, v_f, u_g, v_g) where it begins
+    distance=1,  # of the witness points [length]
+    error=1,  # norm of the projections on unit tangents, those that are held left out [length]
+    mode_f=1,  # how many parameters of f are held at ends
     mode_g=1,
     gain=1,
 )
@@ -48,8 +49,28 @@ ERROR = place_of(STEP_ROW, "error")
 MODE_F = place_of(STEP_ROW, "mode_f")
 MODE_G = place_of(STEP_ROW, "mode_g")
 GAIN = place_of(STEP_ROW, "gain")
-# Fields of a law: gain (0: as large as the step allows), exponential rate (0: none), the least distance, feed-forward.
-LAW_GAIN, LAW_RATE, LAW_NEAREST, LAW_FEED, LAW = 0, 1, 2, 3, 4
+# How a controller moves, as four numbers.
+ControlLaw = namedtuple(
+    "ControlLaw",
+    [
+        "gain",  # 0: as large as the step allows
+        "rate",  # exponential rate of the distance [1 / time]; 0: none
+        "nearest",  # the distance that the rate leads to [length]
+        "feed_forward",  # 1: the motion's part of the closest point's rate is added
+    ],
+)
+# Where the target stands, seen from f, and how it moves.
+Target = namedtuple(
+    "Target",
+    [
+        "turn",  # rotation of the target's body
+        "shift",  # its origin; of a point, the point
+        "drift_f",  # velocity of the other witness point seen from f, in its axes
+        "drift_g",  # the same seen from g
+    ],
+)
+# What a law says of a state.
+ControlStep = namedtuple("ControlStep", ["rates", "distance", "error", "mode_f", "mode_g", "gain"])
 # A step without a given gain is halved at most so often.
 HALVINGS = 30
 # How region-of-attraction runs move.
@@ -150,11 +171,9 @@ def keep(h, held_u, held_v):
 
 
 @kernel(inner=True)
-def control_rates(table, pool, f, g, turn, shift, x, drift_f, drift_g, form, law, dt):
-    """Rates of x, and distance, error, modes and gain. With g < 0 the target is the point `shift`.
-
-    drift_f, drift_g: the velocity of the other witness point seen from f and from g, in their axes.
-    """
+def control_rates(table, pool, f, g, placed, x, form, law, dt):
+    """The `ControlStep` of a `ControlLaw` at x, of a `Target`. With g < 0 that is the point `placed.shift`."""
+    turn, shift = placed.turn, placed.shift
     s = surface_point(table, pool, f, x[0], x[1])
     t = s
     target = shift
@@ -194,18 +213,18 @@ def control_rates(table, pool, f, g, turn, shift, x, drift_f, drift_g, form, law
         metric_g = largest(second_form(t, zero), c, held_r, held_s)
         top = max(top, largest(k, c, held_r, held_s), metric_g) + math.sqrt(metric_f * metric_g)
     limit = 1.0 / (dt * top) if top > 0.0 else 0.0
-    gain = law[LAW_GAIN] if law[LAW_GAIN] > 0.0 else limit
-    if law[LAW_RATE] > 0.0:
-        wanted = law[LAW_RATE] * max(distance - law[LAW_NEAREST], 0.0) * distance
+    gain = law.gain if law.gain > 0.0 else limit
+    if law.rate > 0.0:
+        wanted = law.rate * max(distance - law.nearest, 0.0) * distance
         gain = wanted / power if wanted < limit * power else limit
     mode_f = int(held_u) + int(held_v)
     mode_g = int(held_r) + int(held_s)
     rates = (gain * ru, gain * rv, gain * rr, gain * rs)
-    if law[LAW_FEED] > 0.0:
-        bf = (0.0 if held_u else -dot(s[1], drift_f), 0.0 if held_v else -dot(s[2], drift_f))
+    if law.feed_forward > 0.0:
+        bf = (0.0 if held_u else -dot(s[1], placed.drift_f), 0.0 if held_v else -dot(s[2], placed.drift_f))
         bg = (0.0, 0.0)
         if g >= 0:
-            bg = (0.0 if held_r else -dot(t[1], drift_g), 0.0 if held_s else -dot(t[2], drift_g))
+            bg = (0.0 if held_r else -dot(t[1], placed.drift_g), 0.0 if held_s else -dot(t[2], placed.drift_g))
             fu = matvec_t(turn, s[1])
             fv = matvec_t(turn, s[2])
             p = (
@@ -217,7 +236,7 @@ def control_rates(table, pool, f, g, turn, shift, x, drift_f, drift_g, form, law
         add_f, add_g, definite = descent_step(keep(h, held_u, held_v), p, keep(k, held_r, held_s), bf, bg, 0.0)
         if definite:
             rates = (rates[0] + add_f[0], rates[1] + add_f[1], rates[2] + add_g[0], rates[3] + add_g[1])
-    return rates, distance, math.sqrt(error), mode_f, mode_g, gain
+    return ControlStep(rates, distance, math.sqrt(error), mode_f, mode_g, gain)
 
 
 @kernel(inline=True)
@@ -261,28 +280,31 @@ def relative(table, poses, k, g, point):
 
 
 @kernel(inline=True)
-def write_row(out, row, x, distance, error, mode_f, mode_g, gain):
-    step = step_row_at(out, row)
-    out[row, 0], out[row, 1], out[row, 2], out[row, 3] = x
-    step.distance = distance
-    step.error = error
-    step.mode_f = mode_f
-    step.mode_g = mode_g
-    step.gain = gain
+def write_row(out, row, x, step):
+    written = step_row_at(out, row)
+    for k in range(4):
+        written.parameters[k] = x[k]
+    written.distance = step.distance
+    written.error = step.error
+    written.mode_f = step.mode_f
+    written.mode_g = step.mode_g
+    written.gain = step.gain
 
 
 @kernel(
     signatures=(
-        "(i8[::1], f8[::1], i8, i8, UniTuple(f8, 3), f8[:, :, ::1], UniTuple(f8, 4), f8, i8, i8, f8[::1], f8, "
+        "(i8[::1], f8[::1], i8, i8, UniTuple(f8, 3), f8[:, :, ::1], UniTuple(f8, 4), f8, i8, i8, UniTuple(f8, 4), f8, "
         "f8, f8[:, ::1])"
     ),
 )
 def run_control(table, pool, f, g, point, poses, x, dt, steps, form, law, tolerance, meet, out):
     """`steps` Euler steps of the controller from x, along poses (n, 2, 7), the last of which stays: status and steps.
 
-    Row k of `out` is the state after k steps; one with a single row gets the last state. Where nothing moves any more
-    the run ends with an error of at most `tolerance`. The points meet at a distance of `meet`.
+    `law` are the numbers of a `ControlLaw`. Row k of `out` is the state after k steps; one with a single row gets the
+    last state. Where nothing moves any more the run ends with an error of at most `tolerance`. The points meet at a
+    distance of `meet`.
     """
+    law = ControlLaw(law[0], law[1], law[2], law[3])
     turn, shift = relative(table, poses, 0, g, point)
     last = out.shape[0] - 1
     zero = (0.0, 0.0, 0.0)
@@ -307,23 +329,21 @@ def run_control(table, pool, f, g, point, poses, x, dt, steps, form, law, tolera
                 before = add(matvec(turn, there), shift)
                 after = add(matvec(next_turn, there), next_shift)
             drift_f = (i * (after[0] - before[0]), i * (after[1] - before[1]), i * (after[2] - before[2]))
-        rates, distance, error, mode_f, mode_g, gain = control_rates(
-            table, pool, f, g, turn, shift, x, drift_f, drift_g, form, law, dt
-        )
-        if not distance < 1e300:
+        step = control_rates(table, pool, f, g, Target(turn, shift, drift_f, drift_g), x, form, law, dt)
+        if not step.distance < 1e300:
             return IRREGULAR, max(k - 1, 0)
-        write_row(out, min(k, last), x, distance, error, mode_f, mode_g, gain)
-        if distance <= meet:
+        write_row(out, min(k, last), x, step)
+        if step.distance <= meet:
             return MEETING, k
-        if still and error <= tolerance:
+        if still and step.error <= tolerance:
             # Where patches cross the error is of the distance itself.
-            return CLOSEST if distance > 10.0 * tolerance else MEETING, k
+            return CLOSEST if step.distance > 10.0 * tolerance else MEETING, k
         if k == steps:
             break
-        if still and law[LAW_GAIN] == 0.0:
-            x = lowering(table, pool, f, g, turn, shift, x, rates, dt, distance)
+        if still and law.gain == 0.0:
+            x = lowering(table, pool, f, g, turn, shift, x, step.rates, dt, step.distance)
         else:
-            x = moved(table, pool, f, g, x, rates, dt)
+            x = moved(table, pool, f, g, x, step.rates, dt)
         turn, shift = next_turn, next_shift
     return ON_ITS_WAY, steps
 
@@ -357,19 +377,19 @@ def attraction(table, pool, point, starts, method, form, limit, tolerance, out):
     Newton's method without saturation fails where it leaves the patch; with it, components that lead out are set to
     zero and the rest is clamped. The switching controller takes the gain that its eigenvalues allow.
     """
-    law = (0.0, 0.0, 0.0, 0.0)
+    law = ControlLaw(0.0, 0.0, 0.0, 0.0)
     same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
     zero = (0.0, 0.0, 0.0)
+    placed = Target(same, point, zero, zero)
     ended = 0
     for i in range(starts.shape[0]):
         x = (starts[i, 0], starts[i, 1], 0.0, 0.0)
         error = math.inf
         for _ in range(limit):
             if method == SWITCHING:
-                rates, distance, error, _f, _g, _k = control_rates(
-                    table, pool, 0, -1, same, point, x, zero, zero, form, law, 1.0
-                )
-                y = lowering(table, pool, 0, -1, same, point, x, rates, 1.0, distance)
+                step = control_rates(table, pool, 0, -1, placed, x, form, law, 1.0)
+                error = step.error
+                y = lowering(table, pool, 0, -1, same, point, x, step.rates, 1.0, step.distance)
                 clamped = False
             else:
                 s = surface_point(table, pool, 0, x[0], x[1])

@@ -24,7 +24,7 @@ from assembly.geometry.splines.evaluate import CURVE_BREAKS, CURVE_COEFFICIENTS,
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.kinematics.pose import pose_row
 from assembly.proximity.brep.records import EDGE, EDGE_CURVE, EDGE_END, EDGE_RECORD, EDGE_START, EDGE_SURFACE, FACE
-from assembly.proximity.extrema.feature_query import GAP, NORMAL, PAIR, POINT_F, feature_derivatives, find_features
+from assembly.proximity.extrema.feature_query import PAIR, feature_derivatives, feature_pair_at, find_features
 from assembly.proximity.extrema.pairs import EXTREMAL, PairStatus, Side, as_face
 
 __all__ = ["CurvePair", "curve_contact_jacobian", "curve_gap_gradient", "curve_gap_hessian", "extremal_curve_pair"]
@@ -208,8 +208,9 @@ def extremal_curve_pair(
     status = find_features(
         packed.table, packed.pool, *query.features, query.q, query.x, nothing, packed.size, np.inf, out
     )
-    points = out[POINT_F : POINT_F + 6].reshape(2, 3)
-    return CurvePair(out[:3], points, out[NORMAL : NORMAL + 3], float(out[GAP]), _STATUSES[status])
+    pair = feature_pair_at(out, 0)
+    points = np.array([pair.point_f, pair.point_g])
+    return CurvePair(pair.parameters[:3], points, pair.normal, float(pair.gap), _STATUSES[status])
 
 
 def _derivatives(

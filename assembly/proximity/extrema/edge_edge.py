@@ -8,6 +8,7 @@ and the gap is |d|. A parameter that a step would move beyond the end of its edg
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 from assembly._kernel import kernel
 from assembly.geometry.vec import cross, dot, neg, scale, sub
@@ -18,6 +19,7 @@ from assembly.proximity.extrema.feature_jets import (
     FINE,
     ROUNDING,
     SLACK,
+    FeatureFrame,
     across,
     edge_advance,
     edge_held,
@@ -34,6 +36,18 @@ from assembly.proximity.extrema.pair_matrix import RANK
 COINCIDENT = 1e-13
 # Of lines at a larger angle the normal is across both, even where their points are hardly determined.
 NEARLY = 3e-8
+
+# A curve where a pair has a point of it, or a vertex, in the axes of body f.
+CurveSide = namedtuple(
+    "CurveSide",
+    [
+        "point",
+        "tangent",  # of length one; zero of a vertex
+        "bent",  # curvature vector C_tt / |C_t|^2
+        "speed",  # |C_t|; one of a vertex
+        "is_point",  # whether it counts as a vertex here
+    ],
+)
 
 
 @kernel(inline=True)
@@ -70,52 +84,51 @@ def normal_between(d, t1, t2, curves, n, size, isolated):
 
 
 @kernel(inner=True)
-def straight_side(tx, ty, n, tangent, bent, speed, point, unit):
+def straight_side(tx, ty, n, side, unit):
     """(X, Y) of an edge or a point, and its parameter's rate."""
-    if point:
+    if side.is_point:
         return vertex_side(unit), (0.0, 0.0, 0.0, 0.0)
-    c0 = dot(tx, tangent)
-    c1 = dot(ty, tangent)
+    c0 = dot(tx, side.tangent)
+    c1 = dot(ty, side.tangent)
     length = math.sqrt(c0 * c0 + c1 * c1)
     if not length > 1e-9:
         return vertex_side(unit), (0.0, 0.0, 0.0, 0.0)
     c0 /= length
     c1 /= length
-    return edge_side(c0, c1, -dot(n, bent), unit), (c0 / speed, c1 / speed, 0.0, 0.0)
+    return edge_side(c0, c1, -dot(n, side.bent), unit), (c0 / side.speed, c1 / side.speed, 0.0, 0.0)
 
 
 @kernel(inner=True)
-def straight_frame(side_f, side_g, residual, normal, size, regular, isolated, h, scope):
-    """The frame of a pair without faces."""
-    p, t1, bent1, speed1, point_f = side_f
-    q, t2, bent2, speed2, point_g = side_g
-    d = sub(q, p)
-    n, sure = normal_between(d, t1, t2, not (point_f or point_g), normal, size, isolated)
+def straight_frame(curve_f, curve_g, residual, normal, size, regular, isolated, fold):
+    """The `FeatureFrame` of a pair without faces, from the `CurveSide` of either."""
+    t1, t2 = curve_f.tangent, curve_g.tangent
+    d = sub(curve_g.point, curve_f.point)
+    n, sure = normal_between(d, t1, t2, not (curve_f.is_point or curve_g.is_point), normal, size, isolated)
     tx = across(n, t1 if dot(t1, t1) > 0.5 else t2)
     ty = cross(n, tx)
     beta = dot(n, d)
-    unit = max(max(abs(dot(n, bent1)), abs(dot(n, bent2))), 1.0 / size)
-    f, rate_f = straight_side(tx, ty, n, t1, bent1, speed1, point_f, unit)
-    g, rate_g = straight_side(tx, ty, n, t2, bent2, speed2, point_g, unit)
+    unit = max(max(abs(dot(n, curve_f.bent)), abs(dot(n, curve_g.bent))), 1.0 / size)
+    f, rate_f = straight_side(tx, ty, n, curve_f, unit)
+    g, rate_g = straight_side(tx, ty, n, curve_g, unit)
     # Where points coincide their direction is the one given, or any.
     isolated = isolated and (sure or dot(normal, normal) > 0.25)
-    return (
-        n,
-        tx,
-        ty,
-        p,
-        q,
-        beta,
-        f,
-        g,
-        rate_f,
-        rate_g,
-        pair_response(f, g, beta, unit),
-        (residual[0], residual[1], 0.0, 0.0),
-        regular,
-        isolated,
-        True,
-        fold_of(h, scope),
+    return FeatureFrame(
+        normal=n,
+        tangent_x=tx,
+        tangent_y=ty,
+        point_f=curve_f.point,
+        point_g=curve_g.point,
+        gap=beta,
+        side_f=f,
+        side_g=g,
+        rates_f=rate_f,
+        rates_g=rate_g,
+        response=pair_response(f, g, beta, unit),
+        residual=(residual[0], residual[1], 0.0, 0.0),
+        regular=regular,
+        isolated=isolated,
+        proper=True,
+        fold=fold,
     )
 
 
@@ -203,16 +216,15 @@ def solve_off_face(table, pool, kind_f, f, kind_g, g, rotation, shift, x, normal
         iteration += 1
     _i, isolated = inverse(h, scope, RANK)
     frame = straight_frame(
-        (p, t1, bent1, speed1, point_f),
-        (q, t2, bent2, speed2, point_g),
+        CurveSide(p, t1, bent1, speed1, point_f),
+        CurveSide(q, t2, bent2, speed2, point_g),
         (r1, r2),
         normal,
         size,
         regular,
         isolated,
-        h,
-        scope,
+        fold_of(h, scope),
     )
-    if status == CONVERGED and not frame[13]:
+    if status == CONVERGED and not frame.isolated:
         status = SINGULAR
     return status, x, frame

@@ -15,6 +15,7 @@ Of a straight edge inclined to a plane no point is extremal: the end with the sm
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 from assembly._kernel import kernel
 from assembly.geometry.vec import add, blend, cross, dot, matvec, neg, sub
@@ -34,6 +35,7 @@ from assembly.proximity.extrema.feature_jets import (
     FINE,
     ROUNDING,
     SLACK,
+    FeatureFrame,
     edge_advance,
     edge_held,
     edge_side,
@@ -52,17 +54,35 @@ STEEP = 1e-12
 # Where nothing is isolated, a residual below this (over the size, or a tilt) is none.
 LEVEL = 1e-9
 
+# What Newton's method came to for a face and an edge, a vertex or a point, in the axes of the face.
+FaceEdgePair = namedtuple(
+    "FaceEdgePair",
+    [
+        "status",
+        "parameters",  # (u, v) on the face, (t, s) of the other feature
+        "face",  # a `SurfaceFrame`
+        "point",  # of the other feature
+        "gap",  # beta = normal.(point - face.point)
+        "along",  # unit tangent of the edge along the face (two numbers)
+        "bend",  # k = -n.C_tt / |P C_t|^2, the edge's curvature along the normal
+        "speed",  # |P C_t|, how fast the edge goes along the face
+        "unit",  # the curvature that makes Y of a point one over a length
+        "residual",  # (r1x, r1y, tilt)
+        "regular",  # whether there is a tangent plane, and a tangent of the edge along it
+        "is_point",  # whether the other feature counts as a point
+        "isolated",
+        "proper",  # whether the edge is nearest here; true of a point
+        "fold",  # det H / |H|^2
+    ],
+)
+
 
 @kernel(inner=True)
 def solve_on_face(table, pool, face, kind, other, rotation, shift, x, size, turn, limit):
     """Newton from x = (u, v, t, s) for a face and an edge, a vertex or a point, in the axes of the face.
 
-    A point of an edge stays at t, one of a face at (t, s). With limit 0 everything is evaluated at x. Returns status,
-    (u, v, t, s), and
-
-    (n, tx, ty, p, q, beta), (E^-1, A, tangent of the edge, k, |P C_t|, curvature unit), residual,
-    (regular, whether the other feature counts as a point, isolated, whether the edge is nearest here; true of a point),
-    det H / |H|^2
+    A point of an edge stays at t, one of a face at (t, s). With limit 0 everything is evaluated at x. Returns a
+    `FaceEdgePair`.
     """
     if limit > 0 and kind == EDGE:
         # A start carried along a step may be beyond an end, where the curve goes on and the edge does not.
@@ -72,7 +92,9 @@ def solve_on_face(table, pool, face, kind, other, rotation, shift, x, size, turn
     status = NOT_CONVERGED
     iteration = 0
     while True:
-        p, n, tx, ty, e, a, regular = own_frame(table, pool, face, x[0], x[1])
+        own = own_frame(table, pool, face, x[0], x[1])
+        p, n, tx, ty = own.point, own.normal, own.tangent_x, own.tangent_y
+        e, a, regular = own.rates, own.shape, own.regular
         q, ct, ctt = other_jet(table, pool, kind, other, rotation, shift, x[2], x[3])
         d = sub(q, p)
         beta = dot(n, d)
@@ -196,77 +218,85 @@ def solve_on_face(table, pool, face, kind, other, rotation, shift, x, size, turn
     fold = fold_of(h, scope)
     # Past a center of curvature the foot is no nearest point of the face; nor is the edge's where it bends away.
     nearest = point or (fold < LEVEL and k11 + k22 > 0.0 and k11 * k22 > k12 * k12)
-    return (
-        status,
-        x,
-        (n, tx, ty, p, q, beta),
-        (e, a, (c0, c1), k, speed, unit),
-        (r0, r1, tilt),
-        (regular and not (steep and not point), point, isolated, nearest),
+    return FaceEdgePair(
+        status=status,
+        parameters=x,
+        face=own,
+        point=q,
+        gap=beta,
+        along=(c0, c1),
+        bend=k,
+        speed=speed,
+        unit=unit,
+        residual=(r0, r1, tilt),
+        regular=regular and not (steep and not point),
+        is_point=point,
+        isolated=isolated,
+        proper=nearest,
         # Positive, as of two faces, where the pair is closest or deepest.
-        fold if point else -fold,
+        fold=fold if point else -fold,
     )
 
 
 @kernel(inner=True)
-def face_frame(parts, rates, residual, flags, fold):
-    """The frame of a pair whose face is f, from what `solve_on_face` returns."""
-    n, tx, ty, p, q, beta = parts
-    e, a, c, k, speed, unit = rates
-    f = face_side(a)
-    if flags[1]:
+def face_frame(found):
+    """The `FeatureFrame` of a pair whose face is f, from what `solve_on_face` returns."""
+    face, c, speed, unit = found.face, found.along, found.speed, found.unit
+    e, residual = face.rates, found.residual
+    f = face_side(face.shape)
+    if found.is_point:
         g = vertex_side(unit)
         rate = (0.0, 0.0, 0.0, 0.0)
     else:
-        g = edge_side(c[0], c[1], k, unit)
+        g = edge_side(c[0], c[1], found.bend, unit)
         rate = (c[0] / speed, c[1] / speed, 0.0, 0.0)
-    return (
-        n,
-        tx,
-        ty,
-        p,
-        q,
-        beta,
-        f,
-        g,
-        (e[0], e[1], 0.0, e[2]),
-        rate,
-        pair_response(f, g, beta, unit),
-        (residual[0], residual[1], residual[2], 0.0),
-        flags[0],
-        flags[2],
-        flags[3],
-        fold,
+    return FeatureFrame(
+        normal=face.normal,
+        tangent_x=face.tangent_x,
+        tangent_y=face.tangent_y,
+        point_f=face.point,
+        point_g=found.point,
+        gap=found.gap,
+        side_f=f,
+        side_g=g,
+        rates_f=(e[0], e[1], 0.0, e[2]),
+        rates_g=rate,
+        response=pair_response(f, g, found.gap, unit),
+        residual=(residual[0], residual[1], residual[2], 0.0),
+        regular=found.regular,
+        isolated=found.isolated,
+        proper=found.proper,
+        fold=found.fold,
     )
 
 
 @kernel(inner=True)
-def turned_frame(rotation, shift, parts, rates, residual, flags, fold):
+def turned_frame(rotation, shift, found):
     """The frame of a pair whose face is g, in the axes of f: n, y and with them the curvatures change their signs."""
-    n, tx, ty, p, q, beta = parts
-    e, a, c, k, speed, unit = rates
+    face, c, speed, unit = found.face, found.along, found.speed, found.unit
+    e, a, residual = face.rates, face.shape, found.residual
     g = face_side((-a[0], a[1], -a[2]))
-    if flags[1]:
+    if found.is_point:
         f = vertex_side(unit)
         rate = (0.0, 0.0, 0.0, 0.0)
     else:
-        f = edge_side(c[0], -c[1], -k, unit)
+        f = edge_side(c[0], -c[1], -found.bend, unit)
         rate = (c[0] / speed, -c[1] / speed, 0.0, 0.0)
-    return (
-        neg(matvec(rotation, n)),
-        matvec(rotation, tx),
-        neg(matvec(rotation, ty)),
-        add(matvec(rotation, q), shift),
-        add(matvec(rotation, p), shift),
-        beta,
-        f,
-        g,
-        rate,
-        (e[0], -e[1], 0.0, -e[2]),
-        pair_response(f, g, beta, unit),
-        (residual[0], -residual[1], residual[2], 0.0),
-        flags[0],
-        flags[2],
-        flags[3],
-        fold,
+    return FeatureFrame(
+        normal=neg(matvec(rotation, face.normal)),
+        tangent_x=matvec(rotation, face.tangent_x),
+        tangent_y=neg(matvec(rotation, face.tangent_y)),
+        point_f=add(matvec(rotation, found.point), shift),
+        point_g=add(matvec(rotation, face.point), shift),
+        gap=found.gap,
+        side_f=f,
+        side_g=g,
+        rates_f=rate,
+        rates_g=(e[0], -e[1], 0.0, -e[2]),
+        response=pair_response(f, g, found.gap, unit),
+        residual=(residual[0], -residual[1], residual[2], 0.0),
+        regular=found.regular,
+        isolated=found.isolated,
+        proper=found.proper,
+        fold=found.fold,
     )

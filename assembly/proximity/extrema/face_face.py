@@ -18,6 +18,7 @@ parameterizations and no sign of the second normal appears).
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 from assembly._kernel import kernel
 from assembly.geometry.splines.domain import into_domain
@@ -25,9 +26,16 @@ from assembly.geometry.splines.evaluate import (
     surface_at,
     surface_point,
 )
-from assembly.geometry.splines.pole import CHART, limits, nearest_pole, polar_step, pole_frame
+from assembly.geometry.splines.pole import CHART, SurfaceFrame, limits, nearest_pole, polar_step, pole_frame
 from assembly.geometry.vec import add, blend, cross, dot, matvec, matvec_t, scale, sub
-from assembly.proximity.extrema.pair_matrix import across_first, curvature_bound, null_ways, pair_matrix, right_side
+from assembly.proximity.extrema.pair_matrix import (
+    PairMatrix,
+    across_first,
+    curvature_bound,
+    null_ways,
+    pair_matrix,
+    right_side,
+)
 
 # A step that turns about a pole by more than this part of the domain is taken in the pole's plane.
 TURN = 0.08
@@ -49,6 +57,47 @@ STAGNANT, HELD_STILL, HELD_ROUNDING = 1e-7, 1e-12, 4e-15
 # A step that turns the normals by less leaves an error below rounding when a solve carries the frame along it.
 CLOSE = 2e-7
 
+# A surface seen in the tangent frame of another one: [S_u S_v] = [x y] T along it.
+SeenFrame = namedtuple(
+    "SeenFrame",
+    [
+        "point",
+        "rates",  # T^-1 (11, 12, 21, 22); zero at a pole
+        "shape",  # shape operator (11, 12, 22) with respect to the other's normal
+        "tilt",  # its normal, scaled to one along the other's, less that: two numbers
+        "regular",  # whether there is a tangent plane, not orthogonal to the other's
+    ],
+)
+# Everything about a pair of faces at some parameters, extremal or not, in the axes of body f.
+PairFrame = namedtuple(
+    "PairFrame",
+    [
+        "normal",  # outward unit normal of f
+        "tangent_x",
+        "tangent_y",  # with the normal a frame of f: [f_u f_v] = [tangent_x tangent_y] E
+        "point_f",
+        "point_g",
+        "rates_f",  # E^-1 (11, 12, 22), upper triangular: parameters by tangential moves; zero at a pole
+        "rates_g",  # T^-1 (11, 12, 21, 22); zero at a pole
+        "shape_f",  # shape operator (11, 12, 22) with respect to the normal
+        "shape_g",
+        "residual",  # (r1x, r1y, r2x, r2y): lengths, then tilts
+        "gap",  # beta = normal.(point_g - point_f)
+        "regular",  # whether both have a tangent plane here, and those are not orthogonal
+    ],
+)
+# What Newton's method from some parameters came to.
+PairSolution = namedtuple(
+    "PairSolution",
+    [
+        "status",
+        "parameters",  # (u_f, v_f, u_g, v_g)
+        "steps",
+        "frame",  # a `PairFrame`
+        "matrix",  # a `PairMatrix`
+    ],
+)
+
 
 @kernel(inline=True)
 def shape_operator(p, q, r, s, luu, luv, lvv):
@@ -64,9 +113,7 @@ def shape_operator(p, q, r, s, luu, luv, lvv):
 
 @kernel(inline=True)
 def own_frame(table, pool, r, u, v):
-    """Point, outward normal n, tangents x and y, E^-1 (11, 12, 22), shape operator, and whether regular.
-
-    [S_u S_v] = [x y] E.
+    """A `SurfaceFrame` at parameters (u, v).
 
     At a pole E^-1 is zero: the point moves, its polar coordinates have no rates.
     """
@@ -75,15 +122,14 @@ def own_frame(table, pool, r, u, v):
     if patch.poles != 0:
         edge, distance = nearest_pole(table, pool, r, u, v)
         if distance < CHART:
-            p, n, x, y, a, smooth = pole_frame(table, pool, r, edge, u, v)
-            return p, n, x, y, zero, a, smooth
+            return pole_frame(table, pool, r, edge, u, v)
     p, su, sv, suu, suv, svv = surface_point(table, pool, r, u, v)
     sign = float(patch.sign)
     normal = cross(su, sv)
     uu = dot(su, su)
     nn = dot(normal, normal)
     if not (nn > POLE * POLE * uu * dot(sv, sv) and nn > 1e-290):
-        return p, zero, zero, zero, zero, zero, False
+        return SurfaceFrame(p, zero, zero, zero, zero, zero, False)
     length = math.sqrt(nn)
     n = scale(sign / length, normal)
     i11 = 1.0 / math.sqrt(uu)
@@ -92,12 +138,12 @@ def own_frame(table, pool, r, u, v):
     i22 = sign * uu * i11 / length
     i12 = -dot(x, sv) * i11 * i22
     a = shape_operator(i11, i12, 0.0, i22, dot(suu, n), dot(suv, n), dot(svv, n))
-    return p, n, x, cross(n, x), (i11, i12, i22), a, True
+    return SurfaceFrame(p, n, x, cross(n, x), (i11, i12, i22), a, True)
 
 
 @kernel(inline=True)
 def other_frame(table, pool, r, u, v, n, x, y):
-    """Seen with another surface's n, x, y: point, T^-1 (11, 12, 21, 22), shape operator, tilt r2, whether regular.
+    """A `SeenFrame` at parameters (u, v), with another surface's n, x, y.
 
     m = n + [x y] r2 is orthogonal to S_u and S_v: T^T r2 = -(n.S_u, n.S_v), with T = [x y]^T [S_u S_v].
     """
@@ -106,10 +152,11 @@ def other_frame(table, pool, r, u, v, n, x, y):
     if surface_at(table, r).poles != 0:
         edge, distance = nearest_pole(table, pool, r, u, v)
         if distance < CHART:
-            p, m, gx, gy, b, smooth = pole_frame(table, pool, r, edge, u, v)
+            own = pole_frame(table, pool, r, edge, u, v)
+            p, m, gx, gy, b = own.point, own.normal, own.tangent_x, own.tangent_y, own.shape
             s = dot(m, n)
-            if not smooth or abs(s) < 1e-3:
-                return p, none, zero, (0.0, 0.0), False
+            if not own.regular or abs(s) < 1e-3:
+                return SeenFrame(p, none, zero, (0.0, 0.0), False)
             side = 1.0 if s > 0.0 else -1.0
             xx = dot(x, gx)
             xy = dot(x, gy)
@@ -120,7 +167,7 @@ def other_frame(table, pool, r, u, v, n, x, y):
                 side * (xx * (b[0] * yx + b[1] * yy) + xy * (b[1] * yx + b[2] * yy)),
                 side * (yx * (b[0] * yx + b[1] * yy) + yy * (b[1] * yx + b[2] * yy)),
             )
-            return p, none, c, (dot(x, m) / s, dot(y, m) / s), True
+            return SeenFrame(p, none, c, (dot(x, m) / s, dot(y, m) / s), True)
     p, su, sv, suu, suv, svv = surface_point(table, pool, r, u, v)
     t11 = dot(x, su)
     t12 = dot(x, sv)
@@ -128,39 +175,41 @@ def other_frame(table, pool, r, u, v, n, x, y):
     t22 = dot(y, sv)
     det = t11 * t22 - t12 * t21
     if not (det * det > POLE * POLE * dot(su, su) * dot(sv, sv) and abs(det) > 1e-145):
-        return p, none, zero, (0.0, 0.0), False
+        return SeenFrame(p, none, zero, (0.0, 0.0), False)
     i = 1.0 / det
     t = (i * t22, -i * t12, -i * t21, i * t11)
     c = shape_operator(t[0], t[1], t[2], t[3], dot(suu, n), dot(suv, n), dot(svv, n))
     nu = dot(n, su)
     nv = dot(n, sv)
-    return p, t, c, (-(t[0] * nu + t[2] * nv), -(t[1] * nu + t[3] * nv)), True
+    return SeenFrame(p, t, c, (-(t[0] * nu + t[2] * nv), -(t[1] * nu + t[3] * nv)), True)
 
 
 @kernel(inline=True)
 def pair_frame(table, pool, f, g, rotation, shift, x):
-    """Everything about a pair at parameters x = (u_f, v_f, u_g, v_g), in the axes of body f.
-
-    Returns
-    -------
-    n, tx, ty : normal of f and its tangent frame, [f_u f_v] = [tx ty] E
-    pf, pg : the two points
-    e : (11, 12, 22) of E^-1, which is upper triangular; zero at a pole
-    t : (11, 12, 21, 22) of T^-1; zero at a pole
-    a, c : shape operators (11, 12, 22) of f and g with respect to n
-    r : (r1x, r1y, r2x, r2y), residual
-    beta : n.(pg - pf)
-    regular : whether both surfaces have a tangent plane here, and those are not orthogonal
-    """
-    pf, n, tx, ty, e, a, regular_f = own_frame(table, pool, f, x[0], x[1])
+    """The `PairFrame` at parameters x = (u_f, v_f, u_g, v_g), in the axes of body f."""
+    own = own_frame(table, pool, f, x[0], x[1])
+    n, tx, ty = own.normal, own.tangent_x, own.tangent_y
     # The normal and the frame go to the axes of g, rather than six derivatives to those of f.
     ng = matvec_t(rotation, n)
     xg = matvec_t(rotation, tx)
     yg = matvec_t(rotation, ty)
-    qg, t, c, tilt, regular_g = other_frame(table, pool, g, x[2], x[3], ng, xg, yg)
-    pg = add(matvec(rotation, qg), shift)
-    d = sub(pg, pf)
-    return n, tx, ty, pf, pg, e, t, a, c, (dot(tx, d), dot(ty, d), tilt[0], tilt[1]), dot(n, d), regular_f and regular_g
+    seen = other_frame(table, pool, g, x[2], x[3], ng, xg, yg)
+    pg = add(matvec(rotation, seen.point), shift)
+    d = sub(pg, own.point)
+    return PairFrame(
+        normal=n,
+        tangent_x=tx,
+        tangent_y=ty,
+        point_f=own.point,
+        point_g=pg,
+        rates_f=own.rates,
+        rates_g=seen.rates,
+        shape_f=own.shape,
+        shape_g=seen.shape,
+        residual=(dot(tx, d), dot(ty, d), seen.tilt[0], seen.tilt[1]),
+        gap=dot(n, d),
+        regular=own.regular and seen.regular,
+    )
 
 
 @kernel(inline=True)
@@ -191,17 +240,18 @@ def pair_step(a, c, r, k, inverse, size):
     by = k[1] * ax + k[2] * ay - r[1]
     bend_f = (abs(ax) + abs(ay)) * max(curvature_bound(a), 2.0 / size)
     bend_g = (abs(bx) + abs(by)) * max(curvature_bound(c), 2.0 / size)
-    return ax, ay, bx, by, bend_f, bend_g
+    return (ax, ay), (bx, by), bend_f, bend_g
 
 
 @kernel(inline=True)
-def step_of_other(a, c, k, h, step, size):
+def step_of_other(a, c, k, h, step_f, step_g, size):
     """A step of a pair of a continuum, without its part along the continuum on g: f makes that one, backwards.
 
     Where an end of g is in the way the pair may go on along the continuum, to where both surfaces are. Along it H = 0,
     so that f moved by s and g by K s, K = I + beta A, leave what the step solves as it is. Returns as `pair_step`.
     """
-    ax, ay, bx, by = step
+    ax, ay = step_f
+    bx, by = step_g
     if abs(h[0]) + abs(h[1]) + abs(h[2]) + abs(h[3]) <= 1e-9 / size:
         # Two planes: all ways are along it.
         ax, ay, bx, by = ax - bx, ay - by, 0.0, 0.0
@@ -214,7 +264,7 @@ def step_of_other(a, c, k, h, step, size):
         ax, ay, bx, by = ax + s * w[0], ay + s * w[1], bx + s * kx, by + s * ky
     bend_f = (abs(ax) + abs(ay)) * max(curvature_bound(a), 2.0 / size)
     bend_g = (abs(bx) + abs(by)) * max(curvature_bound(c), 2.0 / size)
-    return ax, ay, bx, by, bend_f, bend_g
+    return (ax, ay), (bx, by), bend_f, bend_g
 
 
 @kernel(inline=True)
@@ -224,11 +274,13 @@ def bent_at_most(bend):
 
 
 @kernel(inline=True)
-def move_pair(table, pool, f, g, rotation, x, e, t, tx, ty, step_f, step_g):
+def move_pair(table, pool, f, g, rotation, x, frame, step_f, step_g):
     """Parameters after steps along the tangents of either surface; whether either was clamped; how far they were to go.
 
-    The steps are in the tangent frame of f, (tx, ty), for both.
+    The steps are in the tangent frame of f for both; `frame` is the `PairFrame` at x.
     """
+    e, t = frame.rates_f, frame.rates_g
+    tx, ty = frame.tangent_x, frame.tangent_y
     ax, ay = step_f
     bx, by = step_g
     du = e[0] * ax + e[1] * ay
@@ -263,9 +315,32 @@ def stagnates(step, bend, previous, status, p, q, size):
     return bend < least and step > 0.25 * previous
 
 
+@kernel(inline=True)
+def carried_along(frame, ax, ay, bx, by):
+    """The frame after a last, small step: its gap, points, normal and tangents; what depends on curvature stays."""
+    n, tx, ty = frame.normal, frame.tangent_x, frame.tangent_y
+    a, r = frame.shape_f, frame.residual
+    wx = a[0] * ax + a[1] * ay
+    wy = a[1] * ax + a[2] * ay
+    return PairFrame(
+        normal=add(n, blend(wx, tx, wy, ty)),
+        tangent_x=sub(tx, scale(wx, n)),
+        tangent_y=sub(ty, scale(wy, n)),
+        point_f=add(frame.point_f, blend(ax, tx, ay, ty)),
+        point_g=add(frame.point_g, blend(bx, tx, by, ty)),
+        rates_f=frame.rates_f,
+        rates_g=frame.rates_g,
+        shape_f=a,
+        shape_g=frame.shape_g,
+        residual=r,
+        gap=frame.gap + 0.5 * (r[0] * wx + r[1] * wy - r[2] * bx - r[3] * by),
+        regular=frame.regular,
+    )
+
+
 @kernel(inner=True)
 def solve_pair(table, pool, f, g, rotation, shift, x, size, turn, close, downhill):
-    """Newton from x to the extremal pair: status, parameters, iterations, frame, and H as `pair_matrix` gives it.
+    """Newton from x to the extremal pair: a `PairSolution`.
 
     `size` is the length against which steps are measured. A step that would turn a normal by more than `BEND` is
     shortened, so that the iteration follows the surface; one that would turn it by more than `turn` says that x was not
@@ -283,22 +358,29 @@ def solve_pair(table, pool, f, g, rotation, shift, x, size, turn, close, downhil
     stills = 0
     iteration = 0
     while True:
-        n, tx, ty, pf, pg, e, t, a, c, r, beta, regular = pair_frame(table, pool, f, g, rotation, shift, x)
-        k, h, inverse, isolated = pair_matrix(a, c, beta, flat)
-        if not regular:
+        frame = pair_frame(table, pool, f, g, rotation, shift, x)
+        a, c, r = frame.shape_f, frame.shape_g, frame.residual
+        matrix = pair_matrix(a, c, frame.gap, flat)
+        isolated = matrix.isolated
+        if not frame.regular:
             # An apex or a crease: there is no tangent plane to go on.
             break
         if downhill:
-            inverse, levels = across_first(a, c, r, k, h, inverse, flat)
+            inverse, levels = across_first(a, c, r, matrix.k, matrix.h, matrix.inverse, flat)
+            matrix = PairMatrix(matrix.k, matrix.h, inverse, isolated)
             level = level or levels
-        ax, ay, bx, by, bend_f, bend_g = pair_step(a, c, r, k, inverse, size)
+        step_f, step_g, bend_f, bend_g = pair_step(a, c, r, matrix.k, matrix.inverse, size)
         if by_other and not isolated:
-            ax, ay, bx, by, bend_f, bend_g = step_of_other(a, c, k, h, (ax, ay, bx, by), size)
+            step_f, step_g, bend_f, bend_g = step_of_other(a, c, matrix.k, matrix.h, step_f, step_g, size)
+        ax, ay = step_f
+        bx, by = step_g
         step = max(abs(ax) + abs(ay), abs(bx) + abs(by))
         bend = max(bend_f, bend_g)
         small = bend < close and isolated
         # Small against the scene and against the bodies' own curvature; or as small as rounding lets it become.
-        if (step <= tolerance and bend < 1e-9) or stagnates(step, bend, previous, status, pf, pg, size):
+        if (step <= tolerance and bend < 1e-9) or stagnates(
+            step, bend, previous, status, frame.point_f, frame.point_g, size
+        ):
             # In a singular system a vanishing step is a solution only if the residual vanishes too.
             status = CONVERGED if isolated else (SINGULAR if vanishes(r, size) else NOT_CONVERGED)
             break
@@ -316,7 +398,7 @@ def solve_pair(table, pool, f, g, rotation, shift, x, size, turn, close, downhil
         factor_g = bent_at_most(bend_g)
         step_f = (factor_f * ax, factor_f * ay)
         step_g = (factor_g * bx, factor_g * by)
-        y, clamped, way = move_pair(table, pool, f, g, rotation, x, e, t, tx, ty, step_f, step_g)
+        y, clamped, way = move_pair(table, pool, f, g, rotation, x, frame, step_f, step_g)
         status = NOT_CONVERGED
         if clamped:
             status = LEFT_PATCH
@@ -329,19 +411,11 @@ def solve_pair(table, pool, f, g, rotation, shift, x, size, turn, close, downhil
                 by_other = not by_other
                 previous = 1e300
         elif small:
-            wx = a[0] * ax + a[1] * ay
-            wy = a[1] * ax + a[2] * ay
-            beta += 0.5 * (r[0] * wx + r[1] * wy - r[2] * bx - r[3] * by)
-            pf = add(pf, blend(ax, tx, ay, ty))
-            pg = add(pg, blend(bx, tx, by, ty))
-            lean = blend(wx, tx, wy, ty)
-            tx = sub(tx, scale(wx, n))
-            ty = sub(ty, scale(wy, n))
-            n = add(n, lean)
+            frame = carried_along(frame, ax, ay, bx, by)
             x = y
             status = CONVERGED
             iteration += 1
             break
         x = y
         iteration += 1
-    return status, x, iteration, (n, tx, ty, pf, pg, e, t, a, c, r, beta, regular), (k, h, inverse, isolated)
+    return PairSolution(status, x, iteration, frame, matrix)

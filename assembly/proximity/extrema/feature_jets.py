@@ -24,6 +24,7 @@ For two faces this is the form of `proximity/extrema/face_face.py`; for a face a
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 from assembly._kernel import kernel
 from assembly.geometry.splines.domain import into_domain
@@ -51,6 +52,31 @@ ROUNDING = 2e-15
 SLACK = 1e-13
 # A slope (or a length over the size) at the end of an edge that leads beyond it by less is rounding.
 BEYOND = 1e-12
+
+# What a feature asks of a contact normal: the two matrices X and Y above, entry by entry.
+FeatureSide = namedtuple("FeatureSide", ["x11", "x12", "x21", "x22", "y11", "y12", "y21", "y22"])
+# Everything about a pair of any two features at some parameters, extremal or not, in the axes of body f.
+FeatureFrame = namedtuple(
+    "FeatureFrame",
+    [
+        "normal",  # unit normal from f towards g
+        "tangent_x",
+        "tangent_y",  # tangent_x times tangent_y is the normal
+        "point_f",
+        "point_g",
+        "gap",  # beta = normal.(point_g - point_f)
+        "side_f",  # a `FeatureSide`
+        "side_g",
+        "rates_f",  # map (11, 12, 21, 22) from tangential moves to parameters; zero at a pole
+        "rates_g",
+        "response",  # H^-1 (11, 12, 21, 22), damped where H is singular
+        "residual",  # (r1x, r1y, r2x, r2y): lengths, then tilts
+        "regular",  # whether both have a tangent here
+        "isolated",  # whether the pair is no part of a continuum
+        "proper",  # whether two surfaces do not cross, an edge over a face is nearest here; true of other pairs
+        "fold",  # determinant over squared norm of the equations' matrix: zero where a pair ceases to be isolated
+    ],
+)
 
 
 @kernel(inner=True)
@@ -115,19 +141,19 @@ def edge_stride(table, pool, edge):
 
 @kernel(inline=True)
 def face_side(a):
-    """(X, Y) row by row of a face with shape operator a (11, 12, 22)."""
-    return (1.0, 0.0, 0.0, 1.0, a[0], a[1], a[1], a[2])
+    """(X, Y) of a face with shape operator a (11, 12, 22)."""
+    return FeatureSide(1.0, 0.0, 0.0, 1.0, a[0], a[1], a[1], a[2])
 
 
 @kernel(inline=True)
 def edge_side(tx, ty, k, unit):
     """(X, Y) of an edge with unit tangent (tx, ty)."""
-    return (tx, 0.0, ty, 0.0, k * tx, -unit * ty, k * ty, unit * tx)
+    return FeatureSide(tx, 0.0, ty, 0.0, k * tx, -unit * ty, k * ty, unit * tx)
 
 
 @kernel(inline=True)
 def vertex_side(unit):
-    return (0.0, 0.0, 0.0, 0.0, unit, 0.0, 0.0, unit)
+    return FeatureSide(0.0, 0.0, 0.0, 0.0, unit, 0.0, 0.0, unit)
 
 
 @kernel(inline=True)
@@ -158,17 +184,25 @@ def inverse(h, size, rank):
 
 
 @kernel(inline=True)
+def offset_side(side, beta):
+    """X + beta Y (11, 12, 21, 22): how a point at the distance beta above a feature moves."""
+    return (
+        side.x11 + beta * side.y11,
+        side.x12 + beta * side.y12,
+        side.x21 + beta * side.y21,
+        side.x22 + beta * side.y22,
+    )
+
+
+@kernel(inline=True)
 def pair_response(f, g, beta, unit):
     """H^-1 of two sides, damped where H is singular."""
-    v11 = f[0] + beta * f[4]
-    v12 = f[1] + beta * f[5]
-    v21 = f[2] + beta * f[6]
-    v22 = f[3] + beta * f[7]
+    v11, v12, v21, v22 = offset_side(f, beta)
     h = (
-        g[4] * v11 + g[6] * v21 - g[0] * f[4] - g[2] * f[6],
-        g[4] * v12 + g[6] * v22 - g[0] * f[5] - g[2] * f[7],
-        g[5] * v11 + g[7] * v21 - g[1] * f[4] - g[3] * f[6],
-        g[5] * v12 + g[7] * v22 - g[1] * f[5] - g[3] * f[7],
+        g.y11 * v11 + g.y21 * v21 - g.x11 * f.y11 - g.x21 * f.y21,
+        g.y11 * v12 + g.y21 * v22 - g.x11 * f.y12 - g.x21 * f.y22,
+        g.y12 * v11 + g.y22 * v21 - g.x12 * f.y11 - g.x22 * f.y21,
+        g.y12 * v12 + g.y22 * v22 - g.x12 * f.y12 - g.x22 * f.y22,
     )
     return inverse(h, unit * (1.0 + abs(beta) * unit), RANK)[0]
 

@@ -15,37 +15,52 @@ from assembly.proximity.brep.records import FACE
 from assembly.proximity.extrema.edge_edge import solve_off_face
 from assembly.proximity.extrema.face_edge import face_frame, solve_on_face, turned_frame
 from assembly.proximity.extrema.face_face import CLOSE, LIMIT, pair_frame, solve_pair
-from assembly.proximity.extrema.feature_jets import face_side
+from assembly.proximity.extrema.feature_jets import FeatureFrame, face_side, offset_side
 from assembly.proximity.extrema.pair_matrix import pair_matrix
 from assembly.proximity.extrema.rates import ARM_F, ARM_G, NORMAL, ZED, derivatives_at, put
 
 
 @kernel(inner=True)
-def two_face_frame(frame, curvature):
-    """The frame of two faces, from what `solve_pair` returns."""
-    n, tx, ty, pf, pg, e, t, a, c, r, beta, regular = frame
-    _k, h, i, isolated = curvature
+def two_face_frame(frame, matrix):
+    """The frame of two faces, from their `PairFrame` and `PairMatrix`."""
+    h = matrix.h
+    e = frame.rates_f
     det = h[0] * h[3] - h[1] * h[2]
     norm2 = h[0] * h[0] + h[1] * h[1] + h[2] * h[2] + h[3] * h[3]
     # Relative curvature -H (I + beta A)^-1: indefinite means the surfaces cross beside the point.
     proper = det > -1e-9 * norm2 and h[0] + h[3] <= 0.0
     fold = det / norm2 if norm2 > 1e-18 else 0.0
-    rate = (e[0], e[1], 0.0, e[2])
-    return n, tx, ty, pf, pg, beta, face_side(a), face_side(c), rate, t, i, r, regular, isolated, proper, fold
+    return FeatureFrame(
+        normal=frame.normal,
+        tangent_x=frame.tangent_x,
+        tangent_y=frame.tangent_y,
+        point_f=frame.point_f,
+        point_g=frame.point_g,
+        gap=frame.gap,
+        side_f=face_side(frame.shape_f),
+        side_g=face_side(frame.shape_g),
+        rates_f=(e[0], e[1], 0.0, e[2]),
+        rates_g=frame.rates_g,
+        response=matrix.inverse,
+        residual=frame.residual,
+        regular=frame.regular,
+        isolated=matrix.isolated,
+        proper=proper,
+        fold=fold,
+    )
 
 
 @kernel(inline=True)
 def conforms(frame):
     """Whether the relative curvature of a pair is rounding: two faces that are equally near all around it."""
-    beta, f, g = frame[5], frame[6], frame[7]
-    square = 0.0
-    for i in range(2):
-        for j in range(2):
-            # Y_g^T (X_f + beta Y_f) - X_g^T Y_f
-            h = g[4 + i] * (f[j] + beta * f[4 + j]) + g[6 + i] * (f[2 + j] + beta * f[6 + j])
-            h -= g[i] * f[4 + j] + g[2 + i] * f[6 + j]
-            square += h * h
-    return square <= 1e-18
+    f, g = frame.side_f, frame.side_g
+    v11, v12, v21, v22 = offset_side(f, frame.gap)
+    # Y_g^T (X_f + beta Y_f) - X_g^T Y_f
+    h11 = (g.y11 * v11 + g.y21 * v21) - (g.x11 * f.y11 + g.x21 * f.y21)
+    h12 = (g.y11 * v12 + g.y21 * v22) - (g.x11 * f.y12 + g.x21 * f.y22)
+    h21 = (g.y12 * v11 + g.y22 * v21) - (g.x12 * f.y11 + g.x22 * f.y21)
+    h22 = (g.y12 * v12 + g.y22 * v22) - (g.x12 * f.y12 + g.x22 * f.y22)
+    return h11 * h11 + h12 * h12 + h21 * h21 + h22 * h22 <= 1e-18
 
 
 @kernel(inline=True)
@@ -57,17 +72,15 @@ def transposed(m):
 def newton_on_features(table, pool, kind_f, f, kind_g, g, rotation, shift, x, n, size, turn, limit):
     """As `solve_features` for all but two faces, with the number of steps: none evaluates the pair at x."""
     if kind_f == FACE:
-        status, y, parts, rates, residual, flags, fold = solve_on_face(
-            table, pool, f, kind_g, g, rotation, shift, x, size, turn, limit
-        )
-        return status, y, face_frame(parts, rates, residual, flags, fold)
+        found = solve_on_face(table, pool, f, kind_g, g, rotation, shift, x, size, turn, limit)
+        return found.status, found.parameters, face_frame(found)
     if kind_g == FACE:
         back = transposed(rotation)
-        status, y, parts, rates, residual, flags, fold = solve_on_face(
+        found = solve_on_face(
             table, pool, g, kind_f, f, back, neg(matvec(back, shift)), (x[2], x[3], x[0], x[1]), size, turn, limit
         )
-        frame = turned_frame(rotation, shift, parts, rates, residual, flags, fold)
-        return status, (y[2], y[3], y[0], y[1]), frame
+        u, v, t, s = found.parameters
+        return found.status, (t, s, u, v), turned_frame(rotation, shift, found)
     status, z, frame = solve_off_face(
         table, pool, kind_f, f, kind_g, g, rotation, shift, (x[0], x[2]), n, size, turn, limit
     )
@@ -76,7 +89,7 @@ def newton_on_features(table, pool, kind_f, f, kind_g, g, rotation, shift, x, n,
 
 @kernel(inner=True)
 def solve_features(table, pool, kind_f, f, kind_g, g, rotation, shift, x, n, size, turn):
-    """Newton from x to the extremal pair of two features. Returns status, parameters and frame.
+    """Newton from x to the extremal pair of two features. Returns status, parameters and `FeatureFrame`.
 
     Parameters
     ----------
@@ -101,24 +114,13 @@ def solve_features(table, pool, kind_f, f, kind_g, g, rotation, shift, x, n, siz
         CONVERGED, SINGULAR, LEFT_PATCH (a parameter is held at an end; the frame is that of the edge's end point),
         NOT_CONVERGED.
     x
+        Its parameters.
     frame
-        n, tx, ty : normal and tangents, x times y = n
-        pf, pg : the two points
-        beta : n.(pg - pf)
-        sides of f and g : (X, Y) row by row (`proximity/extrema/feature_jets.py`)
-        rates of f and g : the map (11, 12, 21, 22) from tangential moves to parameters; zero at a pole
-        response : H^-1 (11, 12, 21, 22)
-        residual : lengths, then tilts
-        regular : whether both have a tangent here
-        isolated : whether the pair is no part of a continuum
-        proper : whether two surfaces do not cross here, and an edge over a face is nearest here (true of other pairs)
-        fold : determinant over squared norm of the equations' matrix: zero where a pair ceases to be isolated
+        Where it is (`proximity/extrema/feature_jets.py`).
     """
     if kind_f == FACE and kind_g == FACE:
-        status, y, _count, frame, curvature = solve_pair(
-            table, pool, f, g, rotation, shift, x, size, turn, CLOSE, False
-        )
-        return status, y, two_face_frame(frame, curvature)
+        found = solve_pair(table, pool, f, g, rotation, shift, x, size, turn, CLOSE, False)
+        return found.status, found.parameters, two_face_frame(found.frame, found.matrix)
     return newton_on_features(table, pool, kind_f, f, kind_g, g, rotation, shift, x, n, size, turn, LIMIT)
 
 
@@ -127,7 +129,7 @@ def features_at(table, pool, kind_f, f, kind_g, g, rotation, shift, x, n, size):
     """The frame of two features at parameters x, extremal or not."""
     if kind_f == FACE and kind_g == FACE:
         frame = pair_frame(table, pool, f, g, rotation, shift, x)
-        return two_face_frame(frame, pair_matrix(frame[7], frame[8], frame[10], 1e-9 / size))
+        return two_face_frame(frame, pair_matrix(frame.shape_f, frame.shape_g, frame.gap, 1e-9 / size))
     return newton_on_features(table, pool, kind_f, f, kind_g, g, rotation, shift, x, n, size, math.inf, 0)[2]
 
 
@@ -157,39 +159,35 @@ def store_velocities(x, y, arm_f, arm_g, records, row):
 def feature_record(turn, shift, frame, records, row):
     """Fill a record from the frame of two features in the axes of body f, whose rotation is `turn`; g is at `shift`."""
     derivatives = derivatives_at(records, row)
-    n, tx, ty, _pf, pg, beta, f, g, of_f, of_g, i, _r, _regular, _isolated, _proper, _fold = frame
-    normal = matvec(turn, n)
-    x = matvec(turn, tx)
-    y = matvec(turn, ty)
-    arm_f = matvec(turn, pg)
-    arm_g = matvec(turn, sub(pg, shift))
-    derivatives.gap = beta
-    put(records, row, NORMAL, normal)
+    f, g, i = frame.side_f, frame.side_g, frame.response
+    of_f, of_g = frame.rates_f, frame.rates_g
+    x = matvec(turn, frame.tangent_x)
+    y = matvec(turn, frame.tangent_y)
+    arm_f = matvec(turn, frame.point_g)
+    arm_g = matvec(turn, sub(frame.point_g, shift))
+    derivatives.gap = frame.gap
+    put(records, row, NORMAL, matvec(turn, frame.normal))
     put(records, row, ARM_F, arm_f)
     put(records, row, ARM_G, arm_g)
     store_velocities(x, y, arm_f, arm_g, records, row)
     # s = S z, S = H^-1 [Y_g^T, -X_g^T].
     m = (
-        i[0] * g[4] + i[1] * g[5],
-        i[0] * g[6] + i[1] * g[7],
-        -i[0] * g[0] - i[1] * g[1],
-        -i[0] * g[2] - i[1] * g[3],
-        i[2] * g[4] + i[3] * g[5],
-        i[2] * g[6] + i[3] * g[7],
-        -i[2] * g[0] - i[3] * g[1],
-        -i[2] * g[2] - i[3] * g[3],
+        i[0] * g.y11 + i[1] * g.y12,
+        i[0] * g.y21 + i[1] * g.y22,
+        -i[0] * g.x11 - i[1] * g.x12,
+        -i[0] * g.x21 - i[1] * g.x22,
+        i[2] * g.y11 + i[3] * g.y12,
+        i[2] * g.y21 + i[3] * g.y22,
+        -i[2] * g.x11 - i[3] * g.x12,
+        -i[2] * g.x21 - i[3] * g.x22,
     )
-    # X_f + beta Y_f
-    v11 = f[0] + beta * f[4]
-    v12 = f[1] + beta * f[5]
-    v21 = f[2] + beta * f[6]
-    v22 = f[3] + beta * f[7]
-    w = (f[4], f[6], -v11, -v21, f[5], f[7], -v12, -v22)
+    v11, v12, v21, v22 = offset_side(f, frame.gap)
+    w = (f.y11, f.y21, -v11, -v21, f.y12, f.y22, -v12, -v22)
     for j in range(4):
         s0 = m[j]
         s1 = m[4 + j]
-        ax = f[0] * s0 + f[1] * s1
-        ay = f[2] * s0 + f[3] * s1
+        ax = f.x11 * s0 + f.x12 * s1
+        ay = f.x21 * s0 + f.x22 * s1
         bx = v11 * s0 + v12 * s1 - (1.0 if j == 0 else 0.0)
         by = v21 * s0 + v22 * s1 - (1.0 if j == 1 else 0.0)
         derivatives.rates[0, j] = of_f[0] * ax + of_f[1] * ay

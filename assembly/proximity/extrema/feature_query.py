@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly._record import place_of, record_dtype, record_view, size_of
 from assembly.geometry.vec import add, matvec, matvec_t
 from assembly.kinematics.motion import position, relative_pose, rotation
 from assembly.proximity.brep.records import FACE
@@ -19,9 +20,28 @@ from assembly.proximity.extrema.rates import (
     into_quaternions,
 )
 
-# What is written of a pair: parameters (4), point of f, point of g, normal, gap, whether it is isolated, whether two
-# surfaces do not cross there, how far it is from a fold, residual (4).
-PARAMETERS, POINT_F, POINT_G, NORMAL, GAP, ISOLATED, PROPER, FOLD, RESIDUAL, PAIR = 0, 4, 7, 10, 13, 14, 15, 16, 17, 21
+# What is written of a pair, in world axes.
+FEATURE_PAIR = record_dtype(
+    "f8",
+    parameters=4,  # (u_f, v_f, u_g, v_g); of an edge (t, 0), of a vertex what it was
+    point_f=3,  # [length]
+    point_g=3,  # [length]
+    normal=3,  # unit normal from f towards g
+    gap=1,  # normal.(point_g - point_f) [length]
+    isolated=1,  # 1: no part of a continuum
+    proper=1,  # 1: two surfaces do not cross there
+    fold=1,  # how far the pair is from a fold: determinant over squared norm of its equations' matrix
+    residual=4,  # two lengths, two tilts
+)
+feature_pair_at = record_view(FEATURE_PAIR)
+PAIR = size_of(FEATURE_PAIR)
+POINT_F = place_of(FEATURE_PAIR, "point_f")
+POINT_G = place_of(FEATURE_PAIR, "point_g")
+NORMAL = place_of(FEATURE_PAIR, "normal")
+GAP = place_of(FEATURE_PAIR, "gap")
+ISOLATED = place_of(FEATURE_PAIR, "isolated")
+PROPER = place_of(FEATURE_PAIR, "proper")
+FOLD = place_of(FEATURE_PAIR, "fold")
 
 
 @kernel(
@@ -37,21 +57,21 @@ def find_features(table, pool, kind_f, f, kind_g, g, q, x, n, size, turn, out):
     known = matvec_t(turn_f, (n[0], n[1], n[2]))
     status, y, frame = solve_features(table, pool, kind_f, f, kind_g, g, relative, shift, x, known, size, turn)
     origin = position(q, 0)
-    pf = add(matvec(turn_f, frame[3]), origin)
-    pg = add(matvec(turn_f, frame[4]), origin)
-    normal = matvec(turn_f, frame[0])
+    pf = add(matvec(turn_f, frame.point_f), origin)
+    pg = add(matvec(turn_f, frame.point_g), origin)
+    normal = matvec(turn_f, frame.normal)
+    pair = feature_pair_at(out, 0)
     for k in range(3):
-        out[POINT_F + k] = pf[k]
-        out[POINT_G + k] = pg[k]
-        out[NORMAL + k] = normal[k]
-    r = frame[11]
+        pair.point_f[k] = pf[k]
+        pair.point_g[k] = pg[k]
+        pair.normal[k] = normal[k]
     for k in range(4):
-        out[PARAMETERS + k] = y[k]
-        out[RESIDUAL + k] = r[k]
-    out[GAP] = frame[5]
-    out[ISOLATED] = 1.0 if frame[13] else 0.0
-    out[PROPER] = 1.0 if frame[14] else 0.0
-    out[FOLD] = frame[15]
+        pair.parameters[k] = y[k]
+        pair.residual[k] = frame.residual[k]
+    pair.gap = frame.gap
+    pair.isolated = 1.0 if frame.isolated else 0.0
+    pair.proper = 1.0 if frame.proper else 0.0
+    pair.fold = frame.fold
     return status
 
 
@@ -70,9 +90,9 @@ def feature_derivatives(table, pool, kind_f, f, kind_g, g, q, x, n, size, first,
     relative, shift = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
     known = matvec_t(turn_f, (n[0], n[1], n[2]))
     frame = features_at(table, pool, kind_f, f, kind_g, g, relative, shift, x, known, size)
-    if not frame[12]:
+    if not frame.regular:
         return math.inf, False
-    r = frame[11]
+    r = frame.residual
     error = max(abs(r[0]), abs(r[1])) / size + max(abs(r[2]), abs(r[3]))
     records = np.empty((1, RECORD))
     derivatives = derivatives_at(records, 0)
@@ -84,7 +104,7 @@ def feature_derivatives(table, pool, kind_f, f, kind_g, g, q, x, n, size, first,
         row[j] = gradient[0, j]
     into_quaternions(row, q, first, 4)
     for i in range(4):
-        rates = frame[8] if i < 2 else frame[9]
+        rates = frame.rates_f if i < 2 else frame.rates_g
         kind = kind_f if i < 2 else kind_g
         at_pole = kind == FACE and rates[0] == 0.0 and rates[1] == 0.0
         for j in range(12):
@@ -99,4 +119,4 @@ def feature_derivatives(table, pool, kind_f, f, kind_g, g, q, x, n, size, first,
     for i in range(12):
         for j in range(i):
             hessian[i, j] = hessian[j, i]
-    return error, frame[13]
+    return error, frame.isolated

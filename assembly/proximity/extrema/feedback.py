@@ -28,6 +28,7 @@ from assembly.proximity.extrema.face_face import (
     LEFT_PATCH,
     NOT_CONVERGED,
     SINGULAR,
+    PairSolution,
     advance,
     own_frame,
     pair_frame,
@@ -156,46 +157,53 @@ def descent_step(p, c, q, gf, gg, mu):
 @kernel(inline=True)
 def both_frames(table, pool, f, g, turn, shift, x):
     """`own_frame` of either surface, each in its own axes, and the vector d from f to g in both."""
-    pf, nf, xf, yf, ef, a, regular_f = own_frame(table, pool, f, x[0], x[1])
-    pg, ng, xg, yg, eg, b, regular_g = own_frame(table, pool, g, x[2], x[3])
-    d = sub(add(matvec(turn, pg), shift), pf)
-    return (nf, xf, yf, ef, a), (ng, xg, yg, eg, b), d, matvec_t(turn, d), regular_f and regular_g
+    own_f = own_frame(table, pool, f, x[0], x[1])
+    own_g = own_frame(table, pool, g, x[2], x[3])
+    d = sub(add(matvec(turn, own_g.point), shift), own_f.point)
+    return own_f, own_g, d, matvec_t(turn, d)
 
 
 @kernel(inner=True)
 def finish(table, pool, f, g, turn, shift, x, size, reach):
-    """Newton's method from x: the result of `solve_pair`, and whether it is the root that the descent leads to.
+    """Newton's method from x: whether it came to the extremum that the descent leads to, and the `PairSolution`.
 
     That is one no farther apart than x, off by no more than `reach` on either surface; with reach = 0, where the
     surfaces meet, one where they touch or, solids, are deepest in each other.
     """
-    n, tx, ty, pf, pg, e, t, a, c, r, beta, regular = pair_frame(table, pool, f, g, turn, shift, x)
+    start = pair_frame(table, pool, f, g, turn, shift, x)
     most = TURN_APART if reach > 0.0 else TURN_MET
     cosine = SAME_APART if reach > 0.0 else SAME_MET
-    status, y, count, frame, matrices = solve_pair(table, pool, f, g, turn, shift, x, size, most, 0.0, False)
-    same = (status == CONVERGED or status == SINGULAR) and dot(n, frame[0]) > cosine
+    found = solve_pair(table, pool, f, g, turn, shift, x, size, most, 0.0, False)
+    y, frame = found.parameters, found.frame
+    same = (found.status == CONVERGED or found.status == SINGULAR) and dot(start.normal, frame.normal) > cosine
     if same:
-        before = own_frame(table, pool, g, x[2], x[3])[1]
-        after = own_frame(table, pool, g, y[2], y[3])[1]
+        before = own_frame(table, pool, g, x[2], x[3]).normal
+        after = own_frame(table, pool, g, y[2], y[3]).normal
         same = dot(before, after) > cosine
         if reach > 0.0:
-            d = sub(pg, pf)
-            moved_f = sub(frame[3], pf)
-            moved_g = sub(frame[4], pg)
+            d = sub(start.point_g, start.point_f)
+            moved_f = sub(frame.point_f, start.point_f)
+            moved_g = sub(frame.point_g, start.point_g)
             limit = reach * reach
-            same = same and abs(frame[10]) <= math.sqrt(dot(d, d)) + 1e-12 * size
+            same = same and abs(frame.gap) <= math.sqrt(dot(d, d)) + 1e-12 * size
             same = same and dot(moved_f, moved_f) <= limit and dot(moved_g, moved_g) <= limit
         else:
-            opposed = dot(after, matvec_t(turn, frame[0])) < 0.0
-            same = same and (abs(frame[10]) <= 1e-9 * size or (opposed and frame[10] < 0.0))
-    return same, status, y, count, frame, matrices
+            opposed = dot(after, matvec_t(turn, frame.normal)) < 0.0
+            same = same and (abs(frame.gap) <= 1e-9 * size or (opposed and frame.gap < 0.0))
+    return same, found
+
+
+@kernel(inline=True)
+def with_steps(found, count):
+    """What was found, after so many steps more."""
+    return PairSolution(found.status, found.parameters, count + found.steps, found.frame, found.matrix)
 
 
 @kernel(inner=True)
 def descend_pair(table, pool, f, g, turn, shift, x, size, limit):
     """From any parameters x down to the nearest pair that the descent leads to, in at most `limit` steps.
 
-    Returns what `solve_pair` returns: status, parameters, steps, frame, matrices. The points never move apart.
+    Returns a `PairSolution`, as `solve_pair` does. The points never move apart.
 
     CONVERGED, SINGULAR: Newton's method finished, at the root the descent led to.
     LEFT_PATCH: nearest at the end of a patch.
@@ -206,14 +214,14 @@ def descend_pair(table, pool, f, g, turn, shift, x, size, limit):
     mu = LEAST
     near = NEAR
     count = 0
-    f_now, g_now, d, dg, regular = both_frames(table, pool, f, g, turn, shift, x)
+    own_f, own_g, d, dg = both_frames(table, pool, f, g, turn, shift, x)
     square = dot(d, d)
-    while regular:
+    while own_f.regular and own_g.regular:
         if square <= MEET * MEET * size * size:
             status = CROSSED
             break
-        nf, xf, yf, ef, a = f_now
-        ng, xg, yg, eg, b = g_now
+        nf, xf, yf, ef, a = own_f.normal, own_f.tangent_x, own_f.tangent_y, own_f.rates, own_f.shape
+        ng, xg, yg, eg, b = own_g.normal, own_g.tangent_x, own_g.tangent_y, own_g.rates, own_g.shape
         gf = (-dot(xf, d), -dot(yf, d))
         gg = (dot(xg, dg), dot(yg, dg))
         tf = free_directions(table, pool, f, x[0], x[1], ef, gf[0], gf[1], ROUNDING * size)
@@ -248,11 +256,9 @@ def descend_pair(table, pool, f, g, turn, shift, x, size, limit):
             bend = max((abs(sf[0]) + abs(sf[1])) * bend_f, (abs(sg[0]) + abs(sg[1])) * bend_g)
             if not held and bend < near and mu <= 1e-3 * first:
                 # `solve_pair` takes the rest; should it go elsewhere, the descent goes on to a nearer start.
-                same, done, y, more, frame, matrices = finish(
-                    table, pool, f, g, turn, shift, x, size, 8.0 * step + 1e-9 * size
-                )
+                same, found = finish(table, pool, f, g, turn, shift, x, size, 8.0 * step + 1e-9 * size)
                 if same:
-                    return done, y, count + more, frame, matrices
+                    return with_steps(found, count)
                 near *= 0.1
             if step <= MEET * size or count >= limit:
                 break
@@ -268,7 +274,7 @@ def descend_pair(table, pool, f, g, turn, shift, x, size, limit):
                 table, pool, g, x[2], x[3], eg[0] * bx + eg[1] * by, eg[2] * by, blend(bx, xg, by, yg)
             )
             y = (uf, vf, ug, vg)
-            f_next, g_next, d_next, dg_next, regular_next = both_frames(table, pool, f, g, turn, shift, y)
+            next_f, next_g, d_next, dg_next = both_frames(table, pool, f, g, turn, shift, y)
             now = dot(d_next, d_next)
             count += 1
             # What the slope alone would give over this step.
@@ -286,17 +292,16 @@ def descend_pair(table, pool, f, g, turn, shift, x, size, limit):
                 status = LEFT_PATCH
             break
         x = y
-        f_now, g_now, d, dg, regular = f_next, g_next, d_next, dg_next, regular_next
+        own_f, own_g, d, dg = next_f, next_g, d_next, dg_next
         square = now
     if status == NOT_CONVERGED and square <= TOUCH * TOUCH * size * size:
         status = CROSSED
     if status == CROSSED:
-        same, done, y, more, frame, matrices = finish(table, pool, f, g, turn, shift, x, size, 0.0)
+        same, found = finish(table, pool, f, g, turn, shift, x, size, 0.0)
         if same:
-            return done, y, count + more, frame, matrices
-    n, tx, ty, pf, pg, e, t, a, c, r, beta, regular = pair_frame(table, pool, f, g, turn, shift, x)
-    matrices = pair_matrix(a, c, beta, 1e-9 / size)
-    return status, x, count, (n, tx, ty, pf, pg, e, t, a, c, r, beta, regular), matrices
+            return with_steps(found, count)
+    frame = pair_frame(table, pool, f, g, turn, shift, x)
+    return PairSolution(status, x, count, frame, pair_matrix(frame.shape_f, frame.shape_g, frame.gap, 1e-9 / size))
 
 
 @kernel(signatures="(i8[::1], f8[::1], i8, i8, f8[:, ::1], UniTuple(f8, 4), f8, i8, f8[::1])")
@@ -307,11 +312,12 @@ def find_descent(table, pool, f, g, q, x, size, limit, out):
     """
     turn_f = rotation(q, 0)
     turn, shift = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
-    status, x, _count, frame, _matrices = descend_pair(table, pool, f, g, turn, shift, x, size, limit)
+    found = descend_pair(table, pool, f, g, turn, shift, x, size, limit)
+    frame = found.frame
     origin = position(q, 0)
-    out[0], out[1], out[2], out[3] = x
-    out[4], out[5], out[6] = add(matvec(turn_f, frame[3]), origin)
-    out[7], out[8], out[9] = add(matvec(turn_f, frame[4]), origin)
-    out[10], out[11], out[12] = matvec(turn_f, frame[0])
-    out[13] = frame[10]
-    return status
+    out[0], out[1], out[2], out[3] = found.parameters
+    out[4], out[5], out[6] = add(matvec(turn_f, frame.point_f), origin)
+    out[7], out[8], out[9] = add(matvec(turn_f, frame.point_g), origin)
+    out[10], out[11], out[12] = matvec(turn_f, frame.normal)
+    out[13] = frame.gap
+    return found.status

@@ -17,6 +17,7 @@ edges, leads nearer: then Newton runs from where that ends.
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from assembly._kernel import kernel
 from assembly.geometry.splines.domain import into_domain
 from assembly.geometry.splines.evaluate import (
     CELL_SIZE,
+    cell_at,
     surface_at,
     surface_point,
 )
@@ -51,6 +53,17 @@ CROSSING = 1e-3
 # w as a part of the square of the smaller extent.
 ALIGNMENT = 0.1
 
+# A pair that was found, with what it is judged by.
+RankedPair = namedtuple(
+    "RankedPair",
+    [
+        "rank",  # 0: solids face each other; 1: they do not; 2: no extremum, at the end of a patch; 3: none yet
+        "gap",  # signed
+        "status",
+        "parameters",  # (u_f, v_f, u_g, v_g)
+    ],
+)
+
 
 @kernel(inner=True)
 def cell_samples(table, pool, r, turn, shift, samples):
@@ -59,8 +72,8 @@ def cell_samples(table, pool, r, turn, shift, samples):
     lo = (math.inf, math.inf, math.inf)
     hi = (-math.inf, -math.inf, -math.inf)
     for i in range(patch.cell_count):
-        o = patch.cells + CELL_SIZE * i
-        p, su, sv, _uu, _uv, _vv = surface_point(table, pool, r, pool[o], pool[o + 1])
+        cell = cell_at(pool, patch.cells + CELL_SIZE * i)
+        p, su, sv, _uu, _uv, _vv = surface_point(table, pool, r, cell.parameters[0], cell.parameters[1])
         normal = cross(su, sv)
         length = math.sqrt(dot(normal, normal))
         n = matvec(turn, scale(float(patch.sign) / length if length > 0.0 else 0.0, normal))
@@ -102,19 +115,19 @@ def best_samples(a, b, weight, nearest, score):
 @kernel(inner=True)
 def opposed(frame, rotation, table, pool, g, x):
     """Whether the outward normal of g opposes that of f."""
-    normal = own_frame(table, pool, g, x[2], x[3])[1]
-    return dot(normal, matvec_t(rotation, frame[0])) < 0.0
+    normal = own_frame(table, pool, g, x[2], x[3]).normal
+    return dot(normal, matvec_t(rotation, frame.normal)) < 0.0
 
 
 @kernel(inner=True, allocates=True)
 def approach(table, pool, f, g, rotation, shift, x):
     """Parameters with a smaller distance, and it, by direct search: nine points of each surface around the best."""
     patch = surface_at(table, f)
-    surface_record = surface_at(table, g)
+    other = surface_at(table, g)
     fu = 0.03125 * (pool[patch.breaks_u + patch.spans_u] - pool[patch.breaks_u])
     fv = 0.03125 * (pool[patch.breaks_v + patch.spans_v] - pool[patch.breaks_v])
-    gu = 0.03125 * (pool[surface_record.breaks_u + surface_record.spans_u] - pool[surface_record.breaks_u])
-    gv = 0.03125 * (pool[surface_record.breaks_v + surface_record.spans_v] - pool[surface_record.breaks_v])
+    gu = 0.03125 * (pool[other.breaks_u + other.spans_u] - pool[other.breaks_u])
+    gv = 0.03125 * (pool[other.breaks_v + other.spans_v] - pool[other.breaks_v])
     finest = 1e-5 * fu
     points = np.empty((9, 3))
     at = np.empty((9, 2))
@@ -148,28 +161,28 @@ def approach(table, pool, f, g, rotation, shift, x):
 
 
 @kernel(inner=True)
-def is_near(status, frame, distance):
+def is_near(found, distance):
     """Whether Newton's result is no farther apart than points that are known; else it is another pair."""
-    if status == NOT_CONVERGED:
+    if found.status == NOT_CONVERGED:
         return False
-    if status == LEFT_PATCH:
-        d = sub(frame[4], frame[3])
+    if found.status == LEFT_PATCH:
+        d = sub(found.frame.point_g, found.frame.point_f)
         return dot(d, d) <= distance * distance
-    return abs(frame[10]) <= distance
+    return abs(found.frame.gap) <= distance
 
 
 @kernel(inner=True)
-def take(table, pool, g, rotation, status, x, frame, best):
-    """The better of a pair and the best one so far; both are (rank, |gap|, status, x).
+def take(table, pool, g, rotation, found, best):
+    """The better one, as a `RankedPair`, of a pair that Newton's method found and the best one so far.
 
     A true extremum beats a point held at the end of a patch, and one where solids face each other beats all.
     """
     rank = 2.0
-    if status == CONVERGED or status == SINGULAR:
-        rank = 0.0 if opposed(frame, rotation, table, pool, g, x) else 1.0
-    gap = frame[10]
-    if rank < best[0] or (rank == best[0] and abs(gap) < abs(best[1])):
-        return rank, gap, np.int64(status), x
+    if found.status == CONVERGED or found.status == SINGULAR:
+        rank = 0.0 if opposed(found.frame, rotation, table, pool, g, found.parameters) else 1.0
+    gap = found.frame.gap
+    if rank < best.rank or (rank == best.rank and abs(gap) < abs(best.gap)):
+        return RankedPair(rank, gap, np.int64(found.status), found.parameters)
     return best
 
 
@@ -177,15 +190,22 @@ def take(table, pool, g, rotation, status, x, frame, best):
 def next_candidate(table, pool, f, a, nearest, score, i):
     """The cell with the best score, after the neighbors of cell i, which lead to the same extremum, are struck out."""
     patch = surface_at(table, f)
-    o = patch.cells + CELL_SIZE * i
+    radius = cell_at(pool, patch.cells + CELL_SIZE * i).radius
     for k in range(a.shape[0]):
         dx = a[k, 0] - a[i, 0]
         dy = a[k, 1] - a[i, 1]
         dz = a[k, 2] - a[i, 2]
-        reach = pool[o + 8] + pool[patch.cells + CELL_SIZE * k + 8]
+        reach = radius + cell_at(pool, patch.cells + CELL_SIZE * k).radius
         if dx * dx + dy * dy + dz * dz <= reach * reach:
             score[k] = math.inf
     return lowest(score)
+
+
+@kernel(inline=True)
+def start_in(cell_f, cell_g):
+    """The parameters of two cells' points."""
+    u, v = cell_f.parameters[0], cell_f.parameters[1]
+    return u, v, cell_g.parameters[0], cell_g.parameters[1]
 
 
 @kernel(inner=True)
@@ -202,40 +222,40 @@ def lowest(score):
 def global_start(table, pool, f, g, rotation, shift, size):
     """Status, parameters and gap of the best extremal pair found; where there is none, the nearest points known."""
     patch = surface_at(table, f)
-    surface_record = surface_at(table, g)
+    other = surface_at(table, g)
     nf = patch.cell_count
     a = np.empty((nf, 6))
-    b = np.empty((surface_record.cell_count, 6))
+    b = np.empty((other.cell_count, 6))
     same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
     extent = cell_samples(table, pool, f, same, (0.0, 0.0, 0.0), a)
     extent = min(extent, cell_samples(table, pool, g, rotation, shift, b))
     nearest = np.empty(nf, np.int64)
     score = np.empty(nf)
     best_samples(a, b, 0.0, nearest, score)
-    best = (3.0, math.inf, np.int64(NOT_CONVERGED), (0.0, 0.0, 0.0, 0.0))
+    best = RankedPair(3.0, math.inf, np.int64(NOT_CONVERGED), (0.0, 0.0, 0.0, 0.0))
     crossing = False
     upper = math.inf
     i = lowest(score)
     for attempt in range(NEAREST):
         if score[i] == math.inf:
             break
-        o = patch.cells + CELL_SIZE * i
-        p = surface_record.cells + CELL_SIZE * nearest[i]
+        cell_f = cell_at(pool, patch.cells + CELL_SIZE * i)
+        cell_g = cell_at(pool, other.cells + CELL_SIZE * nearest[i])
         # Cells whose spheres are farther apart than the best pair hold no nearer one.
-        if score[i] - 1.5 * (pool[o + 8] + pool[p + 8]) > min(abs(best[1]), upper):
+        if score[i] - 1.5 * (cell_f.radius + cell_g.radius) > min(abs(best.gap), upper):
             break
-        start = (pool[o], pool[o + 1], pool[p], pool[p + 1])
+        start = start_in(cell_f, cell_g)
         if attempt == 0:
-            best = (3.0, math.inf, np.int64(NOT_CONVERGED), start)
-        status, x, _count, frame, _h = solve_pair(table, pool, f, g, rotation, shift, start, size, math.inf, 0.0, False)
+            best = RankedPair(3.0, math.inf, np.int64(NOT_CONVERGED), start)
+        found = solve_pair(table, pool, f, g, rotation, shift, start, size, math.inf, 0.0, False)
         limit = score[i]
-        near = is_near(status, frame, limit)
-        coarse = pool[o + 8] + pool[p + 8] > COARSE * extent
-        if near and coarse and status != LEFT_PATCH and frame[10] > 0.0:
+        near = is_near(found, limit)
+        coarse = cell_f.radius + cell_g.radius > COARSE * extent
+        if near and coarse and found.status != LEFT_PATCH and found.frame.gap > 0.0:
             # Samples are far apart: an extremum that is no minimum is nearer than they are, and others nearer yet.
-            start, limit = approach(table, pool, f, g, rotation, shift, x)
+            start, limit = approach(table, pool, f, g, rotation, shift, found.parameters)
             limit += 1e-12 * size
-            near = frame[10] <= limit
+            near = found.frame.gap <= limit
         elif not near:
             start, limit = approach(table, pool, f, g, rotation, shift, start)
             limit += 1e-12 * size
@@ -246,35 +266,31 @@ def global_start(table, pool, f, g, rotation, shift, size):
                 break
             # The minimum is no farther than the points found.
             upper = min(upper, limit)
-            status, x, _count, frame, _h = solve_pair(
-                table, pool, f, g, rotation, shift, start, size, math.inf, 0.0, False
-            )
-        if is_near(status, frame, limit):
-            best = take(table, pool, g, rotation, status, x, frame, best)
+            found = solve_pair(table, pool, f, g, rotation, shift, start, size, math.inf, 0.0, False)
+        if is_near(found, limit):
+            best = take(table, pool, g, rotation, found, best)
         i = next_candidate(table, pool, f, a, nearest, score, i)
     weight = ALIGNMENT * extent * extent
     for _ in range(3):
         # The surfaces overlap, or do not face each other; the deeper, the more the normals tell.
-        if not crossing and best[0] == 0.0 and best[1] >= 0.0:
+        if not crossing and best.rank == 0.0 and best.gap >= 0.0:
             break
         best_samples(a, b, weight, nearest, score)
         i = lowest(score)
         for _ in range(ALIGNED):
             if score[i] == math.inf:
                 break
-            o = patch.cells + CELL_SIZE * i
-            p = surface_record.cells + CELL_SIZE * nearest[i]
-            start = (pool[o], pool[o + 1], pool[p], pool[p + 1])
-            status, x, _count, frame, _h = solve_pair(
-                table, pool, f, g, rotation, shift, start, size, math.inf, 0.0, False
-            )
-            if status != NOT_CONVERGED:
-                best = take(table, pool, g, rotation, status, x, frame, best)
+            cell_f = cell_at(pool, patch.cells + CELL_SIZE * i)
+            cell_g = cell_at(pool, other.cells + CELL_SIZE * nearest[i])
+            start = start_in(cell_f, cell_g)
+            found = solve_pair(table, pool, f, g, rotation, shift, start, size, math.inf, 0.0, False)
+            if found.status != NOT_CONVERGED:
+                best = take(table, pool, g, rotation, found, best)
             i = next_candidate(table, pool, f, a, nearest, score, i)
-        if best[0] == 0.0:
+        if best.rank == 0.0:
             break
         weight *= 5.0
-    return best[2], best[3], best[1]
+    return best.status, best.parameters, best.gap
 
 
 @kernel(signatures="(i8[::1], f8[::1], i8, i8, i8, i8, f8[:, ::1], f8[:, ::1], i8)")
@@ -298,11 +314,12 @@ def find_pair(table, pool, f, g, q, x, size, out):
         status, x, _gap = global_start(table, pool, f, g, turn, shift, size)
         frame = pair_frame(table, pool, f, g, turn, shift, x)
     else:
-        status, x, _count, frame, _h = solve_pair(table, pool, f, g, turn, shift, x, size, math.inf, 0.0, False)
+        found = solve_pair(table, pool, f, g, turn, shift, x, size, math.inf, 0.0, False)
+        status, x, frame = found.status, found.parameters, found.frame
     origin = position(q, 0)
     out[0], out[1], out[2], out[3] = x
-    out[4], out[5], out[6] = add(matvec(turn_f, frame[3]), origin)
-    out[7], out[8], out[9] = add(matvec(turn_f, frame[4]), origin)
-    out[10], out[11], out[12] = matvec(turn_f, frame[0])
-    out[13] = frame[10]
+    out[4], out[5], out[6] = add(matvec(turn_f, frame.point_f), origin)
+    out[7], out[8], out[9] = add(matvec(turn_f, frame.point_g), origin)
+    out[10], out[11], out[12] = matvec(turn_f, frame.normal)
+    out[13] = frame.gap
     return status

@@ -15,6 +15,7 @@ take third derivatives of the surfaces; terms that vanish with the residuals are
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 from assembly._kernel import kernel
 from assembly.geometry.splines.evaluate import surface_at, surface_point, third_derivatives
@@ -23,8 +24,22 @@ from assembly.kinematics.motion import position, relative_pose, rotation
 from assembly.proximity.extrema.face_face import pair_frame
 
 VARIABLES = 16
-# Variations of d, f_u, f_v, g_u, g_v, N, n: (7, 3, 16).
-D, FU, FV, GU, GV, NN, N1, VECTORS = 0, 1, 2, 3, 4, 5, 6, 7
+# Rates (3, 16) of the vectors that the rows are made of, a column a local variable.
+Variations = namedtuple(
+    "Variations",
+    [
+        "d",  # from the point of f to that of g
+        "f_u",
+        "f_v",
+        "g_u",
+        "g_v",
+        "normal",  # N = f_u x f_v
+        "unit",  # n = N / |N|
+    ],
+)
+VECTORS = len(Variations._fields)
+# The vectors themselves, in world axes; points from their bodies' origins.
+PairVectors = namedtuple("PairVectors", ["d", "n", "length", "point_f", "f_u", "f_v", "point_g", "g_u", "g_v"])
 
 
 @kernel(inline=True)
@@ -77,9 +92,9 @@ def is_extremal(table, pool, f, g, i, j, q, tracked, r, tolerance):
     turn, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
     x = (tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3])
     frame = pair_frame(table, pool, f, g, turn, shift, x)
-    residual = frame[9]
+    residual = frame.residual
     tilt = max(abs(residual[2]), abs(residual[3]))
-    holds = frame[11] and tilt <= 1e-9 and max(abs(residual[0]), abs(residual[1])) <= tolerance
+    holds = frame.regular and tilt <= 1e-9 and max(abs(residual[0]), abs(residual[1])) <= tolerance
     return 1 if holds else 0
 
 
@@ -99,8 +114,8 @@ def has_stayed(table, pool, f, g, tracked, was, r, most):
 
 
 @kernel(inner=True)
-def variations(table, pool, f, g, i, j, q, x, s, out):
-    """First variations of d, f_u, f_v, g_u, g_v, N and n over the 16 variables, and the vectors themselves."""
+def variations(table, pool, f, g, i, j, q, x, s, rates):
+    """Fill the `Variations`; returns the `PairVectors`."""
     patch = surface_at(table, f)
     turn_f = rotation(q, i)
     turn_g = rotation(q, j)
@@ -112,43 +127,51 @@ def variations(table, pool, f, g, i, j, q, x, s, out):
     normal = scale(float(patch.sign), cross(fu, fv))
     length = math.sqrt(dot(normal, normal))
     n = scale(1.0 / length, normal)
-    for m in range(VECTORS):
-        for k in range(3):
-            for l in range(VARIABLES):
-                out[m, k, l] = 0.0
     for k in range(3):
-        out[D, k, k] = -1.0
-        out[D, k, 6 + k] = 1.0
-    put_turn(out[D], 3, scale(-1.0, pf))
-    put_turn(out[D], 9, pg)
-    put_column(out[D], 12, scale(-1.0 / s[0], fu))
-    put_column(out[D], 13, scale(-1.0 / s[1], fv))
-    put_column(out[D], 14, scale(1.0 / s[2], gu))
-    put_column(out[D], 15, scale(1.0 / s[3], gv))
-    put_turn(out[FU], 3, fu)
-    put_column(out[FU], 12, scale(1.0 / s[0], fuu))
-    put_column(out[FU], 13, scale(1.0 / s[1], fuv))
-    put_turn(out[FV], 3, fv)
-    put_column(out[FV], 12, scale(1.0 / s[0], fuv))
-    put_column(out[FV], 13, scale(1.0 / s[1], fvv))
-    put_turn(out[GU], 9, gu)
-    put_column(out[GU], 14, scale(1.0 / s[2], guu))
-    put_column(out[GU], 15, scale(1.0 / s[3], guv))
-    put_turn(out[GV], 9, gv)
-    put_column(out[GV], 14, scale(1.0 / s[2], guv))
-    put_column(out[GV], 15, scale(1.0 / s[3], gvv))
+        for l in range(VARIABLES):
+            rates.d[k, l] = 0.0
+            rates.f_u[k, l] = 0.0
+            rates.f_v[k, l] = 0.0
+            rates.g_u[k, l] = 0.0
+            rates.g_v[k, l] = 0.0
+            rates.normal[k, l] = 0.0
+            rates.unit[k, l] = 0.0
+    for k in range(3):
+        rates.d[k, k] = -1.0
+        rates.d[k, 6 + k] = 1.0
+    put_turn(rates.d, 3, scale(-1.0, pf))
+    put_turn(rates.d, 9, pg)
+    put_column(rates.d, 12, scale(-1.0 / s[0], fu))
+    put_column(rates.d, 13, scale(-1.0 / s[1], fv))
+    put_column(rates.d, 14, scale(1.0 / s[2], gu))
+    put_column(rates.d, 15, scale(1.0 / s[3], gv))
+    put_turn(rates.f_u, 3, fu)
+    put_column(rates.f_u, 12, scale(1.0 / s[0], fuu))
+    put_column(rates.f_u, 13, scale(1.0 / s[1], fuv))
+    put_turn(rates.f_v, 3, fv)
+    put_column(rates.f_v, 12, scale(1.0 / s[0], fuv))
+    put_column(rates.f_v, 13, scale(1.0 / s[1], fvv))
+    put_turn(rates.g_u, 9, gu)
+    put_column(rates.g_u, 14, scale(1.0 / s[2], guu))
+    put_column(rates.g_u, 15, scale(1.0 / s[3], guv))
+    put_turn(rates.g_v, 9, gv)
+    put_column(rates.g_v, 14, scale(1.0 / s[2], guv))
+    put_column(rates.g_v, 15, scale(1.0 / s[3], gvv))
     sign = float(patch.sign)
     for k in range(VARIABLES):
-        change = scale(sign, add(cross(column(out[FU], k), fv), cross(fu, column(out[FV], k))))
-        put_column(out[NN], k, change)
-        put_column(out[N1], k, scale(1.0 / length, sub(change, scale(dot(n, change), n))))
-    return d, n, length, pf, fu, fv, pg, gu, gv
+        change = scale(sign, add(cross(column(rates.f_u, k), fv), cross(fu, column(rates.f_v, k))))
+        put_column(rates.normal, k, change)
+        put_column(rates.unit, k, scale(1.0 / length, sub(change, scale(dot(n, change), n))))
+    return PairVectors(d, n, length, pf, fu, fv, pg, gu, gv)
 
 
 @kernel(inner=True)
 def free_rows(table, pool, f, g, i, j, q, x, s, work, residual, jacobian, r, e):
     """The gap into row r, the rows of tangency into rows e to e + 3, with their gradients."""
-    d, n, _length, _pf, fu, fv, _pg, gu, gv = variations(table, pool, f, g, i, j, q, x, s, work)
+    rates = Variations(work[0], work[1], work[2], work[3], work[4], work[5], work[6])
+    vectors = variations(table, pool, f, g, i, j, q, x, s, rates)
+    d, n = vectors.d, vectors.n
+    fu, fv, gu, gv = vectors.f_u, vectors.f_v, vectors.g_u, vectors.g_v
     beta = dot(n, d)
     residual[r] = beta
     residual[e] = dot(d, fu) / s[0]
@@ -156,13 +179,13 @@ def free_rows(table, pool, f, g, i, j, q, x, s, work, residual, jacobian, r, e):
     residual[e + 2] = dot(n, gu) / s[2]
     residual[e + 3] = dot(n, gv) / s[3]
     for k in range(VARIABLES):
-        dd = column(work[D], k)
-        dn = column(work[N1], k)
+        dd = column(rates.d, k)
+        dn = column(rates.unit, k)
         jacobian[r, k] = dot(n, dd) + dot(d, dn)
-        jacobian[e, k] = (dot(dd, fu) + dot(d, column(work[FU], k))) / s[0]
-        jacobian[e + 1, k] = (dot(dd, fv) + dot(d, column(work[FV], k))) / s[1]
-        jacobian[e + 2, k] = (dot(dn, gu) + dot(n, column(work[GU], k))) / s[2]
-        jacobian[e + 3, k] = (dot(dn, gv) + dot(n, column(work[GV], k))) / s[3]
+        jacobian[e, k] = (dot(dd, fu) + dot(d, column(rates.f_u, k))) / s[0]
+        jacobian[e + 1, k] = (dot(dd, fv) + dot(d, column(rates.f_v, k))) / s[1]
+        jacobian[e + 2, k] = (dot(dn, gu) + dot(n, column(rates.g_u, k))) / s[2]
+        jacobian[e + 3, k] = (dot(dn, gv) + dot(n, column(rates.g_v, k))) / s[3]
 
 
 @kernel(inner=True)
@@ -189,7 +212,10 @@ def add_second(y, a, a1, a2, a11, a12, a22, w, u, s1, s2, out):
 @kernel(inner=True)
 def free_hessian(table, pool, f, g, i, j, q, x, s, y, work, out):
     """Second derivative (16, 16) of y . rows, overwriting out."""
-    d, n, length, pf, fu, fv, pg, gu, gv = variations(table, pool, f, g, i, j, q, x, s, work)
+    rates = Variations(work[0], work[1], work[2], work[3], work[4], work[5], work[6])
+    vectors = variations(table, pool, f, g, i, j, q, x, s, rates)
+    d, n, length = vectors.d, vectors.n, vectors.length
+    fu, fv, gu, gv = vectors.f_u, vectors.f_v, vectors.g_u, vectors.g_v
     sign = float(surface_at(table, f).sign)
     turn_f = rotation(q, i)
     turn_g = rotation(q, j)
@@ -202,13 +228,13 @@ def free_hessian(table, pool, f, g, i, j, q, x, s, y, work, out):
     w = blend(l3, gu, l4, gv)
     across = scale(sign / length, sub(w, scale(dot(w, n), n)))
     for k in range(VARIABLES):
-        dk = column(work[D], k)
-        fuk = column(work[FU], k)
-        fvk = column(work[FV], k)
-        guk = column(work[GU], k)
-        gvk = column(work[GV], k)
-        nk = column(work[N1], k)
-        stretch = dot(n, column(work[NN], k)) / length
+        dk = column(rates.d, k)
+        fuk = column(rates.f_u, k)
+        fvk = column(rates.f_v, k)
+        guk = column(rates.g_u, k)
+        gvk = column(rates.g_v, k)
+        nk = column(rates.unit, k)
+        stretch = dot(n, column(rates.normal, k)) / length
         # Everything that multiplies a variation l once: gathered, so that the inner loop is short.
         with_d = add(scale(y[0], nk), blend(l1, fuk, l2, fvk))
         with_n = add(blend(y[0], dk, -y[0] * beta, nk), add(blend(l3, guk, l4, gvk), scale(-stretch, w)))
@@ -219,13 +245,13 @@ def free_hessian(table, pool, f, g, i, j, q, x, s, y, work, out):
         turned = dot(w, nk) / length
         for l in range(VARIABLES):
             out[k, l] = (
-                dot(with_d, column(work[D], l))
-                + dot(with_n, column(work[N1], l))
-                + dot(with_fu, column(work[FU], l))
-                + dot(with_fv, column(work[FV], l))
-                + dot(with_g, column(work[GU], l))
-                + dot(with_h, column(work[GV], l))
-                - turned * dot(n, column(work[NN], l))
+                dot(with_d, column(rates.d, l))
+                + dot(with_n, column(rates.unit, l))
+                + dot(with_fu, column(rates.f_u, l))
+                + dot(with_fv, column(rates.f_v, l))
+                + dot(with_g, column(rates.g_u, l))
+                + dot(with_h, column(rates.g_v, l))
+                - turned * dot(n, column(rates.normal, l))
             )
     # Second variations of the vectors themselves, each with its coefficient.
     a = surface_point(table, pool, f, x[0], x[1])
@@ -247,8 +273,8 @@ def free_hessian(table, pool, f, g, i, j, q, x, s, y, work, out):
     guvv = matvec(turn_g, b12)
     gvvv = matvec(turn_g, b03)
     of_d = add(scale(y[0], n), blend(l1, fu, l2, fv))
-    add_second(scale(-1.0, of_d), pf, fu, fv, fuu, fuv, fvv, 3, 12, s[0], s[1], out)
-    add_second(of_d, pg, gu, gv, guu, guv, gvv, 9, 14, s[2], s[3], out)
+    add_second(scale(-1.0, of_d), vectors.point_f, fu, fv, fuu, fuv, fvv, 3, 12, s[0], s[1], out)
+    add_second(of_d, vectors.point_g, gu, gv, guu, guv, gvv, 9, 14, s[2], s[3], out)
     of_fu = add(scale(l1, d), cross(fv, across))
     of_fv = add(scale(l2, d), cross(across, fu))
     add_second(of_fu, fu, fuu, fuv, fuuu, fuuv, fuvv, 3, 12, s[0], s[1], out)

@@ -8,6 +8,7 @@ they part. Where it is singular, or nearly so, the pair is one of a continuum, o
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 from assembly._kernel import kernel
 
@@ -21,6 +22,17 @@ UNSURE, LEVEL = 0.1, 1e-10
 NEAR = 0.1
 # A highest pair along a valley that bends by so many times as much is kept.
 PLAIN = 10.0
+
+# How the normals of a pair part as it moves, with A and C the shape operators of its surfaces and beta the gap.
+PairMatrix = namedtuple(
+    "PairMatrix",
+    [
+        "k",  # I + beta A (11, 12, 22)
+        "h",  # H = C (I + beta A) - A (11, 12, 21, 22)
+        "inverse",  # of H (11, 12, 21, 22), damped where it is nearly singular
+        "isolated",  # whether H is regular: else the pair is one of a continuum
+    ],
+)
 
 
 @kernel(inline=True)
@@ -51,7 +63,7 @@ def damped_inverse(h, damping):
 
 @kernel(inline=True)
 def pair_matrix(a, c, beta, flat):
-    """I + beta A, H = C (I + beta A) - A, the inverse of H, and whether H is regular.
+    """The `PairMatrix` of shape operators A and C and the gap beta.
 
     Where H is (nearly) singular the inverse is damped: the least step, so that the current pair of a continuum is kept.
     `flat` is the curvature below which a scene counts as flat.
@@ -73,7 +85,7 @@ def pair_matrix(a, c, beta, flat):
         inverse = (i * h22, -i * h12, -i * h21, i * h11)
     else:
         inverse = damped_inverse((h11, h12, h21, h22), max(RANK * size, flat))
-    return (k11, k12, k22), (h11, h12, h21, h22), inverse, regular
+    return PairMatrix((k11, k12, k22), (h11, h12, h21, h22), inverse, regular)
 
 
 @kernel(inline=True)

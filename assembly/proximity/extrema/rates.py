@@ -26,18 +26,16 @@ from assembly.kinematics.motion import quaternion_columns, relative_pose, rotati
 from assembly.proximity.extrema.face_face import pair_frame
 from assembly.proximity.extrema.pair_matrix import pair_matrix
 
-# A record holds what the derivatives of one gap need, all in world axes: the gap, the normal, the arms from the bodies'
-# origins to the point of g, the (4, 4) map from z to parameter rates, the (4, 4) form of beta'', and z as (4, 12)
-# over the twists of f, then g.
+# What the derivatives of one gap need, in world axes.
 GAP_DERIVATIVES = record_dtype(
     "f8",
-    gap=1,
-    normal=3,
-    arm_f=3,
-    arm_g=3,
-    rates=(4, 4),
-    form=(4, 4),
-    zed=(4, 12),
+    gap=1,  # signed [length]
+    normal=3,  # unit normal from f towards g
+    arm_f=3,  # from the origin of body f to the point of g [length]
+    arm_g=3,  # from the origin of body g to the point of g [length]
+    rates=(4, 4),  # map from z to rates of the parameters (u_f, v_f, u_g, v_g)
+    form=(4, 4),  # beta'' is z.(form z), but for terms of rotation
+    zed=(4, 12),  # z over the twists of f, then g
 )
 derivatives_at = record_view(GAP_DERIVATIVES)
 GAP = place_of(GAP_DERIVATIVES, "gap")
@@ -45,7 +43,6 @@ NORMAL = place_of(GAP_DERIVATIVES, "normal")
 ARM_F = place_of(GAP_DERIVATIVES, "arm_f")
 ARM_G = place_of(GAP_DERIVATIVES, "arm_g")
 RATES = place_of(GAP_DERIVATIVES, "rates")
-FORM = place_of(GAP_DERIVATIVES, "form")
 ZED = place_of(GAP_DERIVATIVES, "zed")
 RECORD = size_of(GAP_DERIVATIVES)
 
@@ -63,18 +60,18 @@ def put(array, row, o, a):
 
 
 @kernel(inner=True)
-def store_record(turn, shift, frame, curvature, records, row):
+def store_record(turn, shift, frame, matrix, records, row):
     """Fill a record from a pair's frame in the axes of body f, whose rotation is `turn`; g's origin is at `shift`."""
     derivatives = derivatives_at(records, row)
-    n, tx, ty, _pf, pg, e, t, a, c, _r, beta, _regular = frame
-    k, _h, i, _isolated = curvature
-    normal = matvec(turn, n)
-    x = matvec(turn, tx)
-    y = matvec(turn, ty)
-    arm_f = matvec(turn, pg)
-    arm_g = matvec(turn, sub(pg, shift))
-    derivatives.gap = beta
-    put(records, row, NORMAL, normal)
+    e, t = frame.rates_f, frame.rates_g
+    a, c = frame.shape_f, frame.shape_g
+    k, i = matrix.k, matrix.inverse
+    x = matvec(turn, frame.tangent_x)
+    y = matvec(turn, frame.tangent_y)
+    arm_f = matvec(turn, frame.point_g)
+    arm_g = matvec(turn, sub(frame.point_g, shift))
+    derivatives.gap = frame.gap
+    put(records, row, NORMAL, matvec(turn, frame.normal))
     put(records, row, ARM_F, arm_f)
     put(records, row, ARM_G, arm_g)
     # z over the twists: x.v, y.v, and (x, y).(omega x n) = (y.omega, -x.omega).
@@ -88,13 +85,13 @@ def store_record(turn, shift, frame, curvature, records, row):
     put(records, row, ZED + 21, cross(arm_g, y))
     for j in range(3):
         derivatives.zed[2, j] = 0.0
-        records[row, ZED + 27 + j] = -y[j]
-        records[row, ZED + 30 + j] = 0.0
-        records[row, ZED + 33 + j] = y[j]
+        derivatives.zed[2, 3 + j] = -y[j]
+        derivatives.zed[2, 6 + j] = 0.0
+        derivatives.zed[2, 9 + j] = y[j]
         derivatives.zed[3, j] = 0.0
-        records[row, ZED + 39 + j] = x[j]
-        records[row, ZED + 42 + j] = 0.0
-        records[row, ZED + 45 + j] = -x[j]
+        derivatives.zed[3, 3 + j] = x[j]
+        derivatives.zed[3, 6 + j] = 0.0
+        derivatives.zed[3, 9 + j] = -x[j]
     # The map from z to a is [H^-1 C, -H^-1].
     m = (
         i[0] * c[0] + i[1] * c[1],
@@ -171,7 +168,7 @@ def add_gap_terms(records, row, jacobian, r, factor, weight, out, f, g):
         p3 = 0.0
         for k in range(4 if factor != 0.0 else 0):
             s = factor * derivatives.zed[k, i]
-            p0 += s * records[row, FORM + 4 * k]
+            p0 += s * derivatives.form[k, 0]
             p1 += s * derivatives.form[k, 1]
             p2 += s * derivatives.form[k, 2]
             p3 += s * derivatives.form[k, 3]
@@ -233,16 +230,16 @@ def pair_derivatives(table, pool, f, g, q, x, size, first, hessian):
     turn = rotation(q, 0)
     relative, shift = relative_pose(q, 0, turn, 1, rotation(q, 1))
     frame = pair_frame(table, pool, f, g, relative, shift, x)
-    r = frame[9]
+    r = frame.residual
     error = max(abs(r[0]), abs(r[1])) / size + max(abs(r[2]), abs(r[3]))
-    if not frame[11]:
+    if not frame.regular:
         return error, False
-    curvature = pair_matrix(frame[7], frame[8], frame[10], 1e-9 / size)
+    matrix = pair_matrix(frame.shape_f, frame.shape_g, frame.gap, 1e-9 / size)
     records = np.empty((1, RECORD))
     derivatives = derivatives_at(records, 0)
     gradient = np.empty((1, 12))
     row = np.empty(12)
-    store_record(turn, shift, frame, curvature, records, 0)
+    store_record(turn, shift, frame, matrix, records, 0)
     gradient_row(records, 0, gradient, 0)
     for j in range(12):
         row[j] = gradient[0, j]
@@ -250,7 +247,7 @@ def pair_derivatives(table, pool, f, g, q, x, size, first, hessian):
     for i in range(4):
         for j in range(12):
             # At a pole the polar coordinates have no rates.
-            at_pole = frame[5][0] == 0.0 if i < 2 else frame[6][0] == 0.0 and frame[6][1] == 0.0
+            at_pole = frame.rates_f[0] == 0.0 if i < 2 else frame.rates_g[0] == 0.0 and frame.rates_g[1] == 0.0
             row[j] = math.nan if at_pole else 0.0
             for l in range(4):
                 row[j] += derivatives.rates[i, l] * derivatives.zed[l, j]
@@ -262,4 +259,4 @@ def pair_derivatives(table, pool, f, g, q, x, size, first, hessian):
     for i in range(12):
         for j in range(i):
             hessian[i, j] = hessian[j, i]
-    return error, curvature[3]
+    return error, matrix.isolated

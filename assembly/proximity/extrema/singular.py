@@ -71,6 +71,6 @@ def fold_beyond(table, pool, posed, x, half):
             if (i == 0 and j == 0) or (j > 0 and (s, t) == (x[2], x[3])):
                 continue
             frame = pair_frame(table, pool, f, g, posed.turn, posed.shift, (u, v, s, t))
-            if frame[11]:
-                least = min(least, fold_of(pair_matrix(frame[7], frame[8], frame[10], 1e-9)[1]))
+            if frame.regular:
+                least = min(least, fold_of(pair_matrix(frame.shape_f, frame.shape_g, frame.gap, 1e-9).h))
     return least

@@ -126,8 +126,10 @@ def pair_from(table, pool, shells, pose, codes, x, n, size):
     a = feature_at(table, shells[0], f)
     b = feature_at(table, shells[1], g)
     status, y, frame = solve_features(table, pool, kind_f, a, kind_g, b, pose[0], pose[1], x, n, size, math.inf)
-    found = (status == CONVERGED or status == SINGULAR) and abs(frame[5]) <= NEARLY * size and dot(frame[0], n) > 0.5
-    return found, y, frame[0], frame[5]
+    found = (
+        (status == CONVERGED or status == SINGULAR) and abs(frame.gap) <= NEARLY * size and dot(frame.normal, n) > 0.5
+    )
+    return found, y, frame.normal, frame.gap
 
 
 @kernel(inner=True, allocates=True)

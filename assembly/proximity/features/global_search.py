@@ -115,15 +115,14 @@ def extremum_near(table, pool, kind_f, f, kind_g, g, turn, shift, x, n, size):
     face = face_at(table, f)
     face_record = face_at(table, g)
     if kind_f == FACE and kind_g == FACE:
-        status, y, _count, frame, curvature = solve_pair(
-            table, pool, face.surface, face_record.surface, turn, shift, x, size, 1.5, 0.0, False
-        )
-        least, stretch = relative_curvature(curvature[0], curvature[1], frame[10])
-        return NearExtremum(status, y, frame[10], least, stretch)
+        found = solve_pair(table, pool, face.surface, face_record.surface, turn, shift, x, size, 1.5, 0.0, False)
+        gap = found.frame.gap
+        least, stretch = relative_curvature(found.matrix.k, found.matrix.h, gap)
+        return NearExtremum(found.status, found.parameters, gap, least, stretch)
     af = face.surface if kind_f == FACE else f
     ag = face_record.surface if kind_g == FACE else g
     status, y, frame = solve_features(table, pool, kind_f, af, kind_g, ag, turn, shift, x, n, size, 1.5)
-    return NearExtremum(status, y, frame[5], 0.0, 1.0)
+    return NearExtremum(status, y, frame.gap, 0.0, 1.0)
 
 
 @kernel(inner=True)

@@ -36,7 +36,7 @@ NOTHING, FEATURES, POINT, HELD_F, HELD_G = 0.0, 1.0, 2.0, 3.0, 4.0
 def lean_of(table, pool, shell, kind, code, t, s, n):
     """By how much a normal leans over what is beside an edge, a vertex or a point, at most; 0 for a face."""
     if kind == FACE_POINT:
-        cosine = dot(n, own_frame(table, pool, feature_at(table, shell, code), t, s)[1])
+        cosine = dot(n, own_frame(table, pool, feature_at(table, shell, code), t, s).normal)
         return math.sqrt(max(1.0 - cosine * cosine, 0.0)) if cosine > 0.0 else 1.0
     if kind == EDGE or kind == EDGE_POINT:
         lean = from_edge(table, pool, shell, code, t, n)[0]
@@ -79,7 +79,7 @@ def hold_features(table, pool, shell_f, shell_g, rotation, shift, code_f, code_g
     if status == CONVERGED and not inside:
         status = LEFT_PATCH
     if status == CONVERGED or status == SINGULAR:
-        n = frame[0]
+        n = frame.normal
         lean = lean_of(table, pool, shell_f, kind_f, code_f, x[0], x[1], n)
         lean = max(lean, lean_of(table, pool, shell_g, kind_g, code_g, x[2], x[3], neg(matvec_t(rotation, n))))
         status = status if lean <= TILT else LEFT_PATCH

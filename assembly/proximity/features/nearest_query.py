@@ -82,8 +82,8 @@ def write_features(table, pool, shell_f, shell_g, q, turn_f, turn, shift, f, g, 
     status, y, frame = solve_features(table, pool, kind_f, a, kind_g, b, turn, shift, x, n, size, math.inf)
     codes[0] = f
     codes[1] = g
-    if (status == CONVERGED or status == SINGULAR) and abs(abs(frame[5]) - abs(gap)) <= 1e-12 * size:
-        write_pair(q, turn_f, y, frame[3], frame[4], frame[0], frame[5], out)
+    if (status == CONVERGED or status == SINGULAR) and abs(abs(frame.gap) - abs(gap)) <= 1e-12 * size:
+        write_pair(q, turn_f, y, frame.point_f, frame.point_g, frame.normal, frame.gap, out)
         return
     # A crossing, or an apex where Newton's method has no tangent to go on: the points themselves.
     same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
@@ -92,7 +92,7 @@ def write_features(table, pool, shell_f, shell_g, q, turn_f, turn, shift, f, g, 
     pg = tangents(table, pool, kind_g, feature_cells(table, shell_g, g).record, turn, shift, x[2], x[3])[0]
     d = sub(pg, pf)
     length = math.sqrt(dot(d, d))
-    write_pair(q, turn_f, x, pf, pg, scale(1.0 / length, d) if length > 1e-9 * size else frame[0], length, out)
+    write_pair(q, turn_f, x, pf, pg, scale(1.0 / length, d) if length > 1e-9 * size else frame.normal, length, out)
 
 
 @kernel(signatures="(i8[::1], f8[::1], i8, i8, f8[:, ::1], f8, i8[::1], f8[::1])")
@@ -108,7 +108,7 @@ def find_nearest(table, pool, shell_f, shell_g, q, size, codes, out):
     if status == UNPROVEN:
         # The search was over before it came to the nearest one; beside what it found there may be nearer ones.
         beside = track_features(table, pool, shell_f, shell_g, turn, shift, f, g, x, none, size, math.inf)
-        off = beside.frame[5]
+        off = beside.frame.gap
         if (beside.status == CONVERGED or beside.status == SINGULAR) and nearest.lower <= abs(off) < abs(gap):
             f, g, x, gap = beside.f, beside.g, beside.x, off
         if abs(gap) - nearest.lower <= PROVEN * size:
@@ -159,11 +159,11 @@ def follow_nearest(table, pool, shell_f, shell_g, q, size, codes, out):
     status, frame = found.status, found.frame
     # An edge may have become the farthest one of its neighborhood, surfaces may cross beside their points. In a
     # continuum, of flush faces say, nothing tells.
-    if not (status == SINGULAR or (status == CONVERGED and frame[14])):
+    if not (status == SINGULAR or (status == CONVERGED and frame.proper)):
         return LOST
     codes[0] = found.f
     codes[1] = found.g
-    write_pair(q, turn_f, found.x, frame[3], frame[4], frame[0], frame[5], out)
+    write_pair(q, turn_f, found.x, frame.point_f, frame.point_g, frame.normal, frame.gap, out)
     answer.lower = math.nan
     answer.switches += found.switches
     return TRACKED

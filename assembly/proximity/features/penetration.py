@@ -68,8 +68,8 @@ def walk_back(table, pool, shell_f, shell_g, turn, shift, away, f, g, x, size):
         f = there.f
         g = there.g
         x = there.x
-        n = there.frame[0]
-        gap = there.frame[5]
+        n = there.frame.normal
+        gap = there.frame.gap
         done = part
     return FoundPair(True, f, g, x, n, gap)
 

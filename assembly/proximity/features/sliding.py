@@ -54,13 +54,15 @@ def slide_off(table, pool, shell_f, shell_g, rotation, shift, code_f, code_g, x,
     """
     f = feature_at(table, shell_f, code_f)
     g = feature_at(table, shell_g, code_g)
-    n, tx, ty, _pf, _pg, e, t, a, c, _r, beta, regular = pair_frame(table, pool, f, g, rotation, shift, x)
+    frame = pair_frame(table, pool, f, g, rotation, shift, x)
+    tx, ty, e, t = frame.tangent_x, frame.tangent_y, frame.rates_f, frame.rates_g
     straight = STRAIGHT / size
-    _k, h, _inverse, isolated = pair_matrix(a, c, beta, straight)
-    if isolated or not regular:
+    matrix = pair_matrix(frame.shape_f, frame.shape_g, frame.gap, straight)
+    h = matrix.h
+    if matrix.isolated or not frame.regular:
         return False, code_f, code_g, x
-    m = matvec(rotation, own_frame(table, pool, g, x[2], x[3])[1])
-    lean = 1.0 / dot(m, n)
+    m = matvec(rotation, own_frame(table, pool, g, x[2], x[3]).normal)
+    lean = 1.0 / dot(m, frame.normal)
     wx = lean * dot(m, tx)
     wy = lean * dot(m, ty)
     if abs(h[0]) + abs(h[1]) + abs(h[2]) + abs(h[3]) > straight:

@@ -104,9 +104,9 @@ def track_solids(table, pool, shell_f, shell_g, i, j, q, start, patience, record
     status, frame = found.status, found.frame
     if status == CONVERGED or status == SINGULAR:
         feature_record(turn, shift, frame, records, r)
-        contact.proper = CONFORMING if conforms(frame) else (1.0 if frame[14] else 0.0)
-        contact.fold = frame[15]
-        write_tracked(found.x, found.f, found.g, frame[0], tracked, r)
+        contact.proper = CONFORMING if conforms(frame) else (1.0 if frame.proper else 0.0)
+        contact.fold = frame.fold
+        write_tracked(found.x, found.f, found.g, frame.normal, tracked, r)
         tracked_at(tracked, r).stays = tracked_at(start, r).stays
     return status
 

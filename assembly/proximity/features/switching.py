@@ -225,7 +225,7 @@ def track_features(table, pool, shell_f, shell_g, rotation, shift, code_f, code_
             code_g = tip_g
             switches += 1
             continue
-        n = frame[0]
+        n = frame.normal
         held = status == LEFT_PATCH
         code_f, at_f, switched = checked(table, pool, shell_f, code_f, x[0], x[1], held, n)
         at_g = (x[2], x[3])
@@ -239,7 +239,7 @@ def track_features(table, pool, shell_f, shell_g, rotation, shift, code_f, code_
         status = NOT_CONVERGED
     if kind_f == FACE and kind_g == FACE and status != NOT_CONVERGED:
         # Of solids that touch, outward normals oppose each other; else one is inside the other.
-        normal = own_frame(table, pool, feature_at(table, shell_g, code_g), x[2], x[3])[1]
+        normal = own_frame(table, pool, feature_at(table, shell_g, code_g), x[2], x[3]).normal
         if dot(normal, matvec_t(rotation, n)) > 0.0:
             status = NOT_CONVERGED
     return FeatureTrack(status, code_f, code_g, x, frame, switches)

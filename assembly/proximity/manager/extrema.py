@@ -145,18 +145,19 @@ def surfaces_root(table, pool, posed, start, roots, k):
     """
     turn, shift = posed.turn, posed.shift
     f, g = posed.surfaces[0], posed.surfaces[1]
-    status, x, _count, frame, curvature = solve_pair(table, pool, f, g, turn, shift, start, 1.0, math.inf, 0.0, True)
-    if status == NOT_CONVERGED:
+    found = solve_pair(table, pool, f, g, turn, shift, start, 1.0, math.inf, 0.0, True)
+    if found.status == NOT_CONVERGED:
         # The controller leads down from anywhere, to a minimum of the distance.
-        status, x, _count, frame, curvature = descend_pair(table, pool, f, g, turn, shift, start, 1.0, DESCENTS)
-    if status != CONVERGED and status != SINGULAR:
+        found = descend_pair(table, pool, f, g, turn, shift, start, 1.0, DESCENTS)
+    if found.status != CONVERGED and found.status != SINGULAR:
         return NOTHING
+    x, frame = found.parameters, found.frame
     if not opposed(frame, turn, table, pool, g, x):
         return NOTHING
-    h = curvature[1]
+    h = found.matrix.h
     det = h[0] * h[3] - h[1] * h[2]
     norm2 = h[0] * h[0] + h[1] * h[1] + h[2] * h[2] + h[3] * h[3]
-    write(roots, k, x, 0, 0, frame[0], frame[10], frame[3], frame[4], fold_of(h))
+    write(roots, k, x, 0, 0, frame.normal, frame.gap, frame.point_f, frame.point_g, fold_of(h))
     return MINIMUM_FOUND if det > -1e-9 * norm2 and h[0] + h[3] <= 0.0 else SADDLE
 
 
@@ -251,12 +252,12 @@ def add_given(table, pool, posed, tracked, listed, many, neglect, roots, work):
         count, found = add_root(table, pool, posed, (0, 0), x, (0.0, 0.0, 0.0), 0.0, roots, count, work, 0.0)
         if posed.surfaces[0] >= 0 and (found == NOTHING or (count > before and count < roots.shape[0])):
             frame = pair_frame(table, pool, posed.surfaces[0], posed.surfaces[1], posed.turn, posed.shift, x)
-            if frame[11]:
-                write(roots, count, x, 0, 0, frame[0], frame[10], frame[3], frame[4], 0.0)
+            if frame.regular:
+                write(roots, count, x, 0, 0, frame.normal, frame.gap, frame.point_f, frame.point_g, 0.0)
             if found != NOTHING:
-                same = frame[11] and are_one(table, pool, posed, roots, before, count, neglect)
+                same = frame.regular and are_one(table, pool, posed, roots, before, count, neglect)
                 count = count if same else before
-            elif frame[11] and opposed(frame, posed.turn, table, pool, posed.surfaces[1], x):
+            elif frame.regular and opposed(frame, posed.turn, table, pool, posed.surfaces[1], x):
                 # At a fold Newton's method may find nothing: there the contact still is.
                 count += 1
         if count > before:

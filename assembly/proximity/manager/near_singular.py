@@ -44,10 +44,13 @@ ValleyStep = namedtuple("ValleyStep", "found there bend on_f along")
 def across_valley(table, pool, f, g, turn, shift, x):
     """A step from parameters x across the valley there, if there is one."""
     none = (0.0, 0.0, 0.0)
-    _n, tx, ty, _pf, _pg, e, t, a, c, r, beta, regular = pair_frame(table, pool, f, g, turn, shift, x)
-    if not regular:
+    frame = pair_frame(table, pool, f, g, turn, shift, x)
+    if not frame.regular:
         return ValleyStep(False, x, FAR, False, none)
-    k, h, _inverse, _isolated = pair_matrix(a, c, beta, FLAT)
+    a, c, r = frame.shape_f, frame.shape_g, frame.residual
+    matrix = pair_matrix(a, c, frame.gap, FLAT)
+    k, h = matrix.k, matrix.h
+    e, t = frame.rates_f, frame.rates_g
     # -H is how the surfaces part, symmetric at beta = 0.
     middle = -0.5 * (h[0] + h[3])
     half = -0.5 * (h[0] - h[3])
@@ -78,12 +81,12 @@ def across_valley(table, pool, f, g, turn, shift, x):
     factor_g = bent_at_most(bend_g)
     step_f = (factor_f * step_f[0], factor_f * step_f[1])
     step_g = (factor_g * step_g[0], factor_g * step_g[1])
-    there, _clamped, _way = move_pair(table, pool, f, g, turn, x, e, t, tx, ty, step_f, step_g)
+    there, _clamped, _way = move_pair(table, pool, f, g, turn, x, frame, step_f, step_g)
     if bent_f >= bent_g:
         sense = toward_end(table, pool, f, e[0] * w[0] + e[1] * w[1], e[2] * w[1])
     else:
         sense = toward_end(table, pool, g, t[0] * w[0] + t[1] * w[1], t[2] * w[0] + t[3] * w[1])
-    along = blend(sense * w[0], tx, sense * w[1], ty)
+    along = blend(sense * w[0], frame.tangent_x, sense * w[1], frame.tangent_y)
     return ValleyStep(True, there, max(bend_f, bend_g), bent_f >= bent_g, along)
 
 

@@ -97,20 +97,21 @@ def stays(table, pool, surfaces, turn, shift, start, half, passed, count):
     f, g = surfaces[0], surfaces[1]
     x = start
     for step in range(STEPS):
-        _n, tx, ty, _pf, _pg, e, t, a, c, r, beta, regular = pair_frame(table, pool, f, g, turn, shift, x)
-        if not regular:
+        frame = pair_frame(table, pool, f, g, turn, shift, x)
+        if not frame.regular:
             return STAYED, x, count
-        k, h, inverse, _isolated = pair_matrix(a, c, beta, FLAT)
-        inverse, _level = across_first(a, c, r, k, h, inverse, FLAT)
-        ax, ay, bx, by, bend_f, bend_g = pair_step(a, c, r, k, inverse, 1.0)
+        a, c, r = frame.shape_f, frame.shape_g, frame.residual
+        matrix = pair_matrix(a, c, frame.gap, FLAT)
+        inverse, _level = across_first(a, c, r, matrix.k, matrix.h, matrix.inverse, FLAT)
+        step_f, step_g, bend_f, bend_g = pair_step(a, c, r, matrix.k, inverse, 1.0)
         if not max(bend_f, bend_g) > CLOSE:
             return STAYED, x, count
         # Each surface by its own measure, as in `solve_pair`.
         factor_f = bent_at_most(bend_f)
         factor_g = bent_at_most(bend_g)
-        step_f = (factor_f * ax, factor_f * ay)
-        step_g = (factor_g * bx, factor_g * by)
-        x, _held, _way = move_pair(table, pool, f, g, turn, x, e, t, tx, ty, step_f, step_g)
+        step_f = (factor_f * step_f[0], factor_f * step_f[1])
+        step_g = (factor_g * step_g[0], factor_g * step_g[1])
+        x, _held, _way = move_pair(table, pool, f, g, turn, x, frame, step_f, step_g)
         if not is_beside(table, pool, surfaces, x, start, half, BESIDE):
             return LEFT, x, count
         if step == 0:

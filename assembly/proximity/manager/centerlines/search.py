@@ -167,9 +167,9 @@ def add_minimum(table, pool, posed, i, j, s, t, neglect, roots, count, work):
     if found == NOTHING or not abs(extremum.gap - gap) <= ASTRAY:
         # At a fold Newton's method may find nothing, or go elsewhere: the minimum is known without it.
         frame = pair_frame(table, pool, posed.surfaces[0], posed.surfaces[1], posed.turn, posed.shift, start)
-        if not frame[11]:
+        if not frame.regular:
             return before
-        write(roots, before, start, 0, 0, frame[0], frame[10], frame[3], frame[4], 0.0)
+        write(roots, before, start, 0, 0, frame.normal, frame.gap, frame.point_f, frame.point_g, 0.0)
         for k in range(before):
             radius = min(neglect, SAME) if extremum_at(roots, k).origin == USELESS else neglect
             if are_one(table, pool, posed, roots, before, k, radius):
