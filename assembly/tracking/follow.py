@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly.constraints.program.contact import surface_of, track_contact, track_row
+from assembly.constraints.program.contact import predict_pair, surface_of, track_contact, track_row
 from assembly.constraints.program.records import (
     ROW,
     Iterate,
@@ -23,7 +23,6 @@ from assembly.constraints.program.records import (
     pool_header_at,
     row_at,
 )
-from assembly.geometry.splines.domain import into_domain
 from assembly.geometry.splines.evaluate import surface_at
 from assembly.geometry.vec import quaternion_product
 from assembly.proximity.extrema.face_face import BEND, CONVERGED, SINGULAR
@@ -104,12 +103,7 @@ def predict(table, pool, row, r, tracked, records, twists, guess):
             s += derivatives.zed[j, i] * twists[f, i] + derivatives.zed[j, 6 + i] * twists[g, i]
         for i in range(4):
             guess[r, i] += derivatives.rates[i, j] * s
-    if contact_row_at(table, row).shell_f < 0:
-        for side in range(2):
-            i = 2 * side
-            guess[r, i], guess[r, i + 1], _clamped = into_domain(
-                table, pool, surface_of(table, row, side), guess[r, i], guess[r, i + 1]
-            )
+    predict_pair(table, pool, row, r, tracked, guess)
 
 
 @kernel(inline=True)
@@ -141,18 +135,19 @@ def is_astray(table, pool, row, r, before, guess, after):
 @kernel(inner=True)
 def correct(table, pool, row, r, q, guess, tracked, records):
     """Newton's method from guess[r], into tracked[r] and record r. Whether there is a minimum of the distance."""
+    pair = tracked_at(tracked, r)
     for i in range(TRACK):
         tracked[r, i] = guess[r, i]
     if contact_row_at(table, row).shell_f >= 0:
         status = track_row(table, pool, row, q, guess, BEND, records, tracked, r)
         found = status == CONVERGED or status == SINGULAR
     else:
-        start = (guess[r, 0], guess[r, 1], guess[r, 2], guess[r, 3])
-        status, x, _distance = track_contact(table, pool, row, q, start, BEND, records, r)
+        status, x, facing, _distance = track_contact(table, pool, row, q, guess, BEND, records, r)
         found = status == CONVERGED or status == SINGULAR
         tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3] = x
+        pair.facing = facing
     if found:
-        tracked_at(tracked, r).gap = derivatives_at(records, r).gap
+        pair.gap = derivatives_at(records, r).gap
     if not found or contact_record_at(records, r).proper == 0.0:
         tracked[r, 0] = math.nan
         return False

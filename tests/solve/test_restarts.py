@@ -310,6 +310,28 @@ def test_with_contacts_bodies_stay_on_their_sides(cases):
     assert solved > 20
 
 
+def test_a_contact_keeps_to_its_side_of_a_ball():
+    # The point below comes past a pole of the ball in a long step. Led on by rates of the polar coordinates it was
+    # expected opposite, where the ball's top faces up as the floor does: SOLVED with the ball by 0.18 in the floor.
+    ground, link, ball = asm.Body("ground", fixed=True), asm.Body("link"), asm.Body("ball", asm.shapes.sphere(0.3))
+    floor = asm.Body("floor", asm.shapes.plane(40, 40), (0, 0, -0.0721), fixed=True)
+    link.pose = asm.Pose((0.8234, 0.0711, 0.4717), (-0.0408, -0.3046, 0.4881, 0.8169))
+    ball.pose = asm.Pose((0.7178, 0.1817, 0.5187), (-0.1728, 0.1042, -0.937, -0.285))
+    scene = asm.Assembly([ground, link, ball, floor])
+    shoulder = ground.frame(z=(-0.4422, 0.8605, 0.253)), link.frame(z=(0.0331, 0.0375, -0.9987))
+    at = (0.4096, -0.1305, 0.2378)
+    elbow = link.frame(at=at, z=(0.4663, 0.4408, -0.767)), ball.frame(z=(-0.8281, 0.1658, 0.5355))
+    scene.constrain(asm.Revolute(*shoulder, limits=(-1.6, 1.1)), asm.Revolute(*elbow))
+    scene.constrain(asm.Contact(floor, ball, "contact", unilateral=True))
+    scene.minimize(asm.PointDistance(ball.point(0.2, 0, 0), (-0.924, -0.3794, -1.0832)))
+    for steps in range(1, 13):
+        solution = scene.solve(max_iterations=steps)
+        # Whatever the solve has come to, its contact is the one at the ball's lowest point.
+        assert solution.contacts["contact"].points[1][2] == pytest.approx(solution.pose(ball).position[2] - 0.3)
+    solution = scene.solve()
+    assert solution.success and solution.contacts["contact"].gap == pytest.approx(0.0, abs=1e-11)
+
+
 def test_a_solve_out_of_steps_is_not_tried_elsewhere():
     solution = crank_slider((0.0, None)).solve(max_iterations=3)
     assert solution.status is asm.Status.ITERATION_LIMIT and not solution.restarted

@@ -19,9 +19,12 @@ from assembly.constraints.program.records import (
     header_at,
     row_at,
 )
-from assembly.geometry.vec import dot, sub
+from assembly.geometry.splines.domain import into_domain
+from assembly.geometry.splines.evaluate import surface_at, surface_point
+from assembly.geometry.splines.pole import limits, nearest_pole, polar_step
+from assembly.geometry.vec import blend, dot, matvec, scale, sub
 from assembly.kinematics.motion import relative_pose, rotation
-from assembly.proximity.extrema.face_face import CLOSE, CONVERGED, LEFT_PATCH, SINGULAR, solve_pair
+from assembly.proximity.extrema.face_face import CLOSE, CONVERGED, LEFT_PATCH, SINGULAR, own_frame, solve_pair
 from assembly.proximity.extrema.rates import RATES, RECORD, derivatives_at, gradient_row, store_record
 from assembly.proximity.features.solid_contact import (
     CONFORMING,
@@ -37,11 +40,75 @@ MAY_GO, HARDLY, TOUCHING = -1.0, 1e-3, 1e-9
 # A clearance's row that is open by more than the last needs its pair again after motions of this part of its gap, or of
 # this part of how far bodies may go where contacts may be born: from farther away Newton's method may find another one.
 UNSEEN, ASTRAY, FAR = 0.5, 0.15, 1e-5
+# Beside the statuses of `solve_pair`: the pair that was found does not continue the one that was tracked.
+OTHER_SIDE = 4
+
+
+@kernel(inline=True)
+def surface_of(table, row, side):
+    """The surface of a contact on side 0, of f, or 1, of g."""
+    contact = contact_row_at(table, row)
+    return contact.surface_f if side == 0 else contact.surface_g
+
+
+@kernel(inline=True)
+def facing_of(table, pool, g, relative, frame, x):
+    """1 where the outward normals of the surfaces of a pair oppose each other, -1 where they agree.
+
+    Seen along the normal n of f, with S the surface g, n.(S_u x S_v) = det T, and the frame has T^-1; at a pole it has
+    none.
+    """
+    t = frame.rates_g
+    along = float(surface_at(table, g).sign) * (t[0] * t[3] - t[1] * t[2])
+    if along == 0.0:
+        along = dot(frame.normal, matvec(relative, own_frame(table, pool, g, x[2], x[3]).normal))
+    return -1.0 if along > 0.0 else 1.0
+
+
+@kernel(inline=True)
+def predict_point(table, pool, surface, u, v, du, dv):
+    """Parameters after rates (du, dv), inside the domain.
+
+    Where a pole is nearer than they lead, that is along the tangent plane: a point that passes a pole goes around it,
+    in coordinates, in no time, and rates of these lead elsewhere.
+    """
+    if surface_at(table, surface).poles != 0:
+        _p, su, sv, _suu, _suv, _svv = surface_point(table, pool, surface, u, v)
+        step = blend(du, su, dv, sv)
+        edge, part = nearest_pole(table, pool, surface, u, v)
+        low, high, _closed = limits(table, pool, surface, 0 if edge <= 2 else 1)
+        spoke = scale(part * (high - low), su if edge <= 2 else sv)
+        if dot(step, step) > dot(spoke, spoke):
+            return polar_step(table, pool, surface, edge, u, v, step)
+    u, v, _clamped = into_domain(table, pool, surface, u + du, v + dv)
+    return u, v
+
+
+@kernel(inner=True)
+def predict_pair(table, pool, row, r, tracked, guess):
+    """Make of guess[r], coordinates that run on from tracked[r] by their rates, where the pair is expected.
+
+    A prediction may run over the end of a patch; Newton starts inside. What becomes of edges is up to switching.
+    """
+    if contact_row_at(table, row).shell_f >= 0:
+        return
+    for side in range(2):
+        i = 2 * side
+        u, v = tracked[r, i], tracked[r, i + 1]
+        guess[r, i], guess[r, i + 1] = predict_point(
+            table, pool, surface_of(table, row, side), u, v, guess[r, i] - u, guess[r, i + 1] - v
+        )
 
 
 @kernel(inner=True)
 def track_contact(table, pool, row, q, start, patience, records, k):
-    """Newton on the pair of one row; fills its record. Returns status, parameters, the points' signed distance."""
+    """Newton on the pair of one row from start[k]; fills its record.
+
+    A pair that is followed keeps what its outward normals are to each other: no way leads from opposed ones to equal
+    ones, as from the near side of a ball to the far side. Newton's method may come to either.
+    Returns status, parameters, how they face each other (`FACING`), the points' signed distance.
+    """
+    pair = tracked_at(start, k)
     fields = row_at(table, row)
     contact = contact_row_at(table, row)
     contact_record = contact_record_at(records, k)
@@ -50,11 +117,16 @@ def track_contact(table, pool, row, q, start, patience, records, k):
     turn = rotation(q, i)
     relative, shift = relative_pose(q, i, turn, j, rotation(q, j))
     f, g = contact.surface_f, contact.surface_g
-    found = solve_pair(table, pool, f, g, relative, shift, start, 1.0, patience, CLOSE, False)
-    status, frame = found.status, found.frame
+    x = (start[k, 0], start[k, 1], start[k, 2], start[k, 3])
+    found = solve_pair(table, pool, f, g, relative, shift, x, 1.0, patience, CLOSE, False)
+    status, frame, x = found.status, found.frame, found.parameters
     apart = sub(frame.point_g, frame.point_f)
     distance = math.sqrt(dot(apart, apart))
+    facing = pair.facing
     if status == CONVERGED or status == SINGULAR:
+        facing = facing_of(table, pool, g, relative, frame, x)
+        if facing * pair.facing < 0.0:
+            return OTHER_SIDE, x, pair.facing, distance
         store_record(turn, shift, frame, found.matrix, records, k)
         # Relative curvature -H (I + beta A)^-1: indefinite means the surfaces cross beside the point.
         h = found.matrix.h
@@ -63,7 +135,7 @@ def track_contact(table, pool, row, q, start, patience, records, k):
         proper = 1.0 if det > -1e-9 * norm2 and h[0] + h[3] <= 0.0 else 0.0
         contact_record.proper = CONFORMING if norm2 <= 1e-18 else proper
         contact_record.fold = det / norm2 if norm2 > 1e-18 else 0.0
-    return status, found.parameters, distance if frame.gap > 0.0 else -distance
+    return status, x, facing, distance if frame.gap > 0.0 else -distance
 
 
 @kernel(inner=True)
@@ -79,14 +151,15 @@ def start_row(table, pool, row, q, tracked, r):
 
 @kernel(inner=True)
 def restart_contact(table, pool, row, q, tracked, records, k):
-    """As `track_contact`, from a global start; tracked[k] is written meanwhile."""
+    """As `track_contact`, from a global start, without the distance; tracked[k] is written meanwhile."""
     was = (tracked[k, 0], tracked[k, 1], tracked[k, 2], tracked[k, 3])
     status = start_row(table, pool, row, q, tracked, k)
     x = (tracked[k, 0], tracked[k, 1], tracked[k, 2], tracked[k, 3])
-    tracked[k, 0], tracked[k, 1], tracked[k, 2], tracked[k, 3] = was
+    facing = tracked_at(tracked, k).facing
     if status == CONVERGED or status == SINGULAR:
-        status, x, _distance = track_contact(table, pool, row, q, x, math.inf, records, k)
-    return status, x
+        status, x, facing, _distance = track_contact(table, pool, row, q, tracked, math.inf, records, k)
+    tracked[k, 0], tracked[k, 1], tracked[k, 2], tracked[k, 3] = was
+    return status, was if status == OTHER_SIDE else x, facing
 
 
 @kernel(inner=True)
@@ -121,13 +194,6 @@ def track_row(table, pool, row, q, start, patience, records, tracked, r):
         header_at(table, 0).track_address,
         (table, pool, shell_f, shell_g, i, j, q, start, patience, records, tracked, r),
     )
-
-
-@kernel(inline=True)
-def surface_of(table, row, side):
-    """The surface of a contact on side 0, of f, or 1, of g."""
-    contact = contact_row_at(table, row)
-    return contact.surface_f if side == 0 else contact.surface_g
 
 
 @kernel(inline=True)
@@ -269,7 +335,8 @@ def row_of_pair(table, pool, r, start, patience, point):
     """Row r, of contact r, by its pair. Returns whether it was found.
 
     A contact is carried from `start` to its extremal pair, by steps that turn no normal by more than `patience`. A
-    one-sided row that loses its pair takes the nearest one there is.
+    one-sided row that loses its pair takes the nearest one there is, and so does any whose bodies may stand anywhere by
+    now, if what is found from the pair before is on another side of a body.
     """
     q, tracked, records = point.q, point.tracked, point.records
     derivatives = derivatives_at(records, r)
@@ -277,16 +344,16 @@ def row_of_pair(table, pool, r, start, patience, point):
     row = header_at(table, 0).row_table + ROW * r
     if contact_row_at(table, row).shell_f >= 0:
         return solids_row(table, pool, r, start, patience, point)
-    x = (start[r, 0], start[r, 1], start[r, 2], start[r, 3])
-    status, x, distance = track_contact(table, pool, row, q, x, patience, records, r)
+    status, x, facing, distance = track_contact(table, pool, row, q, start, patience, records, r)
     if status != CONVERGED and status != SINGULAR:
-        if row_at(table, row).one_sided == 0:
+        anywhere = status == OTHER_SIDE and patience == math.inf
+        if row_at(table, row).one_sided == 0 and not anywhere:
             return False
         if is_guard(table, r):
             return lost_guard(table, pool, r, start, point, False, False)
         # A one-sided contact is of the nearest pair, whichever that is now.
         held = status == LEFT_PATCH and distance > 0.0
-        status, x = restart_contact(table, pool, row, q, tracked, records, r)
+        status, x, facing = restart_contact(table, pool, row, q, tracked, records, r)
         if status != CONVERGED and status != SINGULAR:
             if not held:
                 return False
@@ -295,10 +362,11 @@ def row_of_pair(table, pool, r, start, patience, point):
             derivatives.gap = distance
             contact.proper = 1.0
             contact.fold = 1.0
-        elif not derivatives.gap > 0.0:
+        elif not (derivatives.gap > 0.0 or anywhere):
             return False
     write_gap_row(table, pool, r, point)
     tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3] = x
+    tracked_at(tracked, r).facing = facing
     return True
 
 

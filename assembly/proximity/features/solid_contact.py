@@ -32,7 +32,8 @@ TRACKED_PAIR = record_dtype(
     gap=1,  # signed distance [over the size of the scene]
     stays=1,  # what the pair stays with: a vertex contact need not be the closest one (`manager/vertex_contacts.py`)
     idle=1,  # of the end of a step: 1: its row stays open there for certain (`solve/loop/predict.py`)
-    allowed=1,  # of a clearance: its gap may be less than the least one by this, because it was where the solve began
+    allowed=1,  # its gap may be less than the least one by this, because it was where the solve began
+    facing=1,  # of a pair of surfaces: 1: their outward normals oppose each other, -1: they agree, 0: not known yet
 )
 tracked_at = record_view(TRACKED_PAIR)
 FEATURE_F = place_of(TRACKED_PAIR, "feature_f")
@@ -41,6 +42,7 @@ PAIR_GAP = place_of(TRACKED_PAIR, "gap")
 STAYS = place_of(TRACKED_PAIR, "stays")
 IDLE = place_of(TRACKED_PAIR, "idle")
 ALLOWED = place_of(TRACKED_PAIR, "allowed")
+FACING = place_of(TRACKED_PAIR, "facing")
 TRACK = size_of(TRACKED_PAIR)
 CONTACT_RECORD = RECORD + 3
 # The record of derivatives of a contact (`extrema/rates.py`), and what is behind it.

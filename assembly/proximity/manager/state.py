@@ -299,6 +299,7 @@ def write_root(roots, i, tracked, r):
     pair.gap = extremum.gap
     pair.stays = extremum.corner
     pair.idle = 0.0
+    pair.facing = 0.0
 
 
 @kernel(inner=True)

@@ -26,6 +26,7 @@ from assembly.solve.loop.settings import (
     OBJECTIVE,
     SCATTER,
     SOLVED,
+    TOUCHING,
     UNSURE,
     VIOLATION,
 )
@@ -138,5 +139,10 @@ def _run(packed: Packed, interruption: Interruption, table: Table, settings: Arr
 
 
 def go_on_once(interruption: Interruption, packed: Packed, settings: Array, state: Array) -> Outcome:
-    """The loop from a state that a solve has led to, with postures measured from where they were."""
+    """The loop from a state that a solve has led to, with postures measured from where they were.
+
+    Bodies may stay in each other only by what they were where the solve began: the state has that.
+    """
+    settings = settings.copy()
+    settings[TOUCHING] = 0.0
     return _run(packed, interruption, following_none(packed), settings, state)

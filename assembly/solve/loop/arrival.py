@@ -20,6 +20,8 @@ from assembly.solve.loop.settings import (
 NEAR_SADDLE, OFF_SADDLE = 1e-3, 1e-6
 # What a step must gain of violations that rounding of far coordinates may explain.
 GAIN = 0.5
+# A step of so many roundings of a coordinate at most is no move.
+STEPS_OF_ROUNDING = 8.0
 
 
 @kernel(inner=True)
@@ -41,11 +43,15 @@ def rounding_at(table, pool, settings, here):
 
 
 @kernel(inner=True)
-def slope_rounding(program, here, lagrangian, n, rows, y):
-    """What rounding leaves of the Lagrangian's slope: poses' by the objective's curvature, and that of forces."""
+def is_rounding(program, here, lagrangian, n, rows, y, moved, dual):
+    """Whether a step moved poses by no more than doubles tell apart, and rounding explains the slope that is left.
+
+    Poses' rounding by the objective's curvature, and that of forces.
+    """
     table, pool, shape = program.table, program.pool, program.structure
     reach = max(1.0, reach_of(table, pool, here.q))
-    return ROUNDING * (reach * greatest_on_diagonal(lagrangian, n, shape.sparsity) + strongest(y, rows))
+    most = ROUNDING * (reach * greatest_on_diagonal(lagrangian, n, shape.sparsity) + strongest(y, rows))
+    return moved <= STEPS_OF_ROUNDING * ROUNDING * reach and dual <= most
 
 
 @kernel(inner=True)

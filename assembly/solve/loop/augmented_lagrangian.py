@@ -43,8 +43,8 @@ from assembly.proximity.manager.update import (
     SPARING,
     any_crossed,
 )
-from assembly.solve.loop.arrival import GAIN, has_arrived, reach_of, rounding_at, slope_rounding
-from assembly.solve.loop.begin import let_touch, read_state, rearrange, set_out
+from assembly.solve.loop.arrival import GAIN, has_arrived, is_rounding, reach_of, rounding_at
+from assembly.solve.loop.begin import let_touch, overlap_allowed, read_state, rearrange, set_out
 from assembly.solve.loop.clearances import allowed_share, look_again, numbers_of, place_guards
 from assembly.solve.loop.contacts import free_folds, is_of_surfaces
 from assembly.solve.loop.deadline import HALF, begin_tick, is_cut, is_spent, may_end, set_deadline
@@ -80,8 +80,10 @@ from assembly.solve.loop.standstill import (
     bound_nearby,
     contradicts,
     drags,
+    grows_endlessly,
     is_stuck,
     next_floor,
+    raise_multipliers,
     stands_still,
     stays_off,
 )
@@ -100,6 +102,8 @@ EXTRA_TIME = 4
 # Where a solve may stray, and its bodies are so many times farther out, or sizes, after so many steps, it is looked at
 # whether that goes on.
 FAR, STRAYING = 1e3, 60
+# After so many whole steps in a row that gain nothing of the slope, rounding may explain what is left of it.
+STANDS = 20
 # So often at most a solve leaves a saddle of its violations.
 KICKS = 3
 
@@ -179,6 +183,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
     leash = math.inf
     back_at = -1
     longest = 0.0
+    stood = 0
     check_at = PATIENCE
     check_violation = math.inf
     iteration = 0
@@ -247,7 +252,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             changed = False
             rows, n, system, lost = rearrange(program, count, rows, here, y, better_y, active)
             if iteration == 0 and lost < 0:
-                let_touch(table, here, limits.touching)
+                let_touch(table, here, overlap_allowed(settings))
             gradient, lines, lagrangian = system.gradient, system.directions, system.hessian
             kept = False
             # What was hard for other rows need not be for these.
@@ -297,9 +302,10 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             holds, leash = False, math.inf
         retreats = sunk and holds and ended == RUNNING and iteration < limit
         looks_last = watched and limits.last_look == 1.0
-        # What a whole step gains nothing of may be rounding.
+        # What whole steps gain nothing of, several in a row, may be rounding.
         stands = alpha * cut == 1.0 and dual > max(GAIN * last_dual, limits.stationarity) and violation <= feasible
-        rounded = stands and dual <= slope_rounding(program, here, lagrangian, n, rows, y)
+        stood = stood + 1 if stands else 0
+        rounded = stood >= STANDS and is_rounding(program, here, lagrangian, n, rows, y, longest, dual)
         unbalanced = 0.0 if rounded else dual
         arrived = has_arrived(program, settings, results, here, violation, last_violation, feasible, unbalanced)
         # Where every last look finds other contacts, the limit ends it.
@@ -403,6 +409,9 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         if restoring:
             mu = 1.0
             forget_objective(order, rows, y, gradient, lagrangian)
+        if grows_endlessly(way, strongest(y, rows), strongest(gradient, n), violation, feasible):
+            floor = mu = min(raise_multipliers(way, y, rows, violation, feasible), limits.penalty_floor)
+            kept = False
         # Where the last step gained so much that a second one by its factor will do, that is cheaper.
         gain = 2.0 * max(violation / max(last_violation, feasible), dual / max(last_dual, limits.stationarity))
         is_fresh = not (kept and gain * violation <= feasible and gain * dual <= limits.stationarity)

@@ -76,29 +76,44 @@ def let_touch(table, here, touching):
 
 
 @kernel(inline=True)
-def find_contacts(program, state, recalled, here, by_row, n, free_trims, sparing, touching):
-    """Find the contacts of the start and evaluate its rows, unless the last tick left them at `recalled`.
+def overlap_allowed(settings):
+    """How far bodies of contacts may be in each other at the start of this solve and stay so.
 
-    Bodies of a contact or a clearance that are in each other by no more than `touching` there may stay so.
+    A solve or a tick that goes on from the last one has its allowance with its pairs, and gets none on top.
+    """
+    limits = settings_at(settings, 0)
+    begins = limits.tick == 0.0 and limits.penalty > limits.penalty_floor
+    return limits.touching if begins else 0.0
+
+
+@kernel(inline=True)
+def find_contacts(program, settings, state, here, by_row, n):
+    """Find the contacts of the start and evaluate its rows, unless the last tick left them in its state.
+
+    Bodies of a contact or a clearance that are in each other by no more than touching there may stay so.
     Returns the contact that has no pair, or -1, and whether that was told by evaluating the rows: which are not
     evaluated yet where a contact has no pair to begin with, or is at a fold.
     """
+    limits = settings_at(settings, 0)
     table, pool, shape, loose, room = program.table, program.pool, program.structure, program.lifted, program.tapes
     header = header_at(table, 0)
     free, lengths, memory = loose.free, loose.lengths, loose.memory
     memory_header = memory_header_at(memory, 0)
     y, better_y, active = by_row.y, by_row.better_y, by_row.active
+    recalled, tick = int(limits.recall), limits.tick == 1.0
     watched = header.watch >= 0
     came = False
     if watched:
         place_guards(table, memory, here, y, better_y, free, True)
     lost = start_contacts(table, pool, here.q, here.tracked, free, lengths)
     if watched and lost < 0:
-        memory_header.overlap = touching
-        came = look_around(table, pool, memory, here, SPARING if sparing else AS_NEEDED)
+        memory_header.overlap = limits.touching
+        came = look_around(table, pool, memory, here, SPARING if tick else AS_NEEDED)
         memory_header.overlap = 0.0
         place_guards(table, memory, here, y, better_y, free, False)
-    count = free_folds(table, pool, here.records, here.tracked, active, free, lengths, -1.0, -1, free_trims)
+    count = free_folds(
+        table, pool, here.records, here.tracked, active, free, lengths, -1.0, -1, limits.free_trims == 1.0
+    )
     if lost >= 0 or count > 0:
         return lost, False
     if watched:
@@ -106,7 +121,7 @@ def find_contacts(program, state, recalled, here, by_row, n, free_trims, sparing
     if recalled == 0 or came or not recall(table, state, recalled, here):
         lost = evaluate(table, pool, here.tracked, math.inf, loose, room, here)
         if lost < 0:
-            let_touch(table, here, touching)
+            let_touch(table, here, overlap_allowed(settings))
     return lost, True
 
 
@@ -150,11 +165,8 @@ def set_out(program, settings, state, here, by_row, n):
     result.culprit = -1.0
     result.held = 0.0
     result.curved = 0.0
-    free_trims = limits.free_trims == 1.0
     tick = limits.tick == 1.0
-    lost, evaluated = find_contacts(
-        program, state, int(limits.recall), here, by_row, n, free_trims, tick, limits.touching
-    )
+    lost, evaluated = find_contacts(program, settings, state, here, by_row, n)
     # A tick begins where the last one ended: there a pair that Newton's method loses is at a fold.
     folded = lost >= 0 and evaluated and tick and is_of_surfaces(table, lost)
     status = CONTACT_LOST if lost >= 0 and not folded else RUNNING

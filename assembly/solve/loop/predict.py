@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly.constraints.program.contact import copy_tracked, is_guard, surface_of
+from assembly.constraints.program.contact import copy_tracked, is_guard, predict_pair, surface_of
 from assembly.constraints.program.records import (
     FREE_COLUMN,
     ROW,
@@ -80,6 +80,7 @@ def carry(table, pool, bases, loose, here, trial, d, alpha):
         if u >= 0:
             for i in range(4):
                 out[k, i] += alpha * d[u + i] / lengths[k, i]
+            keep_inside(table, pool, row, k, out)
         else:
             for j in range(4):
                 s = 0.0
@@ -91,7 +92,7 @@ def carry(table, pool, bases, loose, here, trial, d, alpha):
                 s *= alpha
                 for i in range(4):
                     out[k, i] += derivatives_at(records, k).rates[i, j] * s
-        keep_inside(table, pool, row, k, out)
+            predict_pair(table, pool, row, k, tracked, out)
         if is_guard(table, k) and stays_open(table, pool, bases, k, here, trial, d, alpha):
             tracked_at(out, k).idle = 1.0
             tracked_at(out, k).gap = max(
@@ -102,9 +103,7 @@ def carry(table, pool, bases, loose, here, trial, d, alpha):
 
 @kernel(inner=True)
 def keep_inside(table, pool, row, k, out):
-    """A prediction may run over the end of a patch; Newton starts inside. What becomes of edges is up to switching."""
-    if contact_row_at(table, row).shell_f >= 0:
-        return
+    """Coordinates that are unknowns may run over the end of a patch."""
     for side in range(2):
         i = 2 * side
         out[k, i], out[k, i + 1], _clamped = into_domain(

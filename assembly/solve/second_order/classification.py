@@ -151,7 +151,7 @@ def judge_kink(packed: Packed, state: Array) -> tuple[Verdict, Look | None]:
 
 
 def _symmetric(matrix: Array) -> Array:
-    return 0.5 * (matrix + matrix.T)
+    return 0.5 * matrix + 0.5 * matrix.T
 
 
 @dataclass(frozen=True, eq=False)
