@@ -10,9 +10,9 @@ from scipy.optimize import brentq
 
 from assembly.geometry.vec import dot
 from assembly.proximity.manager.centerlines.box import FreeEnds, Lengths, apart
-from assembly.proximity.manager.centerlines.curve import HALF, PART_BEND
 from assembly.proximity.manager.centerlines.minima import MINIMA, valley_minima
 from assembly.proximity.manager.centerlines.search import THIN
+from assembly.proximity.manager.wires import HALF, PART_BEND
 from benchmarks.motions import SHAPES
 from benchmarks.watching import Watch
 from tests.laws.test_spines import Two

@@ -15,7 +15,9 @@ from assembly.geometry.shapes.path import Path
 from assembly.geometry.vec import dot
 from assembly.proximity.manager import state as watch_memory
 from assembly.proximity.manager.centerlines.box import BARREN, CONVEX, EMPTY, FreeEnds, Lengths, apart, box_of
-from assembly.proximity.manager.centerlines.curve import (
+from assembly.proximity.manager.centerlines.packing import pack_spine
+from assembly.proximity.manager.motion_bounds import part_used
+from assembly.proximity.manager.wires import (
     HALF,
     PART,
     PART_POOL,
@@ -25,8 +27,6 @@ from assembly.proximity.manager.centerlines.curve import (
     point_of,
     spine_point,
 )
-from assembly.proximity.manager.centerlines.packing import pack_spine
-from assembly.proximity.manager.motion_bounds import part_used
 from benchmarks.center_lines import path_wire
 from benchmarks.motions import HOOK, SHAPES
 from benchmarks.watching import Watch

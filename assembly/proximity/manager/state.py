@@ -19,7 +19,6 @@ from assembly.proximity.features.solid_contact import (
     pair_parameters,
     tracked_at,
 )
-from assembly.proximity.manager.centerlines.curve import both_radii
 from assembly.proximity.manager.extrema import (
     ALIKE,
     BESIDE_CONTACT,
@@ -37,6 +36,7 @@ from assembly.proximity.manager.extrema import (
 )
 from assembly.proximity.manager.near_singular_points import sunk
 from assembly.proximity.manager.overlap import is_outside
+from assembly.proximity.manager.wires import both_radii
 
 # The record of a contact manager in the table. Places of the pool and the table are absolute.
 MANAGER_DTYPE = record_dtype(

@@ -25,7 +25,6 @@ from assembly.proximity.bvh.tree import least_distance, node_at, tree_at
 from assembly.proximity.features.solid_contact import CONTACT_RECORD, TRACK, tracked_at
 from assembly.proximity.manager.candidates import facing_pairs, near_enough
 from assembly.proximity.manager.centerlines.box import BOX
-from assembly.proximity.manager.centerlines.curve import both_radii
 from assembly.proximity.manager.centerlines.minima import MINIMA
 from assembly.proximity.manager.centerlines.parts import near_parts, parts_beyond
 from assembly.proximity.manager.centerlines.search import BOXES, MARK, search_spines
@@ -81,6 +80,7 @@ from assembly.proximity.manager.state import (
     seat_given,
 )
 from assembly.proximity.manager.vertex_contacts import add_corners
+from assembly.proximity.manager.wires import both_radii
 
 # Looks: at pairs that used up their allowance, or at all that moved. The first may be careful, at urgent pairs too, and
 # in turns, earlier at one pair at a time, and ask whether bodies cross where a contact lost its root. MEASURED: which

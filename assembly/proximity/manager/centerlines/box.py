@@ -20,7 +20,7 @@ from collections import namedtuple
 from assembly._kernel import kernel
 from assembly._record import record_dtype, record_view, size_of
 from assembly.geometry.vec import add, blend, dot, matvec, matvec_t, sub
-from assembly.proximity.manager.centerlines.curve import (
+from assembly.proximity.manager.wires import (
     centerline_part_at,
     spine_point,
 )

@@ -1,4 +1,4 @@
-"""Spines of wires as kernels read them (`proximity/manager/centerlines/curve.py`)."""
+"""Spines of wires as kernels read them (`proximity/manager/wires.py`)."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ from assembly.proximity.bvh.neighbor_list import (
 )
 from assembly.proximity.bvh.tree import three_of
 from assembly.proximity.manager.centerlines.box import ROUNDING, centerline_box_at, segment_distance
-from assembly.proximity.manager.centerlines.curve import (
+from assembly.proximity.manager.wires import (
     BALL,
     PART,
     ball_at,

@@ -30,16 +30,6 @@ from assembly.proximity.manager.centerlines.box import (
     box_of,
     centerline_box_at,
 )
-from assembly.proximity.manager.centerlines.curve import (
-    PART,
-    both_radii,
-    centerline_at,
-    centerline_part_at,
-    spine_place,
-    spine_point,
-    wire_at,
-    wire_parameters,
-)
 from assembly.proximity.manager.centerlines.minima import convex_minimum, valley_minima
 from assembly.proximity.manager.extrema import (
     NEW,
@@ -52,6 +42,16 @@ from assembly.proximity.manager.extrema import (
     write,
 )
 from assembly.proximity.manager.motion_bounds import MotionBall, PairSearch, no_ball
+from assembly.proximity.manager.wires import (
+    PART,
+    both_radii,
+    centerline_at,
+    centerline_part_at,
+    spine_place,
+    spine_point,
+    wire_at,
+    wire_parameters,
+)
 
 # Room for boxes that wait.
 BOXES = 2048
