@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.geometry.shapes.centerline import Spine
-from assembly.proximity.manager.centerlines import curve as layout
+from assembly.proximity.manager import wires as layout
 
 __all__ = ["pack_spine"]
 
