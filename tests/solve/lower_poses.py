@@ -191,35 +191,12 @@ class Model:
         return q if worst < HOLDS else None
 
 
-def lagrangian(model, q):
-    """The value of a pose, with what its rows are off by times the forces that balance q: a function of poses.
-
-    At a pose that holds it is the value. Next to where rows hold by their curvature alone a rounding of 1e-13 lets
-    bodies go by 3e-7, and forces of 1e6 say what that gains.
-    """
-    above = model.above(q)
-    touching = above < 1e-9
-    slopes = np.vstack([model.slope(model.equal, q), model.slope(model.above, q)[touching]])
-    downhill = -model.slope(lambda p: model.value(p)[..., None], q)[0]
-    forces = np.linalg.lstsq(slopes.T, downhill, rcond=1e-12)[0]
-    two_sided = len(slopes) - int(touching.sum())
-    forces[two_sided:] = np.minimum(forces[two_sided:], 0.0)
-
-    def value(p):
-        rows = np.concatenate([model.equal(p), model.above(p)[touching]])
-        off = np.where(np.abs(rows) < 1e-9, rows, 0.0)
-        return float(model.value(p)) + float(forces @ off)
-
-    return value
-
-
 def lowest_neighbor(model, q, rng, tries):
     """How much lower a pose beside q is that holds, at most: along curvature of its own, and along random motions."""
-    worth = lagrangian(model, q)
-    value = worth(q)
     q = model.onto_rows(q)
     if q is None:
         return 0.0
+    value = float(model.value(q))
     slopes = model.slope(model.equal, q)
     _, sizes, right = np.linalg.svd(slopes, full_matrices=True)
     free = right[int((sizes > 1e-7 * max(sizes.max(initial=0.0), 1e-30)).sum()) :].T
@@ -228,7 +205,7 @@ def lowest_neighbor(model, q, rng, tries):
 
     def at(x):
         p = model.onto_rows(model.move(q, free @ x))
-        return np.inf if p is None else worth(p)
+        return np.inf if p is None else float(model.value(p))
 
     d = free.shape[1]
     ways = list(rng.normal(size=(tries, d)))

@@ -80,10 +80,8 @@ from assembly.solve.loop.standstill import (
     bound_nearby,
     contradicts,
     drags,
-    grows_endlessly,
     is_stuck,
     next_floor,
-    raise_multipliers,
     stands_still,
     stays_off,
 )
@@ -409,9 +407,6 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         if restoring:
             mu = 1.0
             forget_objective(order, rows, y, gradient, lagrangian)
-        if grows_endlessly(way, strongest(y, rows), strongest(gradient, n), violation, feasible):
-            floor = mu = min(raise_multipliers(way, y, rows, violation, feasible), limits.penalty_floor)
-            kept = False
         # Where the last step gained so much that a second one by its factor will do, that is cheaper.
         gain = 2.0 * max(violation / max(last_violation, feasible), dual / max(last_dual, limits.stationarity))
         is_fresh = not (kept and gain * violation <= feasible and gain * dual <= limits.stationarity)

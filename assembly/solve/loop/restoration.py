@@ -29,7 +29,6 @@ RESTORATION = record_dtype(
     slow_steps=1,  # whole steps in a row that gained little
     drags=1,  # steps of any length in a row that left what rows are off
     nearby=1,  # 1: steps that restore rows are no longer than a neighborhood
-    endless=1,  # whole steps in a row after which multipliers would grow without end
 )
 restoration_at = record_view(RESTORATION)
 WAY = size_of(RESTORATION)
@@ -84,7 +83,6 @@ def begin_way(way):
     progress.slow_steps = 0.0
     progress.drags = 0.0
     progress.nearby = 0.0
-    progress.endless = 0.0
 
 
 @kernel(inline=True)

@@ -6,8 +6,6 @@ import math
 
 from assembly._kernel import kernel
 from assembly.constraints.program.contact import TOUCHING
-from assembly.solve.loop.direction import CLOSE
-from assembly.solve.loop.multipliers import strongest
 from assembly.solve.loop.restoration import restoration_at
 from assembly.solve.loop.settings import NEIGHBORHOOD, settings_at
 
@@ -24,11 +22,6 @@ DRAGGED, SETTLED = 4.0, 2.0
 # Where so many whole steps in a row do not halve the violation, the floor of the penalty gives way, down to here:
 # rounding, times its inverse, must stay small against the objective's curvature.
 SLOW, HARDEST = 3.0, 1e-10
-# What is to be left of what counts as held where multipliers that grow without end are raised at once; those that are
-# so many times stronger than the objective's slope do.
-AIMED, ENDLESSLY = 0.25, 100.0
-# The penalty, times such a multiplier: rows are to be stiffer across than what it bends them by.
-SOFT = 0.01
 
 
 @kernel(inline=True)
@@ -121,29 +114,4 @@ def next_floor(way, floor, is_slow):
     """
     progress = restoration_at(way, 0)
     progress.slow_steps = progress.slow_steps + 1.0 if is_slow else 0.0
-    progress.endless = 1.0 if progress.slow_steps >= SLOW and floor <= HARDEST else 0.0
     return max(0.1 * floor, HARDEST) if progress.slow_steps >= SLOW else floor
-
-
-@kernel(inline=True)
-def grows_endlessly(way, force, steepest, violation, feasible):
-    """Whether only multipliers without end would hold the rows, of which the strongest is `force` by now."""
-    return restoration_at(way, 0).endless == 1.0 and feasible < violation <= CLOSE and force > ENDLESSLY * steepest
-
-
-@kernel(inline=True)
-def raise_multipliers(way, y, rows, violation, feasible):
-    """Raise multipliers that would grow without end to where what rows are off counts as held.
-
-    Where rows depend on each other and hold by their curvature alone, as of an arm stretched to the only place where it
-    touches, no multipliers balance a force across them. Poses off by e along that way are balanced by multipliers in
-    proportion to 1 / e, and violate rows by e^2: by steps of c / mu that takes e^-3 mu of them. Returns a penalty for
-    rows with such multipliers.
-    """
-    progress = restoration_at(way, 0)
-    factor = math.sqrt(violation / (AIMED * feasible))
-    for r in range(rows):
-        y[r] *= factor
-    progress.endless = 0.0
-    progress.slow_steps = 0.0
-    return SOFT / strongest(y, rows)
