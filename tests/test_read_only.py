@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 import pickle
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from enum import Enum
 from typing import Any
@@ -37,7 +38,9 @@ def arrays_of(value: Any, path: str, seen: dict[int, Any]) -> Iterator[tuple[str
         # Dataclasses may make fields when they are read.
         fields = {field.name for field in dataclasses.fields(value)} if dataclasses.is_dataclass(value) else set()
         for name in sorted(fields | set(dir(value))):
-            got = getattr(value, name) if name[0] != "_" else None
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", DeprecationWarning)  # of attributes that have another name now
+                got = getattr(value, name) if name[0] != "_" else None
             if not callable(got):
                 yield from arrays_of(got, f"{path}.{name}", seen)
 

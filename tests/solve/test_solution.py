@@ -7,7 +7,7 @@ import pytest
 
 import assembly as asm
 from assembly.errors import InputError
-from assembly.solve import solution as solution_module
+from assembly.solve import result as result_module
 from assembly.solve.result import Iteration
 from tests.solve.dense.test_jacobian import everything
 from tests.solve.mechanisms import bricard, planar_four_bar
@@ -129,7 +129,7 @@ def test_a_plain_solve_pays_for_nothing(monkeypatch):
             f"assembly.solve.dense.jacobian.{name}" if name == "rows_at" else f"assembly.solve.diagnosis.lost.{name}",
             None,
         )
-    monkeypatch.setattr(solution_module, "measure", None)
+    monkeypatch.setattr(result_module, "measure", None)
     solution = scene.solve()
     assert solution.success and solution.violations and solution.multipliers and solution.history.size
     assert repr(solution) and solution.message

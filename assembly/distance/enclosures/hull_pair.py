@@ -87,8 +87,8 @@ def hull_distance(full, a, count_a, b, count_b, state):
         inside_weights(full, g)
         x, y = witnesses(g, kept)
         differences(g, kept)
-        y = vertex(g, 0)
-        off = 4.0 * UNIT * (abs(y[0]) + abs(y[1]) + abs(y[2])) + slack
+        first = vertex(g, 0)
+        off = 4.0 * UNIT * (abs(first[0]) + abs(first[1]) + abs(first[2])) + slack
         if inside_proven(full, g, (0.0, 0.0, 0.0), off):
             best.met = 1.0
     else:
