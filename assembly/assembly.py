@@ -11,26 +11,26 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.constraints.constraint import structure_changes
-from assembly.constraints.contact import lone_surfaces
-from assembly.constraints.contents import Contents
-from assembly.constraints.packing import Packed, structure_of
-from assembly.constraints.scene_size import check_reach, scene_size
+from assembly.constraints.model.constraint import structure_changes
+from assembly.constraints.model.contact import lone_surfaces
+from assembly.constraints.model.contents import Contents
+from assembly.constraints.packing.scene import Packed, structure_of
+from assembly.constraints.packing.scene_size import check_reach, scene_size
 from assembly.errors import InputError, vector
 from assembly.kinematics.body import Body, Frame, Point
 from assembly.kinematics.pose import pose_rows
-from assembly.proximity.pairs import inside
-from assembly.proximity.solid_contact import TRACK
-from assembly.solve.attempts import attempt, load
+from assembly.proximity.extrema.pairs import inside
+from assembly.proximity.features.solid_contact import TRACK
+from assembly.solve.attempts.attempts import attempt, load
+from assembly.solve.attempts.postures import postures_from
 from assembly.solve.interruption import CTRL_C, Interruption
+from assembly.solve.loop.settings import ANY_POSE, GATHER, ITERATIONS, STRAYS, TOUCHING
 from assembly.solve.options import Options
-from assembly.solve.postures import postures_from
 from assembly.solve.scene import Scene, Status
-from assembly.solve.settings import ANY_POSE, GATHER, ITERATIONS, STRAYS, TOUCHING
 from assembly.solve.solution import Solution
 
 if TYPE_CHECKING:
-    from assembly.solve.mobility import Mobility
+    from assembly.solve.diagnosis.mobility import Mobility
     from assembly.tracking.tracker import Tracker
 
 __all__ = ["Assembly"]
@@ -223,7 +223,7 @@ class Assembly(Contents):
                 code, state, history, order, fit = outcome
                 status = Status.FITTED if fit is not None and fit.apart is not None else interruption.status(code)
                 if status is not Status.SOLVED and self._objectives:
-                    from assembly.solve.unbounded import Asked, has_strayed, status_of
+                    from assembly.solve.diagnosis.unbounded import Asked, has_strayed, status_of
 
                     asked = Asked(self.bodies, self.constraints, self._objectives)
                     status = status_of(status, asked, packed, settings, start, state, interruption)
@@ -366,7 +366,7 @@ class Assembly(Contents):
         TimeoutError
             The time limit was over before: half of a rank says nothing.
         """
-        from assembly.solve.mobility import Mobility
+        from assembly.solve.diagnosis.mobility import Mobility
 
         if not isinstance(drives, (bool, np.bool_)):
             raise InputError(f"drives is {drives!r}; expected True or False")

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import math
 import operator
+import warnings
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,11 +30,13 @@ __all__ = [
     "number",
     "positive",
     "real_array",
+    "renamed",
     "text",
     "vector",
 ]
 
 
+Value = TypeVar("Value")
 # Coordinates and lengths are no larger: squares of those that come out of them must not overflow.
 FARTHEST = 1e150
 
@@ -118,6 +121,14 @@ def real_array(name: str, value: ArrayLike, shape: Sequence[int | str]) -> NDArr
 def vector(name: str, value: ArrayLike, length: int = 3) -> NDArray[np.float64]:
     """A finite vector of the given length."""
     return real_array(name, value, (length,))
+
+
+def renamed(new: str, value: Value, old: str, old_value: Value | None) -> Value:
+    """The value of an argument that had another name, under which it still works, with a warning."""
+    if old_value is None:
+        return value
+    warnings.warn(f"{old} is called {new} now", DeprecationWarning, stacklevel=3)
+    return old_value
 
 
 def number(name: str, value: Any) -> float:

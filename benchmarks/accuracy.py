@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import assembly as asm
-from assembly.proximity.pairs import PairStatus
+from assembly.proximity.extrema.pairs import PairStatus
 from benchmarks.figures import figure
 from benchmarks.hands import NEAR, WIRE, linked_rings
 from benchmarks.hidden import JOINTS, Hidden

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.geometry.path import Path
+from assembly.geometry.shapes.path import Path
 
 __all__ = ["Wire", "ball_wire", "linking_number", "paper_clip_wire", "path_wire", "torus_wire"]
 

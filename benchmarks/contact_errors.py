@@ -15,7 +15,7 @@ from scipy.optimize import minimize
 
 import assembly as asm
 from assembly.kinematics.pose import retract
-from assembly.solve.reference import ReferenceSolver
+from assembly.solve.oracle.reference import ReferenceSolver
 from assembly.solve.scene import Status
 from benchmarks.figures import figure
 from benchmarks.first_order import lines_without_curvature

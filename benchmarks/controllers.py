@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.geometry import shapes
-from assembly.geometry.surface import NurbsSurface
+from assembly.geometry.splines.surface import NurbsSurface
 from assembly.proximity import PairStatus, closest_features, convergence_hypotheses, descend, extremal_pair
-from assembly.proximity.control_bounds import Method, final_parameters
+from assembly.proximity.controllers.bounds import Method, final_parameters
 from benchmarks.features import random_pose
 from benchmarks.figures import figure
 from benchmarks.timing import measure

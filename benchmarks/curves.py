@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly import NurbsCurve
+from assembly.distance.curves.capsules import capsule_tree
+from assembly.distance.curves.search import ANSWER
 from assembly.proximity import collides, is_separated, minimum_distance, minimum_distances
-from assembly.proximity.bezier_capsules import capsule_tree
-from assembly.proximity.bezier_search import ANSWER
 from benchmarks.figures import figure
 from benchmarks.query_kernels import point_question_often, question_often, subdivide, subdivide_often
 from benchmarks.timing import measure

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import assembly as asm
-from assembly.geometry.face import Face
+from assembly.geometry.faces.face import Face
 from assembly.proximity import FeatureStatus, closest_features
-from assembly.proximity.bounding_tree import tree_distance
-from assembly.proximity.facet_tree import FacetTree
-from assembly.proximity.tree_packing import pack_tree
+from assembly.proximity.bvh.facet_tree import FacetTree
+from assembly.proximity.bvh.packing import pack_tree
+from assembly.proximity.bvh.tree import tree_distance
 from benchmarks.figures import figure
 from benchmarks.kernels import facing_bodies
 

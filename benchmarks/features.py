@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from assembly.geometry import shapes, solids
-from assembly.geometry.curve import NurbsCurve
-from assembly.geometry.face import Face
-from assembly.geometry.surface import NurbsSurface
+from assembly.geometry import shapes
+from assembly.geometry.faces.face import Face
+from assembly.geometry.shapes import solids
+from assembly.geometry.splines.curve import NurbsCurve
+from assembly.geometry.splines.surface import NurbsSurface
 from assembly.proximity import FeatureStatus, FeatureTracker, closest_features
 from benchmarks.dense_distance import Sampled, circle_distance, least_distance
 from benchmarks.figures import figure

@@ -38,7 +38,7 @@ def lines_without_curvature(count: int, tolerances: Sequence[float]) -> list[lis
 
 
 def main(arguments: Sequence[str]) -> int:
-    from assembly.solve import multipliers
+    from assembly.solve.loop import multipliers
 
     multipliers.WEAK = math.inf
     from benchmarks.contact_errors import Case, ours

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import assembly as asm
-from assembly.geometry.face import Face
-from assembly.proximity.extremal import CLOSE
-from assembly.proximity.facet_tree import FacetTree
+from assembly.geometry.faces.face import Face
+from assembly.proximity.bvh.facet_tree import FacetTree
+from assembly.proximity.extrema.face_face import CLOSE
 from benchmarks import linkages
 from benchmarks.facets import CLIP_RADIUS, CLIPS, Descents, walk
 from benchmarks.figures import figure

@@ -10,13 +10,13 @@ import math
 
 from assembly._kernel import kernel
 from assembly._lanes import lane, load_lanes
-from assembly.geometry.spline import surface_lanes, surface_point
+from assembly.geometry.splines.evaluate import surface_lanes, surface_point
 from assembly.geometry.vec import add
 from assembly.kinematics.motion import relative_pose, rotation
-from assembly.proximity.bounding_tree import pairs_within
-from assembly.proximity.extremal import pair_frame, solve_pair
-from assembly.proximity.pair_matrix import pair_matrix
-from assembly.proximity.velocity import RATES, ZED, into_quaternions, pair_derivatives, store_record
+from assembly.proximity.bvh.tree import pairs_within
+from assembly.proximity.extrema.face_face import pair_frame, solve_pair
+from assembly.proximity.extrema.pair_matrix import pair_matrix
+from assembly.proximity.extrema.rates import RATES, ZED, into_quaternions, pair_derivatives, store_record
 
 
 @kernel

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import assembly as asm
-from assembly.solve.reference import ReferenceSolver
+from assembly.solve.oracle.reference import ReferenceSolver
 from benchmarks.figures import figure
 from benchmarks.scenes import linked_wires, torus_pairs
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import assembly as asm
-from assembly.constraints.constraint import Constraint
+from assembly.constraints.model.constraint import Constraint
 from assembly.kinematics.body import Point
 
 __all__ = [

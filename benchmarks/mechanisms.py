@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import assembly as asm
-from assembly.constraints.dexterity import MEASURES
+from assembly.constraints.model.dexterity import MEASURES
 from assembly.kinematics.body import Point
 from benchmarks import linkages
 from benchmarks.figures import figure

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import assembly as asm
-from assembly.geometry.path import Path
+from assembly.geometry.shapes.path import Path
 from benchmarks.center_lines import Wire, paper_clip_wire, path_wire, torus_wire
 from benchmarks.watching import Listed, Watch
 from benchmarks.wire_oracle import Extrema, WireOracle

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import assembly as asm
-from assembly.proximity.extremal import CLOSE, CONVERGED
-from assembly.proximity.velocity import RECORD
+from assembly.proximity.extrema.face_face import CLOSE, CONVERGED
+from assembly.proximity.extrema.rates import RECORD
 from benchmarks.figures import figure
 from benchmarks.kernels import all_derivatives, contact_jacobians, evaluate_pairs, solve_pairs
 from benchmarks.peers import occt_pairs, occt_points

@@ -10,12 +10,12 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.geometry import curves
-from assembly.geometry.curve import NurbsCurve
-from assembly.geometry.formula_curve import FormulaCurve
-from assembly.proximity.collision_queries import collisions
-from assembly.proximity.enclosure_queries import enclosed_distance
-from assembly.proximity.separation import SeparationStatus
+from assembly.distance.batch.queries import collisions
+from assembly.distance.enclosures.queries import enclosed_distance
+from assembly.distance.separation import SeparationStatus
+from assembly.geometry.shapes import curves
+from assembly.geometry.splines.curve import NurbsCurve
+from assembly.geometry.splines.formula_curve import FormulaCurve
 from benchmarks.figures import figure
 from benchmarks.timing import measure
 

@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from assembly._kernel import kernel
-from assembly.proximity.bezier_capsules import OPEN, compare_curves, compare_point
-from assembly.proximity.bezier_point import point_distance
-from assembly.proximity.bezier_search import curve_distance
+from assembly.distance.curves.capsules import OPEN, compare_curves, compare_point
+from assembly.distance.curves.point_curve import point_distance
+from assembly.distance.curves.search import curve_distance
 
 
 @kernel

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import assembly as asm
-from assembly.constraints.objectives import PointDistance
-from assembly.geometry.bezier import insert
-from assembly.geometry.spline import BREAKS_U, BREAKS_V, CELLS, COEFFICIENTS
+from assembly.constraints.model.objectives import PointDistance
+from assembly.geometry.splines.bezier import insert
+from assembly.geometry.splines.evaluate import BREAKS_U, BREAKS_V, CELLS, COEFFICIENTS
 
 __all__ = [
     "Pairs",

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from assembly.geometry import shapes
-from assembly.geometry.curve import NurbsCurve
-from assembly.geometry.face import Face
+from assembly.geometry.faces.face import Face
+from assembly.geometry.splines.curve import NurbsCurve
 from benchmarks.figures import figure
 from benchmarks.timing import compare
 

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import assembly as asm
-from assembly.constraints import layout
-from assembly.proximity import watch, watch_memory
-from assembly.proximity.facing import CROWDED_PART
-from assembly.proximity.solid_contact import PAIR_GAP, TRACK
+from assembly.constraints.program import records as layout
+from assembly.proximity.features.solid_contact import PAIR_GAP, TRACK
+from assembly.proximity.manager import state as watch_memory
+from assembly.proximity.manager import update as watch
+from assembly.proximity.manager.candidates import CROWDED_PART
 
 __all__ = ["Listed", "Watch"]
 
@@ -57,7 +58,7 @@ class Watch:
         self.bodies = [asm.Body(f"body {k + 1}", surface) for k, surface in enumerate(surfaces)]
         scene = asm.Assembly(self.bodies)
         # Wires that move fast are looked at far ahead, and as many contacts are listed.
-        scene.constrain(asm.Clearance(places=16))
+        scene.constrain(asm.Clearance(slots=16))
         self._packed = packed = scene.packed()
         self._at = int(packed.table[layout.WATCH])
         self.pairs = [(self.bodies.index(a), self.bodies.index(b)) for a, b in packed.guarded[0]]

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import assembly as asm
-from assembly.constraints.objectives import PointDistance
-from assembly.proximity.pairs import PairStatus
-from assembly.solve.reference import ReferenceSolver
+from assembly.constraints.model.objectives import PointDistance
+from assembly.proximity.extrema.pairs import PairStatus
+from assembly.solve.oracle.reference import ReferenceSolver
 from benchmarks.figures import figure
 from benchmarks.running import example
 from benchmarks.scenes import Wires, crossing, linked_wires

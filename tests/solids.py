@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from assembly.geometry.curve import NurbsCurve
-from assembly.geometry.face import Face
-from assembly.geometry.surface import NurbsSurface
+from assembly.geometry.faces.face import Face
+from assembly.geometry.splines.curve import NurbsCurve
+from assembly.geometry.splines.surface import NurbsSurface
 
 # Half the sides of the tiled solid's base, its height in the middle, and how fast its roof falls off.
 HALF_X, HALF_Y, HEIGHT, FALL_X, FALL_Y = 5.0, 4.0, 8.0, 0.06, 0.05

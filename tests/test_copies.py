@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly.constraints.dexterity import Dexterity
+from assembly.constraints.model.dexterity import Dexterity
 
 STILL = (1.0, 0.0, 0.0, 0.0)
 

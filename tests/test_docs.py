@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 
 import assembly as asm
-from assembly.constraints import joints as joints_of_frames
-from assembly.constraints import placements as joints_of_points
-from assembly.constraints.dexterity import MEASURES
-from assembly.proximity.pairs import PairStatus
+from assembly.constraints.model import joints as joints_of_frames
+from assembly.constraints.model import placements as joints_of_points
+from assembly.constraints.model.dexterity import MEASURES
+from assembly.proximity.extrema.pairs import PairStatus
 from assembly.solve.options import Options
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -131,7 +131,9 @@ def test_a_name_is_imported_once(monkeypatch):
 
 
 def test_there_are_kernel_files():
-    assert {"geometry/vec.py", "geometry/spline.py"} <= {p.relative_to(PACKAGE).as_posix() for p in KERNEL_FILES}
+    assert {"geometry/vec.py", "geometry/splines/evaluate.py"} <= {
+        p.relative_to(PACKAGE).as_posix() for p in KERNEL_FILES
+    }
 
 
 @pytest.mark.parametrize("path", sorted(PACKAGE.rglob("*.py")), ids=lambda p: p.relative_to(PACKAGE).as_posix())
@@ -167,10 +169,10 @@ def test_kernels_reach_no_objects(path):
 def test_an_edit_compiles_what_it_reaches():
     # How many of the entries an edit of a file compiles again.
     counts = {
-        "solve/step.py": 1,
-        "solve/augmented_lagrangian.py": 1,
-        "proximity/watch.py": 9,
-        "proximity/extremal.py": 36,
+        "solve/loop/direction.py": 1,
+        "solve/loop/augmented_lagrangian.py": 1,
+        "proximity/manager/update.py": 9,
+        "proximity/extrema/face_face.py": 34,
     }
     entries = [source_of_kernel(entry.compiled.py_func) for entry in listed_entries()]
     assert len(entries) == 78
@@ -216,3 +218,31 @@ def test_readme_commands_are_what_ci_runs():
     tests = 'pip install ".[step,test]" && python -m tests'
     assert commands == ["pip install . && python examples/paper_clips.py", tests]
     assert "^pip install" in (ROOT / ".ci/run").read_text()
+
+
+def named_offsets(path):
+    """Subscripts of a kernel file by a constant's name: `block[at + NAME]`, and not a field of a record."""
+    places = [node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Subscript)]
+    return [
+        ast.unparse(place)
+        for place in places
+        if any(isinstance(part, ast.Name) and part.id.strip("_").isupper() for part in ast.walk(place.slice))
+    ]
+
+
+def test_tables_and_pools_are_read_by_fields():
+    # What is left: columns of the Jacobian, copies of whole rows of a state, rooms of formulas. It may not grow.
+    assert sum(len(named_offsets(path)) for path in KERNEL_FILES) <= 32
+
+
+def test_kernels_return_few_values():
+    # Matrices and derivatives of surfaces, which are formulas, return up to six; what has more parts is a named tuple.
+    many = [
+        f"{path.name}: {node.name}"
+        for path in KERNEL_FILES
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.FunctionDef)
+        for end in ast.walk(node)
+        if isinstance(end, ast.Return) and isinstance(end.value, ast.Tuple) and len(end.value.elts) > 4
+    ]
+    assert len(set(many)) <= 21, sorted(set(many))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 import pickle
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from enum import Enum
 from typing import Any
@@ -14,8 +15,8 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly.proximity.facet_tree import FacetTree
-from assembly.proximity.topology import topology_of
+from assembly.proximity.brep.topology import topology_of
+from assembly.proximity.bvh.facet_tree import FacetTree
 
 STILL = (1.0, 0.0, 0.0, 0.0)
 
@@ -37,7 +38,9 @@ def arrays_of(value: Any, path: str, seen: dict[int, Any]) -> Iterator[tuple[str
         # Dataclasses may make fields when they are read.
         fields = {field.name for field in dataclasses.fields(value)} if dataclasses.is_dataclass(value) else set()
         for name in sorted(fields | set(dir(value))):
-            got = getattr(value, name) if name[0] != "_" else None
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", DeprecationWarning)  # of attributes that have another name now
+                got = getattr(value, name) if name[0] != "_" else None
             if not callable(got):
                 yield from arrays_of(got, f"{path}.{name}", seen)
 

@@ -11,8 +11,8 @@ import pytest
 
 import assembly as asm
 from assembly.errors import InputError
-from assembly.geometry.curve import NurbsCurve
-from assembly.geometry.loop import Loop
+from assembly.geometry.faces.loop import Loop
+from assembly.geometry.splines.curve import NurbsCurve
 from tests.geometry.loops import blob, circle, polygon, segment
 
 THIRD = 1.0 / 3.0

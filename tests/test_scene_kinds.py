@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 import assembly as asm
 from assembly import scene_file
-from assembly.constraints.joint import Joint
+from assembly.constraints.model.joint import Joint
 from assembly.errors import InputError
 from assembly.kinematics.body import Frame
 from assembly.scene_file.kinds import CONSTRAINTS, OBJECTIVES
@@ -82,7 +82,7 @@ def every_constraint():
         touch,
         *joints,
         asm.TrimContact(touch, loop, "inside", "cartesian", side="b", name="kept"),
-        asm.Clearance([ground, crank], THIRD, neglect=0.1, places=3, exclude=[(crank, ground)]),
+        asm.Clearance([ground, crank], THIRD, merge_radius=0.1, slots=3, exclude=[(crank, ground)]),
         asm.Expression(mixed(3, 2), [wheel, ground, crank], unilateral=True, scale=0.1, weight=THIRD),
     )
     scene.minimize(

@@ -193,3 +193,32 @@ def iarctangent2(a, b):
     s = math.atan2(a[1], b[1])
     lo, hi = widened(min(min(p, q), min(r, s)), max(max(p, q), max(r, s)), LIBRARY)
     return lo, hi, False
+
+
+_GROW = 1.0 + 16.0 * UNIT
+
+
+@kernel(inline=True)
+def middle_of(x, o, k):
+    """A double in the k-th of the pairs at x[o:]."""
+    return 0.5 * (x[o + 2 * k] + x[o + 2 * k + 1])
+
+
+@kernel(inner=True, exact=True)
+def off_of(x, o):
+    """How far the middle of three pairs may be from what they enclose."""
+    a = x[o + 1] - x[o]
+    b = x[o + 3] - x[o + 2]
+    c = x[o + 5] - x[o + 4]
+    # Half the width, and the rounding of the middle itself.
+    size = abs(x[o]) + abs(x[o + 2]) + abs(x[o + 4])
+    return _GROW * (0.5 * math.sqrt(a * a + b * b + c * c) + UNIT * size)
+
+
+@kernel(inner=True, exact=True)
+def most(x, o):
+    """Largest norm of what three pairs enclose."""
+    a = magnitude((x[o], x[o + 1]))
+    b = magnitude((x[o + 2], x[o + 3]))
+    c = magnitude((x[o + 4], x[o + 5]))
+    return _GROW * math.sqrt(a * a + b * b + c * c)

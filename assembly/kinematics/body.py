@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly._read_only import ReadOnlyArrays
 from assembly.errors import InputError, KnownSettings, check_coordinates, checked_color, text, vector
-from assembly.geometry.face import Face
-from assembly.geometry.surface import NurbsSurface
+from assembly.geometry.faces.face import Face
+from assembly.geometry.splines.surface import NurbsSurface
 from assembly.kinematics.pose import Pose, direction, length
 
 __all__ = ["Body", "BodyFace", "Frame", "Point", "Shape"]

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from assembly.assembly import Assembly
-from assembly.constraints.constraint import Constraint
+from assembly.constraints.model.constraint import Constraint
 from assembly.errors import InputError
 from assembly.scene_file.fields import at, bad, each, members, whole, written
 from assembly.scene_file.kinds import BODY, CONSTRAINTS, FACE, OBJECTIVES, SURFACE

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.constraints.clearance import Clearance
-from assembly.constraints.contact import Contact
-from assembly.constraints.couplings import Gear, RackPinion
-from assembly.constraints.dexterity import Dexterity
-from assembly.constraints.expression import Expression
-from assembly.constraints.joints import (
+from assembly.constraints.model.clearance import Clearance
+from assembly.constraints.model.contact import Contact
+from assembly.constraints.model.couplings import Gear, RackPinion
+from assembly.constraints.model.dexterity import Dexterity
+from assembly.constraints.model.expression import Expression
+from assembly.constraints.model.joints import (
     Cylindrical,
     Fixed,
     Parallel,
@@ -26,14 +26,14 @@ from assembly.constraints.joints import (
     Spherical,
     Universal,
 )
-from assembly.constraints.objectives import FrameDistance, PointDistance, Posture
-from assembly.constraints.placements import Angle, Distance, PointOnLine, PointOnPlane
-from assembly.constraints.trim_contact import TrimContact, single_face
+from assembly.constraints.model.objectives import FrameDistance, PointDistance, Posture
+from assembly.constraints.model.placements import Angle, Distance, PointOnLine, PointOnPlane
+from assembly.constraints.model.trim_contact import TrimContact, single_face
 from assembly.errors import InputError
-from assembly.geometry.curve import NurbsCurve
-from assembly.geometry.face import Face
-from assembly.geometry.loop import Loop
-from assembly.geometry.surface import NurbsSurface
+from assembly.geometry.faces.face import Face
+from assembly.geometry.faces.loop import Loop
+from assembly.geometry.splines.curve import NurbsCurve
+from assembly.geometry.splines.surface import NurbsSurface
 from assembly.kinematics.body import Body, Frame, Point
 from assembly.kinematics.pose import Pose
 from assembly.scene_file.fields import bad, each, flag, number, or_null, table, text, vector, whole
@@ -129,6 +129,11 @@ def _free(*names: str) -> tuple[Field, ...]:
     return tuple(
         made for name, its in zip(names, limits, strict=True) for made in (Field(name, DRIVEN), Field(its, LIMITS))
     )
+
+
+def _clearance(neglect: float, places: int | None, **others: Any) -> Clearance:
+    """Files have the former names of two options."""
+    return Clearance(merge_radius=neglect, slots=places, **others)
 
 
 def _point_distance(body: Body, point: list[float], target: list[float], weight: float) -> PointDistance:
@@ -272,8 +277,9 @@ CONSTRAINTS = OneOf(
             ),
             Field("minimum", NUMBER),
             Field("exclude", Listed(Listed(BODY_NAME))),
-            Field("neglect", NUMBER),
-            Field("places", Plain(or_null(whole))),
+            Field("neglect", NUMBER, "merge_radius"),
+            Field("places", Plain(or_null(whole)), "slots"),
+            make=_clearance,
         ),
         "expression": EXPRESSION,
     }

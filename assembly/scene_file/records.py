@@ -8,10 +8,10 @@ from operator import attrgetter
 from typing import Any, Protocol
 
 from assembly.assembly import Assembly
-from assembly.constraints.constraint import Constraint
+from assembly.constraints.model.constraint import Constraint
 from assembly.errors import InputError
-from assembly.geometry.face import Face
-from assembly.geometry.surface import NurbsSurface
+from assembly.geometry.faces.face import Face
+from assembly.geometry.splines.surface import NurbsSurface
 from assembly.scene_file.fields import at, bad, each, members
 
 __all__ = ["Field", "Form", "Listed", "OneOf", "OrNull", "Parts", "Plain", "Record"]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from assembly.constraints.constraint import Freedom
-from assembly.constraints.contact import Contact
-from assembly.constraints.joint import Joint
+from assembly.constraints.model.constraint import Freedom
+from assembly.constraints.model.contact import Contact
+from assembly.constraints.model.joint import Joint
 from assembly.errors import InputError
 from assembly.kinematics.body import Body, BodyFace
 from assembly.scene_file.fields import at, bad, members, or_null, text, whole

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from assembly.constraints.contact import side_faces
-from assembly.constraints.layout import DEEPEST_AT, NEAREST_AT, ROW, ROW_TABLE, SHELL_F, SHELL_G
+from assembly.constraints.model.contact import side_faces
+from assembly.constraints.program.records import DEEPEST_AT, NEAREST_AT, ROW, ROW_TABLE, SHELL_F, SHELL_G
 from assembly.kinematics.body import Body, BodyFace
-from assembly.proximity.features import closest_features, features_of
-from assembly.proximity.pairs import ContactPair, PairStatus, extremal_pair
-from assembly.proximity.solid_contact import CONTACT_RECORD, FEATURE_F, FEATURE_G, search_solids, track_solids
-from assembly.proximity.velocity import ARM_F, GAP, NORMAL
+from assembly.proximity.extrema.pairs import ContactPair, PairStatus, extremal_pair
+from assembly.proximity.extrema.rates import ARM_F, GAP, NORMAL
+from assembly.proximity.features.features import closest_features, features_of
+from assembly.proximity.features.solid_contact import CONTACT_RECORD, FEATURE_F, FEATURE_G, search_solids, track_solids
 
 if TYPE_CHECKING:
     from assembly.solve.solution import Solution

@@ -15,18 +15,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.constraints import layout
-from assembly.constraints.clearance import Clearance
-from assembly.constraints.constraint import Constraint
-from assembly.constraints.contact import Contact, side_faces
-from assembly.constraints.couplings import Coupling
-from assembly.constraints.joint import Joint
-from assembly.constraints.packing import Packed
+from assembly.constraints.model.clearance import Clearance
+from assembly.constraints.model.constraint import Constraint
+from assembly.constraints.model.contact import Contact, side_faces
+from assembly.constraints.model.couplings import Coupling
+from assembly.constraints.model.joint import Joint
+from assembly.constraints.packing.scene import Packed
+from assembly.constraints.program import records as layout
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import rotation_matrix
-from assembly.proximity import watch, watch_memory
-from assembly.proximity.facet_tree import FacetTree
-from assembly.proximity.solid_contact import PAIR_GAP, TRACK
+from assembly.proximity.bvh.facet_tree import FacetTree
+from assembly.proximity.features.solid_contact import PAIR_GAP, TRACK
+from assembly.proximity.manager import state as watch_memory
+from assembly.proximity.manager import update as watch
 from assembly.solve.interruption import Interruption
 
 if TYPE_CHECKING:
@@ -103,7 +104,7 @@ class _Watched(Clearance):
 
     def __init__(self, pairs: Sequence[Pair], name: str) -> None:
         bodies = dict.fromkeys(body for pair in pairs for body in pair)
-        super().__init__(bodies, name=name, places=PLACES * (1 + min(len(pairs), len(bodies))))
+        super().__init__(bodies, name=name, slots=PLACES * (1 + min(len(pairs), len(bodies))))
         self._pairs = list(pairs)
 
     def pairs(self, bodies: Sequence[Body]) -> list[Pair]:

@@ -1,6 +1,7 @@
 """What ends a solve before it is done: a time limit, a callback of the user's, Ctrl-C.
 
-The compiled loop runs without the interpreter. Every 50 ms at most (`pauses.py`) it calls an address in its settings:
+The compiled loop runs without the interpreter. Every 50 ms at most (`solve/loop/pauses.py`) it calls an address in its
+settings:
 there the interpreter runs again, so that handlers of signals do, and an answer other than 0 ends the loop. A look at
 very many pairs of bodies asks as often; what it returns is whole, but where an exception throws it away.
 
@@ -20,9 +21,9 @@ from numpy.typing import NDArray
 
 from assembly._address import callback_address
 from assembly.errors import InputError, number
-from assembly.proximity.watch_memory import ABORTED, ENDS, GOES_ON, SLICE
+from assembly.proximity.manager.state import ABORTED, ENDS, GOES_ON, SLICE
+from assembly.solve.loop.settings import ASK_AT, COUNT, OBJECTIVE, OUT_OF_TIME, VIOLATION
 from assembly.solve.scene import Status
-from assembly.solve.settings import ASK_AT, COUNT, OBJECTIVE, OUT_OF_TIME, VIOLATION
 
 __all__ = ["CTRL_C", "Interruption"]
 

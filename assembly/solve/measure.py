@@ -1,6 +1,7 @@
 """Coordinates of joints by their definitions, in plain numpy: what the rows of a pose are judged by.
 
-The definitions are those of `constraints/primitives.py`; nothing is shared with its code but the names of the kinds.
+The definitions are those of `constraints/program/primitives.py`; nothing is shared with its code but the names of the
+kinds.
 """
 
 from __future__ import annotations
@@ -12,8 +13,8 @@ from math import atan2, hypot, pi
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.constraints.constraint import Coordinate, Equation
-from assembly.constraints.primitives import ANGLE, AZIMUTH, COINCIDENT, DISTANCE, DOT, SLIDE, SWING, TURN
+from assembly.constraints.model.constraint import Coordinate, Equation
+from assembly.constraints.program.primitives import ANGLE, AZIMUTH, COINCIDENT, DISTANCE, DOT, SLIDE, SWING, TURN
 from assembly.kinematics.body import Frame
 from assembly.kinematics.pose import rotation_matrix
 

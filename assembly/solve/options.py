@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.errors import InputError, integer, number
-from assembly.solve.settings import (
+from assembly.solve.loop.settings import (
     FEASIBILITY,
     FIT,
     ITERATIONS,

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.constraints.constraint import Constraint
-from assembly.constraints.contact import Contact
-from assembly.constraints.layout import TERM_TABLE, TERMS
-from assembly.constraints.packing import Packed
-from assembly.constraints.terms import POINT_DISTANCE, POSTURE, POSTURE_PARAMETERS, TERM
+from assembly.constraints.model.constraint import Constraint
+from assembly.constraints.model.contact import Contact
+from assembly.constraints.packing.scene import Packed
+from assembly.constraints.program.objective_terms import POINT_DISTANCE, POSTURE, POSTURE_PARAMETERS, TERM
+from assembly.constraints.program.records import TERM_TABLE, TERMS
 from assembly.errors import InputError
 from assembly.kinematics.body import Body
 

@@ -8,41 +8,25 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly._read_only import ReadOnlyArrays, read_only
-from assembly.constraints.joint import Joint
-from assembly.constraints.layout import IMPLICIT
-from assembly.constraints.packing import Packed
+from assembly.constraints.program.records import IMPLICIT
 from assembly.errors import InputError
-from assembly.kinematics.body import Body
-from assembly.kinematics.pose import Pose
-from assembly.proximity.pairs import ContactPair
-from assembly.proximity.solid_contact import TRACK
-from assembly.solve.measure import measure, standing
-from assembly.solve.options import Options
-from assembly.solve.scene import Scene, Status
-from assembly.solve.settings import COUNT, DUAL, OBJECTIVE, VIOLATION
+from assembly.proximity.extrema.pairs import ContactPair
+from assembly.solve.loop.settings import DUAL, OBJECTIVE
+from assembly.solve.result import Result
+from assembly.solve.scene import Status
 
 if TYPE_CHECKING:
     from assembly.solve.crossings import Crossings
-    from assembly.solve.leave import Fit
-    from assembly.solve.mobility import Mobility
-    from assembly.solve.second_order import SecondOrder
-    from assembly.solve.statics import Wrench
+    from assembly.solve.diagnosis.mobility import Mobility
+    from assembly.solve.forces.statics import Wrench
+    from assembly.solve.second_order.classification import SecondOrder
 
-__all__ = ["Iteration", "Solution"]
+__all__ = ["Solution"]
 
 Array = NDArray[np.float64]
-# A constraint that is off by less than this part of the worst is not one of those that disagree.
-IDLE = 1e-3
 
 
-class Iteration(tuple[float, ...]):
-    """Names of the columns of `Solution.history`."""
-
-    COLUMNS = ("objective", "feasibility", "stationarity", "penalty", "regularization", "step", "radius")
-
-
-class Solution(ReadOnlyArrays):
+class Solution(Result):
     """The result of a solve. Its tables are computed when they are read; its arrays are read-only.
 
     Attributes
@@ -99,59 +83,13 @@ class Solution(ReadOnlyArrays):
     message : str
     """
 
-    def __init__(
-        self,
-        scene: Scene,
-        packed: Packed,
-        state: Array,
-        status: Status,
-        seconds: float,
-        history: Array,
-        order: SecondOrder | None = None,
-        fit: Fit | None = None,
-    ) -> None:
-        self._scene = scene
-        self._packed = packed
-        self._state = state
-        self._rows = history
-        self.status = status
-        self.seconds = seconds
-        self._order = order
-        self.restarted = False
-        self._fit = fit
-        # What bodies may be in each other and still touch, in parts of the scene's size.
-        self._touching = Options.touching
-        # Flat contacts alone need it again, for the center of their pressure.
-        self._wishes = packed.pool[scene.wished(packed)] if scene.contacts else None
-
-    @cached_property
-    def q(self) -> Array:
-        """Configuration, (n, 7)."""
-        return read_only(self._state[: self._packed.contacts_at].reshape(-1, 7).copy())
-
-    @property
-    def _parameters(self) -> Array:
-        return self._state[self._packed.contacts_at : self._packed.angles_at].reshape(-1, TRACK)
-
-    @property
-    def _residuals(self) -> Array:
-        return self._state[self._packed.residuals_at : self._packed.results_at]
-
-    def _result(self, place: int) -> float:
-        return float(self._state[self._packed.results_at + place])
-
-    @property
-    def iterations(self) -> int:
-        """Steps of the loop."""
-        return int(self._result(COUNT))
-
     @property
     def objective(self) -> float:
         """Value of the objective, in the user's units."""
         value = self._result(OBJECTIVE)
         if np.isfinite(value) or not self._is_lost:
             return value * self._packed.unit
-        from assembly.solve.lost import goal
+        from assembly.solve.diagnosis.lost import goal
 
         return goal(self)[0]
 
@@ -166,30 +104,15 @@ class Solution(ReadOnlyArrays):
         value = self._result(DUAL)
         if np.isfinite(value) or not self._is_lost:
             return value
-        from assembly.solve.lost import goal
+        from assembly.solve.diagnosis.lost import goal
 
         return goal(self)[1]
-
-    @property
-    def _is_lost(self) -> bool:
-        """Whether the loop could not evaluate its rows at the pose, because a contact had no pair there."""
-        return bool(self._scene.contacts) and self._result(VIOLATION) == np.inf
-
-    @property
-    def history(self) -> Array:
-        """A row an iteration, columns `Iteration.COLUMNS`; none where a contact was lost at the start."""
-        return read_only(self._rows[: 0 if self._is_lost and self.iterations == 0 else self.iterations + 1])
-
-    @property
-    def success(self) -> bool:
-        """Whether the status is SOLVED or FITTED."""
-        return self.status is Status.SOLVED or self.status is Status.FITTED
 
     @property
     def second_order(self) -> SecondOrder | None:
         """What the end of a solve is; looked at when it is read, unless the solve had to."""
         if self._order is None and self.success:
-            from assembly.solve.second_order import SecondOrder, judge
+            from assembly.solve.second_order.classification import SecondOrder, judge
 
             self._order = SecondOrder.NO_OBJECTIVE
             if self._packed.table[IMPLICIT] == 0:
@@ -203,81 +126,22 @@ class Solution(ReadOnlyArrays):
     def violations(self) -> dict[str, float]:
         """Violation of every constraint, by name: its largest; lengths in the user's unit, angles in radians."""
         if self._is_lost:
-            from assembly.solve.lost import violations
+            from assembly.solve.diagnosis.lost import violations
 
             return violations(self)
         return self._largest(1.0)
 
-    def _largest(self, unit: float) -> dict[str, float]:
-        """The largest violation of every constraint's rows, lengths in a unit."""
-        packed = self._packed
-        each = np.where(packed.one_sided, np.maximum(-self._residuals, 0.0), np.abs(self._residuals))
-        return self._by_constraint(np.where(packed.lengths, each / unit, each))
-
-    def _by_constraint(self, each: Array) -> dict[str, float]:
-        """The largest of what every constraint's rows have."""
-        return {
-            constraint.name: float(each[rows].max(initial=0.0))
-            for constraint, rows in zip(self._scene.constraints, self._packed.spans, strict=True)
-        }
-
-    @property
-    def _allowed(self) -> float:
-        """What rows that repeat each other may disagree by, over the size."""
-        return Options.fit if self._fit is None else self._fit.allowed
-
-    @cached_property
-    def disagreeing(self) -> dict[str, float]:
-        """Constraints that repeat each other and disagree, and how far each is off: lengths, radians; worst first."""
-        if self._fit is None or self._fit.apart is None:
-            return {}
-        packed = self._packed
-        off = np.abs(self._fit.apart)
-        parts = self._by_constraint(off)
-        amounts = self._by_constraint(np.where(packed.lengths, off * packed.scale, off))
-        least = IDLE * max(parts.values())
-        return {name: amounts[name] for name in sorted(parts, key=lambda name: -parts[name]) if parts[name] > least}
-
-    @cached_property
-    def multipliers(self) -> dict[str, Array]:
-        """Multipliers of every constraint's rows, by name: forces and torques when the objective is an energy."""
-        packed = self._packed
-        forces = self._state[packed.multipliers_at : packed.residuals_at] * packed.unit
-        forces = np.where(packed.lengths, forces / packed.scale, forces)
-        return {
-            constraint.name: read_only(forces[rows])
-            for constraint, rows in zip(self._scene.constraints, packed.spans, strict=True)
-        }
-
     @cached_property
     def wrenches(self) -> dict[str, dict[str, Wrench]]:
         """What every constraint exerts on each of its bodies, by their names."""
-        from assembly.solve.statics import wrenches
+        from assembly.solve.forces.statics import wrenches
 
         return wrenches(self)
 
     @cached_property
-    def values(self) -> dict[str, float]:
-        """Every freedom of every joint, "joint.freedom": lengths in the user's unit, angles in radians."""
-        packed = self._packed
-        near = dict(
-            zip(map(id, packed._angles), self._state[packed.angles_at : packed.multipliers_at : TRACK], strict=True)
-        )
-        values = {}
-        for joint in self._scene.constraints:
-            for name, freedom in joint.freedoms.items() if isinstance(joint, Joint) else ():
-                coordinate = freedom.coordinate
-                pair = coordinate.frames
-                frames = standing(
-                    coordinate, self.q, (self._scene.index(pair.frame_a.body), self._scene.index(pair.frame_b.body))
-                )
-                values[f"{joint.name}.{name}"] = measure(coordinate, frames, float(near.get(id(coordinate), 0.0)))
-        return values
-
-    @cached_property
     def mobility(self) -> Mobility:
         """Degrees of freedom at `q`, free motions, redundant constraints; `Assembly.mobility` has options."""
-        from assembly.solve.mobility import Mobility
+        from assembly.solve.diagnosis.mobility import Mobility
 
         return Mobility.at(self._scene, self._packed, self._state, solved=True, fit=self._allowed)
 
@@ -289,7 +153,7 @@ class Solution(ReadOnlyArrays):
         """
         if self.status is not Status.INFEASIBLE:
             return []
-        from assembly.solve.conflicts import conflicts_at
+        from assembly.solve.diagnosis.conflicts import conflicts_at
 
         return conflicts_at(self._scene, self._packed, self._state, self._allowed)
 
@@ -297,12 +161,6 @@ class Solution(ReadOnlyArrays):
     def conflicting(self) -> list[str]:
         """Names in `conflicting_sets`, sorted, each once."""
         return sorted({name for names in self.conflicting_sets for name in names})
-
-    def _wished_pool(self) -> Array:
-        """The pool with the objective as it was in this solve."""
-        pool = self._packed.pool.copy()
-        pool[self._scene.wished(self._packed)] = self._wishes
-        return pool
 
     @cached_property
     def contacts(self) -> dict[str, ContactPair]:
@@ -357,14 +215,9 @@ class Solution(ReadOnlyArrays):
         root of twice the residual over the rows' curvature: 1e-13 there is 4e-7. Free motions do not count, nor does
         how far an objective is from its best; infinite where rows do not hold to 1e-6.
         """
-        from assembly.solve.pose_error import pose_error
+        from assembly.solve.diagnosis.pose_error import pose_error
 
         return pose_error(self._scene, self._packed, self._state)
-
-    def pose(self, body: Body | str) -> Pose:
-        """Pose of a body, given itself or its name."""
-        row = self.q[self._scene.index(body)]
-        return Pose(row[:3], row[3:])
 
     @property
     def message(self) -> str:

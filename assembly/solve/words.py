@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from assembly.errors import InputError
+from assembly.solve.loop.settings import CULPRIT, IMPROPER
+from assembly.solve.result import Iteration
 from assembly.solve.scene import Status
-from assembly.solve.settings import CULPRIT, IMPROPER
-from assembly.solve.solution import Iteration, Solution
+
+if TYPE_CHECKING:
+    from assembly.solve.solution import Solution
 
 __all__ = ["iteration_table", "message", "table"]
 

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.errors import InputError
-from assembly.geometry.curve import NurbsCurve
-from assembly.geometry.face import Face
-from assembly.geometry.surface import NurbsSurface
+from assembly.geometry.faces.face import Face
+from assembly.geometry.splines.curve import NurbsCurve
+from assembly.geometry.splines.surface import NurbsSurface
 from assembly.step.occt import occt, parts
 from assembly.step.profiles import Unreadable
 from assembly.step.surfaces import Patch, patch

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.errors import AssemblyError
-from assembly.geometry import bezier
+from assembly.geometry.splines import bezier
 from assembly.step.occt import occt
 
 __all__ = ["Direction", "Spline", "Straight", "Turning", "Unreadable", "approximated", "arc", "profile", "spline"]

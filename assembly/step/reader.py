@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from assembly.errors import InputError
-from assembly.geometry.face import Face
+from assembly.geometry.faces.face import Face
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import Pose, axes_quaternion
 from assembly.step.faces import read_face

@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.geometry.curve import NurbsCurve
-from assembly.geometry.curve_parts import sampled
-from assembly.geometry.face import Face
-from assembly.geometry.loop import Loop
-from assembly.geometry.region_cuts import cut_open
-from assembly.geometry.region_pieces import POLE, SEAM, Piece
-from assembly.geometry.surface import NurbsSurface
+from assembly.geometry.faces.face import Face
+from assembly.geometry.faces.loop import Loop
+from assembly.geometry.seams.region_cuts import cut_open
+from assembly.geometry.seams.region_pieces import POLE, SEAM, Piece
+from assembly.geometry.splines.curve import NurbsCurve
+from assembly.geometry.splines.curve_parts import sampled
+from assembly.geometry.splines.surface import NurbsSurface
 from assembly.step.occt import occt, parts
 from assembly.step.profiles import approximated
 from assembly.step.trims import crossings

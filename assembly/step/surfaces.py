@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.geometry import bezier
-from assembly.geometry.surface import NurbsSurface
+from assembly.geometry.splines import bezier
+from assembly.geometry.splines.surface import NurbsSurface
 from assembly.step.occt import occt
 from assembly.step.profiles import (
     SLACK,

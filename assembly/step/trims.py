@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from assembly.geometry.curve import NurbsCurve
-from assembly.geometry.curve_parts import sampled
+from assembly.geometry.splines.curve import NurbsCurve
+from assembly.geometry.splines.curve_parts import sampled
 from assembly.step.occt import occt
 from assembly.step.profiles import Direction, Spline, Straight, Turning, Unreadable, approximated, profile, spline
 from assembly.step.surfaces import Patch

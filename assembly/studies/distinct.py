@@ -10,16 +10,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.constraints.layout import WATCH
-from assembly.constraints.packing import Packed
+from assembly.constraints.packing.scene import Packed
+from assembly.constraints.program.records import WATCH
 from assembly.errors import InputError
 from assembly.kinematics.pose import retract
-from assembly.proximity.solid_contact import TRACK
-from assembly.proximity.watch import EVERYTHING, look
-from assembly.proximity.watch_memory import CROSSED, MEMORY_HEADER, PAIR_MEMORY
-from assembly.solve.jacobian import rows_of
-from assembly.solve.nearby import moves
-from assembly.solve.row_table import gradient_at
+from assembly.proximity.features.solid_contact import TRACK
+from assembly.proximity.manager.state import CROSSED, MEMORY_HEADER, PAIR_MEMORY
+from assembly.proximity.manager.update import EVERYTHING, look
+from assembly.solve.dense.jacobian import rows_of
+from assembly.solve.dense.row_table import gradient_at
+from assembly.solve.diagnosis.nearby_poses import moves
 from assembly.solve.solution import Solution
 
 __all__ = ["are_one"]

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from assembly.errors import integer
+from assembly.solve.attempts.postures import postures_from
+from assembly.solve.attempts.starts import moving_rows, scattered
 from assembly.solve.interruption import Interruption
-from assembly.solve.postures import postures_from
 from assembly.solve.solution import Solution
-from assembly.solve.starts import moving_rows, scattered
 from assembly.studies.distinct import are_one
 
 if TYPE_CHECKING:

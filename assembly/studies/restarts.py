@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.proximity.solid_contact import TRACK
-from assembly.solve.contradiction import is_certain
+from assembly.proximity.features.solid_contact import TRACK
+from assembly.solve.attempts.starts import Spread, far_starts, near_starts
+from assembly.solve.diagnosis.contradiction import is_certain
 from assembly.solve.interruption import Interruption
+from assembly.solve.loop.settings import GATHER, ITERATIONS, VIOLATION
 from assembly.solve.scene import Status
-from assembly.solve.settings import GATHER, ITERATIONS, VIOLATION
 from assembly.solve.solution import Solution
-from assembly.solve.starts import Spread, far_starts, near_starts
 
 if TYPE_CHECKING:
     from assembly.assembly import Assembly

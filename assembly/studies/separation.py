@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.constraints.clearance import Clearance
-from assembly.constraints.contact import Contact
+from assembly.constraints.model.clearance import Clearance
+from assembly.constraints.model.contact import Contact
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import rotate
-from assembly.proximity.features import FeaturePair, FeatureStatus, closest_features
-from assembly.proximity.solid import solid_of
+from assembly.proximity.brep.solid import solid_of
+from assembly.proximity.features.features import FeaturePair, FeatureStatus, closest_features
 from assembly.solve.interruption import Interruption
 from assembly.solve.options import Options
 

@@ -2,11 +2,11 @@
 
 A contact is carried along the move by the contact velocity formulation,
 
-    du = RATES z,     z = ZED (d_f, d_g)                                   (proximity/velocity.py)
+    du = RATES z,     z = ZED (d_f, d_g)                                   (proximity/extrema/rates.py)
 
 with the twists d that lead from the last poses to these, and corrected there by Newton's method. One that is not found,
 is a minimum no longer, or was corrected by so much that it may be another root now, is left to the watch
-(`proximity/watch.py`), whose look at the pair of bodies finds all there are.
+(`proximity/manager/update.py`), whose look at the pair of bodies finds all there are.
 """
 
 from __future__ import annotations
@@ -14,38 +14,32 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly.constraints.contact_rows import predict_pair, track_contact, track_row
-from assembly.constraints.layout import (
-    BODIES,
-    BODY_F,
-    BODY_G,
-    FIRST_GUARD,
-    GUARD_NUMBER,
-    GUARDS,
-    REFERENCE,
+from assembly.constraints.program.contact import predict_pair, surface_of, track_contact, track_row
+from assembly.constraints.program.records import (
     ROW,
-    ROW_TABLE,
-    SCALE,
-    SHELL_F,
-    SURFACE_F,
-    WATCH,
+    Iterate,
+    contact_row_at,
+    header_at,
+    pool_header_at,
+    row_at,
 )
-from assembly.geometry.spline import BREAKS_U, BREAKS_V, CLOSED_U, CLOSED_V, SPANS_U, SPANS_V
+from assembly.geometry.splines.evaluate import surface_at
 from assembly.geometry.vec import quaternion_product
-from assembly.proximity.extremal import BEND, CONVERGED, SINGULAR
-from assembly.proximity.solid_contact import FACING, FOLD, PAIR_GAP, PROPER, TRACK
-from assembly.proximity.velocity import ARM_F, GAP, RATES, ZED
-from assembly.proximity.watch import IN_TURNS
-from assembly.proximity.watch_memory import (
-    ALLOWANCE,
-    EVENT_COUNT,
-    LENGTHS,
-    NEGLECT,
+from assembly.proximity.extrema.face_face import BEND, CONVERGED, SINGULAR
+from assembly.proximity.extrema.rates import derivatives_at
+from assembly.proximity.features.solid_contact import TRACK, contact_record_at, tracked_at
+from assembly.proximity.manager.state import (
     PAIR_MEMORY,
     PLACE_MEMORY,
+    lengths_at,
+    manager_at,
+    memory_header_at,
     memory_places,
+    pair_state_at,
+    place_at,
 )
-from assembly.solve.guards import look_around, place_guards
+from assembly.proximity.manager.update import IN_TURNS
+from assembly.solve.loop.clearances import look_around, place_guards
 
 # A correction by more than this part of the prediction and of the surface's domain puts the root in doubt; so does a
 # root as near as this to a fold (det H over |H|^2), where others are born.
@@ -57,7 +51,8 @@ UNIT = 1e-2
 @kernel(inner=True)
 def place_bodies(table, pool, q, poses):
     """Poses in the user's coordinates to scaled ones. Whether all are finite and the quaternions nearly unit."""
-    for b in range(table[BODIES]):
+    units = pool_header_at(pool, 0)
+    for b in range(header_at(table, 0).bodies):
         square = 0.0
         for k in range(7):
             if not math.isfinite(q[b, k]):
@@ -68,7 +63,7 @@ def place_bodies(table, pool, q, poses):
         if not abs(length - 1.0) <= UNIT:
             return False
         for k in range(3):
-            poses[b, k] = (q[b, k] - pool[REFERENCE + k]) / pool[SCALE]
+            poses[b, k] = (q[b, k] - units.reference[k]) / units.scale
         for k in range(3, 7):
             poses[b, k] = q[b, k] / length
     return True
@@ -77,7 +72,7 @@ def place_bodies(table, pool, q, poses):
 @kernel(inner=True)
 def write_twists(table, before, poses, twists):
     """The twists, over a unit of time, that lead from poses to poses, by the shorter way around."""
-    for b in range(table[BODIES]):
+    for b in range(header_at(table, 0).bodies):
         for k in range(3):
             twists[b, k] = poses[b, k] - before[b, k]
         w, x, y, z = quaternion_product(
@@ -96,27 +91,30 @@ def write_twists(table, before, poses, twists):
 @kernel(inner=True)
 def predict(table, pool, row, r, tracked, records, twists, guess):
     """Coordinates of contact r along its bodies' twists."""
-    f = table[row + BODY_F]
-    g = table[row + BODY_G]
+    fields = row_at(table, row)
+    derivatives = derivatives_at(records, r)
+    f = fields.body_f
+    g = fields.body_g
     for i in range(TRACK):
         guess[r, i] = tracked[r, i]
     for j in range(4):
         s = 0.0
         for i in range(6):
-            s += records[r, ZED + 12 * j + i] * twists[f, i] + records[r, ZED + 12 * j + 6 + i] * twists[g, i]
+            s += derivatives.zed[j, i] * twists[f, i] + derivatives.zed[j, 6 + i] * twists[g, i]
         for i in range(4):
-            guess[r, i] += records[r, RATES + 4 * i + j] * s
+            guess[r, i] += derivatives.rates[i, j] * s
     predict_pair(table, pool, row, r, tracked, guess)
 
 
 @kernel(inline=True)
 def part_of_domain(table, pool, surface, u, v, s, t):
     """The larger difference of two pairs of parameters, in parts of the domain, the shorter way around."""
-    du = abs(u - s) / (pool[table[surface + BREAKS_U] + table[surface + SPANS_U]] - pool[table[surface + BREAKS_U]])
-    dv = abs(v - t) / (pool[table[surface + BREAKS_V] + table[surface + SPANS_V]] - pool[table[surface + BREAKS_V]])
-    if table[surface + CLOSED_U] == 1:
+    patch = surface_at(table, surface)
+    du = abs(u - s) / (pool[patch.breaks_u + patch.spans_u] - pool[patch.breaks_u])
+    dv = abs(v - t) / (pool[patch.breaks_v + patch.spans_v] - pool[patch.breaks_v])
+    if patch.closed_u == 1:
         du = min(du, abs(1.0 - du))
-    if table[surface + CLOSED_V] == 1:
+    if patch.closed_v == 1:
         dv = min(dv, abs(1.0 - dv))
     return max(du, dv)
 
@@ -126,7 +124,7 @@ def is_astray(table, pool, row, r, before, guess, after):
     """Whether a contact of two surfaces was corrected by so much that it may have come to another root."""
     for side in range(2):
         i = 2 * side
-        surface = table[row + SURFACE_F + side]
+        surface = surface_of(table, row, side)
         moved = part_of_domain(table, pool, surface, before[r, i], before[r, i + 1], guess[r, i], guess[r, i + 1])
         off = part_of_domain(table, pool, surface, guess[r, i], guess[r, i + 1], after[r, i], after[r, i + 1])
         if off > ASTRAY * moved + SLACK:
@@ -137,19 +135,20 @@ def is_astray(table, pool, row, r, before, guess, after):
 @kernel(inner=True)
 def correct(table, pool, row, r, q, guess, tracked, records):
     """Newton's method from guess[r], into tracked[r] and record r. Whether there is a minimum of the distance."""
+    pair = tracked_at(tracked, r)
     for i in range(TRACK):
         tracked[r, i] = guess[r, i]
-    if table[row + SHELL_F] >= 0:
+    if contact_row_at(table, row).shell_f >= 0:
         status = track_row(table, pool, row, q, guess, BEND, records, tracked, r)
         found = status == CONVERGED or status == SINGULAR
     else:
         status, x, facing, _distance = track_contact(table, pool, row, q, guess, BEND, records, r)
         found = status == CONVERGED or status == SINGULAR
         tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3] = x
-        tracked[r, FACING] = facing
+        pair.facing = facing
     if found:
-        tracked[r, PAIR_GAP] = records[r, GAP]
-    if not found or records[r, PROPER] == 0.0:
+        pair.gap = derivatives_at(records, r).gap
+    if not found or contact_record_at(records, r).proper == 0.0:
         tracked[r, 0] = math.nan
         return False
     return True
@@ -158,23 +157,24 @@ def correct(table, pool, row, r, q, guess, tracked, records):
 @kernel(inner=True)
 def look_at_all_of(table, memory, k):
     """Let the next look take up the pair of bodies whose contact is at place k."""
-    pairs, places, _events = memory_places(table, table[WATCH])
-    p = int(memory[places + PLACE_MEMORY * k])
-    memory[pairs + PAIR_MEMORY * p + ALLOWANCE] = 0.0
+    pairs, places, _events = memory_places(table, header_at(table, 0).watch)
+    p = int(place_at(memory, places + PLACE_MEMORY * k).pair)
+    pair_state_at(memory, pairs + PAIR_MEMORY * p).allowance = 0.0
 
 
 @kernel(inner=True)
 def doubt_twins(table, pool, memory, k, records):
     """Look at a pair of bodies where contact k came within the spheres of neglect of another one."""
-    first = table[FIRST_GUARD]
-    places = memory_places(table, table[WATCH])[1]
-    near = pool[table[table[WATCH] + LENGTHS] + NEGLECT]
+    header = header_at(table, 0)
+    first = header.first_guard
+    places = memory_places(table, header.watch)[1]
+    near = lengths_at(pool, manager_at(table, header.watch).lengths).neglect
     for l in range(k):
-        if memory[places + PLACE_MEMORY * l] != memory[places + PLACE_MEMORY * k]:
+        if place_at(memory, places + PLACE_MEMORY * l).pair != place_at(memory, places + PLACE_MEMORY * k).pair:
             continue
         square = 0.0
         for i in range(3):
-            d = records[first + k, ARM_F + i] - records[first + l, ARM_F + i]
+            d = derivatives_at(records, first + k).arm_f[i] - derivatives_at(records, first + l).arm_f[i]
             square += d * d
         if square <= near * near:
             look_at_all_of(table, memory, k)
@@ -192,39 +192,43 @@ def follow(table, pool, q, poses, tracked, records, room, free, memory):
     twists), a guess, and two rows of numbers. Returns the number of events, or -1, and nothing has changed, for poses
     that are not finite or whose quaternions are far from unit.
     """
+    header = header_at(table, 0)
+    state = memory_header_at(memory, 0)
     standing, twists, guess, before, rows = room
-    events = memory[EVENT_COUNT]
+    # Nothing evaluates rows here: what would be their residuals and multipliers is room alone.
+    listed = Iterate(poses, tracked, records, rows[0], rows)
+    events = state.event_count
     if not place_bodies(table, pool, q, standing):
         return -1
     write_twists(table, poses, standing, twists)
-    for b in range(table[BODIES]):
+    for b in range(header.bodies):
         for k in range(7):
             poses[b, k] = standing[b, k]
-    first = table[FIRST_GUARD]
-    for k in range(table[GUARDS]):
+    first = header.first_guard
+    for k in range(header.guards):
         r = first + k
-        row = table[ROW_TABLE] + ROW * r
-        if table[row + BODY_F] < 0:
+        row = header.row_table + ROW * r
+        if row_at(table, row).body_f < 0:
             continue
         for i in range(TRACK):
             before[r, i] = tracked[r, i]
         predict(table, pool, row, r, tracked, records, twists, guess)
         if not correct(table, pool, row, r, poses, guess, tracked, records):
             continue
-        if abs(records[r, FOLD]) < NEAR_FOLD:
+        if abs(contact_record_at(records, r).fold) < NEAR_FOLD:
             look_at_all_of(table, memory, k)
-        elif table[row + SHELL_F] < 0 and is_astray(table, pool, row, r, before, guess, tracked):
+        elif contact_row_at(table, row).shell_f < 0 and is_astray(table, pool, row, r, before, guess, tracked):
             look_at_all_of(table, memory, k)
         doubt_twins(table, pool, memory, k, records)
-    look_around(table, pool, memory, (poses, tracked), IN_TURNS)
-    for k in range(table[GUARDS]):
-        before[first + k, 0] = float(table[table[ROW_TABLE] + ROW * (first + k) + GUARD_NUMBER])
-    place_guards(table, memory, (poses, tracked, records, rows[0]), rows[0], rows[1], free, False)
-    for k in range(table[GUARDS]):
+    look_around(table, pool, memory, listed, IN_TURNS)
+    for k in range(header.guards):
+        before[first + k, 0] = float(contact_row_at(table, header.row_table + ROW * (first + k)).guard_number)
+    place_guards(table, memory, listed, rows[0], rows[1], free, False)
+    for k in range(header.guards):
         r = first + k
-        row = table[ROW_TABLE] + ROW * r
-        if table[row + BODY_F] >= 0 and float(table[row + GUARD_NUMBER]) != before[r, 0]:
+        row = header.row_table + ROW * r
+        if row_at(table, row).body_f >= 0 and float(contact_row_at(table, row).guard_number) != before[r, 0]:
             for i in range(TRACK):
                 guess[r, i] = tracked[r, i]
             correct(table, pool, row, r, poses, guess, tracked, records)
-    return int(memory[EVENT_COUNT] - events)
+    return int(state.event_count - events)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.constraints.objectives import FrameDistance, PointDistance
-from assembly.constraints.packing import Packed
+from assembly.constraints.model.objectives import FrameDistance, PointDistance
+from assembly.constraints.packing.scene import Packed
 from assembly.kinematics.pose import Pose, rotation_matrix
 from assembly.solve.scene import Scene, Status
 

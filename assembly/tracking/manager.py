@@ -12,15 +12,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly._copies import OwnState
 from assembly._read_only import ReadOnlyArrays
-from assembly.constraints.clearance import Clearance
-from assembly.constraints.packing import Packed
-from assembly.errors import InputError, number
+from assembly.constraints.model.clearance import Clearance
+from assembly.constraints.packing.scene import Packed
+from assembly.errors import InputError, number, renamed
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import pose_rows
-from assembly.proximity import watch_memory
-from assembly.proximity.events import Event, PairState, events_of
-from assembly.proximity.solid_contact import CONTACT_RECORD, TRACK
-from assembly.proximity.velocity import ARM_F, GAP, NORMAL
+from assembly.proximity.extrema.rates import ARM_F, GAP, NORMAL
+from assembly.proximity.features.solid_contact import CONTACT_RECORD, TRACK
+from assembly.proximity.manager import state as watch_memory
+from assembly.proximity.manager.events import Event, PairState, events_of
 from assembly.solve.crossings import PosedBodies, find_crossings
 from assembly.solve.interruption import CTRL_C
 from assembly.solve.options import Options, touching_part
@@ -90,12 +90,14 @@ class Manager(OwnState):
     reach : float, optional
         Contacts with a gap up to this are all listed, in the unit of the bodies; at most a fifth of the largest body's
         size. By default zero: what touches or crosses is listed, and what is near as far as the bodies' pace asks for.
-    neglect : float
+    merge_radius : float
         Two contacts of the same two bodies whose points are nearer than this on both, and near along the surfaces as
         well, are one: the radius of the spheres of neglect, in parts of the scene's size. Contacts farther apart are
         all kept, also across a wire thinner than the radius.
-    places : int, optional
+    slots : int, optional
         How many contacts may be near at a time, to begin with; twice as many when they do not do.
+    neglect, places
+        Former names of `merge_radius` and `slots`; they warn.
     touching : float
         What bodies may be in each other and still touch, in parts of the scene's size: only what is deeper crosses. For
         parts of files 1e-6 is right, say.
@@ -111,7 +113,9 @@ class Manager(OwnState):
         bodies: Iterable[Body],
         *,
         reach: float | None = None,
-        neglect: float = 1e-6,
+        merge_radius: float = 1e-6,
+        slots: int | None = None,
+        neglect: float | None = None,
         places: int | None = None,
         touching: float = Options.touching,
     ) -> None:
@@ -119,7 +123,9 @@ class Manager(OwnState):
             self._bodies = tuple(bodies)
         except TypeError:
             raise TypeError(f"bodies is {bodies!r}; expected bodies") from None
-        clearance = Clearance(self._bodies, neglect=neglect, places=places)
+        merge_radius = renamed("merge_radius", merge_radius, "neglect", neglect)
+        slots = renamed("slots", slots, "places", places)
+        clearance = Clearance(self._bodies, merge_radius=merge_radius, slots=slots)
         names = [body.name for body in self._bodies]
         for k, name in enumerate(names):
             if name in names[:k]:
@@ -131,16 +137,16 @@ class Manager(OwnState):
                 f"reach is {self._reach:g}; expected a length from 0 to {MOST_REACH * size:g}, "
                 "a fifth of the largest body"
             )
-        self._neglect = clearance.neglect
+        self._merge_radius = clearance.merge_radius
         self._touching = touching_part(touching)
         self._pairs = list(combinations(names, 2))
         self._seen = 0.0
-        self._set_up(places)
+        self._set_up(slots)
 
-    def _set_up(self, places: int | None) -> None:
+    def _set_up(self, slots: int | None) -> None:
         """Pack, with room for so many contacts."""
         # What is to be listed is what comes nearer than this.
-        everything = _Everything(self._bodies, self._reach, neglect=self._neglect, places=places)
+        everything = _Everything(self._bodies, self._reach, merge_radius=self._merge_radius, slots=slots)
         packed = self._packed = Packed(self._bodies, [everything], ())
         count, guards = packed.count, packed.guards
         self._memory = packed.new_state()[packed.memory_at :]
@@ -201,9 +207,14 @@ class Manager(OwnState):
         return self._reach
 
     @property
-    def neglect(self) -> float:
+    def merge_radius(self) -> float:
         """Radius of the spheres of neglect, in parts of the scene's size."""
-        return self._neglect
+        return self._merge_radius
+
+    @property
+    def neglect(self) -> float:
+        """`merge_radius`, by its former name."""
+        return renamed("merge_radius", self._merge_radius, "neglect", self._merge_radius)
 
     @property
     def touching(self) -> float:

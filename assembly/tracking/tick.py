@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly._read_only import ReadOnlyArrays, read_only
-from assembly.proximity.events import Event, events_of
-from assembly.proximity.watch_memory import EVENT_COUNT
+from assembly.proximity.manager.events import Event, events_of
+from assembly.proximity.manager.state import EVENT_COUNT
+from assembly.solve.loop.settings import COUNT, CURVED, DUAL, HISTORY, OBJECTIVE, VIOLATION
 from assembly.solve.scene import Status
-from assembly.solve.settings import COUNT, CURVED, DUAL, HISTORY, OBJECTIVE, VIOLATION
 from assembly.solve.solution import Solution
 from assembly.tracking.followed import Followed
 

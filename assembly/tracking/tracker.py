@@ -11,15 +11,15 @@ from numpy.typing import ArrayLike, NDArray
 from assembly._copies import InOneProcess
 from assembly._read_only import read_only
 from assembly.assembly import Assembly
-from assembly.constraints.constraint import structure_changes
-from assembly.constraints.layout import CLOCK_AT, WATCH
-from assembly.constraints.objectives import FrameDistance, PointDistance
-from assembly.constraints.packing import structure_of
+from assembly.constraints.model.constraint import structure_changes
+from assembly.constraints.model.objectives import FrameDistance, PointDistance
+from assembly.constraints.packing.scene import structure_of
+from assembly.constraints.program.records import CLOCK_AT, WATCH
 from assembly.errors import FARTHEST, InputError, integer, number, positive
 from assembly.kinematics.body import Body, Frame, Point
 from assembly.kinematics.pose import Pose, axes_quaternion
-from assembly.proximity.solid_contact import STAYS, TRACK
-from assembly.proximity.watch_memory import (
+from assembly.proximity.features.solid_contact import STAYS, TRACK
+from assembly.proximity.manager.state import (
     CLOCK,
     CORNERS,
     EVENT_COUNT,
@@ -29,11 +29,8 @@ from assembly.proximity.watch_memory import (
     PAIRS,
     TURN,
 )
-from assembly.solve.augmented_lagrangian import solve_program
-from assembly.solve.options import Options
-from assembly.solve.recall import recall_size
-from assembly.solve.scene import Scene
-from assembly.solve.settings import (
+from assembly.solve.loop.augmented_lagrangian import solve_program
+from assembly.solve.loop.settings import (
     BUDGET,
     CARRIED,
     CARRIES,
@@ -54,6 +51,9 @@ from assembly.solve.settings import (
     TOUCHING,
     VIOLATION,
 )
+from assembly.solve.loop.warm_start import recall_size
+from assembly.solve.options import Options
+from assembly.solve.scene import Scene
 from assembly.solve.solution import Solution
 from assembly.tracking.followed import Followed
 from assembly.tracking.log import TrackLog
@@ -61,7 +61,7 @@ from assembly.tracking.tick import Step, TrackStatus
 from assembly.tracking.trace import Trace
 
 if TYPE_CHECKING:
-    from assembly.constraints.packing import Packed
+    from assembly.constraints.packing.scene import Packed
 
 __all__ = ["Tracker"]
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.geometry import shapes
-from assembly.geometry.face import Face
+from assembly.geometry.faces.face import Face
 from assembly.view.mesh import Mesh, face_mesh, joined
 
 __all__ = ["arrow", "ball", "cross", "rod", "rods", "stick"]

@@ -2,7 +2,7 @@
 
 Each span of the surface becomes a grid of cells, as many as its tangents and normals turn in it and closer where they
 turn faster: a straight leg of a wire costs one cell along, and a bend many. Corners lie on the surface and carry
-its normals. A trimmed face is made of facets (`geometry/polygon.py`) that turn as little.
+its normals. A trimmed face is made of facets (`geometry/meshing/polygon.py`) that turn as little.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.errors import InputError
-from assembly.geometry.face import Face
-from assembly.geometry.polygon import facets
-from assembly.geometry.surface import NurbsSurface
+from assembly.geometry.faces.face import Face
+from assembly.geometry.meshing.polygon import facets
+from assembly.geometry.splines.surface import NurbsSurface
 from assembly.kinematics.body import Body
 from assembly.view.outline import extent, turning
 

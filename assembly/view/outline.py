@@ -12,8 +12,8 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.geometry.border import border
-from assembly.geometry.face import Face
+from assembly.geometry.faces.face import Face
+from assembly.geometry.meshing.border import border
 from assembly.kinematics.body import Body
 
 __all__ = ["Lines", "body_lines", "extent", "turning"]

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.assembly import Assembly
-from assembly.constraints.objectives import PointDistance
+from assembly.constraints.model.objectives import PointDistance
 from assembly.errors import InputError, vector
 from assembly.kinematics.body import Body
 from assembly.kinematics.ellipsoid import Ellipsoid

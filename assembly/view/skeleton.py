@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.assembly import Assembly
-from assembly.constraints.joint import Joint
-from assembly.constraints.objectives import PointDistance
-from assembly.constraints.primitives import COINCIDENT, DISTANCE, SLIDE
+from assembly.constraints.model.joint import Joint
+from assembly.constraints.model.objectives import PointDistance
+from assembly.constraints.program.primitives import COINCIDENT, DISTANCE, SLIDE
 from assembly.kinematics.body import Body
 from assembly.view.item import Color, Item, Place, Stations
 from assembly.view.marks import arrow, ball, rods, stick

@@ -21,7 +21,7 @@ import casadi as ca
 import numpy as np
 
 import assembly as asm
-from assembly.proximity.enclosure_queries import enclosed_distance
+from assembly.distance.enclosures.queries import enclosed_distance
 
 T = ca.SX.sym("t")
 # The paper's algorithms: no Newton's method, ellipsoids alone.

@@ -17,8 +17,8 @@ from types import SimpleNamespace
 import numpy as np
 
 import assembly as asm
-from assembly.proximity.control import MODES
-from assembly.proximity.control_bounds import final_parameters
+from assembly.proximity.controllers.bounds import final_parameters
+from assembly.proximity.controllers.control import MODES
 
 # Table I: five rows, "order 3", which is degree 2 with knots at thirds.
 TABLE = [

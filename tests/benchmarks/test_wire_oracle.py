@@ -8,7 +8,7 @@ from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
 import assembly as asm
-from assembly.geometry.path import Path
+from assembly.geometry.shapes.path import Path
 from benchmarks.center_lines import Wire, ball_wire, linking_number, paper_clip_wire, path_wire, torus_wire
 from benchmarks.dense_distance import circle_distance
 from benchmarks.scenes import linked

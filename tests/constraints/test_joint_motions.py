@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly.constraints import primitives
-from assembly.constraints.primitives import COINCIDENT
+from assembly.constraints.program import primitives
+from assembly.constraints.program.primitives import COINCIDENT
 
 PI = math.pi
 OPPOSABLE = [asm.Fixed, asm.Revolute, asm.Prismatic, asm.Cylindrical, asm.Planar, asm.Parallel]

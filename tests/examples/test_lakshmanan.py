@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from assembly.proximity.enclosure_queries import enclosed_distance
-from assembly.proximity.separation import SeparationStatus
+from assembly.distance.enclosures.queries import enclosed_distance
+from assembly.distance.separation import SeparationStatus
 from tests.examples.running import EXAMPLES
 
 

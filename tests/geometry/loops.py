@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from assembly.geometry.curve import NurbsCurve
-from assembly.geometry.face import Face
+from assembly.geometry.faces.face import Face
+from assembly.geometry.splines.curve import NurbsCurve
 
 HALF = np.sqrt(0.5)
 _CIRCLE = np.array([[1, 0], [1, 1], [0, 1], [-1, 1], [-1, 0], [-1, -1], [0, -1], [1, -1], [1, 0]], dtype=float)

@@ -5,9 +5,9 @@ import pytest
 
 from assembly import errors
 from assembly.geometry import shapes
-from assembly.geometry.curve import NurbsCurve
-from assembly.geometry.path import Path
-from assembly.geometry.surface import NurbsSurface
+from assembly.geometry.shapes.path import Path
+from assembly.geometry.splines.curve import NurbsCurve
+from assembly.geometry.splines.surface import NurbsSurface
 
 LINE = [[0.0, 0.0], [1.0, 0.0]]
 PATCH = np.zeros((2, 2, 3)) + np.arange(2.0)[:, None, None] + np.arange(2.0)[:, None] * [0.0, 1.0, 2.0]

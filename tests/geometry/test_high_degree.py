@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from assembly.errors import InputError
-from assembly.geometry.curve import NurbsCurve
-from assembly.geometry.curve_packing import packed_curves
+from assembly.geometry.splines.curve import NurbsCurve
+from assembly.geometry.splines.curve_packing import packed_curves
 
 
 def exact_derivative(points, order, t):

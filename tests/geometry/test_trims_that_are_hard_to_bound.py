@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from assembly.distance.queries import minimum_distances
 from assembly.errors import InputError
 from assembly.geometry import shapes
-from assembly.geometry.curve import NurbsCurve
-from assembly.geometry.face import Face
-from assembly.proximity.queries import minimum_distances
+from assembly.geometry.faces.face import Face
+from assembly.geometry.splines.curve import NurbsCurve
 
 PLANE = shapes.plane(10.0, 10.0)
 

@@ -12,8 +12,8 @@ PROGRAM = """
 import json, sys
 import numpy as np
 from assembly.geometry import shapes
-from assembly.geometry.curve import NurbsCurve
-from assembly.geometry.surface import NurbsSurface
+from assembly.geometry.splines.curve import NurbsCurve
+from assembly.geometry.splines.surface import NurbsSurface
 
 rng = np.random.default_rng(0)
 knots = [0, 0, 0, 0, 0, 0.4, 1, 1, 1, 1, 1]

@@ -23,7 +23,7 @@ from assembly.kernels.listing import Item, all_items
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 # Two kernels that take a second.
-SMALL = ("assembly.proximity.spine_curve.point_of", "assembly.geometry.curve_tables.swept_area")
+SMALL = ("assembly.proximity.manager.wires.point_of", "assembly.geometry.splines.curve_tables.swept_area")
 # The command, for these alone.
 COMMAND = f"""
 import sys
@@ -43,7 +43,7 @@ from assembly._kernel.targets import own_target
 from assembly.kernels.listing import all_items
 folders._installed = lambda: []
 print(*(item.found().target == own_target() for item in all_items() if item.name in {SMALL}))
-from assembly.geometry.curve_tables import swept_area
+from assembly.geometry.splines.curve_tables import swept_area
 swept_area(np.zeros(1), np.zeros((0, 2), np.int64), 0.0, 0.0, np.zeros(1), np.zeros(1))
 print(swept_area.stats.cache_misses.total(), swept_area.stats.cache_hits.total())
 """
@@ -232,11 +232,11 @@ from assembly.kernels.listing import Item
 class Broken(Item):
     types = ("no type",)
 if __name__ == "__main__":
-    compile_all([Broken("assembly.proximity.spine_curve", 0, 0)], 1, {})
+    compile_all([Broken("assembly.proximity.manager.wires", 0, 0)], 1, {})
 """)
     variables = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(ROOT)}
     done = subprocess.run([sys.executable, str(script)], env=variables, capture_output=True, text=True)
-    assert "RuntimeError: assembly.proximity.spine_curve.point_of cannot be compiled" in done.stderr
+    assert "RuntimeError: assembly.proximity.manager.wires.point_of cannot be compiled" in done.stderr
 
 
 @pytest.mark.parametrize("workers", [1, 2, 3, 100])
@@ -250,5 +250,7 @@ def test_every_kernel_is_in_one_share(workers):
 def test_kernels_of_the_same_sources_are_in_the_same_share():
     # The loop has two signatures; what they share is most of what there is to compile.
     parts = shares(all_items(), 2)
-    loops = [k for k, part in enumerate(parts) for item in part if item.module == "assembly.solve.augmented_lagrangian"]
+    loops = [
+        k for k, part in enumerate(parts) for item in part if item.module == "assembly.solve.loop.augmented_lagrangian"
+    ]
     assert len(loops) == 2 and len(set(loops)) == 1

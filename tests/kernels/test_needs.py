@@ -126,7 +126,7 @@ def test_a_scene_asks_for_the_kernels_of_what_it_has_in_it(all_compiled, run_pyt
 def test_without_a_dexterity_the_loop_is_that_without_it(all_compiled, run_python):
     scene, _needs = SCENES["joints"]
     code = """
-from assembly.solve.augmented_lagrangian import solve_program
+from assembly.solve.loop.augmented_lagrangian import solve_program
 print(*(types[-1] for types in solve_program.overloads))
 """
     assert run_python(SOLVE.format(scene) + code).split() == ["solve_program", "none"]

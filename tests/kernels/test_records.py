@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from numba.core.errors import TypingError
 
 from assembly._kernel import kernel
-from assembly._record import record_dtype, record_view, size_of
+from assembly._record import place_of, record_dtype, record_view, rows_of, size_of
 
 NODE = record_dtype("f8", radius=1, center=3, rates=(2, 2))
 HEAD = record_dtype("i8", count=1, first=1, sides=2)
@@ -54,7 +55,22 @@ def test_python_reads_and_writes_the_same_fields():
         assert a.tolist() == b.tolist()
 
 
-def test_a_record_ends_within_its_block():
+def test_where_a_block_has_no_record_python_has_none():
+    # A kernel may take a view before it asks whether there is a record; a field of it fails in Python.
     pool = np.zeros(10)
-    with pytest.raises(ValueError, match="size"):
-        node_at(pool, 3)
+    assert node_at(pool, 3) is None and node_at(pool, -1) is None
+
+
+def test_records_of_other_numbers_are_refused():
+    with pytest.raises(TypeError, match="a record of float64"):
+        node_at(np.zeros(10, dtype=np.int64), 0)
+    with pytest.raises(TypingError, match="a record of int64"):
+        kernel(lambda pool: head_at(pool, 0).count)(np.zeros(10))
+
+
+def test_rows_are_columns_of_fields():
+    rows = np.arange(30.0).reshape(3, 10)
+    nodes = rows_of(NODE, rows)
+    nodes.radius[1] = -1.0
+    assert nodes.center.tolist() == rows[:, 1:4].tolist() and rows[1, 0] == -1.0
+    assert (place_of(NODE, "rates"), place_of(HEAD, "first")) == (4, 1)

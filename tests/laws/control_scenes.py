@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from assembly.geometry.surface import NurbsSurface
+from assembly.geometry.splines.surface import NurbsSurface
 from benchmarks.controllers import paraboloid
 
 

@@ -16,8 +16,8 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.distance import cdist
 
 import assembly as asm
+from assembly.distance.enclosures.queries import enclosed_distance
 from assembly.proximity import SeparationStatus, minimum_distance
-from assembly.proximity.enclosure_queries import enclosed_distance
 from tests.laws.certificates import bounds_fault
 from tests.laws.curve_queries import random_curve
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from assembly.geometry.curve import NurbsCurve
-from assembly.geometry.face import Face
-from assembly.geometry.spline import (
+from assembly.geometry.faces.face import Face
+from assembly.geometry.splines.curve import NurbsCurve
+from assembly.geometry.splines.evaluate import (
     BREAKS_U,
     BREAKS_V,
     CELLS,
@@ -18,9 +18,7 @@ from assembly.geometry.spline import (
     CURVE_RECORD,
     SURFACE_RECORD,
 )
-from assembly.proximity.extremal import CONVERGED, LEFT_PATCH, NOT_CONVERGED, SINGULAR
-from assembly.proximity.feature_query import PAIR, feature_derivatives, find_features
-from assembly.proximity.shell import (
+from assembly.proximity.brep.records import (
     EDGE,
     EDGE_CURVE,
     EDGE_END,
@@ -32,6 +30,8 @@ from assembly.proximity.shell import (
     FACE_POINT,
     VERTEX,
 )
+from assembly.proximity.extrema.face_face import CONVERGED, LEFT_PATCH, NOT_CONVERGED, SINGULAR
+from assembly.proximity.extrema.feature_query import PAIR, feature_derivatives, find_features
 from tests.laws.scenes import dome, inside, quadratic, quaternion_of, random_quaternion
 from tests.laws.witness import rotated
 

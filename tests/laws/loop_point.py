@@ -7,13 +7,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from assembly.constraints import layout, program, row_terms
-from assembly.constraints.blocks import BLOCKS, COLUMN, COUNT, FIRST, PLACE, is_blocked
-from assembly.proximity.free_pair import VARIABLES, VECTORS
-from assembly.proximity.solid_contact import CONTACT_RECORD, TRACK
-from assembly.solve.contacts import start_contacts
-from assembly.solve.rows import arrange, record_of_blocks, shape_of, size_of_shape
-from assembly.solve.search import goal
+from assembly.constraints.program import evaluate as program
+from assembly.constraints.program import records as layout
+from assembly.constraints.program import row_terms
+from assembly.constraints.program.hessian_blocks import BLOCKS, COLUMN, COUNT, FIRST, PLACE, is_blocked
+from assembly.proximity.extrema.lifted_pair import VARIABLES, VECTORS
+from assembly.proximity.features.solid_contact import CONTACT_RECORD, TRACK
+from assembly.solve.loop.contacts import start_contacts
+from assembly.solve.loop.line_search import goal
+from assembly.solve.loop.residuals import arrange, record_of_blocks, shape_of, size_of_shape
 
 
 def room_of_shape(table, rows, n, blocks):
@@ -34,7 +36,7 @@ class LoopPoint:
         scaled = np.array(q, dtype=float)
         scaled[:, :3] = (scaled[:, :3] - packed.reference) / packed.scale
         pairs, tracks = int(table[layout.CONTACTS]), int(table[layout.TRACKED])
-        self.point = (
+        self.point = layout.Iterate(
             scaled,
             np.zeros((tracks, TRACK)),
             np.ones((pairs + int(table[layout.JOINTS] + table[layout.VECTOR_TRIMS]), CONTACT_RECORD)),
@@ -44,16 +46,16 @@ class LoopPoint:
         self.shape = room_of_shape(table, self.rows, self.n, record_of_blocks(table) if blocks else table[:0])
         free = np.full(pairs, -1, dtype=np.int64)
         room = (np.empty((VECTORS, 3, VARIABLES)), np.empty((VARIABLES, VARIABLES)))
-        self.loose = (free, np.empty((pairs, 4)), *room, np.empty((tracks, TRACK)))
+        self.loose = layout.LiftedPairs(free, np.empty((pairs, 4)), *room, np.empty((tracks, TRACK)), np.empty(0))
         at = table[layout.TAPE_ROOM]
-        self.room = tuple(np.empty(size) for size in table[at : at + 3])
+        self.room = layout.TapeRoom(*(np.empty(size) for size in table[at : at + 3]))
         arrange(table, free, self.shape, self.rows, self.n)
         if tracked is None:
             state = np.zeros(packed.results_at)
             state[packed.contacts_at : packed.angles_at] = np.nan
             packed.start_angles(np.array(q, dtype=float), state, False)
             tracked = state[packed.contacts_at : packed.multipliers_at].reshape(-1, TRACK)
-            start = (table, self.pool, scaled, tracked, free, self.loose[1])
+            start = (table, self.pool, scaled, tracked, free, self.loose.lengths)
             # Solids that cross are looked for where a scene asks for it.
             assert start_contacts(*start) < 0 or (packed.seek_penetration() and start_contacts(*start) < 0)
         lost = program.evaluate(table, self.pool, np.array(tracked), np.inf, self.loose, self.room, self.point)
@@ -61,33 +63,33 @@ class LoopPoint:
 
     @property
     def residual(self):
-        return self.point[3]
+        return self.point.residual
 
     @property
     def tracked(self):
-        return self.point[1]
+        return self.point.tracked
 
     def jacobian(self):
         """Dense, (rows, n): a row's twists at the places of its bodies."""
         out = np.zeros((self.rows, self.n))
         for r in range(self.rows):
-            for b, at in enumerate(self.shape[0][r]):
+            for b, at in enumerate(self.shape.bases[r]):
                 if at >= 0:
                     column = 6 * b if b < 2 else layout.EXTRA_COLUMN + 6 * (b - 3)
-                    out[r, at : at + 6] += self.point[4][r, column : column + 6]
+                    out[r, at : at + 6] += self.point.jacobian[r, column : column + 6]
         return out
 
     def room_for_hessian(self):
         """An array for it, dense or by blocks."""
-        order = self.shape[2]
-        return np.zeros((6 * order[3][BLOCKS], 6) if is_blocked(order) else (self.n, self.n))
+        order = self.shape.sparsity
+        return np.zeros((6 * order.blocks[BLOCKS], 6) if is_blocked(order) else (self.n, self.n))
 
     def dense(self, hessian):
         """The symmetric matrix of what was written to an array."""
-        order = self.shape[2]
+        order = self.shape.sparsity
         if is_blocked(order):
             parts, hessian = hessian, np.zeros((self.n, self.n))
-            blocks, first, column = order[3], order[3][FIRST], order[3][COLUMN]
+            blocks, first, column = order.blocks, order.blocks[FIRST], order.blocks[COLUMN]
             slots = np.argsort(blocks[blocks[PLACE] : blocks[PLACE] + blocks[COUNT]])
             for p in range(blocks[COUNT]):
                 for e in range(blocks[first + p], blocks[first + p + 1]):

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from assembly.geometry import shapes
-from assembly.geometry.face import Face
-from assembly.geometry.surface import NurbsSurface
+from assembly.geometry.faces.face import Face
+from assembly.geometry.splines.surface import NurbsSurface
+from assembly.proximity.manager.posed_pair import PosedPair
 from tests.laws.witness import Pairs, Stack, rotated
 
 
@@ -163,3 +164,8 @@ def random_group(seed, kind_f, kind_g, count):
     tame = np.flatnonzero(np.abs(rates).max(axis=(1, 2)) < 30.0)
     assert tame.size >= count, f"{tame.size} of {many} random pairs are away from singular ones"
     return group.take(tame[:count])
+
+
+def posed(turn, shift, surfaces=(-1, -1), shells=(-1, -1), trees=(-1, -1)):
+    """A posed pair of bodies, of which kernels read no more than the pose and the shapes."""
+    return PosedPair(turn, shift, surfaces, shells, trees, (-1, -1), bodies=(0, 1), poses=None, track_solids=0)

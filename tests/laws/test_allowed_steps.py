@@ -7,17 +7,17 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import assembly as asm
-from assembly.constraints.layout import MOVING, WATCH
-from assembly.proximity import watch
-from assembly.proximity.allowances import part_used, went
-from assembly.proximity.borders import feature_kind
-from assembly.proximity.bounding_tree import ELEMENT, ELEMENT_FEATURE, ELEMENT_POOL
-from assembly.proximity.holding import FEATURES, NOTHING, POINT
-from assembly.proximity.near_root import is_known
-from assembly.proximity.roots import CORNER, ROOT, ROOT_BEYOND, ROOT_FOLD
-from assembly.proximity.shell import EDGE, FACE
-from assembly.proximity.solid_contact import TRACK
-from assembly.proximity.watch_memory import (
+from assembly.constraints.program.records import MOVING, WATCH, Iterate
+from assembly.proximity.brep.borders import feature_kind
+from assembly.proximity.brep.records import EDGE, FACE
+from assembly.proximity.bvh.tree import ELEMENT, ELEMENT_FEATURE, tree_at
+from assembly.proximity.features.holding import FEATURES, NOTHING, POINT
+from assembly.proximity.features.solid_contact import TRACK
+from assembly.proximity.manager import update as watch
+from assembly.proximity.manager.extrema import CORNER, ROOT, ROOT_BEYOND, ROOT_FOLD
+from assembly.proximity.manager.motion_bounds import part_used, went
+from assembly.proximity.manager.newton_regions import is_known
+from assembly.proximity.manager.state import (
     ALLOWANCE,
     BALL_ALLOWANCE,
     CUT_SHORT,
@@ -25,20 +25,16 @@ from assembly.proximity.watch_memory import (
     PAIR_G,
     PAIR_MEMORY,
     PAIR_RECORD,
-    PAIR_SHELL_F,
-    PAIR_SHELL_G,
-    PAIR_SURFACE_F,
-    PAIR_SURFACE_G,
     PAIR_TABLE,
     PAIRS,
     SMALLER,
     SURE,
-    TREE_F,
-    TREE_G,
     memory_places,
+    pair_at,
 )
-from assembly.solve.guards import allowed_share
-from assembly.solve.rows import move
+from assembly.solve.loop.clearances import allowed_share
+from assembly.solve.loop.residuals import move
+from tests.laws.scenes import posed
 
 RINGS = 4
 
@@ -73,7 +69,9 @@ class Looked:
 
     def allowed(self, q, step, share):
         trial = q.copy()
-        return allowed_share(self.table, self.pool, self.memory, (q,), (trial,), step, share)
+        return allowed_share(
+            self.table, self.pool, self.memory, Iterate(q, *[None] * 4), Iterate(trial, *[None] * 4), step, share
+        )
 
     def column(self, k):
         at = memory_places(self.table, self.watch)[0]
@@ -140,14 +138,12 @@ def test_a_point_that_stays_on_an_edge_is_no_root():
     scene.constrain(asm.Clearance())
     packed = scene.packed()
     table, pool = packed.table, packed.pool
-    pair = table[table[WATCH] + PAIR_TABLE]
-    trees = (table[pair + TREE_F], table[pair + TREE_G])
-    shells = (table[pair + PAIR_SHELL_F], table[pair + PAIR_SHELL_G])
-    there = (table[pair + PAIR_SURFACE_F], table[pair + PAIR_SURFACE_G], *shells)
-    looked_into = (None, None, there, trees, None)
+    pair = pair_at(table, table[table[WATCH] + PAIR_TABLE])
+    trees, shells = (pair.tree_f, pair.tree_g), (pair.shell_f, pair.shell_g)
+    looked_into = posed(None, None, (pair.surface_f, pair.surface_g), shells, trees)
     elements = [
-        [(k, *pool[table[tree + ELEMENT_POOL] + ELEMENT * k :][:ELEMENT]) for k in range(table[tree + 3])]
-        for tree in trees
+        [(k, *pool[tree.element_pool + ELEMENT * k :][:ELEMENT]) for k in range(tree.elements)]
+        for tree in (tree_at(table, at) for at in trees)
     ]
     seen = 0
     for e in elements[0]:

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly.geometry.bezier_pieces import CENTER, ERROR
-from assembly.proximity import bezier_capsules as bc
-from assembly.proximity import bezier_nodes as bn
-from assembly.proximity import patch_nodes as pn
-from assembly.proximity import patch_pair as pp
-from assembly.proximity.bezier_bounds import box_bound, convexity, hull_bound, least_change, model_bound, square_minimum
-from assembly.proximity.patch_newton import patch_derivatives
-from assembly.proximity.patch_packing import pack_patches
+from assembly.distance.curves import capsules as bc
+from assembly.distance.curves import nodes as bn
+from assembly.distance.curves.bounds import box_bound, convexity, hull_bound, least_change, model_bound, square_minimum
+from assembly.distance.patches import nodes as pn
+from assembly.distance.patches import pair as pp
+from assembly.distance.patches.newton import patch_derivatives
+from assembly.distance.patches.packing import pack_patches
+from assembly.geometry.splines.bezier_pieces import CENTER, ERROR
 from tests.laws.curve_queries import CURVES, least_distances, piece_values, random_curve
 
 SLACK = 1e-15

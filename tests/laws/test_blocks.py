@@ -7,10 +7,16 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly.constraints import layout, packing
-from assembly.constraints.block_factor import factorize_blocks, forward_blocks, greatest_diagonal, substitute_blocks
-from assembly.constraints.blocks import BLOCKS, COUNT, FACTORED, FIRST, block_row
-from assembly.constraints.elimination import block_record
+from assembly.constraints.packing import scene as packing
+from assembly.constraints.packing.elimination_order import block_record
+from assembly.constraints.program import records as layout
+from assembly.constraints.program.block_factor import (
+    factorize_blocks,
+    forward_blocks,
+    greatest_diagonal,
+    substitute_blocks,
+)
+from assembly.constraints.program.hessian_blocks import BLOCKS, COUNT, FACTORED, FIRST, block_row
 from tests.laws.loop_point import LoopPoint
 
 

@@ -1,4 +1,5 @@
-"""What `proximity/box_model.py` says of a box of a face or a part of an edge, against samples of the true shapes.
+"""What `proximity/features/quadratic_model.py` says of a box of a face or a part of an edge, against samples of the
+true shapes.
 
 Every point is the quadratic's to within e (along the normal: e_n), inside the ball, and below the support in every
 direction; no two samples are nearer than the bound of their cells. Rounding: some 1e-15 of the coordinates.
@@ -10,17 +11,29 @@ import numpy as np
 import pytest
 
 from assembly._kernel import kernel
-from assembly.geometry import shapes, solids
-from assembly.geometry.face import Face
-from assembly.geometry.spline import surface_point
-from assembly.geometry.surface import NurbsSurface
-from assembly.proximity import box_model as box
-from assembly.proximity.cell_tree import CELL, HAS_MODEL, INFO, KIND, LEVEL, RECORD, give_model, grow, plant, room
-from assembly.proximity.edge_frame import edge_jet
-from assembly.proximity.shell import EDGE, EDGE_CURVE, EDGE_RECORD, EDGE_TABLE, EDGES, FACE, FACE_RECORD
-from assembly.proximity.shell_packing import pack_shell
-from assembly.proximity.topology import topology_of
-from tests.geometry.test_surface import random_surface
+from assembly.geometry import shapes
+from assembly.geometry.faces.face import Face
+from assembly.geometry.shapes import solids
+from assembly.geometry.splines.evaluate import surface_point
+from assembly.geometry.splines.surface import NurbsSurface
+from assembly.proximity.brep.packing import pack_shell
+from assembly.proximity.brep.records import EDGE, EDGE_CURVE, EDGE_RECORD, EDGE_TABLE, EDGES, FACE, FACE_RECORD
+from assembly.proximity.brep.topology import topology_of
+from assembly.proximity.extrema.feature_jets import edge_jet
+from assembly.proximity.features import quadratic_model as box
+from assembly.proximity.features.ball_tree import (
+    CELL,
+    HAS_MODEL,
+    INFO,
+    KIND,
+    LEVEL,
+    RECORD,
+    give_model,
+    grow,
+    plant,
+    room,
+)
+from tests.geometry.splines.test_surface import random_surface
 from tests.laws.scenes import random_quaternion
 from tests.laws.witness import rotated
 

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from assembly.geometry import shapes
-from assembly.geometry.face import Face
+from assembly.geometry.faces.face import Face
 from assembly.proximity import contact_jacobian
 from tests.laws.scenes import placed, random_quaternion
 from tests.laws.witness import moved, rotated

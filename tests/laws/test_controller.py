@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from assembly.geometry.face import Face
+from assembly.geometry.faces.face import Face
 from assembly.proximity import Controller, ControlStatus, extremal_pair, gain_bounds, gain_limit
 from benchmarks.controllers import table_one
 from tests.laws.control_scenes import above, random_paraboloid

@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from assembly.geometry import shapes
-from assembly.geometry.face import Face
+from assembly.geometry.faces.face import Face
 from assembly.proximity import (
     Controller,
     ControlStatus,
@@ -19,7 +19,7 @@ from assembly.proximity import (
     gain_limit,
     is_globally_convergent,
 )
-from assembly.proximity.control_bounds import final_parameters
+from assembly.proximity.controllers.bounds import final_parameters
 from benchmarks.controllers import paraboloid, table_one
 from tests.laws.control_scenes import (
     above,

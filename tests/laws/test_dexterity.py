@@ -10,11 +10,11 @@ import pytest
 from scipy.optimize import brentq
 
 import assembly as asm
-from assembly.constraints import layout
-from assembly.constraints.dexterity import MEASURES
+from assembly.constraints.model.dexterity import MEASURES
+from assembly.constraints.program import records as layout
 from assembly.kinematics.pose import rotation_matrix
-from assembly.solve.dexterity import dexterity
-from assembly.solve.row_table import gradient_at
+from assembly.solve.dense.row_table import gradient_at
+from assembly.solve.loop.dexterity import dexterity
 from tests.laws.loop_point import LoopPoint, moved
 from tests.laws.test_solve_formulas import slope_of
 from tests.laws.tip_scenes import MECHANISMS, arm, four_bar

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from assembly.geometry import shapes
-from assembly.geometry.face import Face
-from assembly.geometry.spline import SURFACE_RECORD
+from assembly.geometry.faces.face import Face
+from assembly.geometry.splines.evaluate import OFFSETS, SURFACE_RECORD
 from assembly.proximity import PairStatus, contact_jacobian, extremal_pair
-from assembly.proximity.pairs import OFFSETS
-from assembly.proximity.velocity import pair_derivatives
+from assembly.proximity.extrema.rates import pair_derivatives
 from tests.laws.scenes import placed
 from tests.laws.witness import Pairs, Stack, moved
 

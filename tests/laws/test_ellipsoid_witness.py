@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly.geometry.path import Path
+from assembly.geometry.shapes.path import Path
 from benchmarks.center_lines import ball_wire, path_wire, torus_wire
 from benchmarks.wire_oracle import WireOracle
 from tests.laws.ellipsoid_witness import minima, nearest

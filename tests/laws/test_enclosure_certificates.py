@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly.proximity.enclosure_queries import enclosed_distance
+from assembly.distance.enclosures.queries import enclosed_distance
 from tests.laws.enclosure_certificates import (
     SORTS,
     fault,

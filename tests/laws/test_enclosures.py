@@ -12,10 +12,20 @@ import pytest
 
 import assembly as asm
 from assembly._kernel import kernel
-from assembly.proximity.enclosure_queries import BOUNDS, packed_operand
-from assembly.proximity.enclosure_taylor import box_hessian, crossing_proven, taylor_bound
-from assembly.proximity.enclosures import AUTO, BOX, FIRST_END, LAST_END, MID, PIECE, SPEED, enclose, separation_along
-from assembly.proximity.gjk import APART, INSIDE, ROOM, gjk, witnesses
+from assembly.distance.enclosures.enclosure import (
+    AUTO,
+    BOX,
+    FIRST_END,
+    LAST_END,
+    MID,
+    PIECE,
+    SPEED,
+    enclose,
+    separation_along,
+)
+from assembly.distance.enclosures.gjk import APART, INSIDE, ROOM, gjk, witnesses
+from assembly.distance.enclosures.queries import BOUNDS, packed_operand
+from assembly.distance.enclosures.taylor import box_hessian, crossing_proven, taylor_bound
 
 RNG = np.random.default_rng(1)
 KNOTS = [0, 0, 0, 0, 0.3, 0.5, 1, 1, 1, 1]

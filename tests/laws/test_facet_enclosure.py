@@ -10,16 +10,17 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from assembly.geometry import shapes, solids
-from assembly.geometry.curve import NurbsCurve
-from assembly.geometry.face import Face
-from assembly.geometry.surface import NurbsSurface
+from assembly.geometry import shapes
+from assembly.geometry.faces.face import Face
+from assembly.geometry.shapes import solids
+from assembly.geometry.splines.curve import NurbsCurve
+from assembly.geometry.splines.surface import NurbsSurface
 from assembly.proximity import FeatureStatus, PairStatus, closest_features, extremal_pair
-from assembly.proximity.bounding_tree import NODES, facing_pairs, least_distance, pairs_within, tree_distance
-from assembly.proximity.facet_check import edge_point, other_parameter
-from assembly.proximity.facet_tree import FacetTree
-from assembly.proximity.tree_packing import pack_tree
-from tests.geometry.test_surface import random_surface
+from assembly.proximity.bvh.facet_check import edge_point, other_parameter
+from assembly.proximity.bvh.facet_tree import FacetTree
+from assembly.proximity.bvh.packing import pack_tree
+from assembly.proximity.bvh.tree import NODES, facing_pairs, least_distance, pairs_within, tree_distance
+from tests.geometry.splines.test_surface import random_surface
 
 CLIP = (Face(shapes.paper_clip()),)
 SLOT = solids.plate_with_slot(2.0, 1.0, 0.3, 0.8, 0.3)

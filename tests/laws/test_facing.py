@@ -7,8 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from assembly.geometry.vec import quaternion_matrix
-from assembly.proximity.bounding_tree import magnitudes
-from assembly.proximity.facing import element_distance
+from assembly.proximity.bvh.tree import magnitudes
+from assembly.proximity.manager.candidates import element_distance
 from tests.laws.test_facet_enclosure import BODIES, Descent, placed, sample
 
 POINTS = 7

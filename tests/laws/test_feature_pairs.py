@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from assembly.geometry.face import Face
-from assembly.geometry.surface import NurbsSurface
+from assembly.geometry.faces.face import Face
+from assembly.geometry.splines.surface import NurbsSurface
 from assembly.proximity import (
     PairStatus,
     curve_contact_jacobian,
@@ -20,8 +20,8 @@ from assembly.proximity import (
     curve_gap_hessian,
     extremal_curve_pair,
 )
-from assembly.proximity.feature_query import GAP, NORMAL, POINT_F, POINT_G, PROPER
-from assembly.proximity.shell import EDGE, EDGE_POINT, FACE, FACE_POINT, VERTEX
+from assembly.proximity.brep.records import EDGE, EDGE_POINT, FACE, FACE_POINT, VERTEX
+from assembly.proximity.extrema.feature_query import GAP, NORMAL, POINT_F, POINT_G, PROPER
 from tests.laws.curve_witness import CurveStack, SurfaceCurve, errata_jacobian
 from tests.laws.feature_scenes import Feature, Packed, place, plane_curve, random_feature, space_curve
 from tests.laws.scenes import dome, inside, quadratic, random_gap

@@ -8,23 +8,27 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly.constraints.layout import FREE_COLUMN, ROWS, WATCH
-from assembly.geometry.spline import SURFACE_RECORD
+from assembly.constraints.program.records import FREE_COLUMN, ROWS, WATCH, Iterate
+from assembly.geometry.splines.evaluate import SURFACE_RECORD
 from assembly.kinematics.motion import relative_pose, rotation
-from assembly.proximity import allowances, roots, watch, watch_memory
-from assembly.proximity.allowances import allow_ball, mover
-from assembly.proximity.extremal import SINGULAR, solve_pair
-from assembly.proximity.folds import fold_beyond
-from assembly.proximity.free_pair import VARIABLES, VECTORS, free_rows
-from assembly.proximity.pairs import _key, _packed, as_face, extremal_pair
-from assembly.proximity.solid_contact import CONTACT_RECORD, PAIR_GAP, TRACK
-from assembly.solve.guards import look_again, look_around, place_guards
-from assembly.solve.tangency import untouched
+from assembly.proximity.extrema.face_face import SINGULAR, solve_pair
+from assembly.proximity.extrema.lifted_pair import VARIABLES, VECTORS, free_rows
+from assembly.proximity.extrema.pairs import _key, _packed, as_face, extremal_pair
+from assembly.proximity.extrema.singular import fold_beyond
+from assembly.proximity.features.solid_contact import CONTACT_RECORD, PAIR_GAP, TRACK
+from assembly.proximity.manager import extrema as roots
+from assembly.proximity.manager import motion_bounds as allowances
+from assembly.proximity.manager import state as watch_memory
+from assembly.proximity.manager import update as watch
+from assembly.proximity.manager.motion_bounds import MotionBall, allow_ball, mover
+from assembly.solve.loop.clearances import look_again, look_around, place_guards
+from assembly.solve.loop.violation import untouched
 from benchmarks.center_lines import torus_wire
 from benchmarks.running import example
 from benchmarks.scenes import MAJOR, MINOR
 from benchmarks.watching import Watch
 from benchmarks.wire_oracle import WireOracle
+from tests.laws.scenes import posed
 
 IDENTITY = [1.0, 0.0, 0.0, 0.0]
 
@@ -59,13 +63,13 @@ def test_what_a_gap_gains_by_tangency():
 
 
 def root_at(table, pool, q, start):
-    """A root, and the scene it is of."""
+    """A root, and the posed pair it is of."""
     turn, shift = relative_pose(q, 0, rotation(q, 0), 1, rotation(q, 1))
-    scene = (turn, shift, (0, SURFACE_RECORD))
+    pair = posed(turn, shift, surfaces=(0, SURFACE_RECORD))
     out = np.full((1, roots.ROOT), np.nan)
-    assert roots.surfaces_root(table, pool, scene, tuple(start), out, 0) != roots.NOTHING
+    assert roots.surfaces_root(table, pool, pair, tuple(start), out, 0) != roots.NOTHING
     assert np.isnan(out[0, roots.ROOT_BEYOND])
-    return scene, out[0]
+    return pair, out[0]
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
@@ -86,9 +90,9 @@ def test_a_fold_beyond_a_knot_line_is_that_of_the_pair_there(side):
         offset *= side
         along_line = clip.evaluate(line + offset, 0.0) - clip.evaluate(line, 0.0)
         q = np.array([[0.0, 0.0, 0.0, *IDENTITY], [*(ring[1] + 0.1 * outward + along_line), *IDENTITY]])
-        scene, root = root_at(table, pool, q, extremal_pair(clip, q[0], ball, q[1]).parameters)
+        near_pair, root = root_at(table, pool, q, extremal_pair(clip, q[0], ball, q[1]).parameters)
         near = (0.05, -1.0, -1.0, -1.0)  # no other knot lines
-        folds.append((root[roots.ROOT_FOLD], fold_beyond(table, pool, scene, tuple(root[:4]), near)))
+        folds.append((root[roots.ROOT_FOLD], fold_beyond(table, pool, near_pair, tuple(root[:4]), near)))
     (here, beyond), (there, behind) = folds
     assert abs(here - there) > 0.05
     # The two places are 2e-6 apart, where curvatures change by some hundreds a unit.
@@ -111,13 +115,11 @@ def test_a_valley_of_fourth_order_is_a_pair_after_few_steps():
     identity = rotation(np.array([[0.0, 0.0, 0.0, *IDENTITY]]), 0)
     for start in (0.3, 0.02):
         x = (start, 0.1, start, 0.1)
-        status, x, count, frame, _h = solve_pair(
-            table, pool, 0, SURFACE_RECORD, identity, (0.0, 0.0, 0.01), x, 1.0, np.inf, 0.0, False
-        )
-        assert status == SINGULAR
+        found = solve_pair(table, pool, 0, SURFACE_RECORD, identity, (0.0, 0.0, 0.01), x, 1.0, np.inf, 0.0, False)
+        assert found.status == SINGULAR
         # x^4 where the slope 4 x^3 is 1e-9.
-        assert frame[10] == pytest.approx(0.01, abs=2e-13)
-        assert count <= 25
+        assert found.frame.gap == pytest.approx(0.01, abs=2e-13)
+        assert found.steps <= 25
 
 
 @pytest.mark.parametrize("swapped", [0, 1])
@@ -168,13 +170,21 @@ def test_a_given_contact_stands_only_for_the_root_it_is_at(off, swapped):
     table, pool = packed_pair(f, g)
     q = np.array([[0.0, 0.0, 0.0, *IDENTITY], [0.5, 0.3, 0.2, *IDENTITY]])
     pair = extremal_pair(f, q[0], g, q[1])
-    scene, root = root_at(table, pool, q, pair.parameters)
+    near_pair, root = root_at(table, pool, q, pair.parameters)
     tracked = np.zeros((1, TRACK))
     tracked[0, :4] = np.roll(pair.parameters + [off, 0.0, 0.0, 0.0], 2 * swapped)
     listed = len(table)
     found = np.full((4, roots.ROOT), np.nan)
     count = roots.add_given(
-        np.append(table, [0, swapped, 0, -1, -1, -1, -1]), pool, scene, tracked, listed, 1, 1e-6, found, (found, found)
+        np.append(table, [0, swapped, 0, -1, -1, -1, -1]),
+        pool,
+        near_pair,
+        tracked,
+        listed,
+        1,
+        1e-6,
+        found,
+        (found, found),
     )
     # A parameter of the ellipsoid is some tenth of a length long.
     assert count == (off < 1e-6)
@@ -221,7 +231,7 @@ def test_a_free_contact_of_a_clearance_goes_to_its_extremum_if_it_is_off_it(off)
     q[:, :3] = (q[:, :3] - packed.reference) / packed.scale
     rows = int(table[ROWS])
     tracked, free = np.full((packed.tracked, TRACK), np.nan), np.full(rows, -1)
-    point = (q, tracked, np.zeros((rows, CONTACT_RECORD)), np.zeros(rows))
+    point = Iterate(q, tracked, np.zeros((rows, CONTACT_RECORD)), np.zeros(rows), None)
     assert look_around(table, packed.pool, memory, point, watch.EVERYTHING)
     place_guards(table, memory, point, np.zeros(rows), np.zeros(rows), free, True)
     row = int(np.flatnonzero(~np.isnan(tracked[:, 0]))[0])
@@ -305,7 +315,7 @@ def test_pairs_are_looked_at_that_need_it(by_spines, part, as_needed, in_turns, 
             # A ball of no size: it goes where the body's origin does.
             at = watch_memory.MEMORY_HEADER + watch_memory.PAIR_MEMORY * p
             origin = (0.0, 0.0, 0.0)
-            place = mover(table, watch_at, p, clips.q)[4]
-            allow_ball(clips.memory, at, (origin, place, 0.0), np.inf, allowances.STILL * 1e-3)
+            place = mover(table, watch_at, p, clips.q).shift
+            allow_ball(clips.memory, at, MotionBall(origin, place, 0.0), np.inf, allowances.STILL * 1e-3)
         clips.q[1, 2] += 1e-3 * part
         assert clips.looked(how) == count

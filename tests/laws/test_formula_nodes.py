@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly.geometry.bezier_pieces import CENTER, ERROR, REACH
-from assembly.proximity import formula_nodes as fn
-from assembly.proximity import patch_nodes as pn
-from assembly.proximity import patch_pair as pp
-from assembly.proximity.formula_packing import pack_formula
+from assembly.distance.patches import formula_nodes as fn
+from assembly.distance.patches import nodes as pn
+from assembly.distance.patches import pair as pp
+from assembly.distance.patches.formula_packing import pack_formula
+from assembly.geometry.expression import formula
+from assembly.geometry.splines.bezier_pieces import CENTER, ERROR, REACH
 
 T = ca.SX.sym("t")
 CURVES = [
@@ -29,7 +30,7 @@ ORACLE = 4e-16
 
 def packed(curve):
     record, pool, (table, tape) = pack_formula(curve)
-    return record, pool, (table, tape, np.empty(int(table[fn.formula.ROOM])))
+    return record, pool, (table, tape, np.empty(int(table[formula.ROOM])))
 
 
 def described(curve, rng, depth):

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from assembly.geometry import shapes
-from assembly.geometry.face import Face
-from assembly.geometry.spline import POLES
+from assembly.geometry.faces.face import Face
+from assembly.geometry.splines.evaluate import POLES
+from assembly.geometry.splines.pole import pole_frame
 from assembly.kinematics.pose import angular_velocity_map, multiply, rotation_matrix, skew
 from assembly.proximity import gap_hessian
-from assembly.proximity.pair_matrix import RANK, pair_matrix
-from assembly.proximity.pole import pole_frame
+from assembly.proximity.extrema.pair_matrix import RANK, pair_matrix
 from tests.laws.witness import STEP, moved
 
 EYE = np.eye(2)
@@ -354,14 +354,17 @@ def test_the_frame_at_a_pole(surface, curvatures, reverse):
             place = np.empty(2)
             place[across] = low + delta if edge in (1, 4) else high - delta
             place[1 - across] = start + 0.3 * (end - start)
-            point, normal, x, y, a, smooth = pole_frame(record, pool, 0, edge, *place)
+            frame = pole_frame(record, pool, 0, edge, *place)
+            tangents = np.array([frame.tangent_x, frame.tangent_y])
             # The frame turns with the normal, up to second order.
-            assert smooth and np.abs(np.array([x, y]) @ normal).max() < 50.0 * delta**2
-            off = np.array(point) - surface.evaluate(*place)
+            assert frame.regular and np.abs(tangents @ frame.normal).max() < 50.0 * delta**2
+            off = np.array(frame.point) - surface.evaluate(*place)
             out = face.normal(*place)
-            errors.append([abs(off @ out), np.linalg.norm(off), np.linalg.norm(normal - out)])
+            errors.append([abs(off @ out), np.linalg.norm(off), np.linalg.norm(frame.normal - out)])
             # Positive where the outward normal is n.
-            np.testing.assert_allclose(np.sort(face.sign * np.linalg.eigvalsh(full(a))), curvatures, rtol=0, atol=1e-12)
+            np.testing.assert_allclose(
+                np.sort(face.sign * np.linalg.eigvalsh(full(frame.shape))), curvatures, rtol=0, atol=1e-12
+            )
         ratio = np.array(errors[0]) / errors[1]
         # Halving the distance divides them by 8 and by 4, or more.
         assert ratio[0] > 7.8 and ratio[1:].min() > 3.8

@@ -11,9 +11,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import assembly as asm
-from assembly.geometry import formula, interval, tape
-from assembly.geometry.instructions import compact, packed
-from assembly.geometry.tape_bounds import JUMP, KINK, SMOOTH, bound_outputs
+from assembly.geometry import interval
+from assembly.geometry.expression import formula, tape
+from assembly.geometry.expression.instructions import compact, packed
+from assembly.geometry.expression.tape_bounds import JUMP, KINK, SMOOTH, bound_outputs
 
 CASADI = {name: getattr(ca, name) for name in dir(ca) if name.startswith("OP_")}
 MOVES = ("INPUT", "OUTPUT", "CONST", "ASSIGN", "LIFT")

@@ -13,7 +13,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import assembly as asm
-from assembly.proximity.pair_matrix import (
+from assembly.proximity.extrema.pair_matrix import (
     LEVEL,
     PLAIN,
     UNSURE,

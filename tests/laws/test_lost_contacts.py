@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from assembly.constraints.contact_rows import HARDLY, MAY_GO, hold_all, lost_guard, may_go
-from assembly.constraints.layout import (
+from assembly.constraints.program.contact import HARDLY, MAY_GO, hold_all, lost_guard, may_go
+from assembly.constraints.program.records import (
     CONTACTS,
     FIRST_GUARD,
     FREE_COLUMN,
@@ -16,9 +16,10 @@ from assembly.constraints.layout import (
     ROW,
     ROW_TABLE,
     SHELL_F,
+    Iterate,
 )
-from assembly.proximity.solid_contact import ALLOWED, CONTACT_RECORD, PAIR_GAP, STAYS, TRACK
-from assembly.solve.contacts import start_contacts
+from assembly.proximity.features.solid_contact import ALLOWED, CONTACT_RECORD, PAIR_GAP, STAYS, TRACK
+from assembly.solve.loop.contacts import start_contacts
 
 LEAST = 0.25
 
@@ -32,7 +33,8 @@ def guards(gap, solids=True):
     start = np.full((2, TRACK), 0.5)
     start[:, [STAYS, ALLOWED]] = 0.0
     start[:, PAIR_GAP] = LEAST + 1.0, LEAST + gap
-    point = None, start.copy(), np.full((2, CONTACT_RECORD), np.nan), np.full(2, np.nan), np.full((2, 16), np.nan)
+    records = np.full((2, CONTACT_RECORD), np.nan)
+    point = Iterate(None, start.copy(), records, np.full(2, np.nan), np.full((2, 16), np.nan))
     return table, np.array([0.0, LEAST]), start, point
 
 
@@ -59,7 +61,7 @@ def test_a_contact_that_is_not_open_stays_behind_where_it_goes_or_is_past_its_fa
     for past, goes, told in ((False, True, -0.5), (True, False, 0.0)):
         table, pool, start, point = guards(-0.5)
         assert lost_guard(table, pool, 1, start, point, past, goes)
-        assert point[3][1] == told and np.isnan(point[1][1, 0])
+        assert point.residual[1] == told and np.isnan(point.tracked[1, 0])
 
 
 def test_only_contacts_of_solids_that_are_hardly_in_each_other_may_go():

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly.constraints.dexterity import MEASURES
+from assembly.constraints.model.dexterity import MEASURES
 from assembly.kinematics.pose import retract, rotation_matrix
-from assembly.solve.jacobian import rows_of
-from assembly.solve.linear import factorize, forward, substitute
-from assembly.solve.rank import Balanced
+from assembly.solve.dense.jacobian import rows_of
+from assembly.solve.dense.rank import Balanced
+from assembly.solve.linear_algebra.factorize import factorize, forward, substitute
 from tests.laws.loop_point import LoopPoint, moved
 from tests.laws.witness import OFFSETS, SLOPE
 from tests.solve.mechanisms import bennett, planar_four_bar

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 
-from assembly.solve.multipliers import EXCHANGES, NEAR, ROUNDS, foresee, leave_out, pushing_multipliers
+from assembly.solve.loop.multipliers import EXCHANGES, NEAR, ROUNDS, foresee, leave_out, pushing_multipliers
+from assembly.solve.loop.residuals import Structure
 
 
 def pushing(jacobian, one_sided, residual, active, gradient, exchanges=EXCHANGES):
@@ -18,7 +19,7 @@ def pushing(jacobian, one_sided, residual, active, gradient, exchanges=EXCHANGES
     of_rows = np.arange(rows), np.full(rows, rows - 1)
     y, active = np.full(rows, np.nan), active.copy()
     gram, scratch = np.zeros((rows + 1, rows)), np.zeros(6)
-    shape = bases, one_sided, None, of_rows
+    shape = Structure(bases, one_sided, None, of_rows)
     pushing_multipliers(shape, rows, residual, wide, active, exchanges, ROUNDS, gradient, scratch, gram, y)
     return y, active > 0.0
 
@@ -71,7 +72,7 @@ def test_rows_are_foreseen_until_they_agree_and_left_out_again():
         rows = 8
         wide = np.zeros((rows, 18))
         wide[:, :6] = rng.normal(size=(rows, 6))
-        shape = np.tile([0, -1, -1], (rows, 1)), np.ones(rows, dtype=np.int64), None
+        shape = Structure(np.tile([0, -1, -1], (rows, 1)), np.ones(rows, dtype=np.int64), None, None)
         residual, y, gradient = rng.uniform(0.01, 1.0, rows), np.zeros(rows), rng.normal(size=6)
         active, foreseen, descent = np.zeros(rows), np.zeros(rows), -gradient
         given = (rows, residual, wide, y, mu)

@@ -7,15 +7,15 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import assembly as asm
-from assembly.constraints import layout
-from assembly.constraints.program import evaluate
-from assembly.proximity import watch
-from assembly.proximity.free_pair import VARIABLES, VECTORS
-from assembly.proximity.solid_contact import CONTACT_RECORD, IDLE, PAIR_GAP, SLACK, TRACK
-from assembly.proximity.watch_memory import PAIR_MEMORY, REACH, memory_places
-from assembly.solve.carry import carry
-from assembly.solve.guards import place_guards
-from assembly.solve.rows import arrange, move, record_of_blocks
+from assembly.constraints.program import records as layout
+from assembly.constraints.program.evaluate import evaluate
+from assembly.proximity.extrema.lifted_pair import VARIABLES, VECTORS
+from assembly.proximity.features.solid_contact import CONTACT_RECORD, IDLE, PAIR_GAP, SLACK, TRACK
+from assembly.proximity.manager import update as watch
+from assembly.proximity.manager.state import PAIR_MEMORY, REACH, memory_places
+from assembly.solve.loop.clearances import place_guards
+from assembly.solve.loop.predict import carry
+from assembly.solve.loop.residuals import arrange, move, record_of_blocks
 from tests.laws.loop_point import room_of_shape
 
 SHAPES = {
@@ -42,17 +42,17 @@ class Near:
         self.free = np.full(rows, -1, dtype=np.int64)
         room = np.empty((VECTORS, 3, VARIABLES)), np.empty((VARIABLES, VARIABLES))
         self.memory = packed._memory.copy()
-        self.loose = self.free, np.empty((rows, 4)), *room, np.zeros((rows, TRACK)), self.memory
+        self.loose = layout.LiftedPairs(self.free, np.empty((rows, 4)), *room, np.zeros((rows, TRACK)), self.memory)
         at = table[layout.TAPE_ROOM]
-        self.room = tuple(np.empty(size) for size in table[at : at + 3])
+        self.room = layout.TapeRoom(*(np.empty(size) for size in table[at : at + 3]))
         q = scene.q.copy()
         q[:, :3] = (q[:, :3] - packed.reference) / packed.scale
         self.here = self.point(q)
-        self.here[1][:] = np.nan
+        self.here.tracked[:] = np.nan
         # What is listed is to be farther away, too.
         pairs, places, _ = memory_places(table, table[layout.WATCH])
         self.memory[pairs:places].reshape(-1, PAIR_MEMORY)[:, REACH] = 1.0
-        watch.look(table, pool, table[layout.WATCH], self.memory, q, self.here[1], watch.EVERYTHING)
+        watch.look(table, pool, table[layout.WATCH], self.memory, q, self.here.tracked, watch.EVERYTHING)
         place_guards(table, self.memory, self.here, np.zeros(rows), np.zeros(rows), self.free, True)
         arrange(table, self.free, self.shape, rows, self.n)
         self.rows = rows
@@ -62,20 +62,20 @@ class Near:
         """Room for a point at these poses."""
         rows = int(self.table[layout.ROWS])
         records = np.full((rows, CONTACT_RECORD), np.nan)
-        return q.copy(), np.zeros((rows, TRACK)), records, np.zeros(rows), np.full((rows, 16), np.nan)
+        return layout.Iterate(q.copy(), np.zeros((rows, TRACK)), records, np.zeros(rows), np.full((rows, 16), np.nan))
 
     def exactly(self, point):
         """Every row by its pair."""
-        start = point[1].copy()
+        start = point.tracked.copy()
         return evaluate(self.table, self.pool, start, np.inf, self.loose, self.room, point) < 0
 
     def step(self, d):
         """The point that a step leads to, as the loop evaluates it, and which rows it took as open."""
-        trial = self.point(self.here[0])
-        move(self.table, self.here[0], d, 1.0, trial[0])
-        carry(self.table, self.pool, self.shape[0], self.loose, self.here, trial, d, 1.0)
-        idle = self.loose[4][:, IDLE] == 1.0
-        found = evaluate(self.table, self.pool, self.loose[4], np.inf, self.loose, self.room, trial) < 0
+        trial = self.point(self.here.q)
+        move(self.table, self.here.q, d, 1.0, trial.q)
+        carry(self.table, self.pool, self.shape.bases, self.loose, self.here, trial, d, 1.0)
+        idle = self.loose.guess[:, IDLE] == 1.0
+        found = evaluate(self.table, self.pool, self.loose.guess, np.inf, self.loose, self.room, trial) < 0
         return trial, idle, found
 
 
@@ -96,29 +96,29 @@ def test_rows_that_are_not_evaluated_are_open_and_nearly_what_they_would_be(name
             if not found:
                 break
             gone += np.abs(d).sum()
-            exact = near.point(trial[0])
-            exact[1][:] = trial[1]
-            if not near.exactly(exact) or (np.isnan(exact[1][:, 0]) != np.isnan(near.here[1][:, 0])).any():
+            exact = near.point(trial.q)
+            exact.tracked[:] = trial.tracked
+            if not near.exactly(exact) or (np.isnan(exact.tracked[:, 0]) != np.isnan(near.here.tracked[:, 0])).any():
                 # A pair that a step as long as that leads elsewhere: no row says anything of it.
                 break
             for r in np.flatnonzero(idle):
                 # What is left falls by what both bodies may have moved.
                 minimum_at = int(near.table[near.table[layout.ROW_TABLE] + layout.ROW * r + layout.MINIMUM])
                 gone_now = 0.0
-                for side, at in enumerate(near.shape[0][r, :2]):
+                for side, at in enumerate(near.shape.bases[r, :2]):
                     if at >= 0:
                         reach = near.pool[minimum_at + 4 + side]
                         gone_now += np.linalg.norm(d[at : at + 3]) + reach * np.linalg.norm(d[at + 3 : at + 6])
-                assert trial[2][r, SLACK] == pytest.approx(near.here[2][r, SLACK] - gone_now, abs=1e-15)
+                assert trial.records[r, SLACK] == pytest.approx(near.here.records[r, SLACK] - gone_now, abs=1e-15)
                 # No less than is left; and what a step makes of a gap to first order.
-                assert exact[3][r] >= trial[2][r, SLACK] > 0.0
-                assert trial[3][r] >= trial[2][r, SLACK]
-                assert abs(exact[3][r] - trial[3][r]) < 60.0 * gone**2
-                assert trial[1][r, IDLE] == 0.0 and trial[1][
+                assert exact.residual[r] >= trial.records[r, SLACK] > 0.0
+                assert trial.residual[r] >= trial.records[r, SLACK]
+                assert abs(exact.residual[r] - trial.residual[r]) < 60.0 * gone**2
+                assert trial.tracked[r, IDLE] == 0.0 and trial.tracked[
                     r, PAIR_GAP
-                ] - minimum / near.packed.scale == pytest.approx(trial[3][r], abs=1e-15)
+                ] - minimum / near.packed.scale == pytest.approx(trial.residual[r], abs=1e-15)
             skipped += int(idle.sum())
-            evaluated += int((~idle & ~np.isnan(trial[1][:, 0])).sum())
+            evaluated += int((~idle & ~np.isnan(trial.tracked[:, 0])).sum())
             near.here = trial
     assert skipped > 15 / 14 * count and evaluated > 10 / 14 * count
 
@@ -126,7 +126,7 @@ def test_rows_that_are_not_evaluated_are_open_and_nearly_what_they_would_be(name
 def test_rows_that_may_close_are_evaluated():
     rng = np.random.default_rng(6)
     near = Near(rng, SHAPES["rings"](), 0.0)
-    left = np.nanmax(near.here[2][:, SLACK])
+    left = np.nanmax(near.here.records[:, SLACK])
     assert left > 0.0
     far = near.pool[near.table[near.table[layout.ROW_TABLE] + layout.MINIMUM :: layout.ROW][0] + 4]
     for body in range(near.n // 6):
@@ -135,5 +135,5 @@ def test_rows_that_may_close_are_evaluated():
             # As far as may close the widest of these gaps: by a shift, or a turn of what is farthest away.
             d[6 * body + k] = 1.001 * left / (1.0 if k < 3 else far)
             _, idle, _ = near.step(d)
-            moved = near.shape[0][: near.rows, :2] == 6 * body
+            moved = near.shape.bases[: near.rows, :2] == 6 * body
             assert not (idle & moved.any(axis=1)).any()

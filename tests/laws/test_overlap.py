@@ -7,9 +7,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import assembly as asm
-from assembly.constraints import layout
-from assembly.proximity import watch, watch_memory
-from assembly.proximity.solid_contact import PAIR_GAP, TRACK
+from assembly.constraints.program import records as layout
+from assembly.proximity.features.solid_contact import PAIR_GAP, TRACK
+from assembly.proximity.manager import state as watch_memory
+from assembly.proximity.manager import update as watch
 from benchmarks.center_lines import ball_wire, paper_clip_wire, torus_wire
 from benchmarks.wire_oracle import WireOracle
 from tests.solve.test_flat_contacts import BOX, PLATE, apart
@@ -31,7 +32,7 @@ def judge(f, g):
     The deepest gap is NaN where no contact is listed.
     """
     scene = asm.Assembly([asm.Body("f", f), asm.Body("g", g)])
-    scene.constrain(asm.Clearance(places=32))
+    scene.constrain(asm.Clearance(slots=32))
     packed = scene.packed()
 
     def at(q):

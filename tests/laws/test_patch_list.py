@@ -7,8 +7,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from assembly.geometry.vec import quaternion_matrix
-from assembly.proximity.bounding_tree import CENTER, NODE_POOL, RADIUS, pairs_within
-from assembly.proximity.patch_list import COUNT, LIST_INTS, OWNER, listed_pairs
+from assembly.proximity.bvh.neighbor_list import COUNT, LIST_INTS, OWNER, listed_pairs
+from assembly.proximity.bvh.tree import CENTER, NODE_POOL, RADIUS, pairs_within
+from assembly.proximity.manager.motion_bounds import Mover
 from tests.laws.test_facet_enclosure import BODIES, Descent, placed, sample
 
 REACH, RING = 0.1, 0.15
@@ -50,7 +51,7 @@ def test_a_list_has_what_is_in_reach_at_poses_near_its_own(names, side):
             seen = pose if side == 1 else inverse(*pose)
             seen = seen if k == 0 else around(rng, descent, trees[side], *seen)
             e = tuple(Rotation.from_matrix(seen[0]).as_quat(scalar_first=True).tolist())
-            moving = side, trees[side], e, quaternion_matrix(*e), tuple(seen[1].tolist())
+            moving = Mover(side, trees[side], e, quaternion_matrix(*e), tuple(seen[1].tolist()))
             turn, shift = seen if side == 1 else inverse(*seen)
             there = tuple(turn.ravel().tolist()), tuple(shift.tolist())
             before = table[at:].copy()

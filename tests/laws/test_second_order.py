@@ -7,9 +7,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from assembly.constraints import layout
+from assembly.constraints.program import records as layout
 from assembly.kinematics.pose import retract
-from assembly.solve.look import Look, null_space
+from assembly.solve.second_order.dense import Look, null_space
 from tests.solve.lower_poses import random_scene
 
 SEEDS = range(30)

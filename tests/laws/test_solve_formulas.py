@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly.constraints.terms import objective
-from assembly.geometry.spline import SURFACE_RECORD
+from assembly.constraints.program.objective_terms import objective
+from assembly.constraints.program.records import Sparsity
+from assembly.geometry.splines.evaluate import SURFACE_RECORD
 from assembly.kinematics.pose import multiply, retract, rotation_matrix, skew
 from assembly.proximity import gap_hessian
-from assembly.proximity.free_pair import VARIABLES, VECTORS, coordinate_lengths, free_hessian, free_rows
-from assembly.proximity.pairs import _packed
-from assembly.solve.rows import merit
+from assembly.proximity.extrema.lifted_pair import VARIABLES, VECTORS, coordinate_lengths, free_hessian, free_rows
+from assembly.proximity.extrema.pairs import _packed
+from assembly.solve.loop.residuals import merit
 from tests.laws.test_formulas import Local
 from tests.laws.witness import OFFSETS, SLOPE
 
@@ -120,7 +121,7 @@ def objective_at(scene, q):
     gradient, hessian = np.empty(6), np.empty((6, 6))
     room = (np.empty(0), np.empty(0), np.empty(0))
     places = np.stack([np.full(6, 5), np.arange(6), np.full(6, 5)])
-    whole = (places, np.zeros((1, 2), np.int64), np.empty((1, 6)), np.zeros(0, np.int64))
+    whole = Sparsity(places, np.zeros((1, 2), np.int64), np.empty((1, 6)), np.zeros(0, np.int64))
     value = objective(packed.table, packed.pool, q, 1, room, whole, gradient, hessian)
     # The kernel writes the upper triangle.
     return value, gradient, np.triu(hessian) + np.triu(hessian, 1).T

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly.constraints import layout
-from assembly.constraints.sparsity import clear_upper, place_folds
-from assembly.solve.linear import factorize_shifted, forward_step, solve_step
-from assembly.solve.multipliers import curve_rows, toward_rows
-from assembly.solve.rows import arrange
+from assembly.constraints.program import records as layout
+from assembly.constraints.program.envelope import clear_upper, place_folds
+from assembly.solve.linear_algebra.factorize import factorize_shifted, forward_step, solve_step
+from assembly.solve.loop.multipliers import curve_rows, toward_rows
+from assembly.solve.loop.residuals import Structure, arrange
 from tests.laws.loop_point import room_of_shape
 
 
@@ -44,7 +44,7 @@ def random_system(rng, bodies, pairs):
     last = np.concatenate([np.maximum.accumulate(last), np.repeat(6 * bodies + 4 * np.arange(pairs) + 3, 4)])
     places = np.empty((3, n), np.int64)
     places[0] = last
-    order = (places, folds, np.empty((1, n)), np.empty(0, np.int64))
+    order = layout.Sparsity(places, folds, np.empty((1, n)), np.empty(0, np.int64))
     place_folds(n, order)
     dense = np.triu(matrix) + np.triu(matrix, 1).T
     dense += np.diag(np.abs(dense).sum(axis=1) + 1.0)
@@ -58,8 +58,8 @@ def test_the_step_is_that_of_the_dense_matrix(bodies, pairs):
     n = len(dense)
     if pairs > 0:
         # A permutation, and rows of the factor that reach farther and farther.
-        assert sorted(order[0][1]) == list(range(n))
-        assert (np.diff(order[0][2]) >= 0).all()
+        assert sorted(order.places[1]) == list(range(n))
+        assert (np.diff(order.places[2]) >= 0).all()
     # What the order does not list is neither read nor written.
     upper, factor = np.full((n, n), np.nan), np.full((n, n), np.nan)
     clear_upper(order, n, upper)
@@ -83,9 +83,9 @@ def test_the_step_is_that_of_the_dense_matrix(bodies, pairs):
 def test_a_chain_with_folds_is_as_narrow_as_one_without():
     rng = np.random.default_rng(1)
     order, dense = random_system(rng, 40, 39)
-    reach = order[0][2] - np.arange(len(dense))
+    reach = order.places[2] - np.arange(len(dense))
     # Two bodies and what may stand behind each of them.
-    most = np.bincount(np.maximum(order[1][:39, 0], order[1][:39, 1]).clip(0) // 6).max()
+    most = np.bincount(np.maximum(order.folds[:39, 0], order.folds[:39, 1]).clip(0) // 6).max()
     assert reach.max() < 12 + 4 * (2 * most + 1)
 
 
@@ -110,7 +110,7 @@ def test_rows_of_a_chain_meet_only_their_neighbors():
     # Six rows a pair, and those of the next pair.
     assert (last_row - np.arange(rows)).max() < 18
     # A body, the next one, and the pairs behind both; behind the last one stands the pair with the fixed body as well.
-    assert (order[0][2][:n] - np.arange(n)).max() < 24
+    assert (order.places[2][:n] - np.arange(n)).max() < 24
 
 
 def test_the_way_back_onto_rows_breaks_no_idle_ones():
@@ -121,8 +121,8 @@ def test_the_way_back_onto_rows_breaks_no_idle_ones():
     jacobian = np.zeros((rows, layout.EXTRA_COLUMN))
     jacobian[0, 0], jacobian[1, :2] = 1.0, (-1.0, 1.0)
     places = np.array([np.full(6, 5), np.arange(6), np.full(6, 5)])
-    order = (places, np.zeros((1, 2), np.int64), np.empty((1, 6)), np.empty(0, np.int64))
-    shape = (bases, np.ones(rows, np.int64), order, (np.arange(rows), np.full(rows, rows - 1)))
+    order = layout.Sparsity(places, np.zeros((1, 2), np.int64), np.empty((1, 6)), np.empty(0, np.int64))
+    shape = Structure(bases, np.ones(rows, np.int64), order, (np.arange(rows), np.full(rows, rows - 1)))
     residual, active, mu = np.array([-1e-3, 0.0]), np.empty(rows), 1e-6
     matrices, out = np.empty((2, 6, 6)), np.empty(6)
     forces = np.empty(rows)
@@ -139,8 +139,8 @@ def way_back(sides, residual, jacobian, softness=1.0, enough=0.0):
     bases = np.full((rows, 3), -1, dtype=np.int64)
     bases[:, 0] = 0
     places = np.array([np.full(6, 5), np.arange(6), np.full(6, 5)])
-    order = (places, np.zeros((1, 2), np.int64), np.empty((1, 6)), np.empty(0, np.int64))
-    shape = (bases, np.array(sides), order, (np.arange(rows), np.full(rows, rows - 1)))
+    order = layout.Sparsity(places, np.zeros((1, 2), np.int64), np.empty((1, 6)), np.empty(0, np.int64))
+    shape = Structure(bases, np.array(sides), order, (np.arange(rows), np.full(rows, rows - 1)))
     whole = np.zeros((rows, layout.EXTRA_COLUMN))
     whole[:, :6] = jacobian
     active, forces, matrices, out = np.empty(rows), np.empty(rows), np.empty((2, 6, 6)), np.empty(6)
@@ -190,8 +190,8 @@ def test_the_way_back_onto_rows_is_soft_only_where_it_must_be(angle):
     jacobian = np.zeros((rows, layout.EXTRA_COLUMN))
     jacobian[0, 0], jacobian[1, :2] = 1.0, (np.cos(angle), np.sin(angle))
     places = np.array([np.full(6, 5), np.arange(6), np.full(6, 5)])
-    order = (places, np.zeros((1, 2), np.int64), np.empty((1, 6)), np.empty(0, np.int64))
-    shape = (bases, np.zeros(rows, np.int64), order, (np.arange(rows), np.full(rows, rows - 1)))
+    order = layout.Sparsity(places, np.zeros((1, 2), np.int64), np.empty((1, 6)), np.empty(0, np.int64))
+    shape = Structure(bases, np.zeros(rows, np.int64), order, (np.arange(rows), np.full(rows, rows - 1)))
     residual, mu = np.array([1e-10, -1e-10]), 1e-6
     matrices, out, forces = np.empty((2, 6, 6)), np.empty(6), np.empty(rows)
     back = (jacobian, mu, np.full(rows, 1.0 / mu), 1.0)

@@ -1,4 +1,6 @@
-"""Minima of the distance of two spines over a thin box, by feet (`spine_minima.py`), against samples."""
+"""Minima of the distance of two spines over a thin box, by feet (`proximity/manager/centerlines/minima.py`), against
+samples.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +9,10 @@ import pytest
 from scipy.optimize import brentq
 
 from assembly.geometry.vec import dot
-from assembly.proximity.spine_box import apart
-from assembly.proximity.spine_curve import HALF, PART_BEND
-from assembly.proximity.spine_minima import MINIMA, valley_minima
-from assembly.proximity.spine_search import THIN
+from assembly.proximity.manager.centerlines.box import FreeEnds, Lengths, apart
+from assembly.proximity.manager.centerlines.minima import MINIMA, valley_minima
+from assembly.proximity.manager.centerlines.search import THIN
+from assembly.proximity.manager.wires import HALF, PART_BEND
 from benchmarks.motions import SHAPES
 from benchmarks.watching import Watch
 from tests.laws.test_spines import Two
@@ -111,7 +113,9 @@ def compare(two, box, open_ends):
         # Of a level valley rounding tells where it has minima.
         return None
     places = np.empty((MINIMA, 2))
-    count, _level, certain = valley_minima(two.pool, two.o, two.p, *two.pose(), box, open_ends, places)
+    count, _level, certain = valley_minima(
+        two.pool, two.o, two.p, *two.pose(), Lengths(*box), FreeEnds(*open_ends), places
+    )
     assert certain
     found = places[:count]
     # Slopes of 1e-15 place a minimum by as much over the curvature of the valley, which may be 1e-4 here.

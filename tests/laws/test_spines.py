@@ -9,14 +9,15 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import assembly as asm
-from assembly.geometry.face import Face
-from assembly.geometry.path import Path
-from assembly.geometry.spine import spine_of
+from assembly.geometry.faces.face import Face
+from assembly.geometry.shapes.centerline import spine_of
+from assembly.geometry.shapes.path import Path
 from assembly.geometry.vec import dot
-from assembly.proximity import watch_memory
-from assembly.proximity.allowances import part_used
-from assembly.proximity.spine_box import BARREN, CONVEX, EMPTY, apart, box_of
-from assembly.proximity.spine_curve import (
+from assembly.proximity.manager import state as watch_memory
+from assembly.proximity.manager.centerlines.box import BARREN, CONVEX, EMPTY, FreeEnds, Lengths, apart, box_of
+from assembly.proximity.manager.centerlines.packing import pack_spine
+from assembly.proximity.manager.motion_bounds import part_used
+from assembly.proximity.manager.wires import (
     HALF,
     PART,
     PART_POOL,
@@ -26,7 +27,6 @@ from assembly.proximity.spine_curve import (
     point_of,
     spine_point,
 )
-from assembly.proximity.spine_packing import pack_spine
 from benchmarks.center_lines import path_wire
 from benchmarks.motions import HOOK, SHAPES
 from benchmarks.watching import Watch
@@ -165,7 +165,7 @@ class Two:
         return tuple(self.turn.as_matrix().ravel().tolist()), tuple(self.shift.tolist())
 
     def told(self, ends=(False, False, False, False)):
-        return box_of(self.pool, self.o, self.p, *self.pose(), self.box, ends, np.inf, self.rho)
+        return box_of(self.pool, self.o, self.p, *self.pose(), Lengths(*self.box), FreeEnds(*ends), np.inf, self.rho)
 
     def at(self, s, t):
         """Distances, slopes F_s, F_t and second derivatives F_ss, F_st, F_tt at arrays of places."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from assembly.geometry.face import Face
+from assembly.geometry.faces.face import Face
 from assembly.proximity import contact_jacobian, extremal_pair, gap_gradient, gap_hessian
 
 DERIVATIVES = (contact_jacobian, gap_gradient, gap_hessian)

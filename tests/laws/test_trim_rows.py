@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly.constraints import layout
-from assembly.constraints.trim_contact import FORMS
+from assembly.constraints.model.trim_contact import FORMS
+from assembly.constraints.program import records as layout
 from tests.laws.curve_witness import CurveStack, SurfaceCurve
 from tests.laws.loop_point import LoopPoint, moved
 from tests.laws.trim_scenes import LOOPS, SURFACES, FreePoint, TrimScene, circle, polygon, spline, trim_scene
@@ -182,7 +182,7 @@ def test_rows_against_the_closed_forms(seed):
         _, rate = pair_moved(made.q.ravel()[None], lengths[None], 0.0)
         # Both exact but for rounding, in units of a few times the shape's size.
         np.testing.assert_allclose(packed.scale * point.residual[1:], unit * value, rtol=0, atol=1e-11)
-        jacobian = point.point[4][1:, :12]
+        jacobian = point.point.jacobian[1:, :12]
         np.testing.assert_allclose(packed.scale * (jacobian @ twist), unit * (slope @ rate[0]), rtol=0, atol=1e-10)
 
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from assembly.geometry import pieces, shapes
-from assembly.geometry.curve import NurbsCurve
-from assembly.geometry.derivative_bounds import derivative_bounds
-from assembly.geometry.face import Face
-from assembly.geometry.surface import NurbsSurface
-from assembly.geometry.trim_nearest import nearest_points
+from assembly.geometry import shapes
+from assembly.geometry.faces import trim_pieces as pieces
+from assembly.geometry.faces.face import Face
+from assembly.geometry.faces.trim_nearest import nearest_points
+from assembly.geometry.splines.curve import NurbsCurve
+from assembly.geometry.splines.derivative_bounds import derivative_bounds
+from assembly.geometry.splines.surface import NurbsSurface
 from tests.geometry.loops import blob, dense, polygon_winding, random_face, segment
 
 PLANE = shapes.plane(10.0, 10.0)

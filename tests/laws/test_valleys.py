@@ -7,15 +7,16 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import assembly as asm
-from assembly.constraints.layout import WATCH
-from assembly.geometry.spline import BREAKS_U, BREAKS_V, SPANS_U, SPANS_V, surface_point
-from assembly.proximity.borders import feature_at
-from assembly.proximity.held_valleys import hold_continua, is_next_in_valley, sunk
-from assembly.proximity.holding import HELD_F, HELD_G
-from assembly.proximity.roots import CODE_F, CODE_G, CORNER, LISTED, NEW, ORIGIN, ROOT, ROOT_FOLD, USELESS
-from assembly.proximity.shell import FACES
-from assembly.proximity.valleys import ARRIVED, across_valley, into_valley
-from assembly.proximity.watch_memory import PAIR_SHELL_F, PAIR_SHELL_G, PAIR_TABLE
+from assembly.constraints.program.records import WATCH
+from assembly.geometry.splines.evaluate import BREAKS_U, BREAKS_V, SPANS_U, SPANS_V, surface_point
+from assembly.proximity.brep.borders import feature_at
+from assembly.proximity.brep.records import FACES
+from assembly.proximity.features.holding import HELD_F, HELD_G
+from assembly.proximity.manager.extrema import CODE_F, CODE_G, CORNER, LISTED, NEW, ORIGIN, ROOT, ROOT_FOLD, USELESS
+from assembly.proximity.manager.near_singular import ARRIVED, across_valley, into_valley
+from assembly.proximity.manager.near_singular_points import hold_continua, is_next_in_valley, sunk
+from assembly.proximity.manager.state import PAIR_SHELL_F, PAIR_SHELL_G, PAIR_TABLE
+from tests.laws.scenes import posed
 
 MAJOR, MINOR = 0.7, 0.1
 WIDE = (np.inf, np.inf, np.inf, np.inf)
@@ -115,7 +116,7 @@ def test_no_valley_where_nothing_or_everything_is_level(shape, cases):
         turn, shift = tilted(rng, 0.1, scale)
         for other in others:
             x = lowest_start(table, pool, other, turn, shift)
-            assert not across_valley(table, pool, top, other, tuple(turn.ravel()), tuple(shift), x)[0]
+            assert not across_valley(table, pool, top, other, tuple(turn.ravel()), tuple(shift), x).found
 
 
 def ring_on_a_slab(slab=None):
@@ -140,9 +141,9 @@ def test_a_point_that_is_held_goes_back_to_the_bottom():
     rng = np.random.default_rng(8)
     for tilt in (0.0, 1e-6, 1e-3):
         turn, shift = tilted(rng, tilt, scale)
-        scene = (tuple(turn.ravel()), tuple(shift), (-1, -1, *shells))
+        pair = posed(tuple(turn.ravel()), tuple(shift), shells=tuple(shells))
         start = (0.0, 0.0, rng.uniform(0.0, u1), v0 + (0.75 + rng.uniform(-0.03, 0.03)) * (v1 - v0))
-        x = sunk(table, pool, scene, (top, 0), HELD_G, start)
+        x = sunk(table, pool, pair, (top, 0), HELD_G, start)
         p = surface.evaluate(x[2], x[3])
         low, _ = lowest_across(turn, shift, np.arctan2(p[1], p[0]), scale)
         assert (turn @ p / scale + shift)[2] == pytest.approx(low, abs=ARRIVED**2 + 1e-15 + MINOR * tilt**4)
@@ -151,18 +152,18 @@ def test_a_point_that_is_held_goes_back_to_the_bottom():
 def test_a_point_that_is_held_stays_where_its_bottom_is_over_a_hole():
     table, pool, scale, shells, top = ring_on_a_slab(asm.shapes.plate(4.0, 4.0, 0.5, [(MAJOR, 0.0, 0.2)]))
     _, (v0, v1) = asm.shapes.torus(MAJOR, MINOR).domain
-    scene = (tuple(np.eye(3).ravel()), (0.0, 0.0, 0.35 / scale), (-1, -1, *shells))
+    pair = posed(tuple(np.eye(3).ravel()), (0.0, 0.0, 0.35 / scale), shells=tuple(shells))
     start = (MAJOR, 0.0, 0.0, v0 + 0.77 * (v1 - v0))
     # Of the slab nothing is below it; of the ring there is.
-    assert sunk(table, pool, scene, (top, 0), HELD_F, start) == start
-    assert sunk(table, pool, scene, (top, 0), HELD_G, start)[3] == pytest.approx(v0 + 0.75 * (v1 - v0), abs=1e-9)
+    assert sunk(table, pool, pair, (top, 0), HELD_F, start) == start
+    assert sunk(table, pool, pair, (top, 0), HELD_G, start)[3] == pytest.approx(v0 + 0.75 * (v1 - v0), abs=1e-9)
 
 
 def test_few_of_a_continuum_are_held():
     table, pool, scale, shells, top = ring_on_a_slab()
     (_, u1), (v0, v1) = asm.shapes.torus(MAJOR, MINOR).domain
     turn, shift = tuple(np.eye(3).ravel()), (0.0, 0.0, 0.35 / scale)
-    looked_into = (turn, shift, (-1, -1, *shells), None, None)
+    looked_into = posed(turn, shift, shells=tuple(shells))
     # Eighths of the ring: two new ones a step apart, what is listed, what is of no use, an isolated one.
     states = [(0.0, NEW, 0.0), (0.05, NEW, 0.0), (2.0, LISTED, 0.0), (4.0, USELESS, 0.0), (4.0, NEW, 0.0)]
     states += [(6.0, NEW, 0.3), (6.05, NEW, 0.0)]
@@ -190,7 +191,7 @@ def test_what_lies_beside_a_point_is_in_another_valley():
     _found, x, _on_f, along = into_valley(table, pool, *surfaces, turn, shift, start, WIDE)
     roots = np.zeros((1, ROOT))
     roots[0, :4], roots[0, CODE_F], roots[0, ORIGIN], roots[0, CORNER] = x, top, NEW, HELD_G
-    scene = turn, shift, (-1, -1, *shells)
+    pair = posed(turn, shift, shells=tuple(shells))
     # The slab's parameters are lengths. More beside than along is another valley; a turn by 60 degrees is far, too.
     across = np.cross([0.0, 0.0, 1.0], along)
     turned = 0.4 * np.array(along) + np.sqrt(0.84) * across
@@ -201,4 +202,4 @@ def test_what_lies_beside_a_point_is_in_another_valley():
         (0.3 * turned, tuple(turned), True),
     ):
         there = (x[0] + way[0], x[1] + way[1], x[2], x[3])
-        assert is_next_in_valley(table, pool, scene, (top, 0), surfaces, there, direction, roots, 1) == other
+        assert is_next_in_valley(table, pool, pair, (top, 0), surfaces, there, direction, roots, 1) == other

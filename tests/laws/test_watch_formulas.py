@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from assembly.proximity.allowances import turned_by
-from assembly.proximity.watch_memory import (
+from assembly.proximity.manager.motion_bounds import turned_by
+from assembly.proximity.manager.state import (
     PAIR_MEMORY,
     PLACE,
     TURN,

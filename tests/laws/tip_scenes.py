@@ -8,8 +8,8 @@ import casadi as ca
 import numpy as np
 
 import assembly as asm
-from assembly.constraints.constraint import Freedom
-from assembly.constraints.joint import Joint
+from assembly.constraints.model.constraint import Freedom
+from assembly.constraints.model.joint import Joint
 from assembly.kinematics.body import Frame
 from tests.solve.mechanisms import chain, planar_four_bar
 

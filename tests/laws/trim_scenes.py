@@ -7,12 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 import assembly as asm
-from assembly.constraints import layout, program, row_terms
-from assembly.geometry.curve import NurbsCurve
-from assembly.geometry.face import Face
-from assembly.proximity.free_pair import coordinate_lengths
-from assembly.proximity.solid_contact import TRACK
-from assembly.solve.rows import arrange
+from assembly.constraints.program import evaluate as program
+from assembly.constraints.program import records as layout
+from assembly.constraints.program import row_terms
+from assembly.geometry.faces.face import Face
+from assembly.geometry.splines.curve import NurbsCurve
+from assembly.proximity.extrema.lifted_pair import coordinate_lengths
+from assembly.proximity.features.solid_contact import TRACK
+from assembly.solve.loop.residuals import arrange
 from tests.laws.loop_point import LoopPoint, room_of_shape
 from tests.laws.scenes import dome, placed
 
@@ -141,12 +143,12 @@ class FreePoint:
         self.rows, self.n = rows + 4, 6 * moving + 4
         scaled = np.array(q, dtype=float)
         scaled[:, :3] = (scaled[:, :3] - packed.reference) / packed.scale
-        self.point = (
+        self.point = layout.Iterate(
             scaled,
-            np.zeros_like(base.point[1]),
-            np.ones_like(base.point[2]),
+            np.zeros_like(base.point.tracked),
+            np.ones_like(base.point.records),
             np.empty(self.rows),
-            np.zeros((self.rows, base.point[4].shape[1])),
+            np.zeros((self.rows, base.point.jacobian.shape[1])),
         )
         if lengths is None:
             lengths = np.empty((1, 4))
@@ -154,20 +156,20 @@ class FreePoint:
             surfaces = self.table[row + layout.SURFACE_F], self.table[row + layout.SURFACE_G]
             coordinate_lengths(self.table, self.pool, *surfaces, tuple(case.x), lengths, 0)
         self.lengths = lengths
-        self.loose = (np.zeros(1, dtype=np.int64), lengths, *base.loose[2:])
+        self.loose = base.loose._replace(free=np.zeros(1, dtype=np.int64), lengths=lengths)
         self.shape = room_of_shape(self.table, self.rows, self.n, self.table[:0])
-        arrange(self.table, self.loose[0], self.shape, self.rows, self.n)
+        arrange(self.table, self.loose.free, self.shape, self.rows, self.n)
         self.room = base.room
         start = case.tracked(x)
         assert program.evaluate(self.table, self.pool, start, np.inf, self.loose, self.room, self.point) < 0
 
     @property
     def residual(self):
-        return self.point[3]
+        return self.point.residual
 
     def jacobian(self):
         """Dense, (rows, n): twists of both bodies, then the coordinates times their lengths."""
-        return np.concatenate([self.point[4][:, :12], self.point[4][:, 12:16]], 1)
+        return np.concatenate([self.point.jacobian[:, :12], self.point.jacobian[:, 12:16]], 1)
 
     def row_terms(self, y, weights):
         """Second derivative of y . rows + J^T diag(weights) J, (n, n)."""

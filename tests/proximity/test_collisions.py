@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import assembly as asm
+from assembly.distance.enclosures.queries import enclosed_distance
 from assembly.errors import InputError
 from assembly.proximity import collisions
-from assembly.proximity.enclosure_queries import enclosed_distance
 
 
 def paths(rng, count, d=2):

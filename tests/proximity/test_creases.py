@@ -5,10 +5,10 @@ import pytest
 
 import assembly as asm
 from assembly.geometry import shapes
-from assembly.geometry.face import Face
-from assembly.geometry.surface import NurbsSurface
+from assembly.geometry.faces.face import Face
+from assembly.geometry.splines.surface import NurbsSurface
 from assembly.proximity import FeatureStatus, closest_features
-from assembly.proximity.topology import topology_of
+from assembly.proximity.brep.topology import topology_of
 
 
 def folded(corners, height=2.0):

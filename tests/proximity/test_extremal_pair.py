@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from assembly.geometry import shapes
-from assembly.geometry.face import Face
-from assembly.geometry.surface import NurbsSurface
+from assembly.geometry.faces.face import Face
+from assembly.geometry.splines.surface import NurbsSurface
 from assembly.proximity import PairStatus, contact_jacobian, extremal_pair, gap_gradient, gap_hessian
 from tests.laws.scenes import frame_at, inside, placed, random_quaternion
 from tests.laws.witness import rotated

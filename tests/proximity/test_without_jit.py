@@ -9,7 +9,7 @@ import pytest
 
 import assembly as asm
 from assembly.geometry import shapes
-from assembly.geometry.face import Face
+from assembly.geometry.faces.face import Face
 from assembly.proximity import contact_jacobian, extremal_pair, gap_gradient, gap_hessian
 from benchmarks.watching import Watch
 

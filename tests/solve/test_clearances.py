@@ -114,14 +114,26 @@ def test_a_scene_file_keeps_clearances(tmp_path):
     a, b, c = bodies
     scene = asm.Assembly(bodies)
     scene.constrain(
-        asm.Clearance([a, b], minimum=0.125, name="first", neglect=1e-3, places=7),
+        asm.Clearance([a, b], minimum=0.125, name="first", merge_radius=1e-3, slots=7),
         asm.Clearance(exclude=[(a, b), (b, c)]),
     )
     scene.save(tmp_path / "scene.json")
     first, rest = asm.load(tmp_path / "scene.json").constraints
-    assert (first.name, first.minimum, first.neglect, first.places, first.is_of_all) == ("first", 0.125, 1e-3, 7, False)
+    assert (first.name, first.minimum, first.merge_radius, first.slots, first.is_of_all) == (
+        "first",
+        0.125,
+        1e-3,
+        7,
+        False,
+    )
     assert [body.name for body in first.bodies] == ["a", "b"] and first.exclude == ()
-    assert (rest.name, rest.minimum, rest.neglect, rest.places, rest.is_of_all) == ("clearance", 0.0, 1e-6, None, True)
+    assert (rest.name, rest.minimum, rest.merge_radius, rest.slots, rest.is_of_all) == (
+        "clearance",
+        0.0,
+        1e-6,
+        None,
+        True,
+    )
     assert [[body.name for body in pair] for pair in rest.exclude] == [["a", "b"], ["b", "c"]]
 
 
@@ -218,3 +230,18 @@ def test_bodies_deep_in_each_other_are_moved_apart(a, b, x):
         # Drawn to where they were, they end touching; a level ring is nearest all around, known to the square root
         # of what stationary means.
         assert closest_features(*bodies, *q).gap == pytest.approx(0.0, abs=1e-9)
+
+
+def test_former_names_work_and_warn():
+    a, b = (asm.Body(name, asm.shapes.sphere(1.0)) for name in "ab")
+    with pytest.warns(DeprecationWarning, match="neglect is called merge_radius now"):
+        clearance = asm.Clearance([a, b], neglect=1e-3)
+    with pytest.warns(DeprecationWarning, match="places is called slots now"):
+        manager = asm.Manager([a, b], places=4)
+    assert clearance.merge_radius == 1e-3
+    with pytest.warns(DeprecationWarning, match="neglect is called"):
+        assert clearance.neglect == 1e-3
+    with pytest.warns(DeprecationWarning, match="neglect is called"):
+        assert manager.neglect == manager.merge_radius == 1e-6
+    with pytest.warns(DeprecationWarning, match="places is called"):
+        assert clearance.places is None

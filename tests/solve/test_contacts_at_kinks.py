@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly.geometry import shapes, solids
+from assembly.geometry import shapes
+from assembly.geometry.shapes import solids
 from assembly.proximity import closest_features
 
 

@@ -12,11 +12,12 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly.constraints.packing import Packed
+from assembly.constraints.packing.scene import Packed
 from assembly.errors import InputError
-from assembly.proximity import watch_memory
-from assembly.solve import interruption, pauses
-from assembly.solve.settings import ASK_AT
+from assembly.proximity.manager import state as watch_memory
+from assembly.solve import interruption
+from assembly.solve.loop import pauses
+from assembly.solve.loop.settings import ASK_AT
 
 
 def long_arm(links: int = 250) -> asm.Assembly:
@@ -194,7 +195,7 @@ def crowd(count: int = CROWD) -> asm.Assembly:
     rng = np.random.default_rng(0)
     shape = asm.shapes.ellipsoid(1.0, 0.9, 0.8)
     scene = asm.Assembly(asm.Body(f"{k}", shape, rng.uniform(-1.0, 1.0, 3)) for k in range(count))
-    scene.constrain(asm.Clearance(places=600))
+    scene.constrain(asm.Clearance(slots=600))
     return scene
 
 

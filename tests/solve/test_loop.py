@@ -9,7 +9,7 @@ import pytest
 
 import assembly as asm
 from assembly.kinematics.pose import rotate
-from assembly.proximity.pairs import PairStatus
+from assembly.proximity.extrema.pairs import PairStatus
 
 shapes = asm.shapes
 FOUND = (PairStatus.CONVERGED, PairStatus.SINGULAR)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly.constraints import primitives as P
-from assembly.constraints.constraint import Coordinate, FramePair
+from assembly.constraints.model.constraint import Coordinate, FramePair
+from assembly.constraints.program import primitives as P
 from assembly.solve.measure import JointRow, measure, standing
 
 COORDINATES = [

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly.constraints.constraint import Constraint
-from assembly.constraints.objectives import Objective
+from assembly.constraints.model.constraint import Constraint
+from assembly.constraints.model.objectives import Objective
 from assembly.kinematics.pose import retract
-from assembly.proximity.solid_contact import TRACK
-from assembly.solve import reference
-from assembly.solve.reference import ReferenceSolver
-from assembly.solve.reference_rows import Poses, Rows
-from assembly.solve.reference_terms import Terms
+from assembly.proximity.features.solid_contact import TRACK
+from assembly.solve.oracle import reference
+from assembly.solve.oracle.reference import ReferenceSolver
+from assembly.solve.oracle.rows import Poses, Rows
+from assembly.solve.oracle.terms import Terms
 from assembly.solve.scene import Status
 
 

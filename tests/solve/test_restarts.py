@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly.solve.contradiction import is_certain
-from assembly.solve.starts import scattered
+from assembly.solve.attempts.starts import scattered
+from assembly.solve.diagnosis.contradiction import is_certain
 from tests.solve.linkages import linkage, random_turn
 from tests.solve.test_least_moves import move
 

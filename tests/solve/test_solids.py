@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly.constraints import layout
+from assembly.constraints.program import records as layout
 from assembly.kinematics.pose import rotation_matrix
-from assembly.proximity.solid_contact import FEATURE_F, FEATURE_G
+from assembly.proximity.features.solid_contact import FEATURE_F, FEATURE_G
 from tests.laws.loop_point import LoopPoint, moved
 from tests.laws.witness import OFFSETS, SLOPE
 

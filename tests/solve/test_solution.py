@@ -7,10 +7,10 @@ import pytest
 
 import assembly as asm
 from assembly.errors import InputError
-from assembly.solve import solution as solution_module
-from assembly.solve.solution import Iteration
+from assembly.solve import result as result_module
+from assembly.solve.result import Iteration
+from tests.solve.dense.test_jacobian import everything
 from tests.solve.mechanisms import bricard, planar_four_bar
-from tests.solve.test_jacobian import everything
 
 
 def triangle(third=3.0):
@@ -92,7 +92,7 @@ def test_a_conflict_is_of_the_values_that_were_solved():
 
 
 def test_other_endings_do_not_look_for_conflicts(monkeypatch):
-    monkeypatch.setattr("assembly.solve.conflicts.conflicts_at", None)
+    monkeypatch.setattr("assembly.solve.diagnosis.conflicts.conflicts_at", None)
     solution = triangle(1.5).solve(max_iterations=1)
     assert solution.status is asm.Status.ITERATION_LIMIT and solution.conflicting == []
 
@@ -126,9 +126,10 @@ def test_a_plain_solve_pays_for_nothing(monkeypatch):
     scene.solve()
     for name in ("rows_at", "gradient_at"):
         monkeypatch.setattr(
-            f"assembly.solve.jacobian.{name}" if name == "rows_at" else f"assembly.solve.lost.{name}", None
+            f"assembly.solve.dense.jacobian.{name}" if name == "rows_at" else f"assembly.solve.diagnosis.lost.{name}",
+            None,
         )
-    monkeypatch.setattr(solution_module, "measure", None)
+    monkeypatch.setattr(result_module, "measure", None)
     solution = scene.solve()
     assert solution.success and solution.violations and solution.multipliers and solution.history.size
     assert repr(solution) and solution.message

@@ -8,8 +8,8 @@ import pytest
 import assembly as asm
 from assembly.errors import InputError
 from assembly.proximity import FeatureStatus, closest_features
-from tests.proximity.test_contact_place import CORNER, prism
-from tests.proximity.test_touching import bolt_and_plate
+from tests.proximity.features.test_touching import bolt_and_plate
+from tests.proximity.manager.test_contact_place import CORNER, prism
 
 HOLES = [(0.0, 0.0, 4.5), (20.0, 0.0, 3.0)]
 

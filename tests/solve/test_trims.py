@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly.constraints.trim_contact import FORMS
-from assembly.proximity.pairs import extremal_pair
+from assembly.constraints.model.trim_contact import FORMS
+from assembly.proximity.extrema.pairs import extremal_pair
 from assembly.solve.scene import Status
 from tests.laws.scenes import dome
 from tests.laws.trim_scenes import circle, polygon, spline

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from tests.constraints.test_expression import scalar
+from tests.constraints.model.test_expression import scalar
 
 
 @pytest.mark.parametrize(

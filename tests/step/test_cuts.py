@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly.geometry.bezier import full_knots
-from assembly.geometry.region_cuts import cut_open, part_of
-from assembly.geometry.region_pieces import EDGE, POLE, SEAM, Uncut
-from assembly.geometry.region_strips import strip
+from assembly.geometry.seams.region_cuts import cut_open, part_of
+from assembly.geometry.seams.region_pieces import EDGE, POLE, SEAM, Uncut
+from assembly.geometry.seams.region_strips import strip
+from assembly.geometry.splines.bezier import full_knots
 from assembly.step.profiles import Straight, Turning, Unreadable, approximated, arc, spline
 from assembly.step.surfaces import Patch
 from assembly.step.trims import Edge, chained

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly.geometry.bezier import full_knots
+from assembly.geometry.splines.bezier import full_knots
 from assembly.step import StepError, StepWarning
 from assembly.step.faces import read_face
 from assembly.step.occt import parts

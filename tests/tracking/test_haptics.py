@@ -13,7 +13,7 @@ import pytest
 
 from assembly.errors import InputError
 from assembly.kinematics.pose import axes_quaternion, rotation_matrix, skew
-from assembly.solve.statics import Wrench, tool_wrench
+from assembly.solve.forces.statics import Wrench, tool_wrench
 from assembly.tracking import haptics
 
 STEP = 3e-4

@@ -11,7 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import assembly as asm
-from assembly.proximity.events import EventKind, EventReason, PairState
+from assembly.proximity.manager.events import EventKind, EventReason, PairState
 from benchmarks.center_lines import ball_wire, paper_clip_wire, torus_wire
 from benchmarks.wire_oracle import WireOracle
 
@@ -113,7 +113,7 @@ def test_a_contact_that_loses_its_extremum_is_handed_back():
 
 def test_contacts_within_the_radius_and_near_along_the_surfaces_merge(cases):
     # 0.002 of 11.7, the size of the large ring's box.
-    manager, _ = rings(neglect=0.02)
+    manager, _ = rings(merge_radius=0.02)
     seen = []
     for distance in np.concatenate([np.linspace(4.5, 4.99, cases(40, 100)), np.linspace(4.9901, 4.9999, 20)]):
         seen += kinds(manager.update(crossing_at(distance)))
@@ -126,12 +126,12 @@ def test_contacts_within_the_radius_and_near_along_the_surfaces_merge(cases):
     assert len(fine.contacts) == 2
 
 
-@pytest.mark.parametrize("neglect", [1e-6, 0.1])
-def test_loops_of_a_thin_clip_stay_two_within_the_radius(neglect):
+@pytest.mark.parametrize("merge_radius", [1e-6, 0.1])
+def test_loops_of_a_thin_clip_stay_two_within_the_radius(merge_radius):
     # Legs of wire of radius 0.5 stand 1.5 apart; a tenth of the size is 3.4. A ball lies across both.
     bodies = [asm.Body("clip", CLIP), asm.Body("ball", asm.shapes.sphere(5.0))]
-    manager = asm.Manager(bodies, reach=0.3, neglect=neglect)
-    assert neglect < 0.1 or neglect * bodies[0].size > 3.0
+    manager = asm.Manager(bodies, reach=0.3, merge_radius=merge_radius)
+    assert merge_radius < 0.1 or merge_radius * bodies[0].size > 3.0
     oracle = WireOracle([paper_clip_wire(), ball_wire(5.0)])
     for x in np.concatenate([np.linspace(-4.0, 4.0, 33), np.linspace(4.0, -4.0, 5)]):
         q = np.array([row(0, 0, 0), row(x, 5.2, 0.0)])
@@ -143,7 +143,7 @@ def test_loops_of_a_thin_clip_stay_two_within_the_radius(neglect):
 def test_two_contacts_across_a_wire_stay_two():
     # The wire of a ring of radius 6 stands between two legs of a clip: contacts on its opposite sides, 0.2 apart.
     bodies = [asm.Body("ring", asm.shapes.torus(6.0, 0.1)), asm.Body("clip", CLIP)]
-    manager = asm.Manager(bodies, reach=0.4, neglect=0.1)
+    manager = asm.Manager(bodies, reach=0.4, merge_radius=0.1)
     oracle = WireOracle([torus_wire(6.0, 0.1), paper_clip_wire()])
     # Legs at x = -3.5 and x = -2 leave 0.5 between them; in the plane x = -2.75 the ring's wire runs down there.
     turn = Rotation.from_euler("y", 90.0, degrees=True)
@@ -262,8 +262,8 @@ def test_memory_does_not_grow(cases):
 
 
 def test_more_places_are_made_when_they_are_wanting():
-    small, oracle = rings(places=1)
-    large, _ = rings(places=16)
+    small, oracle = rings(slots=1)
+    large, _ = rings(slots=16)
     for distance in np.linspace(3.5, 4.5, 21):
         q = crossing_at(distance)
         small.update(q)
@@ -319,7 +319,7 @@ def test_what_it_says_of_itself():
     manager = two_balls(reach=0.1)
     assert repr(manager) == "Manager(2 bodies, 1 pairs, reach=0.1)"
     assert [body.name for body in manager.bodies] == ["a", "b"]
-    assert (manager.reach, manager.neglect) == (0.1, 1e-6)
+    assert (manager.reach, manager.merge_radius) == (0.1, 1e-6)
     manager.update(apart(0.05))
     assert repr(manager.contacts[0]) == "ListedContact('a', 'b', number=1, gap=0.05)"
     assert str(manager.log[0]) == "a and b: contact 1 added at gap 0.05"

@@ -9,10 +9,10 @@ import pytest
 
 import assembly as asm
 from assembly._kernel import kernel
-from assembly.constraints.layout import RESULTS, WATCH
+from assembly.constraints.program.records import RESULTS, WATCH
 from assembly.kinematics.body import Point
-from assembly.proximity.events import EventKind
-from assembly.proximity.watch_memory import (
+from assembly.proximity.manager.events import EventKind
+from assembly.proximity.manager.state import (
     DEADLINE,
     DOUBT,
     EARLIER,
@@ -21,9 +21,9 @@ from assembly.proximity.watch_memory import (
     PAIR_MEMORY,
     PAIRS,
 )
-from assembly.solve.augmented_lagrangian import EXTRA_TIME
-from assembly.solve.budget import HALF, LOOKS_ALONE, begin_tick
-from assembly.solve.settings import CARRIED, CARRIES, SETTINGS
+from assembly.solve.loop.augmented_lagrangian import EXTRA_TIME
+from assembly.solve.loop.deadline import HALF, LOOKS_ALONE, begin_tick
+from assembly.solve.loop.settings import CARRIED, CARRIES, SETTINGS
 from assembly.tracking.tick import TrackStatus
 from benchmarks.hands import WIRE, paper_clips
 from benchmarks.running import example

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import assembly as asm
-from assembly.proximity.events import EventKind, EventReason
+from assembly.proximity.manager.events import EventKind, EventReason
 from assembly.tracking.tick import TrackStatus
 from benchmarks.hands import paper_clips
 from benchmarks.running import example
@@ -31,7 +31,7 @@ def test_a_contact_that_finds_no_place_is_told_of():
     bodies = [asm.Body(name, ball, place, fixed=True) for name, place in zip("abc", places, strict=True)]
     moving = asm.Body("d", ball, (1.1, 0.6, 5.0))
     scene = asm.Assembly([*bodies, moving])
-    scene.constrain(asm.Clearance(places=1))
+    scene.constrain(asm.Clearance(slots=1))
     tracker = scene.tracker(follow=moving.point(0, 0, 0))
     events = []
     for k in range(400):

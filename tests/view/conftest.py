@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly.constraints.joints import Revolute, Spherical, Universal
+from assembly.constraints.model.joints import Revolute, Spherical, Universal
 from tests.view.chromium import BROWSER, Chromium, decoded
 
 

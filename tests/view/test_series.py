@@ -11,7 +11,7 @@ import pytest
 import assembly as asm
 from assembly.errors import InputError
 from assembly.kinematics.ellipsoid import Ellipsoid
-from assembly.proximity.pairs import ContactPair, PairStatus
+from assembly.proximity.extrema.pairs import ContactPair, PairStatus
 from assembly.view.series import contact_series, ellipsoid_series, poses_at, stills, trajectory_rows
 
 RNG = np.random.default_rng(2)

@@ -9,8 +9,17 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly.constraints.joints import Cylindrical, Fixed, Parallel, Planar, Prismatic, Revolute, Spherical, Universal
-from assembly.constraints.placements import Angle, Distance, PointOnLine, PointOnPlane
+from assembly.constraints.model.joints import (
+    Cylindrical,
+    Fixed,
+    Parallel,
+    Planar,
+    Prismatic,
+    Revolute,
+    Spherical,
+    Universal,
+)
+from assembly.constraints.model.placements import Angle, Distance, PointOnLine, PointOnPlane
 from assembly.view.item import Stations
 from assembly.view.marks import ball, stick
 from assembly.view.picture import draw

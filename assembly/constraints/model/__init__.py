@@ -1,0 +1,1 @@
+"""Constraints, joints, contacts and objectives as a user writes them."""

@@ -1,0 +1,174 @@
+"""Clearance: bodies stay apart, wherever they come near each other."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Sequence
+
+from assembly.constraints.model.constraint import Constraint
+from assembly.constraints.model.tracked_sizes import check_size
+from assembly.errors import InputError, bounded, items, number, renamed
+from assembly.kinematics.body import Body
+
+__all__ = ["Clearance"]
+
+
+class Clearance(Constraint):
+    """The gap between any two of the bodies is at least `minimum`, everywhere.
+
+    Contacts come and go as the bodies move: a watch lists every extremal pair of points that comes near (`Manager`),
+    each is a row gap >= minimum as long as it is near, and a step is never longer than to where something that is not
+    listed could touch. A solve ends SOLVED only after a look at its pose found no contact that is violated.
+
+    Pairs of points that a `Contact` of the same two bodies has are that contact's: its gap of zero is no violation. A
+    `minimum` above zero does not ask for the place of the contact: what is reached from its points, between the two
+    bodies, without their gap rising to `minimum`. Nothing crosses there, and elsewhere the bodies keep it. The place of
+    a contact that is still open is the one it will have once it is closed; a one-sided one that is open by `minimum` or
+    more leaves nothing out that is nearer.
+
+    Bodies that cross at the start are pushed apart where they are in each other by less than a tenth of the scene's
+    size and less than their radii of curvature. Deeper ones stay, and the solve ends STALLED, never SOLVED; a tracker
+    does not begin there.
+
+    Of solids with edges corners are contacts too: vertices and points of edges over a face, and edges that cross, whose
+    normal misses their cones by less than 0.3 rad, and points of a curve along which two faces all but touch, as a ring
+    and the plate below it. Where faces come to lie on each other, several of them carry.
+
+    Parameters
+    ----------
+    bodies : iterable of Body, optional
+        Two or more, with shapes; every body of the assembly that has one by default.
+    minimum : float
+        Not negative, in the unit of the scene.
+    name : str, optional
+        "clearance" or "clearance a-b-..." by default.
+    exclude : iterable of (Body, Body)
+        Pairs that may overlap: a pin in its hole, links that a joint holds together.
+    merge_radius : float
+        Two contacts of the same two bodies whose points are nearer than this on both, and near along the surfaces as
+        well, are one: the radius of the spheres of neglect (paper 001, section 5), in parts of the scene's size.
+        Contacts farther apart are all kept, also across a wire thinner than the radius.
+    slots : int, optional
+        How many contacts may be near at a time; by default six for one pair and two more for each further one, at most
+        eight and four a body. A solve that needs more doubles it.
+    neglect, places
+        Former names of `merge_radius` and `slots`; they warn.
+
+    Raises
+    ------
+    InputError, TypeError
+        Fewer than two bodies, bodies without shape, a pair that is not of the bodies, numbers out of range; bodies of
+        sizes or of surfaces whose parameters have spans that doubles do not carry (1e-75 to 1e75, 1e-60 to 1e60): of
+        all bodies of an assembly it is looked at when the assembly is solved.
+    """
+
+    # Whether corners over faces are listed besides extrema, for steps to see.
+    corners = True
+
+    def __init__(
+        self,
+        bodies: Iterable[Body] | None = None,
+        minimum: float = 0.0,
+        name: str | None = None,
+        *,
+        exclude: Iterable[tuple[Body, Body]] = (),
+        merge_radius: float = 1e-6,
+        slots: int | None = None,
+        neglect: float | None = None,
+        places: int | None = None,
+    ) -> None:
+        chosen = None if bodies is None else items("bodies", bodies, "two bodies or more, or None for all")
+        if chosen is not None:
+            for k, body in enumerate(chosen):
+                if not isinstance(body, Body):
+                    raise TypeError(f"bodies[{k}] is {body!r}; expected a Body")
+                if not body.faces:
+                    raise InputError(f"bodies[{k}] is {body.name!r}, a body without a shape; expected one with a face")
+                check_size(f"bodies[{k}], {body.name!r},", body)
+            if len(chosen) < 2:
+                raise InputError(f"bodies has {len(chosen)} of them; expected two or more, or None for all")
+        super().__init__(chosen or (), "clearance" if chosen is None and name is None else name, "clearance")
+        self._all = chosen is None
+        self._minimum = bounded("minimum", minimum)
+        if not self._minimum >= 0.0:
+            raise InputError(f"minimum is {self._minimum:g}; expected a length of zero or more")
+        merge_radius = renamed("merge_radius", merge_radius, "neglect", neglect)
+        self._merge_radius = number("merge_radius", merge_radius)
+        if not 0.0 < self._merge_radius <= 1.0:
+            raise InputError(
+                f"merge_radius is {self._merge_radius:g}; expected a part of the scene's size, from above 0 to 1"
+            )
+        slots = renamed("slots", slots, "places", places)
+        if slots is not None and (not isinstance(slots, int) or isinstance(slots, bool) or slots < 1):
+            raise InputError(f"slots is {slots!r}; expected an integer of 1 or more")
+        self._slots = slots
+        self._excluded = tuple(_pair(k, pair) for k, pair in enumerate(exclude))
+        for k, pair in enumerate(self._excluded):
+            for body in pair:
+                if chosen is not None and not any(body is other for other in chosen):
+                    raise InputError(f"exclude[{k}] names body {body.name!r}; expected bodies of this clearance")
+
+    @property
+    def minimum(self) -> float:
+        """The least gap."""
+        return self._minimum
+
+    @property
+    def merge_radius(self) -> float:
+        """Radius of the spheres of neglect, in parts of the scene's size."""
+        return self._merge_radius
+
+    @property
+    def slots(self) -> int | None:
+        """How many contacts may be near at a time; None for six a pair."""
+        return self._slots
+
+    @property
+    def neglect(self) -> float:
+        """`merge_radius`, by its former name."""
+        return renamed("merge_radius", self._merge_radius, "neglect", self._merge_radius)
+
+    @property
+    def places(self) -> int | None:
+        """`slots`, by its former name."""
+        warnings.warn("places is called slots now", DeprecationWarning, stacklevel=2)
+        return self._slots
+
+    @property
+    def exclude(self) -> tuple[tuple[Body, Body], ...]:
+        """Pairs that may overlap."""
+        return self._excluded
+
+    @property
+    def is_of_all(self) -> bool:
+        """Whether every body of the assembly takes part."""
+        return self._all
+
+    def pairs(self, bodies: Sequence[Body]) -> list[tuple[Body, Body]]:
+        """The pairs that are kept apart, of bodies of which one moves, among those of an assembly."""
+        chosen = [body for body in (bodies if self._all else self.bodies) if body.faces]
+        if self._all:
+            for body in chosen:
+                check_size(f"body {body.name!r} of {self.name!r}", body)
+        return [
+            (a, b)
+            for k, a in enumerate(chosen)
+            for b in chosen[k + 1 :]
+            if not (a.fixed and b.fixed) and not any({id(a), id(b)} == set(map(id, pair)) for pair in self._excluded)
+        ]
+
+    def __repr__(self) -> str:
+        bodies = "all bodies" if self._all else [body.name for body in self.bodies]
+        return f"Clearance({bodies}, minimum={self.minimum:g}, name={self.name!r})"
+
+
+def _pair(k: int, pair: tuple[Body, Body]) -> tuple[Body, Body]:
+    """Two bodies, checked."""
+    try:
+        a, b = pair
+    except (TypeError, ValueError):
+        raise InputError(f"exclude[{k}] is {pair!r}; expected a pair of bodies") from None
+    for body in (a, b):
+        if not isinstance(body, Body):
+            raise TypeError(f"exclude[{k}] is {pair!r}; expected a pair of bodies")
+    return a, b

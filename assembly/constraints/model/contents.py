@@ -1,0 +1,148 @@
+"""What an assembly is made of: bodies, constraints and terms of the objective, with names that are distinct."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from operator import is_
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly._read_only import read_only
+from assembly.constraints.model.constraint import Constraint
+from assembly.constraints.model.expression import Expression
+from assembly.constraints.model.objectives import Objective
+from assembly.constraints.model.trim_contact import TrimContact
+from assembly.errors import InputError, items
+from assembly.kinematics.body import Body
+from assembly.kinematics.pose import Pose
+
+__all__ = ["Contents"]
+
+Array = NDArray[np.float64]
+
+
+class Contents:
+    """Bodies, constraints between them and terms of an objective.
+
+    Parameters
+    ----------
+    bodies : iterable of Body
+        Names must be distinct.
+    """
+
+    def __init__(self, bodies: Iterable[Body] = ()) -> None:
+        self._bodies: list[Body] = []
+        self._named: dict[str, Body] = {}
+        self._constraints: list[Constraint] = []
+        self._taken: set[str] = set()  # names of constraints
+        self._objectives: list[tuple[float, Objective]] = []
+        self._stood: tuple[list[Pose], Array] = [], np.empty((0, 7))
+        for body in items("bodies", bodies, "bodies, at least one"):
+            self.add(body)
+
+    def __copy__(self) -> Self:
+        """The same bodies, constraints and terms, in lists of its own."""
+        other = object.__new__(type(self))
+        other.__dict__.update(self.__dict__)
+        for name in ("_bodies", "_named", "_constraints", "_taken", "_objectives"):
+            setattr(other, name, self.__dict__[name].copy())
+        other._has_changed()
+        return other
+
+    def _has_changed(self) -> None:
+        """What was made of the contents before holds no more."""
+
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """Bodies in the order of q's rows."""
+        return tuple(self._bodies)
+
+    @property
+    def constraints(self) -> tuple[Constraint, ...]:
+        """Constraints in the order they were given."""
+        return tuple(self._constraints)
+
+    @property
+    def objectives(self) -> tuple[tuple[float, Objective], ...]:
+        """Terms with their signs: 1 minimized, -1 maximized."""
+        return tuple(self._objectives)
+
+    def body(self, name: str) -> Body:
+        """The body of that name."""
+        if isinstance(name, str) and name in self._named:
+            return self._named[name]
+        known = ", ".join(repr(body.name) for body in self._bodies)
+        raise InputError(f"name is {name!r}; expected " + (f"one of {known}" if known else "a body, but there is none"))
+
+    def add(self, body: Body) -> Body:
+        """Add a body and return it."""
+        if not isinstance(body, Body):
+            raise TypeError(f"body is {body!r}; expected a Body")
+        other = self._named.get(body.name)
+        if other is body:
+            raise InputError(f"body {body.name!r} is in the assembly already; expected each body once")
+        if other is not None:
+            raise InputError(f"body has the name {body.name!r} of another body; expected distinct names")
+        self._bodies.append(body)
+        self._named[body.name] = body
+        self._has_changed()
+        return body
+
+    def constrain(self, *constraints: Constraint) -> None:
+        """Add constraints; their names must be distinct and their bodies in the assembly."""
+        for constraint in constraints:
+            if not isinstance(constraint, Constraint):
+                raise TypeError(
+                    f"constraint is {constraint!r}; expected a Contact or a trim of one, a Clearance, a joint, "
+                    "a coupling or an Expression"
+                )
+            self._check_bodies(constraint.name, constraint.bodies)
+            if constraint.name in self._taken:
+                raise InputError(f"constraint name {constraint.name!r} is taken; expected distinct names, say name=...")
+            if isinstance(constraint, TrimContact) and constraint.contact not in self._constraints:
+                raise InputError(
+                    f"constraint {constraint.name!r} keeps contact {constraint.contact.name!r}, which is not in the "
+                    "assembly; expected its contact to be constrained before it"
+                )
+            if constraint.bodies and all(body.fixed for body in constraint.bodies):
+                raise InputError(f"constraint {constraint.name!r} is between two fixed bodies; expected one that moves")
+            self._constraints.append(constraint)
+            self._taken.add(constraint.name)
+            self._has_changed()
+
+    def minimize(self, *objectives: Objective) -> None:
+        """Add terms to the objective."""
+        self._add_terms(1.0, objectives)
+
+    def maximize(self, *objectives: Objective) -> None:
+        """Subtract terms from the objective."""
+        self._add_terms(-1.0, objectives)
+
+    def _add_terms(self, sign: float, objectives: Iterable[Objective]) -> None:
+        for objective in objectives:
+            if not isinstance(objective, Objective):
+                raise TypeError(f"objective is {objective!r}; expected an objective such as PointDistance or Posture")
+            if isinstance(objective, Expression) and objective.count != 1:
+                raise InputError(f"objective {objective.name!r} has {objective.count} values; expected one")
+            self._check_bodies(repr(objective), objective.bodies)
+            self._objectives.append((sign, objective))
+            self._has_changed()
+
+    def _check_bodies(self, what: str, bodies: Iterable[Body]) -> None:
+        for body in bodies:
+            if self._named.get(body.name) is not body:
+                known = ", ".join(repr(other.name) for other in self._bodies) or "no bodies yet"
+                raise InputError(f"{what} is on body {body.name!r}; expected a body of this assembly: {known}")
+
+    @property
+    def q(self) -> Array:
+        """Where the bodies stand, (n, 7), read-only; set the pose of a body instead."""
+        poses = [body.pose for body in self._bodies]
+        before, q = self._stood
+        # Poses do not change, bodies get others: those of the last call are compared in a fraction of the time.
+        if len(before) != len(poses) or not all(map(is_, before, poses)):
+            q = np.array([pose.row for pose in poses]).reshape(-1, 7)
+            self._stood = poses, q
+        return read_only(q)

@@ -1,0 +1,177 @@
+"""Couplings: one freedom of a joint follows one of another."""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import Any
+
+from assembly.constraints.model.constraint import Constraint, Coordinate, Equation, Freedom, words
+from assembly.constraints.model.joint import Joint, Offset
+from assembly.constraints.program.primitives import SLIDE
+from assembly.errors import InputError, bounded, number
+from assembly.kinematics.body import Body
+
+__all__ = ["Coupling", "Gear", "RackPinion"]
+
+
+def _turns(coordinate: Coordinate) -> bool:
+    return coordinate.is_angle
+
+
+def _slides(coordinate: Coordinate) -> bool:
+    return coordinate.kind == SLIDE
+
+
+def _freedom(name: str, value: Any, slides: bool) -> Freedom:
+    """The freedom itself, or the only one of a joint that turns, or slides."""
+    fits, word = (_slides, "slides") if slides else (_turns, "is an angle")
+    if isinstance(value, Freedom):
+        if not fits(value.coordinate):
+            raise InputError(f"{name} is {value!r}; expected a freedom that {word}")
+        return value
+    if not isinstance(value, Joint):
+        raise TypeError(f"{name} is {value!r}; expected a joint or one of its freedoms, joint.freedom(name)")
+    fitting = [freedom for freedom in value.freedoms.values() if fits(freedom.coordinate)]
+    if len(fitting) != 1:
+        known = ", ".join(repr(freedom.name) for freedom in fitting) or "none"
+        raise InputError(f"{name} is {value.name!r}; expected a joint with one freedom that {word}, it has {known}")
+    return fitting[0]
+
+
+class Coupling(Constraint):
+    """follower = ratio * leader + offset, between freedoms of joints; see its subclasses.
+
+    A joint of the coupling need not be in the scene, its bodies must.
+    """
+
+    offset = Offset("Value of the follower where the leader is zero.")
+
+    def __init__(self, leader: Freedom, follower: Freedom, factor: float, name: str | None, offset: float) -> None:
+        if leader.coordinate is follower.coordinate:
+            raise InputError(f"both sides are {leader!r}; expected two freedoms")
+        bodies = dict.fromkeys((*leader.joint.bodies, *follower.joint.bodies))
+        super().__init__(tuple(bodies), name, words(type(self)))
+        self._leader = leader
+        self._follower = follower
+        self._factor = factor
+        self.offset = offset
+
+    @property
+    def leader(self) -> Freedom:
+        """The freedom that is multiplied."""
+        return self._leader
+
+    @property
+    def follower(self) -> Freedom:
+        """The freedom that follows."""
+        return self._follower
+
+    @property
+    def meshing(self) -> tuple[tuple[Body, Body], ...]:
+        """The pairs of bodies that may be in each other as wheels are: the one that turns in each of the two joints.
+
+        Where the joints have a body in common, a frame or an arm, these are the others; where they have none, those
+        that are not fixed, all of them.
+        """
+        first, second = ({id(body): body for body in side.joint.bodies} for side in (self._leader, self._follower))
+        shared = first.keys() & second.keys()
+
+        def turning(bodies: dict[int, Body]) -> list[Body]:
+            return [body for key, body in bodies.items() if key not in shared and (shared or not body.fixed)]
+
+        return tuple(product(turning(first), turning(second)))
+
+    @property
+    def equations(self) -> tuple[Equation, ...]:
+        """The one row: follower - factor * leader = offset."""
+        terms = ((1.0, self._follower.coordinate), (-self._factor, self._leader.coordinate))
+        return (Equation(terms, (self, "offset")),)
+
+    def __repr__(self) -> str:
+        sides = ", ".join(f"{side.joint.name!r}.{side.name}" for side in (self._leader, self._follower))
+        offset = f", offset={self.offset!r}" if self.offset else ""
+        return f"{type(self).__name__}({sides}, {self._factor!r}, name={self.name!r}{offset})"
+
+
+class Gear(Coupling):
+    """Two angles keep a ratio: 1 row, angle_b = ratio * angle_a + offset.
+
+    Parameters
+    ----------
+    a, b : Joint or Freedom
+        Joints with one freedom that is an angle, or such freedoms, `joint.freedom(name)`.
+    ratio : float
+        Turns of b a turn of a, not zero: -teeth_a / teeth_b of two wheels that mesh outside.
+    name : str, optional
+        "gear" and the bodies' names by default.
+    offset : float
+        angle_b where angle_a is zero [rad].
+
+    Raises
+    ------
+    InputError, TypeError
+        A joint with no such freedom or with several, the same freedom twice, ratio 0.
+    """
+
+    offset = Offset("angle_b where angle_a is zero [rad].")
+
+    def __init__(
+        self,
+        a: Joint | Freedom,
+        b: Joint | Freedom,
+        ratio: float,
+        name: str | None = None,
+        offset: float = 0.0,
+    ) -> None:
+        factor = number("ratio", ratio)
+        if factor == 0.0:
+            raise InputError("ratio is 0; expected the turns of b a turn of a, not zero")
+        super().__init__(_freedom("a", a, slides=False), _freedom("b", b, slides=False), factor, name, offset)
+
+    @property
+    def ratio(self) -> float:
+        """Turns of b a turn of a."""
+        return self._factor
+
+
+class RackPinion(Coupling):
+    """A rack slides as its pinion turns: 1 row, slide = radius * angle + offset.
+
+    Parameters
+    ----------
+    pinion, rack : Joint or Freedom
+        Joints with one freedom that is an angle, and one that slides; or such freedoms, `joint.freedom(name)`.
+    radius : float
+        Travel of the rack a radian of the pinion, not zero; negative where the rack lies on the other side.
+    name : str, optional
+        "rack-pinion" and the bodies' names by default.
+    offset : float
+        slide where the angle is zero.
+
+    Raises
+    ------
+    InputError, TypeError
+        A joint with no such freedom or with several, radius 0.
+    """
+
+    offset = Offset("The slide where the angle is zero.")
+
+    def __init__(
+        self,
+        pinion: Joint | Freedom,
+        rack: Joint | Freedom,
+        radius: float,
+        name: str | None = None,
+        offset: float = 0.0,
+    ) -> None:
+        factor = bounded("radius", radius)
+        if factor == 0.0:
+            raise InputError("radius is 0; expected the travel of the rack a radian of the pinion, not zero")
+        super().__init__(
+            _freedom("pinion", pinion, slides=False), _freedom("rack", rack, slides=True), factor, name, offset
+        )
+
+    @property
+    def radius(self) -> float:
+        """Travel of the rack a radian of the pinion."""
+        return self._factor

@@ -1,0 +1,175 @@
+"""Dexterity: how well a mechanism moves its tip, as an objective."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly._read_only import read_only
+from assembly.constraints.model.constraint import Freedom
+from assembly.constraints.model.joint import Joint
+from assembly.constraints.model.objectives import Objective
+from assembly.errors import InputError, positive, real_array
+from assembly.kinematics.body import Body, Frame, Point
+
+__all__ = ["MEASURES", "TASKS", "Dexterity", "Measure", "Task", "TipTask"]
+
+Array = NDArray[np.float64]
+Measure = Literal["manipulability", "inverse_condition", "isotropy", "smallest_singular_value", "force_transmission"]
+Task = Literal["position", "rotation", "pose"]
+# In the order of the kernel's numbers (`solve/loop/dexterity.py`).
+MEASURES = ("manipulability", "inverse_condition", "isotropy", "smallest_singular_value", "force_transmission")
+TASKS = ("position", "rotation", "pose")
+
+
+class TipTask:
+    """A tip, the inputs that move it, and which of its velocities count: what a tip's Jacobian is of.
+
+    Parameters
+    ----------
+    tip : Point, Frame or Body
+    inputs : sequence of Joint or Freedom
+        Joints with one freedom, or freedoms, `joint.freedom(name)`; rates of angles [rad] and of slides.
+    task : "position", "rotation" or "pose", optional
+        Linear velocity of the tip, angular velocity, or both (linear first), world axes. Position for a point, pose
+        for a frame or a body by default.
+    length : float, optional
+        In a pose task, angular velocities count as those of points this far off. Half the body's size by default, 1
+        for a body without shape.
+    """
+
+    def __init__(
+        self,
+        tip: Point | Frame | Body,
+        inputs: Sequence[Joint | Freedom],
+        task: Task | None = None,
+        length: float | None = None,
+    ) -> None:
+        if isinstance(tip, Body):
+            tip = tip.frame()
+        if not isinstance(tip, (Point, Frame)):
+            raise TypeError(f"tip is {tip!r}; expected a point, a frame or a body")
+        chosen = ("position" if isinstance(tip, Point) else "pose") if task is None else task
+        if not isinstance(chosen, str) or chosen not in TASKS:
+            raise InputError(f"task is {task!r}; expected one of {', '.join(map(repr, TASKS))}")
+        if isinstance(inputs, (Joint, Freedom)) or not isinstance(inputs, Sequence) or not inputs:
+            raise InputError(f"inputs is {inputs!r}; expected joints or freedoms, at least one")
+        self.tip = tip
+        self.inputs = tuple(self._freedom(k, value) for k, value in enumerate(inputs))
+        if len({id(freedom.coordinate) for freedom in self.inputs}) < len(self.inputs):
+            raise InputError(f"inputs is {list(inputs)!r}; expected each freedom once")
+        self.task: str = chosen
+        self.length = 0.5 * tip.body.size or 1.0 if length is None else positive("length", length)
+
+    @staticmethod
+    def _freedom(k: int, value: object) -> Freedom:
+        if isinstance(value, Freedom):
+            return value
+        if not isinstance(value, Joint):
+            raise TypeError(f"inputs[{k}] is {value!r}; expected a joint or one of its freedoms, joint.freedom(name)")
+        if len(value.freedoms) != 1:
+            known = ", ".join(map(repr, value.freedoms)) or "none"
+            raise InputError(f"inputs[{k}] is {value.name!r}; expected a joint with one freedom, it has {known}")
+        return value.freedom()
+
+    @property
+    def origin(self) -> Array:
+        """The tip in body coordinates."""
+        return self.tip.coordinates if isinstance(self.tip, Point) else self.tip.origin
+
+    @property
+    def rows(self) -> int:
+        """Rows of the Jacobian."""
+        return 6 if self.task == "pose" else 3
+
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """The bodies of the tip and of the inputs."""
+        bodies = [self.tip.body, *(body for freedom in self.inputs for body in freedom.joint.bodies)]
+        return tuple(dict.fromkeys(bodies))
+
+
+class Dexterity(Objective):
+    """A measure of the Jacobian of a tip, to be maximized: what unit rates of the inputs do to the tip.
+
+    The Jacobian is taken through closed loops and contacts by the rows of the scene's bilateral constraints; driven
+    values and limits do not count as such. The gradient is exact.
+
+    Parameters
+    ----------
+    tip, inputs, task, length
+        As of `TipTask`.
+    measure : str
+        With singular values s_i of the Jacobian J in the user's units:
+        "manipulability": the product of s_i, which is sqrt(det J J^T), or sqrt(det J^T J) where there are fewer inputs
+        than rows (paper 001, eq. 1);
+        "inverse_condition": s_min / s_max;
+        "isotropy": (product of s_i^2)^(1/r) / (mean of s_i^2);
+        "smallest_singular_value": s_min;
+        "force_transmission": 1 / |J^T u|, the force along the unit vector u that inputs of unit norm hold.
+    direction : (3,) or (6,), optional
+        u, world axes, for "force_transmission" and nothing else.
+    weight : float
+        Positive.
+
+    Raises
+    ------
+    InputError, TypeError
+        Unknown words, no inputs, a joint with several freedoms, a direction where none belongs or none where one does.
+
+    Notes
+    -----
+    Where the inputs do not determine the tip, or depend on each other, the objective is infinite and a solve that
+    starts there ends STALLED.
+    """
+
+    def __init__(
+        self,
+        tip: Point | Frame | Body,
+        inputs: Sequence[Joint | Freedom],
+        measure: Measure = "manipulability",
+        *,
+        task: Task | None = None,
+        length: float | None = None,
+        direction: ArrayLike | None = None,
+        weight: float = 1.0,
+    ) -> None:
+        self._tip_task = TipTask(tip, inputs, task, length)
+        if not isinstance(measure, str) or measure not in MEASURES:
+            raise InputError(f"measure is {measure!r}; expected one of {', '.join(map(repr, MEASURES))}")
+        if (measure == "force_transmission") != (direction is not None):
+            raise InputError(
+                f"direction is {direction!r} with measure {measure!r}; expected one for 'force_transmission' alone"
+            )
+        super().__init__(self._tip_task.bodies, weight)
+        self._measure = measure
+        self._direction: Array | None = None
+        if direction is not None:
+            u = real_array("direction", direction, (self._tip_task.rows,))
+            norm = float(np.linalg.norm(u))
+            if not norm > 0.0:
+                raise InputError(f"direction is {u.tolist()}; expected a direction other than zero")
+            # A unit vector is left as it is, so that reading a written one changes no bit.
+            self._direction = u if abs(norm - 1.0) <= 1e-15 else u / norm
+
+    @property
+    def tip_task(self) -> TipTask:
+        """Tip, inputs and task."""
+        return self._tip_task
+
+    @property
+    def measure(self) -> str:
+        """The measure's name."""
+        return self._measure
+
+    @property
+    def direction(self) -> Array | None:
+        """Unit direction of the force, read-only; None for other measures."""
+        return None if self._direction is None else read_only(self._direction)
+
+    def __repr__(self) -> str:
+        inputs = ", ".join(f"{freedom.joint.name!r}.{freedom.name}" for freedom in self._tip_task.inputs)
+        return f"Dexterity({self._tip_task.tip!r}, [{inputs}], {self._measure!r}, weight={self.weight:g})"

@@ -1,0 +1,228 @@
+"""What all joints have: two frames, rows between them, and freedoms by name.
+
+The z axes of the frames are the joint's axes. "aligned" lets them point the same way, "opposed" against each other,
+as the outward normals of two faces do that lie on each other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
+from typing import Any, ClassVar, Literal, Self, overload
+
+import numpy as np
+
+from assembly._copies import OwnState
+from assembly.constraints.model.constraint import Bounds, Constraint, Coordinate, Equation, FramePair, Freedom, words
+from assembly.constraints.program.primitives import COINCIDENT, SLIDE, SWING
+from assembly.errors import InputError, bounded
+from assembly.kinematics.body import Body, Frame, Point
+
+__all__ = ["Axes", "Driven", "Joint", "Limits", "Offset", "Side", "SidePoint"]
+
+Axes = Literal["aligned", "opposed"]
+Side = Frame | Body
+SidePoint = Point | Frame | Body
+
+SAME_POINT = ((COINCIDENT, 0), (COINCIDENT, 1), (COINCIDENT, 2))
+SAME_AXIS = ((SWING, 0), (SWING, 1))
+ON_AXIS = ((SLIDE, 0), (SLIDE, 1))
+
+
+def _frame(name: str, side: Any, takes_point: bool) -> Frame:
+    """The frame that a side stands for; a point's and a body's axes are those of the body."""
+    if isinstance(side, Frame):
+        return side
+    if isinstance(side, Body):
+        return side.frame()
+    if takes_point and isinstance(side, Point):
+        return side.body.frame(at=side.coordinates)
+    expected = "a point, a frame or a body" if takes_point else "a frame, body.frame(...), or a body"
+    raise TypeError(f"{name} is {side!r}; expected {expected}")
+
+
+def _opposed(frame: Frame) -> Frame:
+    axes = frame.axes * np.array([1.0, -1.0, -1.0])
+    return Frame(frame.body, frame.origin, axes)
+
+
+class Joint(OwnState, Constraint):
+    """A joint between two bodies; see its subclasses.
+
+    What it asks for is in `equations`, what it leaves free in `freedoms`. A freedom is driven where it has a value,
+    and kept within limits where it has limits; both may be set between solves.
+
+    Parameters
+    ----------
+    frame_a, frame_b : Frame or Body
+        `body.frame(at, z, x)`; of a body the frame at its origin.
+    name : str, optional
+        The kind and the bodies' names by default, as in "revolute ground-crank".
+    axes : "aligned" or "opposed"
+        Whether the z axes point the same way or against each other, of joints that ask for either.
+    settings : (value, limits) by freedom
+        Driven value or None; limits (lower, upper) or None.
+
+    Raises
+    ------
+    InputError, TypeError
+        Both sides on one body, a driven value outside the limits, a value that is no number, an unknown word.
+    """
+
+    # Coordinates, by kind and component, that are zero; and those that are free, by name.
+    _zero: ClassVar[tuple[tuple[int, int], ...]] = ()
+    _free: ClassVar[Mapping[str, tuple[int, int]]] = {}
+    # What messages call the two sides, and which of them may be points.
+    _sides: ClassVar[tuple[str, str]] = ("frame_a", "frame_b")
+    _points: ClassVar[tuple[bool, bool]] = (False, False)
+    # The argument that says the value, where it is not a drive of the joint but what the joint holds.
+    _argument: ClassVar[str | None] = None
+
+    def __init__(
+        self,
+        frame_a: SidePoint,
+        frame_b: SidePoint,
+        name: str | None = None,
+        axes: Axes = "aligned",
+        **settings: tuple[float | None, Sequence[float | None] | None],
+    ) -> None:
+        sides = zip(self._sides, (frame_a, frame_b), self._points, strict=True)
+        self._frame_a, self._frame_b = (_frame(*side) for side in sides)
+        if self._frame_a.body is self._frame_b.body:
+            a, b = self._sides
+            raise InputError(f"{a} and {b} are both on body {self._frame_a.body.name!r}; expected two bodies")
+        if not isinstance(axes, str) or axes not in ("aligned", "opposed"):
+            raise InputError(f"axes is {axes!r}; expected 'aligned' or 'opposed'")
+        super().__init__((self._frame_a.body, self._frame_b.body), name, words(type(self)))
+        self._axes = axes
+        self._frames = FramePair(self._frame_a, self._frame_b if axes == "aligned" else _opposed(self._frame_b))
+        self._own = tuple(Equation(((1.0, self._coordinate(*which)),)) for which in self._zero)
+        limits_names = ["limits"] if len(self._free) == 1 else [f"{freedom}_limits" for freedom in self._free]
+        self._freedoms = {
+            freedom: Freedom(
+                self, freedom, self._free_coordinate(freedom), *settings[freedom], self._argument, limits_name
+            )
+            for freedom, limits_name in zip(self._free, limits_names, strict=True)
+        }
+
+    def _shared(self) -> Iterable[object]:
+        return *self._bodies, self._frame_a, self._frame_b
+
+    @property
+    def frame_a(self) -> Frame:
+        """The first frame, as it was given."""
+        return self._frame_a
+
+    @property
+    def frame_b(self) -> Frame:
+        """The second frame, as it was given."""
+        return self._frame_b
+
+    @property
+    def axes(self) -> Axes:
+        """Whether the z axes are aligned or opposed, where the joint asks for either."""
+        return self._axes
+
+    @property
+    def freedoms(self) -> Mapping[str, Freedom]:
+        """Freedoms by name."""
+        return MappingProxyType(self._freedoms)
+
+    def freedom(self, name: str | None = None) -> Freedom:
+        """A freedom by name; the only one when no name is given.
+
+        Raises
+        ------
+        InputError
+            No such freedom, or no name where there are several; the message lists the names.
+        """
+        if name is None and len(self._freedoms) == 1:
+            return next(iter(self._freedoms.values()))
+        if isinstance(name, str) and name in self._freedoms:
+            return self._freedoms[name]
+        known = ", ".join(map(repr, self._freedoms)) or "none, the joint leaves nothing free"
+        raise InputError(f"name is {name!r}; expected a freedom of {self.name!r}: {known}")
+
+    @property
+    def equations(self) -> tuple[Equation, ...]:
+        """Rows now: the joint's own, then driven values, then limits, both in the order of the freedoms."""
+        asked = [row for freedom in self._freedoms.values() for row in freedom.equations]
+        return (
+            *self._own,
+            *(row for row in asked if not row.one_sided),
+            *(row for row in asked if row.one_sided),
+        )
+
+    def _coordinate(self, kind: int, component: int) -> Coordinate:
+        return Coordinate(kind, component, self._frames)
+
+    def _free_coordinate(self, freedom: str) -> Coordinate:
+        return self._coordinate(*self._free[freedom])
+
+    def __repr__(self) -> str:
+        a, b = self._bodies
+        axes = ", axes='opposed'" if self._axes == "opposed" else ""
+        settings = "".join(freedom.settings() for freedom in self._freedoms.values())
+        return f"{type(self).__name__}({a.name!r}, {b.name!r}, name={self.name!r}{axes}{settings})"
+
+
+class Driven:
+    """Attribute of a joint: the driven value of a freedom, None where it is free. Settable."""
+
+    def __init__(self, freedom: str, meaning: str) -> None:
+        self._freedom = freedom
+        self.__doc__ = f"Driven value: {meaning}; None where it is free. Settable between solves."
+
+    @overload
+    def __get__(self, joint: None, owner: type[Joint]) -> Self: ...
+
+    @overload
+    def __get__(self, joint: Joint, owner: type[Joint]) -> float | None: ...
+
+    def __get__(self, joint: Joint | None, owner: type[Joint]) -> Self | float | None:
+        return self if joint is None else joint._freedoms[self._freedom].value
+
+    def __set__(self, joint: Joint, value: float | None) -> None:
+        joint._freedoms[self._freedom].value = value
+
+
+class Limits:
+    """Attribute of a joint: the limits of a freedom, None without. Settable."""
+
+    def __init__(self, freedom: str) -> None:
+        self._freedom = freedom
+        self.__doc__ = f"(lower, upper) of {freedom}; either may be None; None without limits. Settable between solves."
+
+    @overload
+    def __get__(self, joint: None, owner: type[Joint]) -> Self: ...
+
+    @overload
+    def __get__(self, joint: Joint, owner: type[Joint]) -> Bounds | None: ...
+
+    def __get__(self, joint: Joint | None, owner: type[Joint]) -> Self | Bounds | None:
+        return self if joint is None else joint._freedoms[self._freedom].limits
+
+    def __set__(self, joint: Joint, value: Sequence[float | None] | None) -> None:
+        joint._freedoms[self._freedom].limits = value
+
+
+class Offset:
+    """Attribute of a constraint: the number that one of its rows equals. Settable."""
+
+    def __init__(self, meaning: str) -> None:
+        self.__doc__ = f"{meaning} Settable between solves."
+
+    @overload
+    def __get__(self, constraint: None, owner: type[Constraint]) -> Self: ...
+
+    @overload
+    def __get__(self, constraint: Constraint, owner: type[Constraint]) -> float: ...
+
+    def __get__(self, constraint: Constraint | None, owner: type[Constraint]) -> Self | float:
+        if constraint is None:
+            return self
+        value: float = constraint.__dict__["offset"]
+        return value
+
+    def __set__(self, constraint: Constraint, value: float) -> None:
+        constraint.__dict__["offset"] = bounded("offset", value)

@@ -1,0 +1,144 @@
+"""Joints of points and directions: a point on a line or a plane, a distance, an angle."""
+
+from __future__ import annotations
+
+from assembly.constraints.model.constraint import Equation
+from assembly.constraints.model.joint import ON_AXIS, Driven, Joint, Limits, Offset, Side, SidePoint
+from assembly.constraints.model.joints import ALONG, Number, Range
+from assembly.constraints.program.primitives import ANGLE, DISTANCE, SLIDE
+
+__all__ = ["Angle", "Distance", "PointOnLine", "PointOnPlane"]
+
+
+class PointOnLine(Joint):
+    """A point stays on the z axis of a frame: 2 rows.
+
+    Frame a is the line's. Free with a name: `slide` along z_a; the bodies turn freely against each other.
+
+    Parameters
+    ----------
+    point : Point, Frame or Body
+        Of a frame or a body its origin.
+    frame : Frame or Body
+        Its z axis is the line.
+    """
+
+    _zero = ON_AXIS
+    _free = {"slide": ALONG}
+    _sides = ("frame", "point")
+    _points = (False, True)
+    slide = Driven("slide", "the point along the line")
+    limits = Limits("slide")
+
+    def __init__(
+        self,
+        point: SidePoint,
+        frame: Side,
+        name: str | None = None,
+        *,
+        slide: Number = None,
+        limits: Range = None,
+    ) -> None:
+        super().__init__(frame, point, name, slide=(slide, limits))
+
+
+class PointOnPlane(Joint):
+    """A point stays in the x-y plane of a frame, or at a height above it: 1 row.
+
+    Frame a is the plane's. Free with a name: `x` and `y` along its axes; the bodies turn freely against each other.
+
+    Parameters
+    ----------
+    point : Point, Frame or Body
+        Of a frame or a body its origin.
+    frame : Frame or Body
+        Its z axis is the plane's normal.
+    offset : float
+        Height of the point along z_a.
+    """
+
+    _free = {"x": (SLIDE, 0), "y": (SLIDE, 1)}
+    _sides = ("frame", "point")
+    _points = (False, True)
+    x = Driven("x", "the point along x_a")
+    y = Driven("y", "the point along y_a")
+    x_limits = Limits("x")
+    y_limits = Limits("y")
+    offset = Offset("Height of the point above the plane.")
+
+    def __init__(
+        self,
+        point: SidePoint,
+        frame: Side,
+        name: str | None = None,
+        *,
+        offset: float = 0.0,
+        x: Number = None,
+        y: Number = None,
+        x_limits: Range = None,
+        y_limits: Range = None,
+    ) -> None:
+        super().__init__(frame, point, name, x=(x, x_limits), y=(y, y_limits))
+        self.offset = offset
+        self._own = (Equation(((1.0, self._coordinate(*ALONG)),), (self, "offset")),)
+
+
+class Distance(Joint):
+    """Two points are a given distance apart, or within limits of each other: 1 row, or one for each limit.
+
+    Parameters
+    ----------
+    point_a, point_b : Point, Frame or Body
+        Of a frame or a body its origin.
+    value : float, optional
+        Above zero; points that coincide are `Spherical`.
+    limits : (lower, upper), optional
+        Of value and limits at least one is needed.
+    """
+
+    _free = {"distance": (DISTANCE, 0)}
+    _sides = ("point_a", "point_b")
+    _points = (True, True)
+    _argument = "value"
+    value = Driven("distance", "the distance")
+    limits = Limits("distance")
+
+    def __init__(
+        self,
+        point_a: SidePoint,
+        point_b: SidePoint,
+        value: Number = None,
+        name: str | None = None,
+        *,
+        limits: Range = None,
+    ) -> None:
+        super().__init__(point_a, point_b, name, distance=(value, limits))
+
+
+class Angle(Joint):
+    """The z axes of two frames make a given angle, or one within limits: 1 row, or one for each limit.
+
+    Parameters
+    ----------
+    frame_a, frame_b : Frame or Body
+    value : float, optional
+        Between 0 and pi [rad], both excluded; axes along each other are `Parallel`, aligned or opposed.
+    limits : (lower, upper), optional
+        Of value and limits at least one is needed.
+    """
+
+    _free = {"angle": (ANGLE, 0)}
+    _argument = "value"
+    value = Driven("angle", "the angle between the z axes [rad]")
+    limits = Limits("angle")
+
+    def __init__(
+        self,
+        frame_a: Side,
+        frame_b: Side,
+        value: Number = None,
+        name: str | None = None,
+        *,
+        limits: Range = None,
+    ) -> None:
+        super().__init__(frame_a, frame_b, name, angle=(value, limits))

@@ -1,0 +1,1 @@
+"""A scene's constraints written into the flat table that kernels read."""

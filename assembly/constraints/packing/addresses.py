@@ -1,0 +1,64 @@
+"""Addresses of the kernels that only some scenes ask for, compiled when a scene is packed that does."""
+
+from __future__ import annotations
+
+from assembly._address import address_of
+from assembly.constraints.program.block_factor import factorize_blocks, solve_blocks
+from assembly.constraints.program.contact import contact_rows
+from assembly.constraints.program.lifted_contact import free_row, free_terms
+from assembly.constraints.program.tapes import run_scene_tape
+from assembly.constraints.program.trim import trim_rows, trim_terms
+from assembly.proximity.extrema.global_start import start_surfaces
+from assembly.proximity.extrema.lifted_pair import coordinate_lengths, has_stayed, is_extremal
+from assembly.proximity.features.nearest_query import find_deepest, find_nearest
+from assembly.proximity.features.solid_contact import search_solids, track_solids
+from assembly.proximity.manager.contact_place import mark_places
+from assembly.proximity.manager.motion_bounds import measure_parts, went_beyond
+from assembly.proximity.manager.update import look
+
+__all__ = ["blocks", "contacts", "deepest", "places", "solids", "surfaces", "tapes", "trims", "watch"]
+
+
+def blocks() -> tuple[int, int]:
+    """Of `factorize_blocks` and `solve_blocks`."""
+    return address_of(factorize_blocks), address_of(solve_blocks)
+
+
+def contacts() -> int:
+    """Of `contact_rows`."""
+    return address_of(contact_rows)
+
+
+def surfaces() -> list[int]:
+    """Of `start_surfaces`, `coordinate_lengths`, `free_row`, `free_terms` and `is_extremal`."""
+    return [address_of(entry) for entry in (start_surfaces, coordinate_lengths, free_row, free_terms, is_extremal)]
+
+
+def tapes() -> int:
+    """Of `run_scene_tape`."""
+    return address_of(run_scene_tape)
+
+
+def solids() -> tuple[int, int, int]:
+    """Of `track_solids`, `search_solids` and `find_nearest`."""
+    return address_of(track_solids), address_of(search_solids), address_of(find_nearest)
+
+
+def deepest() -> int:
+    """Of `find_deepest`."""
+    return address_of(find_deepest)
+
+
+def places() -> int:
+    """Of `mark_places`."""
+    return address_of(mark_places)
+
+
+def trims() -> tuple[int, int]:
+    """Of `trim_rows` and `trim_terms`."""
+    return address_of(trim_rows), address_of(trim_terms)
+
+
+def watch() -> tuple[int, int, int, int]:
+    """Of `look`, `has_stayed`, `measure_parts` and `went_beyond`."""
+    return address_of(look), address_of(has_stayed), address_of(measure_parts), address_of(went_beyond)

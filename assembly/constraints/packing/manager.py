@@ -1,0 +1,218 @@
+"""What clearances watch (`proximity/manager/update.py`): which pairs of bodies, and how many contacts may be near at a
+time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.constraints.model.clearance import Clearance
+from assembly.constraints.model.contact import Contact, side_faces
+from assembly.constraints.packing.scene_writer import SceneWriter
+from assembly.constraints.program import records as layout
+from assembly.errors import InputError
+from assembly.geometry.faces.face import Face
+from assembly.geometry.shapes.centerline import spine_of
+from assembly.kinematics.body import Body, BodyFace
+from assembly.proximity.brep.solid import is_one_smooth
+from assembly.proximity.bvh.facet_tree import FacetTree
+from assembly.proximity.bvh.neighbor_list import LIST_INTS
+from assembly.proximity.bvh.packing import pack_tree
+from assembly.proximity.manager import state as watch_memory
+from assembly.proximity.manager.centerlines.packing import pack_spine
+from assembly.proximity.manager.extrema import GIVEN_RECORD
+
+__all__ = ["LAST_REACH", "guarded_pairs", "is_of_surfaces", "pack_watch", "place_count", "table_with_guards"]
+
+Table = NDArray[np.int64]
+Pair = tuple[Body, Body]
+Side = Body | BodyFace
+# A contact of the scene, its sides, and whether it is one of their whole surfaces, without edges.
+GivenContact = tuple[Contact, tuple[Side, Side], bool]
+
+# Of a watch, in parts of the scene's size: how far its looks reach at least, and at most.
+FIRST_REACH, LAST_REACH = 0.005, 0.1
+# How far bodies may go between looks where contacts may be born, in parts of the smallest radius of curvature of the
+# two; in parts of the scene's size, it is no less than this.
+FLANK, LEAST_FLANK = 0.5, 1e-4
+# Faces leave edges that they share, and Newton's method leaves roots beside their surfaces, by less than so many times
+# what tells points of a body apart: by so much more facets of a body with edges are taken to be off, flat ones too.
+SEAMS = 3.0
+# Lists of facing patches are kept for so many pairs of bodies at a time.
+MOST_LISTS = 64
+
+
+def guarded_pairs(clearances: Sequence[Clearance], bodies: Sequence[Body]) -> list[list[Pair]]:
+    """The pairs that each clearance keeps apart; no pair may be that of two."""
+    owner: dict[frozenset[int], str] = {}
+    result = []
+    for clearance in clearances:
+        pairs = clearance.pairs(bodies)
+        for a, b in pairs:
+            other = owner.setdefault(frozenset((id(a), id(b))), clearance.name)
+            if other != clearance.name:
+                raise InputError(
+                    f"clearance {clearance.name!r} is of bodies {a.name!r} and {b.name!r}, of which clearance "
+                    f"{other!r} is, too; expected each pair once, say exclude=..."
+                )
+        result.append(pairs)
+    return result
+
+
+def place_count(clearance: Clearance, pairs: Sequence[Pair]) -> int:
+    """How many contacts may be near at a time."""
+    if not pairs:
+        return 0
+    bodies = len({id(body) for pair in pairs for body in pair})
+    return clearance.slots or min(4 + 2 * len(pairs), 8 + 4 * bodies)
+
+
+def is_of_surfaces(pair: Pair) -> bool:
+    """Whether contacts of two bodies are of two surfaces; else they are of solids."""
+    return all(is_one_smooth(side_faces(body)) for body in pair)
+
+
+def pack_watch(
+    writer: SceneWriter,
+    clearances: Sequence[Clearance],
+    guarded: Sequence[Sequence[Pair]],
+    places: Sequence[int],
+    contacts: Sequence[GivenContact],
+) -> int:
+    """Pack the watch of clearances, of which each has pairs and places; where its record begins.
+
+    `contacts` are the given ones, in the order of their rows; the first place is behind them.
+    """
+    pairs = _PairPacking(writer, [pair for own in guarded for pair in own], contacts)
+    first = 0
+    for clearance, own, count in zip(clearances, guarded, places, strict=True):
+        for pair in own:
+            pairs.add(pair, clearance.minimum, [first, first + count])
+        first += count
+    count, pair_table = pairs.write()
+    lengths = np.zeros(watch_memory.LENGTH_COUNT)
+    lengths[watch_memory.NEGLECT] = min(clearance.merge_radius for clearance in clearances)
+    lengths[watch_memory.FIRST_REACH], lengths[watch_memory.LAST_REACH] = FIRST_REACH, LAST_REACH
+    _, lengths_place = writer.add(pool=lengths)
+    lists = min(count, MOST_LISTS)
+    list_table, _ = writer.add([-1] * (LIST_INTS * lists))
+    record = np.zeros(watch_memory.WATCH_RECORD, dtype=np.int64)
+    record[watch_memory.PAIRS], record[watch_memory.PLACES] = count, first
+    record[watch_memory.PAIR_TABLE], record[watch_memory.FIRST] = pair_table, len(contacts)
+    record[watch_memory.LENGTHS] = lengths_place
+    record[watch_memory.LISTS], record[watch_memory.LIST_TABLE] = lists, list_table
+    record[watch_memory.CORNERS] = any(clearance.corners for clearance in clearances)
+    # Where one is asked for, its address is written when the scene is ready.
+    record[watch_memory.MARK_AT] = pairs.any_in_place
+    return writer.add(record)[0]
+
+
+def table_with_guards(table: Table, placed: Sequence[Sequence[int]]) -> Table:
+    """A table whose rows of clearances have contacts.
+
+    `placed` has for every row its pair or -1, the number of its contact, and 1 where that is in the place of a given
+    one.
+    """
+    table = table.copy()
+    record = table[layout.WATCH]
+    first = table[layout.ROW_TABLE] + layout.ROW * table[layout.FIRST_GUARD]
+    rows = table[first:][: layout.ROW * len(placed)].reshape(-1, layout.ROW)
+    size = watch_memory.PAIR_RECORD * table[record + watch_memory.PAIRS]
+    pairs = table[table[record + watch_memory.PAIR_TABLE] :][:size].reshape(-1, watch_memory.PAIR_RECORD)
+    for row, (place, number, given) in zip(rows, placed, strict=True):
+        if place >= 0:
+            pair = pairs[place]
+            row[[layout.BODY_F, layout.BODY_G]] = pair[[watch_memory.PAIR_F, watch_memory.PAIR_G]]
+            shapes = pair[watch_memory.PAIR_SURFACE_F : watch_memory.PAIR_SHELL_G + 1]
+            row[layout.SURFACE_F : layout.SHELL_G + 1] = shapes
+            row[layout.MINIMUM] = pair[watch_memory.PAIR_MINIMUM] + watch_memory.IN_PLACE * given
+            row[layout.GUARD_NUMBER] = number
+    return table
+
+
+class _PairPacking:
+    """The pairs of a watch while they are packed; the trees of all their bodies come first."""
+
+    def __init__(self, writer: SceneWriter, pairs: Sequence[Pair], contacts: Sequence[GivenContact]) -> None:
+        self._writer = writer
+        self._contacts = contacts
+        self._records: list[list[int]] = []
+        self.any_in_place = False
+        self._given: list[int] = []
+        self._surfaces: dict[tuple[int, bool], int] = {}
+        self._spines: dict[Face, int] = {}
+        # Where the tree of faces is, the radius of a ball around it, how far from the body's origin it reaches, its
+        # smallest radius of curvature and how far its facets are off; bodies of a shape share it.
+        self._trees: dict[tuple[Face, ...], tuple[int, float, float, float, float]] = {}
+        for faces in dict.fromkeys(side_faces(body) for pair in pairs for body in pair):
+            tree = FacetTree.of(faces)
+            table, pool, at = pack_tree(tree, writer.scale, writer.table_at, writer.pool_at)
+            writer.add(table, pool)
+            seams = SEAMS * tree.topology.tolerance if tree.topology.edges else 0.0
+            ball = float(tree.nodes.radius[0])
+            far = float(np.linalg.norm(0.5 * (tree.nodes.low[0] + tree.nodes.high[0]))) + ball
+            offset = (tree.offset + seams) / writer.scale
+            self._trees[faces] = at, ball, far, tree.least_radius / writer.scale, offset
+
+    def add(self, pair: Pair, least: float, places: Sequence[int]) -> None:
+        """Pack a pair with its least gap and where its places begin and end."""
+        writer = self._writer
+        f, g = (side_faces(body) for body in pair)
+        tree_f, ball_f, far_f, radius_f, offset_f = self._trees[f]
+        tree_g, ball_g, far_g, radius_g, offset_g = self._trees[g]
+        flank = max(FLANK * min(radius_f, radius_g), LEAST_FLANK)
+        far = [far_f / writer.scale, far_g / writer.scale]
+        lengths = [least / writer.scale, flank, offset_f, offset_g, *far]
+        spines = [-1, -1]
+        if is_of_surfaces(pair):
+            shape = [writer.surface(self._surfaces, f[0]), writer.surface(self._surfaces, g[0]), -1, -1]
+            spines = self._spines_of(f[0], g[0])
+        else:
+            shape = [-1, -1, writer.shell(f), writer.shell(g)]
+        # Of bodies with edges a contact and a least gap of zero are both asked for.
+        given = self._contacts_of(pair) if is_of_surfaces(pair) or least > 0.0 else []
+        if given and least > 0.0:
+            self.any_in_place = True
+            lengths += [0.0, *lengths[1:]]
+        _, minimum = writer.add(pool=lengths)
+        fields = [*writer.places_of(pair), tree_f, tree_g, *shape, minimum, *places]
+        many = len(given) // GIVEN_RECORD
+        self._records.append([*fields, len(self._given), many, int(ball_g <= ball_f), *spines])
+        self._given += given
+
+    def _spines_of(self, f: Face, g: Face) -> list[int]:
+        """Where the spines of two faces are, if both are round wires."""
+        for face in (f, g):
+            spine = spine_of(face)
+            if spine is None:
+                return [-1, -1]
+            if face not in self._spines:
+                writer = self._writer
+                table, pool, at = pack_spine(spine, writer.scale, writer.table_at, writer.pool_at)
+                writer.add(table, pool)
+                self._spines[face] = at
+        return [self._spines[f], self._spines[g]]
+
+    def _contacts_of(self, pair: Pair) -> list[int]:
+        """The records of given contacts between two bodies."""
+        writer = self._writer
+        fields: list[int] = []
+        for k, (contact, sides, is_whole) in enumerate(self._contacts):
+            if {id(body) for body in contact.bodies} == {id(body) for body in pair}:
+                faces = [side_faces(side) for side in sides]
+                fields += [k, int(contact.body_a is pair[1]), int(contact.unilateral)]
+                if is_whole:
+                    fields += [*(writer.surface(self._surfaces, own[0]) for own in faces), -1, -1]
+                else:
+                    fields += [-1, -1, *(writer.shell(own) for own in faces)]
+        return fields
+
+    def write(self) -> tuple[int, int]:
+        """How many pairs there are, and where their records begin."""
+        given_place, _ = self._writer.add(self._given)
+        table = np.array(self._records, dtype=np.int64).reshape(-1, watch_memory.PAIR_RECORD)
+        table[:, watch_memory.GIVEN] += given_place
+        return len(table), self._writer.add(table)[0]

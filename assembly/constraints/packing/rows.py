@@ -1,0 +1,183 @@
+"""The rows of a scene (`constraints/program/records.py`): of contacts, of clearances, of trims, of joints, of
+expressions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.constraints.model.clearance import Clearance
+from assembly.constraints.model.constraint import Constraint, Equation
+from assembly.constraints.model.contact import Contact, side_faces
+from assembly.constraints.model.couplings import Coupling
+from assembly.constraints.model.expression import Expression
+from assembly.constraints.model.joint import Joint
+from assembly.constraints.model.trim_contact import FORMS, TrimContact
+from assembly.constraints.packing.numbering import gathering_order
+from assembly.constraints.packing.scene_writer import SceneWriter
+from assembly.constraints.program import records as layout
+from assembly.geometry.faces.trim_pieces import TRIM_FIRST
+from assembly.geometry.splines.evaluate import CURVE_RECORD
+from assembly.kinematics.body import Body, BodyFace
+from assembly.proximity.brep.records import EDGE_CURVE, EDGE_END, EDGE_RECORD, EDGE_START, EDGE_SURFACE
+
+__all__ = ["RowPacking"]
+
+Table = NDArray[np.int64]
+
+
+class RowPacking:
+    """The rows of a scene while they are packed, in this order: contacts, clearances, trims, joints, expressions.
+
+    Parameters
+    ----------
+    writer : SceneWriter
+    constraints : sequence of Constraint
+        All of the scene.
+
+    Attributes
+    ----------
+    owners : list of int
+        The constraint of every row.
+    values : list of (Equation, int, float)
+        Equations of joints, where the value of each is in the pool, and what one of it counts in the user's units.
+    """
+
+    def __init__(self, writer: SceneWriter, constraints: Sequence[Constraint]) -> None:
+        self.owners: list[int] = []
+        self.values: list[tuple[Equation, int, float]] = []
+        self._writer = writer
+        self._constraints = constraints
+        self._numbers = {id(constraint): k for k, constraint in enumerate(constraints)}
+        self._rows: list[list[int]] = []
+        # The bodies of every row that scattered bodies can be put together by.
+        self._joined: list[list[int]] = []
+        self._extra = 0
+
+    def _add(self, owner: Constraint, row: list[int], joined: Sequence[int] = ()) -> None:
+        self._rows.append(row)
+        self.owners.append(self._numbers[id(owner)])
+        self._joined.append(list(dict.fromkeys(joined)))
+
+    def add_contacts(
+        self,
+        contacts: Sequence[Contact],
+        sides: Sequence[tuple[Body | BodyFace, Body | BodyFace]],
+        whole: Sequence[bool],
+    ) -> None:
+        """Rows of contacts of two surfaces, where they are whole, or of two shells."""
+        writer = self._writer
+        known: dict[tuple[int, bool], int] = {}
+        for contact, pair, is_whole in zip(contacts, sides, whole, strict=True):
+            row = [layout.CONTACT_ROW, *writer.places_of(contact.bodies), int(contact.unilateral), 0, 1]
+            if is_whole:
+                row += [*(writer.surface(known, side_faces(side)[0]) for side in pair), -1, -1, layout.ZERO]
+            else:
+                row += [-1, -1, *(writer.shell(side_faces(side)) for side in pair), layout.ZERO]
+            self._add(contact, row)
+
+    def add_guards(self, clearances: Sequence[Clearance], places: Sequence[int]) -> None:
+        """Idle rows, as many of each clearance as it has places."""
+        header = self._writer.header
+        header[layout.FIRST_GUARD], header[layout.GUARDS] = len(self._rows), sum(places)
+        for clearance, count in zip(clearances, places, strict=True):
+            for _ in range(count):
+                self._add(clearance, [layout.CONTACT_ROW, -1, -1, 1, 0, 1, -1, -1, -1, -1, layout.ZERO, 0])
+
+    def add_trims(self, contacts: Sequence[Contact]) -> None:
+        """Rows of trims, of contacts in the order of their rows."""
+        pairs = {contact.name: k for k, contact in enumerate(contacts)}
+        before = len(self._rows)
+        for item in self._constraints:
+            if isinstance(item, TrimContact):
+                self._add_trim(item, pairs[item.contact.name])
+        self._writer.header[layout.TRIMS] = len(self._rows) - before
+
+    def _add_trim(self, trim: TrimContact, pair: int) -> None:
+        writer = self._writer
+        table, pool = trim.region.packed_trim(writer.table_at, writer.pool_at)
+        loop, _ = writer.add(table, pool)
+        factor = trim.stretch / writer.scale
+        _, at = writer.add(pool=[-factor if trim.keep == "outside" else factor])
+        form = FORMS.index(trim.form)
+        count = (1, 2, 3, 3)[form]
+        edges = -1
+        if form > 0:
+            writer.header[layout.VECTOR_TRIMS] = 1
+            surface = self._rows[pair][layout.SURFACE_F + trim.side]
+            edges = self._loop_edges(trim, int(table[TRIM_FIRST]), surface)
+        row = [layout.TRIM_ROW, *writer.places_of(trim.bodies), int(trim.unilateral), 0, 1, pair, trim.side, loop, at]
+        row += [form, count, edges, int(trim.form in ("parametric", "cartesian"))]
+        for _ in range(count):
+            self._add(trim, row)
+
+    def _loop_edges(self, trim: TrimContact, first: int, surface: int) -> int:
+        """Records of the curves of a trim's loop as edges on its surface; where they begin."""
+        fields: list[int] = []
+        for k, curve in enumerate(trim.region.boundary):
+            record = np.full(EDGE_RECORD, -1, dtype=np.int64)
+            record[EDGE_SURFACE], record[EDGE_CURVE] = surface, first + CURVE_RECORD * k
+            if not curve.closed:
+                record[EDGE_START], record[EDGE_END] = 0, 0
+            fields += record.tolist()
+        return self._writer.add(fields)[0]
+
+    def add_joints(self, slots: Table) -> None:
+        """Rows of joints and couplings, whose bodies have these places among the unknowns."""
+        # In the order of their bodies: then the envelope of J J^T is narrow, too.
+        joints = [item for item in self._constraints if isinstance(item, (Joint, Coupling))]
+        joints.sort(key=lambda item: max(slots[self._writer.places_of(item.bodies)]))
+        for joint in joints:
+            for equation in joint.equations:
+                self._add_equation(joint, equation)
+                self._extra = max(self._extra, 2 * (len(equation.terms) - 1))
+
+    def _add_equation(self, joint: Constraint, equation: Equation) -> None:
+        """Factors are such that the row has the unit of its first term, lengths scaled."""
+        writer = self._writer
+        (factor, first), *others = equation.terms
+        unit = 1.0 if first.is_angle else writer.scale
+        pool = [factor, 0.0, 0.0]
+        fields, bodies = writer.coordinate(first)
+        joined = bodies
+        second = -1
+        for other_factor, other in others:
+            other_fields, other_bodies = writer.coordinate(other)
+            pool[1] = other_factor * (1.0 if other.is_angle else writer.scale) / unit
+            second, _ = writer.add([*other_fields, *other_bodies])
+            joined = [*joined, *other_bodies]
+        _, at = writer.add(pool=pool)
+        self.values.append((equation, at + 2, unit))
+        flags = [int(equation.one_sided), int(equation.is_drive), int(not first.is_angle)]
+        self._add(joint, [layout.JOINT_ROW, *bodies, *flags, *fields, at, second], joined)
+
+    def add_expressions(self) -> None:
+        """Rows of expressions, and the table of their tapes."""
+        writer = self._writer
+        tapes: list[list[int]] = []
+        for item in self._constraints:
+            if isinstance(item, Expression):
+                bodies = writer.places_of(item.bodies)
+                flags = [int(item.unilateral), 0, 0]
+                tapes.append(writer.tape(item, len(self._rows)))
+                for value in range(item.count):
+                    self._add(item, [layout.TAPE_ROW, *[*bodies, -1][:2], *flags, len(tapes) - 1, value])
+                self._extra = max(self._extra, len(bodies) - 2)
+        writer.header[layout.TAPE_TABLE], _ = writer.add([field for record in tapes for field in record])
+        writer.header[layout.TAPES] = len(tapes)
+
+    def write(self, bodies: Sequence[Body]) -> Table:
+        """Write the records of all rows (m, ROW), which are returned, and how scattered bodies are put together."""
+        header = self._writer.header
+        table = np.zeros((len(self._rows), layout.ROW), dtype=np.int64)
+        for record, row in zip(table, self._rows, strict=True):
+            record[: len(row)] = row
+        header[layout.ROW_TABLE], _ = self._writer.add(table)
+        order = gathering_order([body.fixed for body in bodies], self._joined)
+        fields = [field for body, held in order for field in (body, len(held), *held)]
+        header[layout.GATHER_TABLE], _ = self._writer.add([len(order), *fields])
+        header[layout.ROWS], header[layout.EXTRA] = len(table), self._extra
+        return table

@@ -1,0 +1,398 @@
+"""A scene turned into the table and the pool that the compiled loop works on (`constraints/program/records.py`)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import copy
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly._address import clock_address
+from assembly.constraints.model.clearance import Clearance
+from assembly.constraints.model.constraint import Constraint, structure_changes
+from assembly.constraints.model.contact import Contact, side_face
+from assembly.constraints.model.couplings import Coupling
+from assembly.constraints.model.expression import Expression
+from assembly.constraints.model.joint import Joint
+from assembly.constraints.model.objectives import Objective, Posture
+from assembly.constraints.model.trim_contact import TrimContact
+from assembly.constraints.packing import addresses
+from assembly.constraints.packing import manager as watch_packing
+from assembly.constraints.packing.elimination_order import FEW, block_record
+from assembly.constraints.packing.numbering import number_bodies
+from assembly.constraints.packing.revolutions import Turns
+from assembly.constraints.packing.rows import RowPacking
+from assembly.constraints.packing.scene_size import check_reach, has_no_extent, scene_size
+from assembly.constraints.packing.scene_writer import SceneWriter
+from assembly.constraints.packing.terms import TermPacking, natural_unit
+from assembly.constraints.program import records as layout
+from assembly.constraints.program.coordinates_at import coordinates_at
+from assembly.constraints.program.hessian_blocks import FACTORIZE_AT, SOLVE_AT
+from assembly.constraints.program.primitives import RECORD as JOINT_FRAMES
+from assembly.errors import FARTHEST, InputError
+from assembly.kinematics.body import Body
+from assembly.proximity.features.solid_contact import TRACK
+from assembly.proximity.manager import state as watch_memory
+from assembly.proximity.manager.events import fresh_memory, listed_places
+
+__all__ = ["Packed", "structure_of"]
+
+Array = NDArray[np.float64]
+Table = NDArray[np.int64]
+# Smaller numbers have fewer digits; those whose reciprocals are, too, may overflow.
+LEAST_UNIT = 1e-305
+# A size that rests on values alone is another one where they have grown or shrunk by this factor.
+OUTGROWN = 1e4
+
+
+class Packed:
+    """A packed scene: arrays for the loop, and what is needed to refresh them between solves.
+
+    Parameters
+    ----------
+    bodies, constraints
+    objectives : sequence of (sign, term)
+        1 to minimize, -1 to maximize; a posture where there is none.
+    places : int
+        Clearances have so many times the places they ask for.
+
+    Attributes
+    ----------
+    table, pool : arrays
+        See `constraints/program/records.py`. Lengths in the pool are divided by `scale`.
+    scale : float
+        The scene's size (`scene_size`), 1 where it has none.
+    has_size : bool
+        Whether the scene has a size.
+    outgrown : Packed or None
+        The same scene as it was packed before it had this size.
+    unit : float
+        What one of the loop's objective counts in the user's units.
+    sides : list of (Body or BodyFace, Body or BodyFace)
+        The sides of every contact; faces where it is one of whole surfaces.
+    whole : list of bool
+        Whether a contact is one of two whole surfaces, without edges.
+    clearances : list of Clearance
+    guarded : list of list of (Body, Body)
+        The pairs of bodies of every clearance.
+    guards : int
+        Rows of clearances, behind those of contacts.
+    spans : list of int arrays
+        The rows of every constraint.
+    owners : (m,) int
+        The constraint of every row.
+    drives : (m,) bool
+        Whether a driven value or a limit asks for the row.
+    trims : int
+        Rows of trims.
+    chooses_turns : bool
+        Whether the turns of angles are told by where bodies stand once they are put together.
+    pairs : (m,) int
+        The contact whose pair a row is of, or -1.
+    one_sided, lengths : (m,) bool
+        Whether a row is >= 0; whether it is a length.
+    """
+
+    def __init__(
+        self,
+        bodies: Sequence[Body],
+        constraints: Sequence[Constraint],
+        objectives: Sequence[tuple[float, Objective]],
+        places: int = 1,
+    ) -> None:
+        self.count = len(bodies)
+        self.stamp = structure_changes()
+        self.structure = structure_of(constraints)
+        size = scene_size(bodies, constraints, objectives)
+        self.has_size = size > 0.0
+        self._has_no_extent = has_no_extent(bodies, constraints, objectives)
+        self.scale = size if self.has_size else 1.0
+        self.outgrown: Packed | None = None
+        self.reference = bodies[0].pose.position.copy()
+        self.contacts = [constraint for constraint in constraints if isinstance(constraint, Contact)]
+        # Of a contact with trims the surfaces take part without their own boundaries.
+        trimmed = {item.contact.name for item in constraints if isinstance(item, TrimContact)}
+        self.whole = [contact.name in trimmed or not contact.edges for contact in self.contacts]
+        self.sides = [
+            (side_face(contact.a), side_face(contact.b)) if whole else (contact.a, contact.b)
+            for contact, whole in zip(self.contacts, self.whole, strict=True)
+        ]
+        self.clearances = [constraint for constraint in constraints if isinstance(constraint, Clearance)]
+        self.guarded = watch_packing.guarded_pairs(self.clearances, bodies)
+        self.places = [
+            places * watch_packing.place_count(clearance, pairs)
+            for clearance, pairs in zip(self.clearances, self.guarded, strict=True)
+        ]
+        self.guards = sum(self.places)
+        self._write(bodies, constraints, objectives)
+        self._take_addresses()
+        # Where the parts of a state begin: tracked values, multipliers, residuals, results.
+        self.contacts_at = 7 * self.count
+        self.angles_at = self.contacts_at + TRACK * self.pair_rows
+        self.multipliers_at = self.contacts_at + TRACK * self.tracked
+        self.residuals_at = self.multipliers_at + self.rows
+        self.results_at = self.residuals_at + self.rows
+        self.memory_at = self.results_at + layout.RESULTS
+        self._memory = np.empty(0)
+        if self.guards:
+            # The first look sees what crosses at the start as well, if it is no deeper than this.
+            self._memory = fresh_memory(sum(map(len, self.guarded)), self.guards, watch_packing.LAST_REACH)
+
+    def _write(
+        self,
+        bodies: Sequence[Body],
+        constraints: Sequence[Constraint],
+        objectives: Sequence[tuple[float, Objective]],
+    ) -> None:
+        """Write table and pool, part by part, and keep what tells of them."""
+        goals = objectives or [(1.0, Posture())]
+        self.unit = max(term.weight * natural_unit(term, self.scale) for _, term in goals)
+        if not LEAST_UNIT <= self.unit <= 1.0 / LEAST_UNIT:
+            raise InputError(
+                f"the objective counts in units of {self.unit:g}, by its weights and the scene's size {self.scale:g}; "
+                f"expected from {LEAST_UNIT:g} to {1.0 / LEAST_UNIT:g}"
+            )
+        writer = SceneWriter(bodies, self.scale, self.pair_rows)
+        header = writer.header
+        writer.add(header, self._pool_header())
+        groups = [writer.places_of(item.bodies) for item in constraints]
+        slots = number_bodies([body.fixed for body in bodies], groups)
+        header[layout.SLOTS], _ = writer.add(slots)
+        header[layout.BODIES], header[layout.MOVING] = self.count, slots.max() + 1
+        header[layout.CONTACTS] = self.pair_rows
+        header[layout.IMPLICIT] = not objectives
+        self._write_rows(writer, bodies, constraints, slots)
+        terms = TermPacking(writer, bodies, self.reference, self.unit)
+        for sign, term in goals:
+            terms.add(sign, term)
+        terms.write()
+        writer.add_shared()
+        # Rows of clearances are of any bodies, those of trims and dexterities are not by blocks.
+        if header[layout.MOVING] > FEW and not (self.guards or self.trims or header[layout.DEXTERITIES]):
+            groups += [writer.places_of(term.bodies) for _, term in goals if isinstance(term, Expression)]
+            record = block_record(int(header[layout.MOVING]), [slots[group].tolist() for group in groups])
+            header[layout.BLOCK_RECORD], header[layout.BLOCK_LENGTH] = writer.add(record)[0], record.size
+        self.table, self.pool = writer.arrays()
+        # What the loop is compiled for: None without a dexterity.
+        self.tips = 1 if header[layout.DEXTERITIES] else None
+        self.tracked = self.pair_rows + len(writer.angles)
+        self.shells, self._angles = writer.shells, writer.angles
+        self._places, self._frames = writer.places, writer.frames
+        self._targets, self._turns = terms.targets, terms.turns
+        self._turned = Turns(self._angles, [(equation, at) for equation, at, _ in self._values])
+        self.chooses_turns = self._turned.chosen and not self.guards
+        told = self._turned.told
+        self._standing = np.array(
+            [(self._frames[item.frames], item.kind, item.component) for item in told], dtype=np.int64
+        ).reshape(-1, 3)
+        self._standing_units = np.array([1.0 if item.is_angle else self.scale for item in told])
+
+    def _pool_header(self) -> Array:
+        pool = np.zeros(layout.POOL_HEADER)
+        pool[layout.SCALE] = self.scale
+        pool[layout.REFERENCE : layout.REFERENCE + 3] = self.reference
+        pool[layout.UNIT] = self.unit
+        return pool
+
+    def _write_rows(
+        self, writer: SceneWriter, bodies: Sequence[Body], constraints: Sequence[Constraint], slots: Table
+    ) -> None:
+        """Write rows, and keep what tells of them."""
+        rows = RowPacking(writer, constraints)
+        rows.add_contacts(self.contacts, self.sides, self.whole)
+        rows.add_guards(self.clearances, self.places)
+        writer.header[layout.WATCH] = -1
+        if self.guards:
+            given = list(zip(self.contacts, self.sides, self.whole, strict=True))
+            writer.header[layout.WATCH] = watch_packing.pack_watch(
+                writer, self.clearances, self.guarded, self.places, given
+            )
+        rows.add_trims(self.contacts)
+        rows.add_joints(slots)
+        rows.add_expressions()
+        table = rows.write(bodies)
+        self._values = rows.values
+        self._sources = [item for item in self._values if item[0].source is not None]
+        self.rows = len(table)
+        self.owners = np.array(rows.owners, dtype=np.int64)
+        self.one_sided = table[:, layout.ONE_SIDED] == 1
+        self.drives = table[:, layout.DRIVE] == 1
+        self.lengths = table[:, layout.IS_LENGTH] == 1
+        kinds = table[:, layout.KIND]
+        self.pairs = np.where(kinds == layout.CONTACT_ROW, np.arange(len(table)), -1)
+        trims = kinds == layout.TRIM_ROW
+        self.pairs[trims] = table[trims, layout.TRIM_PAIR]
+        self.trims = int(trims.sum())
+        by_owner = np.argsort(self.owners, kind="stable")
+        ends = np.searchsorted(self.owners[by_owner], np.arange(len(constraints) + 1))
+        self.spans = [by_owner[first:last] for first, last in pairwise(ends)]
+
+    @property
+    def pair_rows(self) -> int:
+        """Rows of contacts, given ones and those of clearances."""
+        return len(self.contacts) + self.guards
+
+    def is_crowded(self, state: Array) -> bool:
+        """Whether contacts of clearances were near that found no place."""
+        return self.guards > 0 and state[self.memory_at + watch_memory.CROWDED] == 1.0
+
+    def new_state(self) -> Array:
+        """The state of a solve that knows nothing yet."""
+        state = np.zeros(self.memory_at + self._memory.size)
+        state[self.memory_at :] = self._memory
+        return state
+
+    def pair_name(self, k: int) -> str:
+        """The name of the contact, or the clearance, that row k is of."""
+        names = [contact.name for contact in self.contacts]
+        for clearance, count in zip(self.clearances, self.places, strict=True):
+            names += [clearance.name] * count
+        return names[k]
+
+    def table_at(self, state: Array) -> Table:
+        """The table with the rows of clearances as a state has them; in the packed one they have no contacts."""
+        has_guards = self.guards > 0 and state.size > self.memory_at
+        return watch_packing.table_with_guards(self.table, self._placed(state)) if has_guards else self.table
+
+    def may_have_outgrown(self) -> bool:
+        """Whether the size rests on values and places alone and the values have become others by far."""
+        if not self._has_no_extent or not self.has_size:
+            return self._has_no_extent
+        values = [abs(row.current()) for row, _, _ in self._sources if not row.terms[0][1].is_angle]
+        return self.is_outgrown(max(values, default=0.0))
+
+    def is_outgrown(self, length: float) -> bool:
+        """Whether a length, not zero, is another one than the size by far, or there is none."""
+        near = self.has_size and self.scale <= OUTGROWN * length <= OUTGROWN**2 * self.scale
+        return length > 0.0 and not near
+
+    def taken_over(self, state: Array) -> Array:
+        """A state of the scene as it was before it had this size, with multipliers in the units of this one."""
+        assert self.outgrown is not None
+        taken = state.copy()
+        multipliers = taken[self.multipliers_at : self.residuals_at]
+        multipliers *= self.outgrown.unit / self.unit
+        multipliers[self.lengths] *= self.scale / self.outgrown.scale
+        return taken
+
+    def listed(self, state: Array) -> list[tuple[int, int]]:
+        """Of every place of a watch in a state: its pair of bodies, or -1, and the number of its contact."""
+        return [(pair, number) for pair, number, _given in self._placed(state)]
+
+    def _placed(self, state: Array) -> list[list[int]]:
+        """The same, and whether it is in the place of a given contact."""
+        return listed_places(state[self.memory_at :], sum(map(len, self.guarded)), self.guards)
+
+    def _take_addresses(self) -> None:
+        """Where the kernels are that only contacts, trims, clearances, expressions or many bodies ask for."""
+        table = self.table
+        table[layout.CLOCK_AT] = clock_address()
+        if table[layout.BLOCK_RECORD]:
+            record = table[table[layout.BLOCK_RECORD] :]
+            record[[FACTORIZE_AT, SOLVE_AT]] = addresses.blocks()
+        if self.pair_rows:
+            table[layout.CONTACT_ROWS_AT] = addresses.contacts()
+        if any(self.whole) or any(watch_packing.is_of_surfaces(pair) for pairs in self.guarded for pair in pairs):
+            table[layout.START_AT : layout.EXTREMAL_AT + 1] = addresses.surfaces()
+        if self.shells:
+            table[[layout.TRACK_AT, layout.SEARCH_AT, layout.NEAREST_AT]] = addresses.solids()
+        if self.trims:
+            table[[layout.TRIM_ROWS_AT, layout.TRIM_TERMS_AT]] = addresses.trims()
+        if self.guards:
+            table[[layout.LOOK_AT, layout.STAYED_AT, layout.PARTS_AT, layout.WENT_AT]] = addresses.watch()
+            table[table[layout.WATCH] + watch_memory.TRACK_SOLIDS] = table[layout.TRACK_AT]
+            at = table[layout.WATCH] + watch_memory.MARK_AT
+            table[at] = addresses.places() if table[at] else 0
+        if table[table[layout.TAPE_ROOM]] > 0:
+            table[layout.RUN_TAPE_AT] = addresses.tapes()
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        # Addresses are those of one process; a copy, or what another process wrote, takes its own.
+        self.__dict__.update(state)
+        self.table = self.table.copy()
+        self.table[layout.DEEPEST_AT] = 0
+        self._take_addresses()
+
+    def seek_penetration(self) -> bool:
+        """From now on contacts of solids that cross at the start are looked for; whether that is new.
+
+        The kernel for it is large, and few scenes need it.
+        """
+        if not self.shells or self.table[layout.DEEPEST_AT]:
+            return False
+        self.table[layout.DEEPEST_AT] = addresses.deepest()
+        return True
+
+    @property
+    def is_implicit(self) -> bool:
+        """Whether nobody asked for the objective, which is the least move then."""
+        return bool(self.table[layout.IMPLICIT] == 1)
+
+    def start_angles(self, q: Array, state: Array, warm: bool) -> None:
+        """Write the turns that angles start on into a state."""
+        if not self._angles:
+            return
+        near = state[self.angles_at : self.multipliers_at : TRACK]
+        if warm and not self._turned.coupled:
+            self._turned.follow_drives(self.pool, near)
+            return
+
+        def measure() -> Array:
+            values = np.empty(len(self._standing))
+            if values.size:
+                scaled = q.copy()
+                scaled[:, :3] = (q[:, :3] - self.reference) / self.scale
+                coordinates_at(self.table, self.pool, scaled, self._standing, np.empty((1, JOINT_FRAMES)), values)
+            values *= self._standing_units
+            return values
+
+        self._turned.start(self.pool, near, warm, measure)
+
+    def twin(self) -> Packed:
+        """The same with a table and values of its own."""
+        other = copy(self)
+        other.pool = self.pool.copy()
+        return other
+
+    @property
+    def value_rows(self) -> NDArray[np.int64]:
+        """The rows of joints and couplings, which have a value each."""
+        first = int((self.pairs >= 0).sum())
+        return np.arange(first, first + len(self._values))
+
+    def move_values(self, change: Array) -> None:
+        """Add a change (m,) to the values of joints' and couplings' rows, until the next `refresh`."""
+        self.pool[[at for _, at, _ in self._values]] += change[self.value_rows]
+
+    def refresh(self) -> None:
+        """Write what may have changed since the last solve: values and targets."""
+        pool, scale = self.pool, self.scale
+        x, y, z = self.reference.tolist()
+        for equation, at, unit in self._sources:
+            value = equation.current() / unit
+            if not -FARTHEST <= value <= FARTHEST and not equation.terms[0][1].is_angle:
+                assert equation.source is not None
+                check_reach(f"a value of {equation.source[0]!r}", abs(equation.current()), scale)
+            pool[at] = value
+        for distance, at in self._targets:
+            target = distance._target.tolist()
+            if not max(map(abs, target)) <= FARTHEST * scale:
+                check_reach(f"a target of body {distance.bodies[0].name!r}", max(map(abs, target)), scale)
+            pool[at] = (target[0] - x) / scale
+            pool[at + 1] = (target[1] - y) / scale
+            pool[at + 2] = (target[2] - z) / scale
+        for frame_distance, at in self._turns:
+            pool[at : at + 4] = frame_distance.body_quaternion
+
+
+def structure_of(constraints: Sequence[Constraint]) -> tuple[tuple[object, ...], ...]:
+    """Which rows constraints have, whatever their values."""
+    return tuple(
+        (id(item), id(equation.terms[0][1]), equation.terms[0][0], equation.source and equation.source[1])
+        for item in constraints
+        if isinstance(item, (Joint, Coupling))
+        for equation in item.equations
+    )

@@ -1,0 +1,1 @@
+"""Kernels that evaluate constraint residuals, their derivatives, and objective terms from the packed table."""

@@ -1,0 +1,413 @@
+"""Rows of contacts: the pair of each is carried to the poses, its gap is the row. `constraints/program/records.py` says
+what stands where.
+
+A contact of two surfaces is a pair of points with a common normal, one of solids the closest features of both
+(`proximity/features/solid_contact.py`). Rows of a clearance are contacts as well, of what its watch has listed.
+"""
+
+from __future__ import annotations
+
+import math
+
+from assembly._address import call_address
+from assembly._kernel import kernel
+from assembly.constraints.program.records import (
+    FREE_COLUMN,
+    ROW,
+    Iterate,
+    contact_row_at,
+    header_at,
+    row_at,
+)
+from assembly.geometry.splines.domain import into_domain
+from assembly.geometry.splines.evaluate import surface_at, surface_point
+from assembly.geometry.splines.pole import limits, nearest_pole, polar_step
+from assembly.geometry.vec import blend, dot, matvec, scale, sub
+from assembly.kinematics.motion import relative_pose, rotation
+from assembly.proximity.extrema.face_face import CLOSE, CONVERGED, LEFT_PATCH, SINGULAR, own_frame, solve_pair
+from assembly.proximity.extrema.rates import RATES, RECORD, derivatives_at, gradient_row, store_record
+from assembly.proximity.features.solid_contact import (
+    CONFORMING,
+    CONTACT_RECORD,
+    TRACK,
+    contact_record_at,
+    tracked_at,
+)
+
+# A clearance's contact of solids that are hardly in each other may be given up where its pair ends: then MAY_GO - k
+# stands for what it holds on to, k. One that ends where they touch, which rounding decides, is as good as open.
+MAY_GO, HARDLY, TOUCHING = -1.0, 1e-3, 1e-9
+# A clearance's row that is open by more than the last needs its pair again after motions of this part of its gap, or of
+# this part of how far bodies may go where contacts may be born: from farther away Newton's method may find another one.
+UNSEEN, ASTRAY, FAR = 0.5, 0.15, 1e-5
+# Beside the statuses of `solve_pair`: the pair that was found does not continue the one that was tracked.
+OTHER_SIDE = 4
+
+
+@kernel(inline=True)
+def surface_of(table, row, side):
+    """The surface of a contact on side 0, of f, or 1, of g."""
+    contact = contact_row_at(table, row)
+    return contact.surface_f if side == 0 else contact.surface_g
+
+
+@kernel(inline=True)
+def facing_of(table, pool, g, relative, frame, x):
+    """1 where the outward normals of the surfaces of a pair oppose each other, -1 where they agree.
+
+    Seen along the normal n of f, with S the surface g, n.(S_u x S_v) = det T, and the frame has T^-1; at a pole it has
+    none.
+    """
+    t = frame.rates_g
+    along = float(surface_at(table, g).sign) * (t[0] * t[3] - t[1] * t[2])
+    if along == 0.0:
+        along = dot(frame.normal, matvec(relative, own_frame(table, pool, g, x[2], x[3]).normal))
+    return -1.0 if along > 0.0 else 1.0
+
+
+@kernel(inline=True)
+def predict_point(table, pool, surface, u, v, du, dv):
+    """Parameters after rates (du, dv), inside the domain.
+
+    Where a pole is nearer than they lead, that is along the tangent plane: a point that passes a pole goes around it,
+    in coordinates, in no time, and rates of these lead elsewhere.
+    """
+    if surface_at(table, surface).poles != 0:
+        _p, su, sv, _suu, _suv, _svv = surface_point(table, pool, surface, u, v)
+        step = blend(du, su, dv, sv)
+        edge, part = nearest_pole(table, pool, surface, u, v)
+        low, high, _closed = limits(table, pool, surface, 0 if edge <= 2 else 1)
+        spoke = scale(part * (high - low), su if edge <= 2 else sv)
+        if dot(step, step) > dot(spoke, spoke):
+            return polar_step(table, pool, surface, edge, u, v, step)
+    u, v, _clamped = into_domain(table, pool, surface, u + du, v + dv)
+    return u, v
+
+
+@kernel(inner=True)
+def predict_pair(table, pool, row, r, tracked, guess):
+    """Make of guess[r], coordinates that run on from tracked[r] by their rates, where the pair is expected.
+
+    A prediction may run over the end of a patch; Newton starts inside. What becomes of edges is up to switching.
+    """
+    if contact_row_at(table, row).shell_f >= 0:
+        return
+    for side in range(2):
+        i = 2 * side
+        u, v = tracked[r, i], tracked[r, i + 1]
+        guess[r, i], guess[r, i + 1] = predict_point(
+            table, pool, surface_of(table, row, side), u, v, guess[r, i] - u, guess[r, i + 1] - v
+        )
+
+
+@kernel(inner=True)
+def track_contact(table, pool, row, q, start, patience, records, k):
+    """Newton on the pair of one row from start[k]; fills its record.
+
+    A pair that is followed keeps what its outward normals are to each other: no way leads from opposed ones to equal
+    ones, as from the near side of a ball to the far side. Newton's method may come to either.
+    Returns status, parameters, how they face each other (`FACING`), the points' signed distance.
+    """
+    pair = tracked_at(start, k)
+    fields = row_at(table, row)
+    contact = contact_row_at(table, row)
+    contact_record = contact_record_at(records, k)
+    i = fields.body_f
+    j = fields.body_g
+    turn = rotation(q, i)
+    relative, shift = relative_pose(q, i, turn, j, rotation(q, j))
+    f, g = contact.surface_f, contact.surface_g
+    x = (start[k, 0], start[k, 1], start[k, 2], start[k, 3])
+    found = solve_pair(table, pool, f, g, relative, shift, x, 1.0, patience, CLOSE, False)
+    status, frame, x = found.status, found.frame, found.parameters
+    apart = sub(frame.point_g, frame.point_f)
+    distance = math.sqrt(dot(apart, apart))
+    facing = pair.facing
+    if status == CONVERGED or status == SINGULAR:
+        facing = facing_of(table, pool, g, relative, frame, x)
+        if facing * pair.facing < 0.0:
+            return OTHER_SIDE, x, pair.facing, distance
+        store_record(turn, shift, frame, found.matrix, records, k)
+        # Relative curvature -H (I + beta A)^-1: indefinite means the surfaces cross beside the point.
+        h = found.matrix.h
+        det = h[0] * h[3] - h[1] * h[2]
+        norm2 = h[0] * h[0] + h[1] * h[1] + h[2] * h[2] + h[3] * h[3]
+        proper = 1.0 if det > -1e-9 * norm2 and h[0] + h[3] <= 0.0 else 0.0
+        contact_record.proper = CONFORMING if norm2 <= 1e-18 else proper
+        contact_record.fold = det / norm2 if norm2 > 1e-18 else 0.0
+    return status, x, facing, distance if frame.gap > 0.0 else -distance
+
+
+@kernel(inner=True)
+def start_row(table, pool, row, q, tracked, r):
+    """The pair of the surfaces of a row wherever it is, into tracked[r]. A status."""
+    contact = contact_row_at(table, row)
+    fields = row_at(table, row)
+    f, g = contact.surface_f, contact.surface_g
+    return call_address(
+        header_at(table, 0).start_address, (table, pool, f, g, fields.body_f, fields.body_g, q, tracked, r)
+    )
+
+
+@kernel(inner=True)
+def restart_contact(table, pool, row, q, tracked, records, k):
+    """As `track_contact`, from a global start, without the distance; tracked[k] is written meanwhile."""
+    was = (tracked[k, 0], tracked[k, 1], tracked[k, 2], tracked[k, 3])
+    status = start_row(table, pool, row, q, tracked, k)
+    x = (tracked[k, 0], tracked[k, 1], tracked[k, 2], tracked[k, 3])
+    facing = tracked_at(tracked, k).facing
+    if status == CONVERGED or status == SINGULAR:
+        status, x, facing, _distance = track_contact(table, pool, row, q, tracked, math.inf, records, k)
+    tracked[k, 0], tracked[k, 1], tracked[k, 2], tracked[k, 3] = was
+    return status, was if status == OTHER_SIDE else x, facing
+
+
+@kernel(inner=True)
+def search_row(table, pool, row, q, tracked, r, crossing):
+    """The closest features of the solids of a row wherever they are, into tracked[r]. Whether there are any.
+
+    Solids that are in each other have some if `crossing`, which takes a thousand times as long.
+    """
+    header = header_at(table, 0)
+    contact = contact_row_at(table, row)
+    fields = row_at(table, row)
+    shell_f = contact.shell_f
+    shell_g = contact.shell_g
+    i = fields.body_f
+    j = fields.body_g
+    nearest = header.nearest_address
+    deepest = header.deepest_address if crossing else 0
+    found = call_address(header.search_address, (table, pool, shell_f, shell_g, i, j, q, nearest, deepest, tracked, r))
+    return found == 1
+
+
+@kernel(inner=True)
+def track_row(table, pool, row, q, start, patience, records, tracked, r):
+    """The features of the solids of a row from start[r] on, into tracked[r] and record r. A status."""
+    contact = contact_row_at(table, row)
+    fields = row_at(table, row)
+    shell_f = contact.shell_f
+    shell_g = contact.shell_g
+    i = fields.body_f
+    j = fields.body_g
+    return call_address(
+        header_at(table, 0).track_address,
+        (table, pool, shell_f, shell_g, i, j, q, start, patience, records, tracked, r),
+    )
+
+
+@kernel(inline=True)
+def is_guard(table, r):
+    """Whether row r is a clearance's."""
+    header = header_at(table, 0)
+    return header.first_guard <= r < header.first_guard + header.guards
+
+
+@kernel(inline=True)
+def least_gap(table, pool, r, tracked):
+    """The least gap of row r, less by what the bodies were in each other where the solve began and still touched."""
+    return pool[contact_row_at(table, header_at(table, 0).row_table + ROW * r).minimum] - tracked_at(tracked, r).allowed
+
+
+@kernel(inline=True)
+def is_of_solids(table, r):
+    """Whether row r is a contact of solids, or has no contact."""
+    return contact_row_at(table, header_at(table, 0).row_table + ROW * r).shell_f >= 0
+
+
+@kernel(inline=True)
+def may_go(table, r, residual):
+    """Whether row r is a clearance's of solids that are hardly in each other: there, its pair may end."""
+    return is_guard(table, r) and is_of_solids(table, r) and residual[r] > -HARDLY
+
+
+@kernel(inner=True)
+def hold_all(table, tracked):
+    """No contact may be given up any more."""
+    header = header_at(table, 0)
+    for r in range(header.first_guard, header.first_guard + header.guards):
+        pair = tracked_at(tracked, r)
+        if pair.stays <= MAY_GO:
+            pair.stays = MAY_GO - pair.stays
+
+
+@kernel(inline=True)
+def copy_tracked(start, r, tracked):
+    """All that is tracked of a row, also what its kind has no use for: nothing is to depend on what was in memory."""
+    for i in range(TRACK):
+        tracked[r, i] = start[r, i]
+
+
+@kernel(inline=True)
+def idle_row(r, gap, point):
+    """A row that is open by `gap`."""
+    records = point.records
+    contact = contact_record_at(records, r)
+    derivatives_at(records, r).gap = gap
+    contact.proper = 1.0
+    contact.fold = 1.0
+    point.residual[r] = gap
+
+
+@kernel(inner=True)
+def lost_guard(table, pool, r, start, point, past, goes):
+    """Row r of a clearance whose pair was lost: idle, if its gap would be open, or it is a corner `past` its face.
+
+    Solids need only touch. Or if it `goes`, though it is not open: one that ends where bodies are in each other would
+    hold every step. One that is lost already stays as it is. What the neighborhood holds now is for the next look to
+    find.
+    """
+    row = header_at(table, 0).row_table + ROW * r
+    least = least_gap(table, pool, r, start)
+    gap = tracked_at(start, r).gap - least
+    if past:
+        gap = max(gap, 0.0)
+    elif (
+        not gap > (-TOUCHING if contact_row_at(table, row).shell_f >= 0 else 0.0)
+        and not goes
+        and not math.isnan(start[r, 0])
+    ):
+        return False
+    idle_row(r, gap, point)
+    tracked_at(point.tracked, r).gap = gap + least
+    # Nothing moves it: its pair is not known.
+    for i in range(RATES, RECORD):
+        point.records[r, i] = 0.0
+    for i in range(FREE_COLUMN):
+        point.jacobian[r, i] = 0.0
+    point.tracked[r, 0] = math.nan
+    return True
+
+
+@kernel(inline=True)
+def write_gap_row(table, pool, r, point):
+    """Row r, of contact r, from its record: the gap less the least one, and its gradient over the twists."""
+    tracked, records, residual, jacobian = point.tracked, point.records, point.residual, point.jacobian
+    derivatives = derivatives_at(records, r)
+    residual[r] = derivatives.gap - least_gap(table, pool, r, tracked)
+    gradient_row(records, r, jacobian, r)
+    # A pair that follows the bodies has no unknowns of its own.
+    for i in range(4):
+        jacobian[r, FREE_COLUMN + i] = 0.0
+    tracked_at(tracked, r).gap = derivatives.gap
+
+
+@kernel(inner=True)
+def solids_row(table, pool, r, start, patience, point):
+    """Row r, of a contact of solids. Returns whether its pair was found.
+
+    Where the pair that is tracked is lost, or an edge is farthest there, the closest one there is takes over, if the
+    row is one-sided or a step may end anywhere: the loop shortens steps as long as it can. A clearance has a watch for
+    that.
+    """
+    pair = tracked_at(start, r)
+    q, tracked, records = point.q, point.tracked, point.records
+    row = header_at(table, 0).row_table + ROW * r
+    goes = pair.stays <= MAY_GO
+    if goes:
+        pair.stays = MAY_GO - pair.stays
+        tracked_at(tracked, r).stays = pair.stays
+    status = track_row(table, pool, row, q, start, patience, records, tracked, r)
+    found = (status == CONVERGED or status == SINGULAR) and (
+        contact_record_at(records, r).proper != 0.0 or is_guard(table, r)
+    )
+    if not found:
+        if is_guard(table, r):
+            past = pair.stays > 0.0 and status == LEFT_PATCH
+            return lost_guard(table, pool, r, start, point, past, goes)
+        # Near touching a search takes long, and steps are short.
+        far = abs(pair.gap) > HARDLY
+        if not (far or row_at(table, row).one_sided == 1 or patience == math.inf):
+            return False
+        # Where an edge is farthest, solids may be deep in each other: a step that leads there is too long.
+        lost = status != CONVERGED and status != SINGULAR
+        if not search_row(table, pool, row, q, tracked, r, lost or patience == math.inf):
+            return False
+        status = track_row(table, pool, row, q, tracked, math.inf, records, tracked, r)
+        if status != CONVERGED and status != SINGULAR:
+            return False
+    write_gap_row(table, pool, r, point)
+    return True
+
+
+@kernel(inner=True)
+def row_of_pair(table, pool, r, start, patience, point):
+    """Row r, of contact r, by its pair. Returns whether it was found.
+
+    A contact is carried from `start` to its extremal pair, by steps that turn no normal by more than `patience`. A
+    one-sided row that loses its pair takes the nearest one there is, and so does any whose bodies may stand anywhere by
+    now, if what is found from the pair before is on another side of a body.
+    """
+    q, tracked, records = point.q, point.tracked, point.records
+    derivatives = derivatives_at(records, r)
+    contact = contact_record_at(records, r)
+    row = header_at(table, 0).row_table + ROW * r
+    if contact_row_at(table, row).shell_f >= 0:
+        return solids_row(table, pool, r, start, patience, point)
+    status, x, facing, distance = track_contact(table, pool, row, q, start, patience, records, r)
+    if status != CONVERGED and status != SINGULAR:
+        anywhere = status == OTHER_SIDE and patience == math.inf
+        if row_at(table, row).one_sided == 0 and not anywhere:
+            return False
+        if is_guard(table, r):
+            return lost_guard(table, pool, r, start, point, False, False)
+        # A one-sided contact is of the nearest pair, whichever that is now.
+        held = status == LEFT_PATCH and distance > 0.0
+        status, x, facing = restart_contact(table, pool, row, q, tracked, records, r)
+        if status != CONVERGED and status != SINGULAR:
+            if not held:
+                return False
+            for i in range(CONTACT_RECORD):
+                records[r, i] = 0.0
+            derivatives.gap = distance
+            contact.proper = 1.0
+            contact.fold = 1.0
+        elif not (derivatives.gap > 0.0 or anywhere):
+            return False
+    write_gap_row(table, pool, r, point)
+    tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3] = x
+    tracked_at(tracked, r).facing = facing
+    return True
+
+
+@kernel(inline=True)
+def contact_row(table, pool, r, start, patience, point):
+    """Row r, of contact r, from `start` on. Returns whether its pair was found, or need not be.
+
+    A row of a clearance that stays open is as `solve/loop/predict.py` left it.
+    """
+    pair = tracked_at(start, r)
+    tracked, records, residual = point.tracked, point.records, point.residual
+    contact_record = contact_record_at(records, r)
+    row = header_at(table, 0).row_table + ROW * r
+    contact = contact_row_at(table, row)
+    copy_tracked(start, r, tracked)
+    if row_at(table, row).body_f < 0:
+        idle_row(r, 1.0, point)
+        return True
+    if pair.idle == 1.0:
+        tracked_at(tracked, r).idle = 0.0
+        residual[r] = pair.gap - least_gap(table, pool, r, start)
+        return True
+    if not row_of_pair(table, pool, r, start, patience, point):
+        return False
+    tracks = not math.isnan(tracked[r, 0])
+    # Features of solids switch as they move: their rows are followed.
+    open_far = is_guard(table, r) and contact.shell_f < 0 and residual[r] > FAR
+    contact_record.slack = 0.0
+    if tracks and open_far:
+        # How far they may go is behind the least gap.
+        contact_record.slack = min(UNSEEN * residual[r], ASTRAY * pool[contact.minimum + 1])
+    return True
+
+
+@kernel(
+    signatures=("(i8[::1], f8[::1], f8[:, ::1], f8, i8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1])"),
+)
+def contact_rows(table, pool, start, patience, free, q, tracked, records, residual, jacobian):
+    """All rows of contacts but those of free pairs, and their gradients. Returns one whose pair was lost, or -1."""
+    point = Iterate(q, tracked, records, residual, jacobian)
+    for r in range(header_at(table, 0).contacts):
+        if free[r] < 0 and not contact_row(table, pool, r, start, patience, point):
+            return r
+    return -1

@@ -1,0 +1,108 @@
+"""The rows of a packed scene evaluated, with their first derivatives; `constraints/program/records.py` says what stands
+where.
+
+A row of a joint is c_1 coordinate_1 + c_2 coordinate_2 - value (`constraints/program/primitives.py`), a row of a trim
+the signed distance
+of a contact to a loop (`proximity/features/trim_distance.py`); rows of a tape are the values of a user's expression
+(`geometry/expression/tape.py`).
+Rows of contacts are in `constraints/program/contact.py`, second derivatives in `row_terms.py`.
+"""
+
+from __future__ import annotations
+
+from assembly._address import call_address
+from assembly._kernel import kernel
+from assembly.constraints.program.contact import copy_tracked
+from assembly.constraints.program.primitives import coordinate, place_frames, write_gradient
+from assembly.constraints.program.records import (
+    COORDINATE,
+    EXTRA_COLUMN,
+    JOINT_RECORD,
+    JOINT_ROW,
+    ROW,
+    TAPE_RECORD,
+    coordinate_at,
+    header_at,
+    joint_at,
+    joint_row_at,
+    row_at,
+)
+from assembly.constraints.program.tapes import tape_rows
+
+
+@kernel(inner=True)
+def coordinate_row(pool, kind, component, k, angle, factor, start, tracked, records, jacobian, r, column):
+    """Factor times a coordinate, its gradient into row r from `column` on; its angle is tracked."""
+    near = start[angle, 0] if angle >= 0 else 0.0
+    found = coordinate(kind, component, records, k, near)
+    if angle >= 0:
+        tracked[angle, 0] = found.value
+    write_gradient(found.n, found.arm_f, found.arm_g, found.h, factor, jacobian, r, column)
+    return factor * found.value
+
+
+@kernel(inner=True)
+def joint_row(table, pool, r, start, tracked, records, residual, jacobian):
+    """Row r, of a joint."""
+    header = header_at(table, 0)
+    row = header.row_table + ROW * r
+    joint = joint_row_at(table, row)
+    o = joint.parameters
+    pairs = header.contacts
+    second = joint.second
+    value = -pool[o + 2]
+    for part in range(1 if second < 0 else 2):
+        asked = coordinate_at(table, row + COORDINATE if part == 0 else second)
+        value += coordinate_row(
+            pool,
+            asked.kind,
+            asked.component,
+            pairs + asked.joint,
+            asked.angle,
+            pool[o + part],
+            start,
+            tracked,
+            records,
+            jacobian,
+            r,
+            0 if part == 0 else EXTRA_COLUMN,
+        )
+    residual[r] = value
+
+
+@kernel(inner=True)
+def evaluate(table, pool, start, patience, loose, room, point):
+    """Evaluate all rows at the point's poses. Returns the contact whose pair was lost, or -1.
+
+    `start` are the tracked values to begin from. Of `point`, an `Iterate`, all but the poses is written. `loose` are
+    `LiftedPairs`.
+    """
+    header = header_at(table, 0)
+    q, tracked, records, residual, jacobian = point.q, point.tracked, point.records, point.residual, point.jacobian
+    pairs = header.contacts
+    free = loose.free
+    for r in range(pairs):
+        if free[r] >= 0:
+            one = (table, pool, r, start, free, loose.lengths, loose.vectors, q, tracked, records, residual, jacobian)
+            call_address(header.free_row_address, one)
+    if pairs > 0:
+        others = (table, pool, start, patience, free, q, tracked, records, residual, jacobian)
+        lost = call_address(header.contact_rows_address, others)
+        if lost >= 0:
+            return lost
+    if header.trims > 0:
+        call_address(
+            header.trim_rows_address, (table, pool, free, loose.lengths, q, tracked, records, residual, jacobian)
+        )
+    for k in range(pairs, header.tracked):
+        # Of an angle that no row has, only an input of a dexterity, this is all that is known.
+        copy_tracked(start, k, tracked)
+    for k in range(header.joints):
+        joint = joint_at(table, header.joint_table + JOINT_RECORD * k)
+        place_frames(pool, joint.frames, q, joint.body_f, joint.body_g, records, pairs + k)
+    for r in range(pairs, header.rows):
+        if row_at(table, header.row_table + ROW * r).kind == JOINT_ROW:
+            joint_row(table, pool, r, start, tracked, records, residual, jacobian)
+    for t in range(header.tapes):
+        tape_rows(table, pool, header.tape_table + TAPE_RECORD * t, q, room, residual, jacobian)
+    return -1

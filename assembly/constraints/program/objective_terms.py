@@ -1,0 +1,210 @@
+"""The terms of an objective: values, gradients and Hessians in twists.
+
+point distance   weight |p - target|^2
+posture          weight |x - x0|^2 + lever 4 sin^2(angle / 2), from a pose (x0, e0)
+tape             weight times a user's expression
+"""
+
+from __future__ import annotations
+
+import math
+
+from assembly._address import call_address
+from assembly._kernel import kernel
+from assembly._record import place_of, record_dtype, record_view, size_of
+from assembly.constraints.program.envelope import clear_upper
+from assembly.constraints.program.hessian_blocks import block_row, is_blocked, spot
+from assembly.constraints.program.records import header_at, pool_header_at, tape_at
+from assembly.constraints.program.tapes import place_tape
+from assembly.geometry.vec import add, cross, dot, matvec, quaternion_product, sub
+from assembly.kinematics.motion import position, rotation
+
+# A term.
+TERM_RECORD = record_dtype(
+    "i8",
+    kind=1,  # POINT_DISTANCE, ...
+    body=1,  # -1: none
+    parameters=1,  # where these are in the pool
+    tape=1,  # where the record of its tape is, or of its dexterity
+    follows=1,  # 1: a posture whose reference is the start of each solve
+    spare=3,
+)
+term_at = record_view(TERM_RECORD)
+TERM = size_of(TERM_RECORD)
+POINT_DISTANCE, POSTURE, TAPE_TERM, DEXTERITY = 0, 1, 2, 3
+# Parameters of a point distance.
+POINT_DISTANCE_FIELDS = record_dtype(
+    "f8",
+    weight=1,
+    point=3,  # in the axes of its body
+    target=3,
+)
+point_distance_at = record_view(POINT_DISTANCE_FIELDS)
+# Parameters of a posture.
+POSTURE_FIELDS = record_dtype(
+    "f8",
+    weight=1,  # of the square of the distance
+    position=3,  # of the reference
+    quaternion=4,  # of the reference
+    lever=1,  # of 4 sin^2(angle / 2)
+)
+posture_at = record_view(POSTURE_FIELDS)
+POSTURE_QUATERNION = place_of(POSTURE_FIELDS, "quaternion")
+POSTURE_PARAMETERS = size_of(POSTURE_FIELDS)
+
+
+@kernel(inline=True)
+def load(array, o):
+    return (array[o], array[o + 1], array[o + 2])
+
+
+@kernel(inner=True)
+def point_distance(pool, o, q, body, s, order, gradient, hessian):
+    """Value of weight |p - target|^2; from order 1 on its derivatives are added at s, the place of the body's twist."""
+    term = point_distance_at(pool, o)
+    weight = term.weight
+    p = matvec(rotation(q, body), (term.point[0], term.point[1], term.point[2]))
+    e = add(sub(position(q, body), (term.target[0], term.target[1], term.target[2])), p)
+    value = weight * dot(e, e)
+    if s < 0 or order == 0:
+        return value
+    turn = cross(p, e)
+    for k in range(3):
+        gradient[s + k] += 2.0 * weight * e[k]
+        gradient[s + 3 + k] += 2.0 * weight * turn[k]
+    pp = dot(p, p) - dot(e, p)
+    for k in range(3):
+        hessian[s + k, s + k] += 2.0 * weight
+        hessian[s + 3 + k, s + 3 + k] += 2.0 * weight * pp
+        i = (k + 1) % 3
+        j = (k + 2) % 3
+        # d(turn)/dx = [p]x: -p_j at (k, i), +p_i at (k, j).
+        hessian[s + i, s + 3 + k] -= 2.0 * weight * p[j]
+        hessian[s + j, s + 3 + k] += 2.0 * weight * p[i]
+        for l in range(k, 3):
+            hessian[s + 3 + k, s + 3 + l] += weight * (p[k] * e[l] + e[k] * p[l] - 2.0 * p[k] * p[l])
+    return value
+
+
+@kernel(inner=True)
+def posture(pool, o, q, body, s, order, gradient, hessian):
+    """|x - x0|^2 and 4 sin^2(angle / 2), with c and u the scalar and vector part of e0 e^*."""
+    term = posture_at(pool, o)
+    weight, lever = term.weight, term.lever
+    turn = term.quaternion
+    d = sub(position(q, body), (term.position[0], term.position[1], term.position[2]))
+    c, ux, uy, uz = quaternion_product(
+        (turn[0], turn[1], turn[2], turn[3]), (q[body, 3], -q[body, 4], -q[body, 5], -q[body, 6])
+    )
+    u = (ux, uy, uz)
+    value = weight * dot(d, d) + 4.0 * lever * dot(u, u)
+    if s < 0 or order == 0:
+        return value
+    for k in range(3):
+        gradient[s + k] += 2.0 * weight * d[k]
+        gradient[s + 3 + k] -= 4.0 * lever * c * u[k]
+    for k in range(3):
+        hessian[s + k, s + k] += 2.0 * weight
+        hessian[s + 3 + k, s + 3 + k] += 2.0 * lever * c * c
+        for l in range(k, 3):
+            hessian[s + 3 + k, s + 3 + l] -= 2.0 * lever * u[k] * u[l]
+    return value
+
+
+@kernel(inner=True)
+def tape_term(table, pool, term, q, order, room, entries, gradient, hessian):
+    """Weight times the one value of a tape."""
+    header = header_at(table, 0)
+    term_record = term_at(table, term)
+    inputs, outputs, work = room
+    weight = pool[term_record.parameters]
+    size = pool_header_at(pool, 0).scale
+    # A term's tape has the record of a row's tape, one value.
+    tape = term_record.tape
+    expression = tape_at(table, tape)
+    end = place_tape(table, pool, tape, q, inputs)
+    call_address(header.run_tape_address, (table, pool, expression.first_order, inputs, work, outputs))
+    value = weight * outputs[0]
+    count = expression.bodies
+    bodies = expression.body_list
+    if order == 0 or not math.isfinite(value):
+        return value if math.isfinite(value) else math.inf
+    for b in range(count):
+        s = 6 * table[header.slots + table[bodies + b]]
+        if s >= 0:
+            for i in range(3):
+                gradient[s + i] += weight * size * outputs[1 + 6 * b + i]
+                gradient[s + 3 + i] += weight * outputs[4 + 6 * b + i]
+    inputs[end] = weight
+    call_address(header.run_tape_address, (table, pool, expression.second_order, inputs, work, outputs))
+    for b in range(count):
+        at = 6 * table[header.slots + table[bodies + b]]
+        for c in range(count):
+            other = 6 * table[header.slots + table[bodies + c]]
+            if at < 0 or other < at:
+                continue
+            row, column = spot(entries, at, other)
+            for i in range(6):
+                for j in range(6):
+                    factor = (size if i < 3 else 1.0) * (size if j < 3 else 1.0)
+                    hessian[row + i, column + j] += factor * outputs[6 * count * (6 * b + i) + 6 * c + j]
+    return value
+
+
+@kernel(inner=True)
+def term_by_blocks(pool, o, kind, q, body, s, entries, gradient, hessian):
+    """A term of one body with its derivatives, for a Hessian by blocks."""
+    if s < 0:
+        slope, block, order = gradient[:0], hessian[:0], 0
+    else:
+        at = block_row(entries.blocks, s, s)
+        slope, block, order = gradient[s : s + 6], hessian[at : at + 6], 1
+    if kind == POINT_DISTANCE:
+        return point_distance(pool, o, q, body, 0, order, slope, block)
+    return posture(pool, o, q, body, 0, order, slope, block)
+
+
+@kernel(inner=True)
+def recenter(table, pool, q):
+    """Postures that have no reference of their own from where their bodies are now."""
+    header = header_at(table, 0)
+    for t in range(header.terms):
+        term = term_at(table, header.term_table + TERM * t)
+        if term.kind == POSTURE and term.follows == 1:
+            reference = posture_at(pool, term.parameters)
+            for k in range(3):
+                reference.position[k] = q[term.body, k]
+            for k in range(4):
+                reference.quaternion[k] = q[term.body, 3 + k]
+
+
+@kernel(inner=True)
+def objective(table, pool, q, order, room, entries, gradient, hessian):
+    """Value of the objective. From order 1 on the gradient and the upper triangle of the Hessian are overwritten.
+
+    `entries` says where the Hessian has any (`constraints/program/envelope.py`).
+    """
+    header = header_at(table, 0)
+    if order > 0:
+        for i in range(gradient.size):
+            gradient[i] = 0.0
+        clear_upper(entries, gradient.size, hessian)
+    blocked = order > 0 and is_blocked(entries)
+    value = 0.0
+    for t in range(header.terms):
+        term = header.term_table + TERM * t
+        term_record = term_at(table, term)
+        kind = term_record.kind
+        body = term_record.body
+        if blocked and (kind == POINT_DISTANCE or kind == POSTURE):
+            s = 6 * table[header.slots + body]
+            value += term_by_blocks(pool, term_record.parameters, kind, q, body, s, entries, gradient, hessian)
+        elif kind == POINT_DISTANCE:
+            s = 6 * table[header.slots + body]
+            value += point_distance(pool, term_record.parameters, q, body, s, order, gradient, hessian)
+        elif kind == POSTURE:
+            s = 6 * table[header.slots + body]
+            value += posture(pool, term_record.parameters, q, body, s, order, gradient, hessian)
+        elif kind == TAPE_TERM:
+            value += tape_term(table, pool, term, q, order, room, entries, gradient, hessian)
+    return value

@@ -1,0 +1,260 @@
+"""Where everything stands in a packed scene: the one table of integers and the one pool of doubles.
+
+All lengths in a program are divided by the scene's length scale. Table: a header, the slot of every body (-1: fixed),
+then a record a row (contacts first, then trims), a joint, a tape and an objective term. The loop works on iterates
+(`Iterate`), of
+
+    q              (n, 7)       poses, scaled, positions relative to a reference
+    tracked        (k, 12)      of every contact parameters, features, normal and gap of its pair
+                                (`proximity/features/solid_contact.py`), then (first column) unwrapped angles of joints
+    records        (k + j, R)   what the derivatives of gaps need (see `track_contact`), then frames of joints, then
+                                one of trims that are vectors
+    residual       (m,)         rows: contacts, trims, joints, tapes; behind them four for every free pair
+    jacobian       (m, 16 + e)  in the twists of a row's two bodies (12), a free pair's coordinates (4), further bodies
+"""
+
+from __future__ import annotations
+
+from collections import namedtuple
+
+from assembly._record import place_of, record_dtype, record_view, size_of
+
+# Header of the table. `x_table` says where part x begins, `x_address` where a kernel is in memory that few scenes need
+# (`_address.call_address`).
+HEADER_RECORD = record_dtype(
+    "i8",
+    bodies=1,  # how many
+    moving=1,  # bodies that are not fixed
+    contacts=1,  # rows of contacts, given ones and those of clearances; they come first
+    tracked=1,  # rows of tracked values: contacts, then angles
+    joints=1,
+    rows=1,  # constraint residuals in all
+    tapes=1,  # users' expressions that are constraints
+    terms=1,  # terms of the objective
+    extra=1,  # twists beyond two that a row of the Jacobian has place for
+    slots=1,  # where the list of the bodies' slots begins: the number among moving ones; negative: fixed
+    row_table=1,
+    joint_table=1,
+    tape_table=1,
+    term_table=1,
+    tape_room=1,  # where the sizes of the workspace of tapes are: inputs, outputs, intermediate values
+    gather_table=1,  # how scattered bodies are put together (`solve/loop/initial_guess.py`)
+    implicit=1,  # 1: the user gave no objective; it is the least move
+    dexterities=1,  # terms that are dexterities
+    trims=1,  # rows of trims, which follow those of contacts
+    vector_trims=1,  # 1: some are vectors, which take one more record
+    track_address=1,  # carries a contact of solids along
+    search_address=1,  # finds the pair of a contact of solids anywhere
+    nearest_address=1,  # the nearest features of two solids
+    deepest_address=1,  # the same of solids that are in each other; 0: not needed yet
+    trim_rows_address=1,  # rows of trims
+    trim_terms_address=1,  # their second derivatives
+    first_guard=1,  # first row of a clearance, among those of contacts; one without bodies is idle
+    guards=1,  # how many rows clearances have
+    watch=1,  # the contact manager (`proximity/manager/update.py`); -1: no clearance
+    look_address=1,  # its update
+    clock_address=1,  # tells the time [ns]; 0: nothing does
+    block_record=1,  # the layout of a large scene's Hessian (`hessian_blocks.py`); 0: it is dense
+    block_length=1,  # how long that is
+    contact_rows_address=1,  # rows of contacts
+    start_address=1,  # a global start of a contact of two surfaces
+    lengths_address=1,  # lengths of a lifted pair's coordinates
+    free_row_address=1,  # rows of a lifted pair
+    free_terms_address=1,  # their second derivatives
+    extremal_address=1,  # whether a lifted pair is extremal
+    stayed_address=1,  # whether an update left a lifted pair where it was
+    parts_address=1,  # parts of motion bounds that bodies have used
+    went_address=1,  # whether bodies went farther than a contact was open
+    run_tape_address=1,  # runs a tape
+)
+header_at = record_view(HEADER_RECORD)
+BODIES = place_of(HEADER_RECORD, "bodies")
+MOVING = place_of(HEADER_RECORD, "moving")
+CONTACTS = place_of(HEADER_RECORD, "contacts")
+TRACKED = place_of(HEADER_RECORD, "tracked")
+JOINTS = place_of(HEADER_RECORD, "joints")
+ROWS = place_of(HEADER_RECORD, "rows")
+TAPES = place_of(HEADER_RECORD, "tapes")
+TERMS = place_of(HEADER_RECORD, "terms")
+EXTRA = place_of(HEADER_RECORD, "extra")
+SLOTS = place_of(HEADER_RECORD, "slots")
+ROW_TABLE = place_of(HEADER_RECORD, "row_table")
+JOINT_TABLE = place_of(HEADER_RECORD, "joint_table")
+TAPE_TABLE = place_of(HEADER_RECORD, "tape_table")
+TERM_TABLE = place_of(HEADER_RECORD, "term_table")
+TAPE_ROOM = place_of(HEADER_RECORD, "tape_room")
+GATHER_TABLE = place_of(HEADER_RECORD, "gather_table")
+IMPLICIT = place_of(HEADER_RECORD, "implicit")
+DEXTERITIES = place_of(HEADER_RECORD, "dexterities")
+TRIMS = place_of(HEADER_RECORD, "trims")
+VECTOR_TRIMS = place_of(HEADER_RECORD, "vector_trims")
+TRACK_AT = place_of(HEADER_RECORD, "track_address")
+SEARCH_AT = place_of(HEADER_RECORD, "search_address")
+NEAREST_AT = place_of(HEADER_RECORD, "nearest_address")
+DEEPEST_AT = place_of(HEADER_RECORD, "deepest_address")
+TRIM_ROWS_AT = place_of(HEADER_RECORD, "trim_rows_address")
+TRIM_TERMS_AT = place_of(HEADER_RECORD, "trim_terms_address")
+FIRST_GUARD = place_of(HEADER_RECORD, "first_guard")
+GUARDS = place_of(HEADER_RECORD, "guards")
+WATCH = place_of(HEADER_RECORD, "watch")
+LOOK_AT = place_of(HEADER_RECORD, "look_address")
+CLOCK_AT = place_of(HEADER_RECORD, "clock_address")
+BLOCK_RECORD = place_of(HEADER_RECORD, "block_record")
+BLOCK_LENGTH = place_of(HEADER_RECORD, "block_length")
+CONTACT_ROWS_AT = place_of(HEADER_RECORD, "contact_rows_address")
+START_AT = place_of(HEADER_RECORD, "start_address")
+EXTREMAL_AT = place_of(HEADER_RECORD, "extremal_address")
+STAYED_AT = place_of(HEADER_RECORD, "stayed_address")
+PARTS_AT = place_of(HEADER_RECORD, "parts_address")
+WENT_AT = place_of(HEADER_RECORD, "went_address")
+RUN_TAPE_AT = place_of(HEADER_RECORD, "run_tape_address")
+HEADER = size_of(HEADER_RECORD)
+# A row, of any kind. Row k is that of contact k. Fields of its kind stand behind these.
+ROW = 14
+ROW_RECORD = record_dtype(
+    "i8",
+    kind=1,  # CONTACT_ROW, ...
+    body_f=1,  # -1: none
+    body_g=1,  # -1: none
+    one_sided=1,  # 1: residual >= 0
+    drive=1,  # 1: it prescribes a joint coordinate
+    is_length=1,  # 1: the residual is a length
+)
+row_at = record_view(ROW_RECORD)
+KIND = place_of(ROW_RECORD, "kind")
+BODY_F = place_of(ROW_RECORD, "body_f")
+BODY_G = place_of(ROW_RECORD, "body_g")
+ONE_SIDED = place_of(ROW_RECORD, "one_sided")
+DRIVE = place_of(ROW_RECORD, "drive")
+IS_LENGTH = place_of(ROW_RECORD, "is_length")
+CONTACT_ROW, JOINT_ROW, TAPE_ROW, TRIM_ROW = 0, 1, 2, 3
+# A row of a contact, given or a clearance's.
+CONTACT_ROW_RECORD = record_dtype(
+    "i8",
+    before=6,  # what every row has
+    surface_f=1,  # -1: of solids
+    surface_g=1,
+    shell_f=1,  # -1: of two surfaces
+    shell_g=1,
+    minimum=1,  # where the gap that counts as none is in the pool
+    guard_number=1,  # of a clearance's row: the number of the contact it has now; 0: none
+)
+contact_row_at = record_view(CONTACT_ROW_RECORD)
+SURFACE_F = place_of(CONTACT_ROW_RECORD, "surface_f")
+SURFACE_G = place_of(CONTACT_ROW_RECORD, "surface_g")
+SHELL_F = place_of(CONTACT_ROW_RECORD, "shell_f")
+SHELL_G = place_of(CONTACT_ROW_RECORD, "shell_g")
+MINIMUM = place_of(CONTACT_ROW_RECORD, "minimum")
+GUARD_NUMBER = place_of(CONTACT_ROW_RECORD, "guard_number")
+# A row of a trim.
+TRIM_ROW_RECORD = record_dtype(
+    "i8",
+    before=6,  # what every row has
+    contact=1,  # whose coordinates are kept
+    side=1,  # 0: on the face of f, 1: of g
+    loop=1,
+    factor=1,  # where the factor of the residual is in the pool
+    form=1,  # SIGNED, ...
+    count=1,  # rows that the trim has; its first one says
+    edges=1,  # records of the loop's curves as edges
+    is_length=1,  # 1: a vector counts by its signed length
+)
+trim_row_at = record_view(TRIM_ROW_RECORD)
+TRIM_PAIR = place_of(TRIM_ROW_RECORD, "contact")
+TRIM_LENGTH = place_of(TRIM_ROW_RECORD, "is_length")
+# Forms of trims (`trim.py`).
+SIGNED, PARAMETRIC, CARTESIAN, BETWEEN = 0, 1, 2, 3
+# A row of a joint: factor * coordinate + factor' * second coordinate - value.
+JOINT_ROW_RECORD = record_dtype(
+    "i8",
+    before=6,  # what every row has
+    coordinate=1,  # from here on a `COORDINATE_RECORD`: kind
+    component=1,
+    joint=1,
+    angle=1,
+    parameters=1,  # where the two factors and the value are in the pool
+    second=1,  # where the record of a second coordinate is, which has bodies of its own; -1: none
+)
+joint_row_at = record_view(JOINT_ROW_RECORD)
+COORDINATE = place_of(JOINT_ROW_RECORD, "coordinate")
+# A coordinate of a joint.
+COORDINATE_RECORD = record_dtype(
+    "i8",
+    kind=1,  # `primitives.py`
+    component=1,
+    joint=1,  # the joint that has its frames
+    angle=1,  # row of tracked values where its angle is unwrapped; -1: it is none
+)
+coordinate_at = record_view(COORDINATE_RECORD)
+# A coordinate with bodies of its own: the second one of a row, an input of a dexterity.
+BODY_COORDINATE = record_dtype(
+    "i8",
+    kind=1,  # these four as in `COORDINATE_RECORD`
+    component=1,
+    joint=1,
+    angle=1,
+    body_f=1,
+    body_g=1,
+)
+body_coordinate_at = record_view(BODY_COORDINATE)
+# A row of a tape.
+TAPE_ROW_RECORD = record_dtype(
+    "i8",
+    before=6,  # what every row has
+    tape=1,
+    value=1,  # which of the tape's values
+)
+tape_row_at = record_view(TAPE_ROW_RECORD)
+# A joint.
+JOINT_FIELDS = record_dtype(
+    "i8",
+    body_f=1,
+    body_g=1,
+    frames=1,  # where its two frames are in the pool
+)
+joint_at = record_view(JOINT_FIELDS)
+JOINT_RECORD = size_of(JOINT_FIELDS)
+# A tape: a user's expression, or several that are constraints together.
+TAPE_FIELDS = record_dtype(
+    "i8",
+    first_order=1,  # instructions for values and Jacobian
+    second_order=1,  # instructions for the Hessian
+    values=1,  # how many
+    bodies=1,  # how many
+    body_list=1,  # where they are listed
+    first_row=1,
+    unit=1,  # where the size of one unit is in the pool
+    spare=1,
+)
+tape_at = record_view(TAPE_FIELDS)
+TAPE_RECORD = size_of(TAPE_FIELDS)
+# Columns of the Jacobian: twists of f and g, a lifted pair's coordinates, further bodies.
+FREE_COLUMN, EXTRA_COLUMN = 12, 16
+# Header of the pool.
+POOL_HEADER_RECORD = record_dtype(
+    "f8",
+    scale=1,  # length that scaled lengths are parts of [length]
+    reference=3,  # point that scaled positions are relative to [length]
+    unit=1,  # what the objective's scaled value of one counts [its unit]
+    zero=1,  # always zero: a least gap that is none
+    spare=2,
+)
+pool_header_at = record_view(POOL_HEADER_RECORD)
+SCALE = place_of(POOL_HEADER_RECORD, "scale")
+REFERENCE = place_of(POOL_HEADER_RECORD, "reference")
+UNIT = place_of(POOL_HEADER_RECORD, "unit")
+ZERO = place_of(POOL_HEADER_RECORD, "zero")
+POOL_HEADER = size_of(POOL_HEADER_RECORD)
+# Figures that a solve leaves in its state, behind poses, tracked values, multipliers and residuals.
+RESULTS = 12
+
+# A point of the loop: the current iterate or a trial one. See the heading.
+Iterate = namedtuple("Iterate", "q tracked records residual jacobian")
+# What contacts work in. `free` has for every contact its number among lifted pairs (-1: it is none), `lengths` those
+# of its coordinates; `vectors` and `variables` are room for its derivatives; `guess` are tracked values that a step
+# expects, `memory` is what the contact manager remembers.
+LiftedPairs = namedtuple("LiftedPairs", "free lengths vectors variables guess memory")
+# What the instructions of tapes work in.
+TapeRoom = namedtuple("TapeRoom", "inputs outputs work")
+# Where the Hessian of the Lagrangian and its factor have entries (`envelope.py`).
+Sparsity = namedtuple("Sparsity", "places folds scratch blocks")

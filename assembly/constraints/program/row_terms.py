@@ -1,0 +1,155 @@
+"""What rows add to a Hessian: second derivative of y . rows, weighted squares of their gradients; dense, or by blocks.
+
+Whose columns a row has is in `bases` (`solve/loop/residuals.py`), the blocks of large scenes in
+`constraints/program/hessian_blocks.py`. A free pair
+(`proximity/extrema/lifted_pair.py`) brings unknowns of its own and four rows of tangency.
+"""
+
+from __future__ import annotations
+
+from assembly._address import call_address
+from assembly._kernel import kernel
+from assembly.constraints.program.hessian_blocks import add_patch, block_row, clear_patch, is_blocked
+from assembly.constraints.program.primitives import add_coordinate_hessian
+from assembly.constraints.program.records import (
+    COORDINATE,
+    EXTRA_COLUMN,
+    FREE_COLUMN,
+    JOINT_ROW,
+    ROW,
+    TAPE_RECORD,
+    coordinate_at,
+    header_at,
+    joint_row_at,
+    row_at,
+    tape_at,
+)
+from assembly.constraints.program.tapes import add_tape_hessian
+from assembly.proximity.extrema.rates import add_gap_terms
+
+
+@kernel(inline=True)
+def block_at(b):
+    """First column and width of block b of a row: twists of f and g, coordinates of a free pair, further twists."""
+    if b < 2:
+        return 6 * b, 6
+    return (FREE_COLUMN, EXTRA_COLUMN - FREE_COLUMN) if b == 2 else (EXTRA_COLUMN + 6 * (b - 3), 6)
+
+
+@kernel(inner=True)
+def add_gram(bases, jacobian, r, weight, hessian):
+    """Upper triangle of hessian += weight J_r^T J_r, for row r of two bodies and more."""
+    for b in range(bases.shape[1]):
+        at = bases[r, b]
+        if at < 0:
+            continue
+        column, width = block_at(b)
+        for c in range(bases.shape[1]):
+            other = bases[r, c]
+            if other < at:
+                continue
+            across, breadth = block_at(c)
+            for i in range(width):
+                s = weight * jacobian[r, column + i]
+                if s != 0.0:
+                    for j in range(breadth):
+                        hessian[at + i, other + j] += s * jacobian[r, across + j]
+
+
+@kernel(inner=True)
+def add_gram_blocks(blocks, bases, jacobian, r, weight, hessian):
+    """As `add_gram`, for a Hessian by blocks; no pair has unknowns of its own."""
+    for b in range(bases.shape[1]):
+        at = bases[r, b]
+        if at < 0:
+            continue
+        column, _width = block_at(b)
+        for c in range(bases.shape[1]):
+            other = bases[r, c]
+            if other < at:
+                continue
+            across, _breadth = block_at(c)
+            row = block_row(blocks, at, other)
+            for i in range(6):
+                s = weight * jacobian[r, column + i]
+                for j in range(6):
+                    hessian[row + i, j] += s * jacobian[r, across + j]
+
+
+@kernel(inline=True)
+def add_square(order, bases, jacobian, r, weight, hessian):
+    """Upper triangle of hessian += weight J_r^T J_r, however it is kept."""
+    if is_blocked(order):
+        add_gram_blocks(order.blocks, bases, jacobian, r, weight, hessian)
+    else:
+        add_gram(bases, jacobian, r, weight, hessian)
+
+
+@kernel(inner=True)
+def add_coordinate_blocks(kind, component, records, k, y, order, hessian, f, g):
+    """As `add_coordinate_hessian`, for a Hessian by blocks."""
+    at_f, at_g = clear_patch(order, f, g)
+    add_coordinate_hessian(kind, component, records, k, y, order.scratch[1:], at_f, at_g)
+    add_patch(order, f, g, hessian)
+
+
+@kernel(inner=True)
+def add_row_terms(table, pool, loose, room, shape, point, y, weights, hessian):
+    """Upper triangle of hessian += second derivative of y . rows + J^T diag(weights) J.
+
+    The rows of tangency of a free pair go with its row.
+    """
+    header = header_at(table, 0)
+    q, tracked, records, jacobian = point.q, point.tracked, point.records, point.jacobian
+    bases, order = shape.bases, shape.sparsity
+    blocked = is_blocked(order)
+    pairs = header.contacts
+    free, lengths, vectors, block = loose.free, loose.lengths, loose.vectors, loose.variables
+    for r in range(pairs):
+        if free[r] >= 0:
+            call_address(
+                header.free_terms_address,
+                (table, pool, r, free, lengths, vectors, block, q, tracked, jacobian, y, weights, hessian),
+            )
+        elif blocked and (y[r] != 0.0 or weights[r] != 0.0):
+            f, g = clear_patch(order, bases[r, 0], bases[r, 1])
+            add_gap_terms(records, r, jacobian, r, y[r], weights[r], order.scratch[1:], f, g)
+            add_patch(order, bases[r, 0], bases[r, 1], hessian)
+        elif y[r] != 0.0 or weights[r] != 0.0:
+            add_gap_terms(records, r, jacobian, r, y[r], weights[r], hessian, bases[r, 0], bases[r, 1])
+    for r in range(pairs, pairs + header.trims):
+        if weights[r] != 0.0:
+            add_gram(bases, jacobian, r, weights[r], hessian)
+        if y[r] != 0.0:
+            call_address(
+                header.trim_terms_address,
+                (table, pool, r, free, lengths, bases, tracked, records, jacobian, y[r], hessian),
+            )
+    for r in range(pairs + header.trims, header.rows):
+        if weights[r] != 0.0 and blocked:
+            add_gram_blocks(order.blocks, bases, jacobian, r, weights[r], hessian)
+        elif weights[r] != 0.0:
+            add_gram(bases, jacobian, r, weights[r], hessian)
+        row = header.row_table + ROW * r
+        joint = joint_row_at(table, row)
+        if y[r] == 0.0 or row_at(table, row).kind != JOINT_ROW:
+            continue
+        second = joint.second
+        for part in range(1 if second < 0 else 2):
+            asked = coordinate_at(table, row + COORDINATE if part == 0 else second)
+            f = bases[r, 0 if part == 0 else 3]
+            g = bases[r, 1 if part == 0 else 4]
+            k = pairs + asked.joint
+            factor = y[r] * pool[joint.parameters + part]
+            if blocked:
+                add_coordinate_blocks(asked.kind, asked.component, records, k, factor, order, hessian, f, g)
+            else:
+                add_coordinate_hessian(asked.kind, asked.component, records, k, factor, hessian, f, g)
+    for t in range(header.tapes):
+        tape = header.tape_table + TAPE_RECORD * t
+        expression = tape_at(table, tape)
+        idle = True
+        for v in range(expression.values):
+            idle = idle and y[expression.first_row + v] == 0.0
+        if not idle:
+            add_tape_hessian(table, pool, tape, q, room, order, y, hessian)

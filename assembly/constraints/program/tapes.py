@@ -1,0 +1,97 @@
+"""Rows of users' expressions: their tapes (`geometry/expression/tape.py`) run at poses, with first and second
+derivatives.
+
+What runs a tape is large, and called by its address.
+"""
+
+from __future__ import annotations
+
+import math
+
+from assembly._address import call_address
+from assembly._kernel import kernel
+from assembly.constraints.program.hessian_blocks import spot
+from assembly.constraints.program.records import (
+    EXTRA_COLUMN,
+    ROW,
+    header_at,
+    pool_header_at,
+    row_at,
+    tape_at,
+)
+from assembly.geometry.expression.tape import run_tape
+
+
+@kernel(signatures="(i8[::1], f8[::1], i8, f8[::1], f8[::1], f8[::1])")
+def run_scene_tape(table, pool, o, x, work, y):
+    """`run_tape`, for who calls it by its address."""
+    run_tape(table, pool, o, x, work, y)
+    return 0
+
+
+@kernel(inner=True)
+def place_tape(table, pool, tape, q, room):
+    """The poses of a tape's bodies, in the user's units, to the front of its room. Returns where its inputs end."""
+    units = pool_header_at(pool, 0)
+    expression = tape_at(table, tape)
+    size = units.scale
+    for b in range(expression.bodies):
+        body = table[expression.body_list + b]
+        for i in range(3):
+            room[7 * b + i] = q[body, i] * size + units.reference[i]
+        for i in range(3, 7):
+            room[7 * b + i] = q[body, i]
+    return 7 * expression.bodies
+
+
+@kernel(inner=True)
+def tape_rows(table, pool, tape, q, room, residual, jacobian):
+    """All rows of a tape; a value or a slope that is not finite is an infinite violation, of one side too."""
+    header = header_at(table, 0)
+    expression = tape_at(table, tape)
+    inputs, outputs, work = room
+    place_tape(table, pool, tape, q, inputs)
+    call_address(header.run_tape_address, (table, pool, expression.first_order, inputs, work, outputs))
+    m = expression.values
+    count = expression.bodies
+    each = 1.0 / pool[expression.unit]
+    size = pool_header_at(pool, 0).scale
+    for v in range(m):
+        r = expression.first_row + v
+        nowhere = -math.inf if row_at(table, header.row_table + ROW * r).one_sided == 1 else math.inf
+        residual[r] = outputs[v] * each if math.isfinite(outputs[v]) else nowhere
+        for b in range(count):
+            at = m + 6 * (count * v + b)
+            column = 6 * b if b < 2 else EXTRA_COLUMN + 6 * (b - 2)
+            for i in range(3):
+                jacobian[r, column + i] = outputs[at + i] * each * size
+                jacobian[r, column + 3 + i] = outputs[at + 3 + i] * each
+                if not (math.isfinite(outputs[at + i]) and math.isfinite(outputs[at + 3 + i])):
+                    residual[r] = nowhere
+
+
+@kernel(inner=True)
+def add_tape_hessian(table, pool, tape, q, room, order, y, hessian):
+    """Upper triangle of hessian += second derivative of y . rows, for the rows of a tape."""
+    header = header_at(table, 0)
+    expression = tape_at(table, tape)
+    inputs, outputs, work = room
+    m = expression.values
+    count = expression.bodies
+    each = 1.0 / pool[expression.unit]
+    size = pool_header_at(pool, 0).scale
+    end = place_tape(table, pool, tape, q, inputs)
+    for v in range(m):
+        inputs[end + v] = y[expression.first_row + v] * each
+    call_address(header.run_tape_address, (table, pool, expression.second_order, inputs, work, outputs))
+    for b in range(count):
+        at = 6 * table[header.slots + table[expression.body_list + b]]
+        for c in range(count):
+            other = 6 * table[header.slots + table[expression.body_list + c]]
+            if at < 0 or other < at:
+                continue
+            row, column = spot(order, at, other)
+            for i in range(6):
+                for j in range(6):
+                    factor = (size if i < 3 else 1.0) * (size if j < 3 else 1.0)
+                    hessian[row + i, column + j] += factor * outputs[6 * count * (6 * b + i) + 6 * c + j]

@@ -1,0 +1,391 @@
+"""Rows of trims: where on its face a contact stands to a loop.
+
+"signed": s, the signed distance in (u, v) (`proximity/features/trim_distance.py`), s_q = n.u_q. The forms of paper 001,
+section
+3.4, take the point c(t) of the loop's own extremum against the other surface, whose rate t_q is that of a surface and
+a curve (appendix A, corrected):
+
+    "parametric"  u - c            u_q - c' t_q
+    "cartesian"   f(u) - f(c)      f_u u_q - f_u c' t_q
+    "between"     g(u_g) - f(c)    g_q - f_u c' t_q,
+
+in the axes of the face's body, where f(u) and f(c) have no rates of their own. At a solution they depend on one
+another (the loop's extremum is then the contact's), each a multiple of s; so are their second derivatives taken to
+be. Off the loop the vector u - c = s n has two independent rates, n s_q and s n_q, of which the second forbids what the
+loop allows, to slide along it: the closer to the loop, the larger the multiplier that says so. So the first two forms
+count by their signed length, one row that is zero where the vector is. The third contains the gap and has no such sign.
+The loop of a solve calls the two kernels at the end by their addresses.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import namedtuple
+
+import numpy as np
+
+from assembly._kernel import kernel
+from assembly.constraints.program.contact import surface_of
+from assembly.constraints.program.records import (
+    BETWEEN,
+    CARTESIAN,
+    FREE_COLUMN,
+    PARAMETRIC,
+    ROW,
+    SIGNED,
+    Iterate,
+    header_at,
+    row_at,
+    trim_row_at,
+)
+from assembly.constraints.program.row_terms import add_gram
+from assembly.geometry.faces.trim_nearest import trim_nearest
+from assembly.geometry.faces.trim_pieces import trim_at
+from assembly.geometry.splines.evaluate import curve_point, surface_point
+from assembly.geometry.vec import add, cross, dot, matvec, matvec_t, scale, sub
+from assembly.kinematics.motion import position, relative_pose, rotation
+from assembly.proximity.brep.borders import on_surface
+from assembly.proximity.brep.records import EDGE, EDGE_RECORD, FACE, edge_at
+from assembly.proximity.extrema.face_face import CONVERGED, SINGULAR
+from assembly.proximity.extrema.feature_pair import feature_record, solve_features
+from assembly.proximity.extrema.rates import derivatives_at
+from assembly.proximity.features.trim_distance import trim_distance
+
+# A vector shorter than this has no direction of its own.
+NO_LENGTH = 1e-9
+# Of contacts: which of them have their coordinates as unknowns (negative: it has not), and lengths of these.
+LiftedCoordinates = namedtuple("LiftedCoordinates", "free lengths")
+
+
+@kernel(inner=True)
+def clear(jacobian, r):
+    """Zeros for the twists and the coordinates of row r."""
+    for j in range(FREE_COLUMN + 4):
+        jacobian[r, j] = 0.0
+
+
+@kernel(inner=True)
+def add_coordinate(loose, records, k, i, factor, jacobian, r):
+    """Row r += factor times the derivative of coordinate i of contact k: an unknown, or by the contact velocity."""
+    free = loose.free
+    lengths = loose.lengths
+    if free[k] >= 0:
+        jacobian[r, FREE_COLUMN + i] += factor / lengths[k, i]
+    else:
+        add_rate(records, k, i, factor, jacobian, r)
+
+
+@kernel(inner=True)
+def add_rate(records, k, i, factor, jacobian, r):
+    """Row r += factor times the rate of coordinate i of record k over the twists."""
+    derivatives = derivatives_at(records, k)
+    for l in range(4):
+        rate = factor * derivatives.rates[i, l]
+        for j in range(12):
+            jacobian[r, j] += rate * derivatives.zed[l, j]
+
+
+@kernel(inner=True)
+def signed_row(table, pool, r, loose, point):
+    """Row r, of a trim in the signed form."""
+    tracked, records, residual, jacobian = point.tracked, point.records, point.residual, point.jacobian
+    row = trim_row_at(table, header_at(table, 0).row_table + ROW * r)
+    k = row.contact
+    o = 2 * row.side
+    factor = pool[row.factor]
+    s, n, _bend = trim_distance(table, pool, row.loop, tracked[k, o], tracked[k, o + 1])
+    residual[r] = factor * s
+    clear(jacobian, r)
+    add_coordinate(loose, records, k, o, factor * n[0], jacobian, r)
+    add_coordinate(loose, records, k, o + 1, factor * n[1], jacobian, r)
+
+
+@kernel(inner=True)
+def loop_extremum(table, pool, row, x, o, turn, relative, shift, records, scratch):
+    """The loop's point that is extremal against the other surface: found near the contact x, its record in `scratch`.
+
+    Returns the curve, its parameter, whether it moves (it does not at a corner), and the signed distance of x.
+    """
+    trim = trim_row_at(table, row)
+    loop = trim.loop
+    s, number, t, _cu, _cv, _nu, _nv = trim_nearest(table, pool, loop, 0, trim_at(table, loop).curves, x[o], x[o + 1])
+    edge = trim.edges + EDGE_RECORD * number
+    other = other_surface(table, row)
+    none = (0.0, 0.0, 0.0)
+    if o == 0:
+        start = (t, 0.0, x[2], x[3])
+        status, y, frame = solve_features(
+            table, pool, EDGE, edge, FACE, other, relative, shift, start, none, 1.0, math.inf
+        )
+        found = y[0]
+    else:
+        start = (x[0], x[1], t, 0.0)
+        status, y, frame = solve_features(
+            table, pool, FACE, other, EDGE, edge, relative, shift, start, none, 1.0, math.inf
+        )
+        found = y[2]
+    moves = status == CONVERGED or status == SINGULAR
+    if moves:
+        t = found
+        feature_record(turn, shift, frame, records, scratch)
+    return edge_at(table, edge).curve, t, moves, s
+
+
+@kernel(inline=True)
+def own_surface(table, row):
+    """The surface that has the loop of a trim."""
+    trim = trim_row_at(table, row)
+    pair = header_at(table, 0).row_table + ROW * trim.contact
+    return surface_of(table, pair, trim.side)
+
+
+@kernel(inline=True)
+def other_surface(table, row):
+    """The surface that touches the one with the loop."""
+    trim = trim_row_at(table, row)
+    pair = header_at(table, 0).row_table + ROW * trim.contact
+    return surface_of(table, pair, 1 - trim.side)
+
+
+@kernel(inner=True)
+def material_rates(axis, arm_f, arm_g, sign, jacobian, r):
+    """Row r += sign times axis . (velocity of body g less that of body f) at a point with these arms."""
+    turn_f = cross(arm_f, axis)
+    turn_g = cross(arm_g, axis)
+    for l in range(3):
+        jacobian[r, l] -= sign * axis[l]
+        jacobian[r, 3 + l] -= sign * turn_f[l]
+        jacobian[r, 6 + l] += sign * axis[l]
+        jacobian[r, 9 + l] += sign * turn_g[l]
+
+
+@kernel(inner=True)
+def offset_tangents(pu, pv, puu, puv, pvv, n, beta):
+    """Derivatives of p + beta n, n the unit normal on one side of the surface."""
+    normal = cross(pu, pv)
+    length = math.sqrt(dot(normal, normal))
+    if not length > 0.0:
+        return pu, pv
+    factor = (beta if dot(normal, n) > 0.0 else -beta) / length
+    u = add(cross(puu, pv), cross(pu, puv))
+    v = add(cross(puv, pv), cross(pu, pvv))
+    u = sub(u, scale(dot(u, n), n))
+    v = sub(v, scale(dot(v, n), n))
+    return add(pu, scale(factor, u)), add(pv, scale(factor, v))
+
+
+@kernel(inner=True)
+def vector_rows(table, pool, first, loose, point):
+    """The rows of a trim from `first` on, in one of the paper's forms."""
+    header = header_at(table, 0)
+    q, tracked, records, residual, jacobian = point.q, point.tracked, point.records, point.residual, point.jacobian
+    row = header.row_table + ROW * first
+    trim = trim_row_at(table, row)
+    fields = row_at(table, row)
+    k = trim.contact
+    derivatives = derivatives_at(records, k)
+    side = trim.side
+    form = trim.form
+    o = 2 * side
+    i = fields.body_f
+    j = fields.body_g
+    x = (tracked[k, 0], tracked[k, 1], tracked[k, 2], tracked[k, 3])
+    turn_f = rotation(q, i)
+    turn_g = rotation(q, j)
+    relative, shift = relative_pose(q, i, turn_f, j, turn_g)
+    scratch = header.contacts + header.joints
+    curve, t, moves, s = loop_extremum(table, pool, row, x, o, turn_f, relative, shift, records, scratch)
+    factor = pool[trim.factor]
+    kept = 1.0 if factor >= 0.0 else -1.0
+    factor = abs(factor)
+    turn = turn_f if side == 0 else turn_g
+    surface = own_surface(table, row)
+    at, rate, _bend = curve_point(table, pool, curve, t)
+    on_edge = on_surface(table, pool, surface, curve, t)
+    c, along = on_edge.point, on_edge.tangent
+    p, pu, pv, puu, puv, pvv = surface_point(table, pool, surface, x[o], x[o + 1])
+    there, du, dv, _uu, _uv, _vv = surface_point(table, pool, other_surface(table, row), x[2 - o], x[3 - o])
+    away = turn_g if side == 0 else turn_f
+    origin = position(q, j if side == 0 else i)
+    point_w = add(matvec(away, there), origin)
+    arm_f = sub(point_w, position(q, i))
+    arm_g = sub(point_w, position(q, j))
+    du = matvec(away, du)
+    dv = matvec(away, dv)
+    free = loose.free[k] >= 0
+    # Seen from the side of the loop the other point is p + beta n.
+    toward = (0.0, 0.0, 0.0)
+    if form == BETWEEN and not free:
+        n = (derivatives.normal[0], derivatives.normal[1], derivatives.normal[2])
+        toward = scale(1.0 - 2.0 * side, matvec_t(turn, n))
+        pu, pv = offset_tangents(pu, pv, puu, puv, pvv, toward, derivatives.gap)
+    for l in range(trim.count):
+        r = first + l
+        clear(jacobian, r)
+        if form == PARAMETRIC:
+            residual[r] = factor * (x[o + l] - at[l])
+            slope = factor * rate[l]
+            add_coordinate(loose, records, k, o + l, factor, jacobian, r)
+        elif form == CARTESIAN:
+            residual[r] = p[l] - c[l]
+            slope = along[l]
+            add_coordinate(loose, records, k, o, pu[l], jacobian, r)
+            add_coordinate(loose, records, k, o + 1, pv[l], jacobian, r)
+        else:
+            axis = (turn[l], turn[3 + l], turn[6 + l])
+            arm = arm_f if side == 0 else arm_g
+            residual[r] = dot(axis, arm) - c[l]
+            slope = along[l]
+            if not free:
+                # The other side's own coordinates have no rates at its poles.
+                add_coordinate(loose, records, k, o, pu[l], jacobian, r)
+                add_coordinate(loose, records, k, o + 1, pv[l], jacobian, r)
+                for j in range(FREE_COLUMN):
+                    jacobian[r, j] += toward[l] * jacobian[k, j]
+                if moves:
+                    add_rate(records, scratch, o, -slope, jacobian, r)
+                continue
+            material_rates(axis, arm_f, arm_g, 1.0 - 2.0 * side, jacobian, r)
+            add_coordinate(loose, records, k, 2 - o, dot(axis, du), jacobian, r)
+            add_coordinate(loose, records, k, 3 - o, dot(axis, dv), jacobian, r)
+        if moves:
+            add_rate(records, scratch, o, -slope, jacobian, r)
+    if trim.is_length == 1:
+        signed_length(table, pool, first, trim.count, 1.0 if kept * s >= 0.0 else -1.0, loose, point)
+
+
+@kernel(inner=True)
+def signed_length(table, pool, first, count, side, loose, point):
+    """One row of a vector's rows: its length, positive on the right side of the loop. The others become zero.
+
+    The length is smooth through zero, but its gradient is 0 / 0 there: as all columns of the rows are then along one
+    line, that of the greatest stands for the direction, and the signed distance says which way is positive.
+    """
+    residual = point.residual
+    jacobian = point.jacobian
+    square = 0.0
+    for l in range(count):
+        square += residual[first + l] * residual[first + l]
+    length = math.sqrt(square)
+    best = -1
+    most = 0.0
+    for j in range(FREE_COLUMN + 4):
+        column = 0.0
+        for l in range(count):
+            column += jacobian[first + l, j] * jacobian[first + l, j]
+        if column > most:
+            most = column
+            best = j
+    sign = side
+    if length < NO_LENGTH and best >= 0:
+        sign = 1.0
+        reach = math.sqrt(most)
+        for l in range(count):
+            residual[first + l] = jacobian[first + l, best] / reach
+        column = reach
+    else:
+        column = 0.0
+        for l in range(count):
+            residual[first + l] /= max(length, 1e-300)
+    for j in range(FREE_COLUMN + 4):
+        slope = 0.0
+        for l in range(count):
+            slope += residual[first + l] * jacobian[first + l, j]
+            if l > 0:
+                jacobian[first + l, j] = 0.0
+        jacobian[first, j] = sign * slope
+    for l in range(1, count):
+        residual[first + l] = 0.0
+    residual[first] = side * length
+    if column > 0.0 and growth(table, pool, first, best, loose, point) < 0.0:
+        for j in range(FREE_COLUMN + 4):
+            jacobian[first, j] = -jacobian[first, j]
+
+
+@kernel(inner=True)
+def growth(table, pool, r, j, loose, point):
+    """The derivative along column j of the signed distance, positive on the right side of the loop."""
+    tracked = point.tracked
+    records = point.records
+    row = trim_row_at(table, header_at(table, 0).row_table + ROW * r)
+    k = row.contact
+    derivatives = derivatives_at(records, k)
+    o = 2 * row.side
+    factor = pool[row.factor]
+    _s, n, _bend = trim_distance(table, pool, row.loop, tracked[k, o], tracked[k, o + 1])
+    value = 0.0
+    for i in range(2):
+        if loose.free[k] >= 0:
+            value += n[i] if j == FREE_COLUMN + o + i else 0.0
+        elif j < FREE_COLUMN:
+            for l in range(4):
+                value += n[i] * derivatives.rates[o + i, l] * derivatives.zed[l, j]
+    return factor * value
+
+
+@kernel(signatures="(i8[::1], f8[::1], i8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1])")
+def trim_rows(table, pool, free, lengths, q, tracked, records, residual, jacobian):
+    """All rows of trims, and their gradients."""
+    header = header_at(table, 0)
+    loose = LiftedCoordinates(free, lengths)
+    point = Iterate(q, tracked, records, residual, jacobian)
+    r = header.contacts
+    while r < header.contacts + header.trims:
+        row = trim_row_at(table, header.row_table + ROW * r)
+        if row.form == SIGNED:
+            signed_row(table, pool, r, loose, point)
+        else:
+            vector_rows(table, pool, r, loose, point)
+        r += row.count
+    return 0
+
+
+@kernel(inner=True)
+def part_of(jacobian, r, rates, k):
+    """The number a with row r = a rates + b row k, by least squares."""
+    ss = 0.0
+    sg = 0.0
+    gg = 0.0
+    rs = 0.0
+    rg = 0.0
+    for j in range(FREE_COLUMN + 4):
+        ss += rates[0, j] * rates[0, j]
+        sg += rates[0, j] * jacobian[k, j]
+        gg += jacobian[k, j] * jacobian[k, j]
+        rs += jacobian[r, j] * rates[0, j]
+        rg += jacobian[r, j] * jacobian[k, j]
+    det = ss * gg - sg * sg
+    return (rs * gg - rg * sg) / det if det > 1e-12 * ss * gg else 0.0
+
+
+@kernel(
+    signatures=(
+        "(i8[::1], f8[::1], i8, i8[::1], f8[:, ::1], i8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8, f8[:, ::1])"
+    ),
+)
+def trim_terms(table, pool, r, free, lengths, bases, tracked, records, jacobian, y, hessian):
+    """Upper triangle of hessian += y (second derivative of row r).
+
+    Of a signed row of a free contact that is all; else what the change of u_q adds is left out. A vector's row counts
+    as the signed distance, times what its gradient has of that one's: at a solution all else in it is the gap's.
+    """
+    row = trim_row_at(table, header_at(table, 0).row_table + ROW * r)
+    k = row.contact
+    o = 2 * row.side
+    loose = LiftedCoordinates(free, lengths)
+    _s, n, bend = trim_distance(table, pool, row.loop, tracked[k, o], tracked[k, o + 1])
+    places = np.empty((1, bases.shape[1]), np.int64)
+    for b in range(bases.shape[1]):
+        places[0, b] = bases[r, b]
+    rates = np.zeros((1, jacobian.shape[1]))
+    factor = pool[row.factor]
+    if row.form != SIGNED:
+        add_coordinate(loose, records, k, o, n[0], rates, 0)
+        add_coordinate(loose, records, k, o + 1, n[1], rates, 0)
+        factor = part_of(jacobian, r, rates, k)
+        clear(rates, 0)
+    # s_uu = bend t t^T, t along the loop.
+    add_coordinate(loose, records, k, o, -n[1], rates, 0)
+    add_coordinate(loose, records, k, o + 1, n[0], rates, 0)
+    add_gram(places, rates, 0, y * factor * bend, hessian)
+    return 0

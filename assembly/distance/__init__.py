@@ -1,0 +1,1 @@
+"""Certified distances of curves, surfaces and hulls (paper 003): bounds that hold, whatever the rounding."""

@@ -1,0 +1,1 @@
+"""Collision queries of many shapes at once."""

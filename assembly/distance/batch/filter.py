@@ -1,0 +1,334 @@
+"""Which of many Bezier pieces come nearer than a clearance to which of many convex hulls, in one call.
+
+A piece lies in the hull of its Bezier points, so that with a unit n any
+
+    distance >= min over the obstacle of n.b - max over the Bezier points of n.p
+
+proves. A few points of a curve come first, in the plane against a polygon inside the obstacle: x is inside where it is
+left of every edge of a closed polygon of its vertices, whatever their order. Then boxes and fixed directions, which
+tell most of the others apart, then a direction by GJK; what nothing parts is halved by de Casteljau's algorithm, and
+ends of halves are points of the curve: one within the clearance is an answer too. A piece shorter than the tolerance,
+or than its rounding, of which halves are no shorter, stays undecided, which counts as near.
+
+Halving is n sums, each off by half a unit: 50 depths of it, by which no piece of a polynomial is longer than its
+rounding, are off by 25 n units 2^-52 of the largest number, of both X and w where there are weights, and 128 depths by
+what (64 n + 64) pays for.
+
+Hulls are a tuple: where the vertices of each begin and how many, the vertices, boxes, directions, the supports along
+them, polygons inside.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from assembly._kernel import kernel
+from assembly.distance.enclosures.enclosure import hull_support
+from assembly.distance.enclosures.gjk import INSIDE, OVERLAP, POINT, ROOM, gjk, simplex_at, support_point, witnesses
+from assembly.geometry.interval import UNIT, down, up
+from assembly.geometry.vec import dot
+
+# Of a pair: proven apart, a point within the clearance, open at the tolerance.
+APART, NEAR, OPEN = 0, 1, 2
+# Pieces that wait at once.
+DEPTH = 40
+# Points of a curve that are looked at first, and pieces that are parted by fixed directions alone.
+_LOOKS, _PIECES = 15, 4
+
+
+@kernel(inner=True, exact=True)
+def boxes_apart(points, o, count, boxes, j, reach):
+    """Whether the box of points is farther from a box than the reach."""
+    gap = 0.0
+    for k in range(3):
+        lo = points[o + k]
+        hi = lo
+        for i in range(1, count):
+            x = points[o + 3 * i + k]
+            lo = min(lo, x)
+            hi = max(hi, x)
+        d = max(boxes[j, k] - hi, lo - boxes[j, 3 + k])
+        if d > 0.0:
+            gap += d * d
+    return math.sqrt(gap) * (1.0 - 8.0 * UNIT) > reach
+
+
+@kernel(inline=True)
+def from_center(points, o, boxes, j):
+    """From the middle of a box to a point: a first direction."""
+    return (
+        points[o] - 0.5 * (boxes[j, 0] + boxes[j, 3]),
+        points[o + 1] - 0.5 * (boxes[j, 1] + boxes[j, 4]),
+        points[o + 2] - 0.5 * (boxes[j, 2] + boxes[j, 5]),
+    )
+
+
+@kernel(inner=True, exact=True)
+def in_polygon(x, y, obstacles, polygons, j, off):
+    """Whether a point of the plane, known up to `off`, is left of every edge of the polygon of an obstacle."""
+    edges = polygons[j, 0]
+    if edges < 3:
+        return False
+    p = polygons[j, edges]
+    a = obstacles[p] - x
+    b = obstacles[p + 1] - y
+    for k in range(1, edges + 1):
+        p = polygons[j, k]
+        c = obstacles[p] - x
+        d = obstacles[p + 1] - y
+        m = abs(a) + abs(b)
+        n = abs(c) + abs(d)
+        if not (a * d - b * c > 2.0 * off * (m + n) + 16.0 * UNIT * m * n):
+            return False
+        a = c
+        b = d
+    return True
+
+
+@kernel(inner=True, allocates=True)
+def inner_polygons(full, hulls, obstacles, directions):
+    """Of every obstacle in the plane the number, then the places, of its farthest vertices along the directions."""
+    polygons = np.zeros((hulls.shape[0], directions.shape[0] + 1), dtype=np.int64)
+    if full == 3:
+        for j in range(hulls.shape[0]):
+            count = 0
+            for k in range(directions.shape[0]):
+                n = (directions[k, 0], directions[k, 1], directions[k, 2])
+                _x, found = support_point(obstacles, hulls[j, 0], hulls[j, 1], -1.0, n)
+                place = hulls[j, 0] + 3 * found
+                if count == 0 or (place != polygons[j, count] and place != polygons[j, 1]):
+                    count += 1
+                    polygons[j, count] = place
+            polygons[j, 0] = count
+    return polygons
+
+
+@kernel(inner=True)
+def fill_basis(degree, basis):
+    """Bernstein polynomials at the points that are looked at first, a row each."""
+    for m in range(_LOOKS):
+        t = (m + 1) / (_LOOKS + 1)
+        binomial = 1.0
+        for k in range(degree + 1):
+            basis[m, k] = binomial * t**k * (1.0 - t) ** (degree - k)
+            binomial = binomial * (degree - k) / (k + 1)
+
+
+@kernel(inner=True, exact=True)
+def look(points, degree, basis, looks):
+    """Points of a piece that is not rational, to the rows of looks."""
+    for m in range(_LOOKS):
+        x = 0.0
+        y = 0.0
+        z = 0.0
+        for k in range(degree + 1):
+            f = basis[m, k]
+            x += f * points[3 * k]
+            y += f * points[3 * k + 1]
+            z += f * points[3 * k + 2]
+        looks[3 * m] = x
+        looks[3 * m + 1] = y
+        looks[3 * m + 2] = z
+
+
+@kernel(inner=True, exact=True)
+def look_is_near(looks, obstacles, boxes, polygons, j, off):
+    """Whether one of the points that are looked at is proven inside an obstacle of the plane."""
+    for m in range(_LOOKS):
+        x = looks[3 * m]
+        y = looks[3 * m + 1]
+        if boxes[j, 0] < x < boxes[j, 3] and boxes[j, 1] < y < boxes[j, 4]:
+            if in_polygon(x, y, obstacles, polygons, j, off):
+                return True
+    return False
+
+
+@kernel(inner=True, exact=True)
+def end_is_near(full, points, o, hulls, j, clearance, off, g):
+    """Whether a point of the curve is within the clearance of a hull, rounding against it."""
+    place, obstacles, boxes, directions, supports, polygons = hulls
+    b, count = place[j, 0], place[j, 1]
+    reach = up(clearance + off)
+    if boxes_apart(points, o, 1, boxes, j, reach) or parted(points, o, 1, directions, supports, j, reach):
+        return False
+    if in_polygon(points[o], points[o + 1], obstacles, polygons, j, off):
+        return True
+    first = from_center(points, o, boxes, j)
+    simplex = simplex_at(g, 0)
+    for k in range(3):
+        simplex.point[k] = points[o + k]
+    how, v, kept = gjk(full, g, POINT, 1, -1.0, obstacles, b, count, -1.0, first, clearance, 1e-12, g)
+    if how == INSIDE:
+        return True
+    _a, _b = witnesses(g, kept)
+    return up(math.sqrt(dot(v, v)) * (1.0 + 8.0 * UNIT)) + off <= clearance
+
+
+@kernel(inner=True, exact=True)
+def project(stack, o, degree, rational, points):
+    """Bezier points in space of a piece at stack[o:], to points."""
+    for i in range(degree + 1):
+        p = o + 4 * i
+        f = 1.0 / stack[p + 3] if rational else 1.0
+        for k in range(3):
+            points[3 * i + k] = f * stack[p + k]
+
+
+@kernel(inner=True, exact=True)
+def piece_is_near(full, stack, degree, rational, points, hulls, j, clearance, tolerance, off, g):
+    """Whether a piece, at the front of the stack, is apart from, near or open to a hull."""
+    place, obstacles, boxes, directions, supports, _polygons = hulls
+    b, count = place[j, 0], place[j, 1]
+    size = 4 * (degree + 1)
+    top = 0
+    project(stack, 0, degree, rational, points)
+    if end_is_near(full, points, 0, hulls, j, clearance, off, g):
+        return NEAR
+    if end_is_near(full, points, 3 * degree, hulls, j, clearance, off, g):
+        return NEAR
+    pieces = 0
+    while top >= 0:
+        o = size * top
+        pieces += 1
+        project(stack, o, degree, rational, points)
+        reach = up(clearance + off)
+        if boxes_apart(points, 0, degree + 1, boxes, j, reach) or parted(
+            points, 0, degree + 1, directions, supports, j, reach
+        ):
+            top -= 1
+            continue
+        if pieces > _PIECES:
+            first = from_center(points, 3 * (degree // 2), boxes, j)
+            how, v, _k = gjk(
+                full, points, 0, degree + 1, -1.0, obstacles, b, count, -1.0, first, clearance + off, 1e-3, g
+            )
+            if how != INSIDE and how != OVERLAP:
+                length = math.sqrt(dot(v, v))
+                n = (-v[0] / length, -v[1] / length, -v[2] / length)
+                c = (points[0], points[1], points[2])
+                high = hull_support(points, 0, degree + 1, n, c)
+                high += hull_support(obstacles, b, count, (-n[0], -n[1], -n[2]), c)
+                if down(-high - off) * (1.0 - 8.0 * UNIT) > clearance:
+                    top -= 1
+                    continue
+        extent = 0.0
+        for i in range(1, degree + 1):
+            d = (points[3 * i] - points[0], points[3 * i + 1] - points[1], points[3 * i + 2] - points[2])
+            extent = max(extent, dot(d, d))
+        shortest = max(tolerance, off)
+        if extent <= shortest * shortest or top + 1 >= DEPTH:
+            return OPEN
+        # The first half below, the second on top.
+        p = o + size
+        for k in range(size):
+            stack[p + k] = stack[o + k]
+        for r in range(1, degree + 1):
+            for i in range(degree - r + 1):
+                q = p + 4 * i
+                for k in range(4):
+                    stack[q + k] = 0.5 * (stack[q + k] + stack[q + 4 + k])
+            for k in range(4):
+                stack[o + 4 * r + k] = stack[p + k]
+        f = 1.0 / stack[p + 3] if rational else 1.0
+        for k in range(3):
+            points[k] = f * stack[p + k]
+        if end_is_near(full, points, 0, hulls, j, clearance, off, g):
+            return NEAR
+        top += 1
+    return APART
+
+
+@kernel(inner=True, allocates=True)
+def fixed_directions(full):
+    """Unit vectors around: 24 in the plane, 26 in space, rounded."""
+    if full == 3:
+        n = np.zeros((24, 3))
+        for k in range(24):
+            n[k, 0] = math.cos(k * math.pi / 12.0)
+            n[k, 1] = math.sin(k * math.pi / 12.0)
+        return n
+    n = np.zeros((26, 3))
+    k = 0
+    for x in range(-1, 2):
+        for y in range(-1, 2):
+            for z in range(-1, 2):
+                if x != 0 or y != 0 or z != 0:
+                    f = 1.0 / math.sqrt(float(x * x + y * y + z * z))
+                    n[k, 0], n[k, 1], n[k, 2] = f * x, f * y, f * z
+                    k += 1
+    return n
+
+
+@kernel(inner=True, exact=True)
+def parted(points, o, count, directions, supports, j, reach):
+    """Whether one of the directions parts points from a hull."""
+    most = 0.0
+    for i in range(o, o + 3 * count):
+        most = max(most, abs(points[i]))
+    # Three products, two sums and a difference of numbers below the first, and the rounding of the support.
+    least = up(reach + 16.0 * UNIT * most) * (1.0 + 8.0 * UNIT)
+    for k in range(directions.shape[0]):
+        x, y, z = directions[k, 0], directions[k, 1], directions[k, 2]
+        edge = supports[j, k] + least
+        p = o
+        for _ in range(count):
+            if x * points[p] + y * points[p + 1] + z * points[p + 2] <= edge:
+                break
+            p += 3
+        if p == o + 3 * count:
+            return True
+    return False
+
+
+@kernel(signatures="(i8, i8[:, ::1], f8[::1], i8[:, ::1], f8[::1], f8[:, ::1], f8, f8, i8[:, ::1])")
+def near_pairs(full, table, pool, hulls, obstacles, boxes, clearance, tolerance, out):
+    """Whether curve i comes near obstacle j, to out (curves, obstacles).
+
+    table: rows (curve, degree, rational, place) of pieces, whose homogeneous points stand in the pool; hulls: rows
+    (place, count) of obstacles; boxes: lower and upper corner of each, six numbers.
+    """
+    degree = 0
+    for i in range(table.shape[0]):
+        degree = max(degree, table[i, 1])
+    stack = np.empty(4 * (degree + 1) * (DEPTH + 1))
+    points = np.empty(3 * (degree + 1))
+    g = np.zeros(ROOM)
+    directions = fixed_directions(full)
+    supports = np.empty((hulls.shape[0], directions.shape[0]))
+    for j in range(hulls.shape[0]):
+        for k in range(directions.shape[0]):
+            n = (directions[k, 0], directions[k, 1], directions[k, 2])
+            supports[j, k] = hull_support(obstacles, hulls[j, 0], hulls[j, 1], n, (0.0, 0.0, 0.0))
+    polygons = inner_polygons(full, hulls, obstacles, directions)
+    shapes = hulls, obstacles, boxes, directions, supports, polygons
+    basis = np.empty((_LOOKS, degree + 1))
+    looks = np.empty(3 * _LOOKS)
+    filled = -1
+    for i in range(table.shape[0]):
+        curve, degree, rational, place = table[i, 0], table[i, 1], table[i, 2] != 0, table[i, 3]
+        most = 0.0
+        for m in range(degree + 1):
+            f = 1.0 / pool[place + 4 * m + 3] if rational else 1.0
+            for k in range(3):
+                points[3 * m + k] = f * pool[place + 4 * m + k]
+                most = max(most, abs(points[3 * m + k]))
+        off = (64.0 * degree + 64.0) * UNIT * most
+        looked = full == 3 and not rational
+        if looked:
+            if filled != degree:
+                fill_basis(degree, basis)
+                filled = degree
+            look(points, degree, basis, looks)
+        for j in range(hulls.shape[0]):
+            if out[curve, j] == NEAR:
+                continue
+            if looked and look_is_near(looks, obstacles, boxes, polygons, j, off):
+                out[curve, j] = NEAR
+                continue
+            for k in range(4 * (degree + 1)):
+                stack[k] = pool[place + k]
+            told = piece_is_near(full, stack, degree, rational, points, shapes, j, clearance, tolerance, off, g)
+            if told != APART and out[curve, j] != NEAR:
+                out[curve, j] = told

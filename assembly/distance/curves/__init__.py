@@ -1,0 +1,1 @@
+"""Distances of Bezier curves by best-first branch and bound."""

@@ -1,0 +1,159 @@
+"""Newton's method on |a(s) - b(t)|^2 / 2 inside bounds of the parameters: for good upper bounds, proves nothing."""
+
+from __future__ import annotations
+
+import math
+
+from assembly._kernel import kernel
+from assembly.distance.enclosures.enclosure import FORMULA, HULL
+from assembly.distance.enclosures.gjk import INSIDE, POINT, gjk, inside_weights, on_b, simplex_at
+from assembly.geometry.expression.formula import formula_point, formula_room_at
+from assembly.geometry.interval import UNIT
+from assembly.geometry.splines.bezier_ranges import BEZIER_AT, piece_points, ranged_curve_at, value, weighted_point_at
+from assembly.geometry.vec import blend, dot, sub
+
+_ROUNDS = 24
+
+
+@kernel(inner=True)
+def local_point(kind, table, pool, span, t, room):
+    """C, C', C'' at t."""
+    if kind == FORMULA:
+        formula_point(table, pool, t, room)
+        c = formula_room_at(room, 0).results
+        return (c[0], c[1], c[2]), (c[3], c[4], c[5]), (c[6], c[7], c[8])
+    found = weighted_point_at(room, BEZIER_AT)
+    o, n = piece_points(table, span, 0)
+    value(pool, o, n, t, room, BEZIER_AT)
+    w = found.weight
+    p = (found.position[0], found.position[1], found.position[2])
+    o, n = piece_points(table, span, 1)
+    value(pool, o, n, t, room, BEZIER_AT)
+    w1 = found.weight
+    d = (found.position[0], found.position[1], found.position[2])
+    o, n = piece_points(table, span, 2)
+    dd = (0.0, 0.0, 0.0)
+    w2 = 0.0
+    if n >= 0:
+        value(pool, o, n, t, room, BEZIER_AT)
+        w2 = found.weight
+        dd = (found.position[0], found.position[1], found.position[2])
+    if ranged_curve_at(table, 0).rational == 0:
+        return p, d, dd
+    f = 1.0 / w
+    p = (f * p[0], f * p[1], f * p[2])
+    d = blend(f, d, -f * w1, p)
+    dd = blend(f, dd, -2.0 * f * w1, d)
+    return p, d, blend(1.0, dd, -f * w2, p)
+
+
+@kernel(inner=True)
+def hull_point(full, points, count, x, g):
+    """Nearest point of a hull, how many vertices carry it, whether x is inside, and how far the point may be off it.
+
+    It is a vertex and parts of the differences to the others: off by half a unit of itself and some of those.
+    """
+    v = (x[0] - points[0], x[1] - points[1], x[2] - points[2])
+    simplex = simplex_at(g, 0)
+    for c in range(3):
+        simplex.point[c] = x[c]
+    how, _v, kept = gjk(full, g, POINT, 1, -1.0, points, 0, count, -1.0, v, math.inf, 1e-15, g)
+    if how == INSIDE:
+        inside_weights(full, g)
+    last = on_b(g, kept - 1)
+    b = last
+    off = 0.0
+    for k in range(kept - 1):
+        d = sub(on_b(g, k), last)
+        b = blend(1.0, b, simplex.weights[k], d)
+        off += 8.0 * (abs(d[0]) + abs(d[1]) + abs(d[2]))
+    return b, kept, how == INSIDE, UNIT * (off + abs(b[0]) + abs(b[1]) + abs(b[2]))
+
+
+@kernel(inline=True)
+def across(v, kept, full, g):
+    """The part of v across the feature that carries a nearest point."""
+    if kept == 1:
+        return v
+    e = sub(on_b(g, 1), on_b(g, 0))
+    size = dot(e, e)
+    if size > 0.0:
+        v = blend(1.0, v, -dot(v, e) / size, e)
+    if kept == 3:
+        f = sub(on_b(g, 2), on_b(g, 0))
+        if size > 0.0:
+            f = blend(1.0, f, -dot(f, e) / size, e)
+        size = dot(f, f)
+        if size > 0.0:
+            v = blend(1.0, v, -dot(v, f) / size, f)
+    return v
+
+
+@kernel(inline=True)
+def held(x, step, lo, hi):
+    return min(max(x + step, lo), hi)
+
+
+@kernel(inner=True)
+def newton(full, ka, ta, pa, sa, ra, kb, tb, pb, sb, rb, count, s, t, s0, s1, t0, t1, g):
+    """Parameters of a local minimum in [s0, s1] x [t0, t1] from (s, t). b is a curve, or a hull of `count` points."""
+    hull = kb == HULL
+    best = math.inf
+    at = (s, t)
+    step = (0.0, 0.0)
+    for _ in range(_ROUNDS):
+        a, a1, a2 = local_point(ka, ta, pa, sa, s, ra)
+        b1 = (0.0, 0.0, 0.0)
+        b2 = b1
+        c1 = a1
+        if hull:
+            b, kept, inside, _off = hull_point(full, pb, count, a, g)
+            if inside:
+                return s, t
+            c1 = across(a1, kept, full, g)
+        else:
+            b, b1, b2 = local_point(kb, tb, pb, sb, t, rb)
+        r = sub(a, b)
+        f = dot(r, r)
+        if not (f < best):
+            # No descent: half the way, until it is too short to matter.
+            step = (0.25 * step[0], 0.25 * step[1])
+            s = held(at[0], step[0], s0, s1)
+            t = held(at[1], step[1], t0, t1)
+            if s == at[0] and t == at[1]:
+                break
+            if f == best:
+                break
+            continue
+        best = f
+        at = (s, t)
+        gs = dot(r, a1)
+        gt = -dot(r, b1)
+        ss = dot(c1, c1)
+        tt = dot(b1, b1)
+        st = -dot(a1, b1)
+        p = ss + dot(r, a2)
+        q = tt - dot(r, b2)
+        free_s = s1 > s0 and not ((s <= s0 and gs > 0.0) or (s >= s1 and gs < 0.0))
+        free_t = t1 > t0 and not ((t <= t0 and gt > 0.0) or (t >= t1 and gt < 0.0))
+        if not free_s and not free_t:
+            break
+        if free_s and free_t:
+            det = p * q - st * st
+            if not (p > 0.0 and det > 1e-14 * p * abs(q)):
+                p, q = 1.0001 * ss + 1e-300, 1.0001 * tt + 1e-300
+                det = p * q - st * st
+            step = (-(q * gs - st * gt) / det, -(p * gt - st * gs) / det)
+        elif free_s:
+            step = (-gs / (p if p > 1e-8 * ss else ss + 1e-300), 0.0)
+        else:
+            step = (0.0, -gt / (q if q > 1e-8 * tt else tt + 1e-300))
+        if not (abs(step[0]) < math.inf and abs(step[1]) < math.inf):
+            break
+        s = held(s, step[0], s0, s1)
+        t = held(t, step[1], t0, t1)
+        if s == at[0] and t == at[1]:
+            break
+        if abs(s - at[0]) <= 1e-15 * (s1 - s0) and abs(t - at[1]) <= 1e-15 * (t1 - t0):
+            break
+    return at

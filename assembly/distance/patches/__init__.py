@@ -1,0 +1,1 @@
+"""Distances of Bezier patches and of curves given by formulas."""

@@ -1,0 +1,233 @@
+"""Newton's method for the nearest points of two patches, held in the unit cube, and what the point found proves.
+
+A curve given by a formula takes the place of the second patch (`distance/patches/formula_nodes.py`): it is evaluated at
+its own
+parameter, by intervals, and what these leave open is part of the proof. `curve` is None elsewhere, and no kernel of
+formulas is compiled then.
+"""
+
+from __future__ import annotations
+
+import math
+
+from assembly._kernel import kernel
+from assembly.distance.curves.bounds import least_change
+from assembly.distance.patches.formula_nodes import formula_derivatives
+from assembly.distance.patches.nodes import ROWS, bezier_surface_at, patch_node_at
+from assembly.distance.patches.pair import (
+    BASIS,
+    MARGIN,
+    PATCH_J,
+    PATCH_K,
+    D,
+    J,
+    factorize,
+    load_hessian,
+    load_side,
+    patch_work_at,
+    size_at,
+    vector_dot,
+)
+from assembly.geometry.splines.bezier_pieces import UNIT
+
+_STEPS = 30
+_SHORTENINGS = 12
+
+
+@kernel(inner=True)
+def fill_basis(w, at, n, x):
+    """B_i^n and its first two derivatives at x, rows of n + 1 from `at`, by the triangle of sums of positive terms."""
+    m = n + 1
+    for i in range(3 * m):
+        w[at + i] = 0.0
+    w[at] = 1.0
+    for k in range(1, n + 1):
+        if k == n - 1:
+            # B^(n - 2) is there: second differences.
+            for i in range(m):
+                c = w[at + i]
+                l = w[at + i - 1] if i >= 1 else 0.0
+                ll = w[at + i - 2] if i >= 2 else 0.0
+                w[at + 2 * m + i] = n * (n - 1.0) * (ll - 2.0 * l + c)
+        if k == n:
+            for i in range(m):
+                l = w[at + i - 1] if i >= 1 else 0.0
+                w[at + m + i] = n * (l - w[at + i])
+        for i in range(k, -1, -1):
+            l = w[at + i - 1] if i >= 1 else 0.0
+            w[at + i] = x * l + (1.0 - x) * w[at + i]
+
+
+@kernel(inner=True)
+def patch_derivatives(record, nodes, o, x, y, w):
+    """Point of a patch; its first and second derivatives at PATCH_J and PATCH_K."""
+    work = patch_work_at(w, 0)
+    patch = bezier_surface_at(record, 0)
+    p = patch.degree_u
+    q = patch.degree_v
+    bu = BASIS
+    bv = BASIS + 3 * (p + 1)
+    fill_basis(w, bu, p, x)
+    fill_basis(w, bv, q, y)
+    s = (0.0, 0.0, 0.0, 0.0)
+    su = s
+    sv = s
+    suu = s
+    suv = s
+    svv = s
+    r = o + ROWS
+    for i in range(p + 1):
+        t = (0.0, 0.0, 0.0, 0.0)
+        tv = t
+        tvv = t
+        for l in range(q + 1):
+            row = (nodes[r], nodes[r + 1], nodes[r + 2], nodes[r + 3])
+            r += 4
+            t = add4(t, w[bv + l], row)
+            tv = add4(tv, w[bv + q + 1 + l], row)
+            tvv = add4(tvv, w[bv + 2 * q + 2 + l], row)
+        b0 = w[bu + i]
+        b1 = w[bu + p + 1 + i]
+        b2 = w[bu + 2 * p + 2 + i]
+        s = add4(s, b0, t)
+        su = add4(su, b1, t)
+        sv = add4(sv, b0, tv)
+        suu = add4(suu, b2, t)
+        suv = add4(suv, b1, tv)
+        svv = add4(svv, b0, tvv)
+    d = 1.0 / s[3]
+    for c in range(3):
+        v = d * s[c]
+        vu = d * (su[c] - su[3] * v)
+        vv = d * (sv[c] - sv[3] * v)
+        work.patch_j[c] = vu
+        work.patch_j[3 + c] = vv
+        work.patch_k[c] = d * (suu[c] - 2.0 * su[3] * vu - suu[3] * v)
+        work.patch_k[3 + c] = d * (suv[c] - su[3] * vv - sv[3] * vu - suv[3] * v)
+        work.patch_k[6 + c] = d * (svv[c] - 2.0 * sv[3] * vv - svv[3] * v)
+    return (d * s[0], d * s[1], d * s[2])
+
+
+@kernel(inline=True)
+def add4(a, s, b):
+    return (a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2], a[3] + s * b[3])
+
+
+@kernel(inner=True)
+def load_points(ra, a, o, na, rb, b, p, nb, curve, shift, w):
+    """D, J and K at PLACE in the unit cube; the two points."""
+    work = patch_work_at(w, 0)
+    u = patch_derivatives(ra, a, o, work.place[0], work.place[1] if na > 1 else 0.0, w)
+    load_side(w, PATCH_J, PATCH_K, 1.0, na, 0, w)
+    x = work.place[na] if nb > 0 else 0.0
+    if curve is None:
+        v = patch_derivatives(rb, b, p, x, work.place[na + 1] if nb > 1 else 0.0, w)
+    else:
+        v = formula_derivatives(curve, b, p, x, w)
+    load_side(w, PATCH_J, PATCH_K, -1.0, nb, na, w)
+    for j in range(3):
+        work.d[j] = (u[j] - v[j]) - shift[j]
+    return u, v
+
+
+@kernel(inner=True)
+def newton_direction(w, n):
+    """A step of Newton's method into STEP, variables held at the ends that the slope pushes them out of."""
+    work = patch_work_at(w, 0)
+    size = 0.0
+    for i in range(n):
+        size = max(size, abs(work.h[5 * i]))
+    for i in range(n):
+        z = work.place[i]
+        if (z <= 0.0 and work.g[i] >= 0.0) or (z >= 1.0 and work.g[i] <= 0.0):
+            work.g[i] = 0.0
+            for j in range(n):
+                work.h[4 * i + j] = 0.0
+                work.h[4 * j + i] = 0.0
+            work.h[5 * i] = size
+        work.step[i] = 0.0
+    raised = -1e-14 * size
+    for _ in range(40):
+        if factorize(w, n, False, raised):
+            for i in range(n):
+                value = -work.g[i]
+                for j in range(i):
+                    value -= work.factor[4 * i + j] * work.step[j]
+                work.step[i] = value / work.factor[5 * i]
+            for i in range(n - 1, -1, -1):
+                value = work.step[i]
+                for j in range(i + 1, n):
+                    value -= work.factor[4 * j + i] * work.step[j]
+                work.step[i] = value / work.factor[5 * i]
+            return
+        raised = min(10.0 * raised, -1e-6 * size)
+
+
+@kernel(inner=True)
+def nearest_in_patches(ra, a, o, na, rb, b, p, nb, curve, shift, w):
+    """From PLACE to a local minimum in the unit cube."""
+    work = patch_work_at(w, 0)
+    n = na + nb
+    best = math.inf
+    part = 1.0
+    shortenings = 0
+    for i in range(n):
+        work.best[i] = work.place[i]
+    for _ in range(_STEPS):
+        load_points(ra, a, o, na, rb, b, p, nb, curve, shift, w)
+        f = vector_dot(w, D, D)
+        if f < best:
+            slow = f > best * (1.0 - 1e-15)
+            best = f
+            load_hessian(w, n)
+            newton_direction(w, n)
+            fall = 0.0
+            way = 0.0
+            for i in range(n):
+                work.best[i] = work.place[i]
+                fall += work.g[i] * work.step[i]
+                way += abs(work.step[i])
+            if slow or fall > -1e-17 * f or way < 1e-16:
+                break
+            part = 1.0
+            shortenings = 0
+        else:
+            part *= 0.25
+            shortenings += 1
+            if shortenings > _SHORTENINGS:
+                break
+        for i in range(n):
+            work.place[i] = min(max(work.best[i] + part * work.step[i], 0.0), 1.0)
+    for i in range(n):
+        work.place[i] = work.best[i]
+
+
+@kernel(inner=True, exact=True)
+def proven_in_patches(ra, a, o, na, rb, b, p, nb, curve, shift, error, rough, curved, w):
+    """Lower bound of the distance on a box, the distance at PLACE, and the points there.
+
+    The Hessian is at least MARGIN times the diagonal in Z, if it is proven curved.
+    """
+    work = patch_work_at(w, 0)
+    u, v = load_points(ra, a, o, na, rb, b, p, nb, curve, shift, w)
+    if curve is not None:
+        error += work.off[0]
+    far = size_at(w, D)
+    size = 16.0 * UNIT * far
+    change = 0.0
+    if curved:
+        for i in range(na + nb):
+            off = rough
+            back = work.place[i]
+            ahead = 1.0 - back
+            if curve is not None and i == na:
+                off += work.off[1]
+                back = work.off[2]
+                ahead = work.off[3]
+            doubt = (error + size) * (size_at(w, J + 3 * i) + off) + far * off
+            change += least_change(vector_dot(w, D, J + 3 * i), doubt, MARGIN * work.z[i], back, ahead)
+    near = max(far - size - error, 0.0)
+    square = near * near + 2.0 * change * (1.0 + 1e-12)
+    lower = math.sqrt(square) * (1.0 - 8.0 * UNIT) if square > 0.0 else 0.0
+    away = patch_node_at(a, o).away + patch_node_at(b, p).away
+    return lower - away, far + size + error + away, u, v

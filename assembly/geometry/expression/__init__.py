@@ -1,0 +1,1 @@
+"""Expressions of coordinates as tapes of instructions, with derivatives and interval bounds."""

@@ -1,0 +1,229 @@
+"""A curve given by a formula, as kernels read it: points, and bounds over an interval of its parameter.
+
+    [C, C', C'']            by doubles, or by intervals that enclose them, at t (three numbers each; z = 0 in the plane)
+    [C, C', C'', C''']      by intervals that enclose them over [t0, t1]
+
+C is taken about a center, zero but for what measures distances.
+
+A natural interval extension is too wide by about the width of its argument. What the derivative tells over h = (t1 -
+t0) / 2 about the middle m, C in C(m) + [-h, h] C'([t0, t1]), is too wide by its square; the two are met.
+"""
+
+from __future__ import annotations
+
+import math
+
+from assembly._kernel import kernel
+from assembly._record import place_of, record_dtype, record_view, size_of
+from assembly.geometry.expression.arithmetic import LANES, lane_constants, run_lanes
+from assembly.geometry.expression.tape import run_tape
+from assembly.geometry.expression.tape_bounds import JUMP, KINK, SMOOTH, run_bounds
+from assembly.geometry.interval import down, idifference, magnitude, meet, up, widened
+
+# A curve given by a formula, in the table.
+FORMULA = record_dtype(
+    "i8",
+    dimension=1,  # 2 or 3
+    point_tape=1,  # where the tape of points begins
+    range_tape=1,  # where the tape of ranges begins
+    arc_tape=1,  # where the tape of the arc length begins; 0: none
+    has_range=1,  # 1: the range of C itself is among the ranges
+    continuous=1,  # 1: no operation of C jumps, so that jumps are those of derivatives and C' bounds C across them
+    room=1,  # doubles of room for a run
+    arc_plain=1,  # 1: the tape of the arc length is for plain doubles (`geometry/expression/rounding.py`)
+)
+formula_at = record_view(FORMULA)
+DIMENSION = place_of(FORMULA, "dimension")
+POINT_TAPE = place_of(FORMULA, "point_tape")
+RANGE_TAPE = place_of(FORMULA, "range_tape")
+ARC_TAPE = place_of(FORMULA, "arc_tape")
+HAS_RANGE = place_of(FORMULA, "has_range")
+CONTINUOUS = place_of(FORMULA, "continuous")
+ROOM = place_of(FORMULA, "room")
+ARC_PLAIN = place_of(FORMULA, "arc_plain")
+FORMULA_RECORD = size_of(FORMULA)
+# The same in the pool.
+FORMULA_HEAD = record_dtype(
+    "f8",
+    domain=2,  # ends of the parameter
+    error=1,  # how far C may be off [length]
+    center=3,  # that C is taken about [length]
+)
+formula_head_at = record_view(FORMULA_HEAD)
+CENTER = place_of(FORMULA_HEAD, "center")
+FORMULA_POOL = size_of(FORMULA_HEAD)
+# Room for a run; the work of the tape stands behind it.
+FORMULA_ROOM = record_dtype(
+    "f8",
+    arguments=4,  # t, or ends of intervals
+    results=24,  # numbers, or pairs of intervals, of C, then of its derivatives
+)
+formula_room_at = record_view(FORMULA_ROOM)
+RESULTS = place_of(FORMULA_ROOM, "results")
+WORK_AT = size_of(FORMULA_ROOM)
+# Numbers of C, C', C'' at a point, and of C, C', C'', C''' over an interval; what is written of an interval.
+_VALUES, _ORDERS = 9, 12
+FORMULA_RANGE = record_dtype(
+    "f8",
+    over=2 * _ORDERS,  # pairs of C, C', C'', C''' over the interval
+    middle=2 * _VALUES,  # pairs of C, C', C'' at its middle
+    arc=1,  # the user's bound of the length of arc
+)
+formula_range_at = record_view(FORMULA_RANGE)
+
+
+@kernel(inner=True)
+def formula_point(table, pool, t, room):
+    """C, C', C'' at t to the results of the room, nine doubles."""
+    room[0] = t
+    run_tape(table, pool, formula_at(table, 0).point_tape, room, room[WORK_AT:], room[RESULTS:])
+    results = formula_room_at(room, 0).results
+    for k in range(3):
+        results[k] -= formula_head_at(pool, 0).center[k]
+
+
+@kernel(inline=True)
+def forget(table, room, first, last):
+    """The whole line for orders of the results, as far as there are coordinates."""
+    results = formula_room_at(room, 0).results
+    for order in range(first, last):
+        for k in range(formula_at(table, 0).dimension):
+            o = 6 * order + 2 * k
+            results[o] = -math.inf
+            results[o + 1] = math.inf
+
+
+@kernel(inline=True)
+def settle(table, pool, room, told, orders):
+    """What a run tells forgets of its derivatives, below `orders`; C with its error, about the center."""
+    head = formula_head_at(pool, 0)
+    formula = formula_at(table, 0)
+    if told >= KINK:
+        forget(table, room, 2, orders)
+    if told >= JUMP and formula.continuous == 0:
+        forget(table, room, 1, 2)
+    error = head.error
+    results = formula_room_at(room, 0).results
+    for k in range(formula.dimension):
+        o = 2 * k
+        if error > 0.0:
+            results[o] = down(results[o] - error)
+            results[o + 1] = up(results[o + 1] + error)
+        c = head.center[k]
+        if c != 0.0:
+            results[o], results[o + 1] = idifference((results[o], results[o + 1]), (c, c))
+
+
+@kernel(inner=True, exact=True)
+def point_bounds(table, pool, t, room):
+    """Intervals of C, C', C'' at t to the results of the room, nine pairs."""
+    room[0] = t
+    room[1] = t
+    told = run_bounds(table, pool, formula_at(table, 0).point_tape, room, room[WORK_AT:], room[RESULTS:])
+    settle(table, pool, room, told, 3)
+
+
+@kernel(inner=True, exact=True)
+def range_bounds(table, pool, lo, hi, room):
+    """Intervals of C, C', C'', C''' over [lo, hi] to the results of the room, twelve pairs."""
+    formula = formula_at(table, 0)
+    room[0] = lo
+    room[1] = hi
+    told = run_bounds(table, pool, formula.range_tape, room, room[WORK_AT:], room[RESULTS:])
+    if formula.has_range == 0:
+        forget(table, room, 0, 1)
+    settle(table, pool, room, told, 4)
+    return told
+
+
+@kernel(inline=True)
+def about_the_middle(middle, half, slope):
+    """Range of a function from its value in the middle and its slope; `half` is half the width, rounded up."""
+    reach = half * magnitude(slope)
+    lo, hi = widened(middle[0] - reach, middle[1] + reach, 2.220446049250313e-16)
+    # A second rounding, of the product.
+    return down(lo), up(hi)
+
+
+@kernel(inner=True, exact=True)
+def refine(values, o, half, m):
+    """Meet the ranges at values[o:] (twelve pairs) with what values at the middle, m (nine pairs from there), tell."""
+    for order in range(2, -1, -1):
+        for k in range(3):
+            at = o + 6 * order + 2 * k
+            middle = (values[m + 6 * order + 2 * k], values[m + 6 * order + 2 * k + 1])
+            slope = (values[at + 6], values[at + 7])
+            if slope[0] > -math.inf and slope[1] < math.inf:
+                lo, hi = meet((values[at], values[at + 1]), about_the_middle(middle, half, slope))
+                values[at] = lo
+                values[at + 1] = hi
+
+
+@kernel(inner=True, exact=True)
+def arc_bound(table, pool, lo, hi, room):
+    """Upper bound of the length of arc over [lo, hi] by the user's expression; infinite where it has no length."""
+    formula = formula_at(table, 0)
+    results = formula_room_at(room, 0).results
+    if formula.arc_tape == 0:
+        return math.inf
+    if formula.arc_plain != 0:
+        room[0] = lo
+        room[1] = hi
+        run_tape(table, pool, formula.arc_tape, room, room[WORK_AT:], room[RESULTS:])
+        return results[0] if results[0] >= 0.0 else math.inf
+    room[0] = lo
+    room[1] = lo
+    room[2] = hi
+    room[3] = hi
+    run_bounds(table, pool, formula.arc_tape, room, room[WORK_AT:], room[RESULTS:])
+    return results[1] if results[1] >= 0.0 else math.inf
+
+
+@kernel(signatures="(i8[::1], f8[::1], f8[::1], f8[:, ::1], f8[::1])")
+def formula_points(table, pool, t, out, room):
+    """C, C', C'' at every t to out (n, 9). Returns the first place where C is not finite, or -1."""
+    results = formula_room_at(room, 0).results
+    bad = -1
+    for i in range(t.size):
+        formula_point(table, pool, t[i], room)
+        for k in range(_VALUES):
+            out[i, k] = results[k]
+        if bad < 0 and not math.isfinite(out[i, 0] + out[i, 1] + out[i, 2]):
+            bad = i
+    return bad
+
+
+@kernel(signatures="(i8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[::1])")
+def formula_ranges(table, pool, lo, hi, out, room):
+    """Bounds over the intervals [lo[i], hi[i]] to out (n, 43).
+
+    Twelve pairs over the interval, nine pairs at its middle, and the user's bound of the length of arc. Returns what
+    the runs tell, the worst of it.
+    """
+    results = formula_room_at(room, 0).results
+    told = SMOOTH
+    for i in range(lo.size):
+        row = formula_range_at(out, i)
+        told = max(told, range_bounds(table, pool, lo[i], hi[i], room))
+        for k in range(2 * _ORDERS):
+            row.over[k] = results[k]
+        middle = 0.5 * (lo[i] + hi[i])
+        point_bounds(table, pool, middle, room)
+        for k in range(2 * _VALUES):
+            row.middle[k] = results[k]
+        refine(out[i], 0, up(max(middle - lo[i], hi[i] - middle)), 2 * _ORDERS)
+        row.arc = arc_bound(table, pool, lo[i], hi[i], room)
+    return told
+
+
+@kernel(signatures="(i8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1])")
+def arc_bounds(table, pool, lo, hi, out, room):
+    """`arc_bound` of every interval [lo[i], hi[i]]; many at a time where plain doubles do."""
+    formula = formula_at(table, 0)
+    if formula.arc_tape != 0 and formula.arc_plain != 0:
+        work = lane_constants(table, pool, formula.arc_tape)
+        for i in range(0, lo.size, LANES):
+            run_lanes(table, formula.arc_tape, lo, hi, i, work, out)
+        return
+    for i in range(lo.size):
+        out[i] = arc_bound(table, pool, lo[i], hi[i], room)

@@ -1,0 +1,215 @@
+"""User expressions as lists of instructions, and the machine that runs them.
+
+A tape computes y from x with one work array. In the table, from place o on, stand
+
+    number of instructions, where its constants begin in the pool, size of the work array,
+
+then four integers an instruction: operation, where the result goes, and the places of two arguments
+
+    CONST    work[out] = constant a          INPUT    work[out] = x[a]
+    others   work[out] = operation(work[a], work[b])
+    OUTPUT   y[out] = work[a]
+
+Every result is that of CasADi's own machine (casadi/core/calculus.hpp), infinities, zeros' signs and NaN included, so
+no multiplication is fused with an addition here. As plain Python, numpy's functions warn of what they are given.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from assembly._kernel import kernel
+from assembly._record import place_of, record_dtype, record_view, size_of
+
+# Head of a tape in the table; its instructions stand behind it.
+TAPE = record_dtype(
+    "i8",
+    count=1,  # of instructions
+    constants=1,  # where in the pool its constants begin
+    work=1,  # size of the work array
+)
+tape_at = record_view(TAPE)
+COUNT = place_of(TAPE, "count")
+CONSTANTS = place_of(TAPE, "constants")
+WORK = place_of(TAPE, "work")
+HEAD = size_of(TAPE)
+# An instruction of a tape.
+TAPE_INSTRUCTION = record_dtype(
+    "i8",
+    code=1,  # operation
+    out=1,  # where the result goes
+    a=1,  # places of two arguments
+    b=1,
+)
+instruction_at = record_view(TAPE_INSTRUCTION)
+INSTRUCTION = size_of(TAPE_INSTRUCTION)
+
+# Names of CasADi's operations (without its OP_) in the order of our codes, the frequent ones first. LLVM makes a jump
+# table of codes without gaps.
+OPERATIONS = (
+    *("MUL", "ADD", "SUB", "INPUT", "OUTPUT", "CONST", "NEG", "SQ", "TWICE", "DIV", "SQRT", "INV", "SIN", "COS"),
+    *("ASSIGN", "LIFT", "POW", "CONSTPOW", "EXP", "LOG", "TAN", "ASIN", "ACOS", "ATAN", "ATAN2", "HYPOT", "FABS"),
+    *("SIGN", "COPYSIGN", "FMIN", "FMAX", "LT", "LE", "EQ", "NE", "NOT", "AND", "OR", "IF_ELSE_ZERO", "FLOOR", "CEIL"),
+    *("FMOD", "REMAINDER", "LOG1P", "EXPM1", "SINH", "COSH", "TANH", "ASINH", "ACOSH", "ATANH", "ERF", "ERFINV"),
+)
+MUL, ADD, SUB, INPUT, OUTPUT, CONST, NEG, SQ, TWICE, DIV, SQRT, INV, SIN, COS = range(14)
+ASSIGN, LIFT, POW, CONSTPOW, EXP, LOG, TAN, ASIN, ACOS, ATAN, ATAN2, HYPOT, FABS = range(14, 27)
+SIGN, COPYSIGN, FMIN, FMAX, LT, LE, EQ, NE, NOT, AND, OR, IF_ELSE_ZERO, FLOOR, CEIL = range(27, 41)
+FMOD, REMAINDER, LOG1P, EXPM1, SINH, COSH, TANH, ASINH, ACOSH, ATANH, ERF, ERFINV = range(41, 53)
+
+
+@kernel(inner=True, exact=True)
+def remainder(x, y):
+    """x - n y with n the integer nearest to x / y, the even one of two (IEEE 754): exact."""
+    size = abs(y)
+    low = np.fmod(abs(x), size)
+    high = size - low
+    if low < high:
+        r = low
+    elif low > high:
+        r = -high
+    elif low == high:
+        # Halfway: the multiple of y that was taken off is odd where half of it leaves half of y.
+        r = low - 2.0 * np.fmod(0.5 * (abs(x) - low), size)
+    else:
+        return low + y  # NaN
+    return r if math.copysign(1.0, x) > 0.0 else -r
+
+
+@kernel(inner=True, exact=True)
+def erfinv(x):
+    """CasADi's inverse of the error function: to 4e-6 below -0.7, which it does not polish, to 2e-15 elsewhere."""
+    if x >= 1.0 or x <= -1.0:
+        return math.copysign(math.inf, x) if x == 1.0 or x == -1.0 else math.nan
+    if -0.7 <= x < 0.7:
+        z = x * x
+        above = ((-0.140543331 * z + 0.914624893) * z - 1.645349621) * z + 0.886226899
+        y = x * above / ((((-0.329097515 * z + 0.012229801) * z + 1.442710462) * z - 2.118377725) * z + 1.0)
+    else:
+        z = np.sqrt(-np.log((1.0 - abs(x)) / 2.0))
+        above = ((1.641345311 * z + 3.429567803) * z - 1.624906493) * z - 1.970840454
+        y = above / ((1.637067800 * z + 3.543889200) * z + 1.0)
+        if x < -0.7:
+            return -y
+    slope = 2.0 / math.sqrt(math.pi)
+    y = y - (math.erf(y) - x) / (slope * np.exp(-y * y))
+    return y - (math.erf(y) - x) / (slope * np.exp(-y * y))
+
+
+@kernel(inner=True, exact=True)
+def run_tape(table, pool, o, x, work, y):
+    """Run the tape that begins at table[o]: y of x. All of y that the tape knows is written."""
+    tape = tape_at(table, o)
+    constants = np.uint64(tape.constants)
+    begin = o + HEAD
+    for k in range(begin, begin + INSTRUCTION * tape.count, INSTRUCTION):
+        instruction = instruction_at(table, k)
+        code = instruction.code
+        # Unsigned, because Numba tests a signed index for being counted from the end: a fifth of the time.
+        out = np.uint64(instruction.out)
+        a = np.uint64(instruction.a)
+        b = np.uint64(instruction.b)
+        if code == MUL:
+            work[out] = work[a] * work[b]
+        elif code == ADD:
+            work[out] = work[a] + work[b]
+        elif code == SUB:
+            work[out] = work[a] - work[b]
+        elif code == INPUT:
+            work[out] = x[a]
+        elif code == OUTPUT:
+            y[out] = work[a]
+        elif code == CONST:
+            work[out] = pool[constants + a]
+        elif code == NEG:
+            work[out] = -work[a]
+        elif code == SQ:
+            work[out] = work[a] * work[a]
+        elif code == TWICE:
+            work[out] = 2.0 * work[a]
+        elif code == DIV:
+            work[out] = work[a] / work[b]
+        elif code == SQRT:
+            work[out] = np.sqrt(work[a])
+        elif code == INV:
+            work[out] = 1.0 / work[a]
+        elif code == SIN:
+            work[out] = np.sin(work[a])
+        elif code == COS:
+            work[out] = np.cos(work[a])
+        elif code == ASSIGN or code == LIFT:
+            work[out] = work[a]
+        elif code == POW or code == CONSTPOW:
+            work[out] = work[a] ** work[b]
+        elif code == EXP:
+            work[out] = np.exp(work[a])
+        elif code == LOG:
+            work[out] = np.log(work[a])
+        elif code == TAN:
+            work[out] = np.tan(work[a])
+        elif code == ASIN:
+            work[out] = np.arcsin(work[a])
+        elif code == ACOS:
+            work[out] = np.arccos(work[a])
+        elif code == ATAN:
+            work[out] = math.atan(work[a])
+        elif code == ATAN2:
+            work[out] = math.atan2(work[a], work[b])
+        elif code == HYPOT:
+            work[out] = np.hypot(work[a], work[b])
+        elif code == FABS:
+            work[out] = abs(work[a])
+        elif code == SIGN:
+            work[out] = -1.0 if work[a] < 0.0 else (1.0 if work[a] > 0.0 else work[a])
+        elif code == COPYSIGN:
+            work[out] = math.copysign(work[a], work[b])
+        elif code == FMIN:
+            work[out] = work[a] if work[a] <= work[b] or work[b] != work[b] else work[b]
+        elif code == FMAX:
+            work[out] = work[a] if work[a] >= work[b] or work[b] != work[b] else work[b]
+        elif code == LT:
+            work[out] = 1.0 if work[a] < work[b] else 0.0
+        elif code == LE:
+            work[out] = 1.0 if work[a] <= work[b] else 0.0
+        elif code == EQ:
+            work[out] = 1.0 if work[a] == work[b] else 0.0
+        elif code == NE:
+            work[out] = 1.0 if work[a] != work[b] else 0.0
+        elif code == NOT:
+            work[out] = 1.0 if work[a] == 0.0 else 0.0
+        elif code == AND:
+            work[out] = 1.0 if work[a] != 0.0 and work[b] != 0.0 else 0.0
+        elif code == OR:
+            work[out] = 1.0 if work[a] != 0.0 or work[b] != 0.0 else 0.0
+        elif code == IF_ELSE_ZERO:
+            work[out] = 0.0 if work[a] == 0.0 else work[b]
+        elif code == FLOOR:
+            work[out] = np.floor(work[a])
+        elif code == CEIL:
+            work[out] = np.ceil(work[a])
+        elif code == FMOD:
+            work[out] = np.fmod(work[a], work[b])
+        elif code == REMAINDER:
+            work[out] = remainder(work[a], work[b])
+        elif code == LOG1P:
+            work[out] = np.log1p(work[a])
+        elif code == EXPM1:
+            work[out] = np.expm1(work[a])
+        elif code == SINH:
+            work[out] = np.sinh(work[a])
+        elif code == COSH:
+            work[out] = np.cosh(work[a])
+        elif code == TANH:
+            work[out] = np.tanh(work[a])
+        elif code == ASINH:
+            work[out] = np.arcsinh(work[a])
+        elif code == ACOSH:
+            work[out] = np.arccosh(work[a])
+        elif code == ATANH:
+            work[out] = np.arctanh(work[a])
+        elif code == ERF:
+            work[out] = math.erf(work[a])
+        elif code == ERFINV:
+            work[out] = erfinv(work[a])

@@ -1,0 +1,282 @@
+"""Face: a surface with a side that is outside, and with a boundary."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly._read_only import ReadOnlyArrays
+from assembly.errors import InputError, checked_color, items
+from assembly.geometry.faces.boundary import Boundary, LoopLike, make_boundary
+from assembly.geometry.faces.loop import Loop
+from assembly.geometry.faces.measures import area_and_volume
+from assembly.geometry.faces.space_nearest import nearest_in_space
+from assembly.geometry.faces.trim import locate_points
+from assembly.geometry.faces.trim_nearest import nearest_points
+from assembly.geometry.splines.curve import NurbsCurve, checked_name, flat, parameters
+from assembly.geometry.splines.derivative_bounds import derivative_bounds
+from assembly.geometry.splines.evaluate import SIGN
+from assembly.geometry.splines.surface import NurbsSurface
+
+__all__ = ["BoundaryPoint", "Face"]
+
+
+@dataclass(frozen=True, eq=False)
+class BoundaryPoint(ReadOnlyArrays):
+    """Nearest points of a boundary: signed distance (positive inside), curve, its parameter, and (u, v)."""
+
+    distance: NDArray[np.float64]
+    curve: NDArray[np.int64]
+    t: NDArray[np.float64]
+    point: NDArray[np.float64]
+
+
+class Face:
+    """A surface with a side that is outside, and with a boundary: what is left of it after trimming.
+
+    Parameters
+    ----------
+    surface : NurbsSurface
+    outer : NurbsCurve, several of them, or Loop, optional
+        The outer boundary in (u, v); the edge of the surface by default. On a surface that is closed in u or v it
+        may be drawn with seams, or be a ring once around with material on its left, the other ring among `holes`.
+    holes : sequence of the same
+        Inner boundaries. The outer loop is turned counterclockwise and holes clockwise; rings stay as they are.
+    name : str, optional
+        The surface's name by default.
+    reversed : bool
+        The outward normal is Su x Sv, or its negative when reversed.
+    color : (red, green, blue), optional
+        0 to 1 each; that of the body by default.
+
+    Attributes
+    ----------
+    boundary : tuple of NurbsCurve
+        All boundary curves, material on their left, without seams and without edges that are one point in space.
+    chains : tuple of range
+        Which of them follow one another.
+
+    Raises
+    ------
+    TypeError
+        The surface or a loop is something else.
+    InputError
+        Naming the loop: one that is open, crosses or touches itself or another, leaves the domain, or does not
+        bound the face together with the others.
+    """
+
+    def __init__(
+        self,
+        surface: NurbsSurface,
+        outer: LoopLike | None = None,
+        holes: Sequence[LoopLike] = (),
+        *,
+        name: str | None = None,
+        reversed: bool = False,
+        color: Sequence[float] | None = None,
+    ) -> None:
+        if not isinstance(surface, NurbsSurface):
+            raise TypeError(f"surface is {surface!r}; expected a NurbsSurface")
+        if not isinstance(reversed, (bool, np.bool_)):
+            raise TypeError(f"reversed is {reversed!r}; expected True or False")
+        self.surface = surface
+        self.name = surface.name if name is None else checked_name(name)
+        self.reversed = bool(reversed)
+        self.color = color
+        self._outer, self._holes = outer, items("holes", holes, "a sequence of loops")
+        if outer is not None or self._holes:
+            _ = self._boundary
+
+    @cached_property
+    def _boundary(self) -> Boundary:
+        """Made at once where there are loops to be checked, else when it is first asked for."""
+        return make_boundary(self.surface, self._outer, self._holes)
+
+    @property
+    def color(self) -> tuple[float, float, float] | None:
+        """Red, green and blue, 0 to 1; None for the color of the body. Settable."""
+        return self._color
+
+    @color.setter
+    def color(self, value: Sequence[float] | None) -> None:
+        self._color = checked_color(value)
+
+    @property
+    def outer(self) -> Loop | None:
+        """The outer loop, counterclockwise; None for the edge of the surface."""
+        return None if self._outer is None else self._boundary.outer
+
+    @property
+    def holes(self) -> tuple[Loop, ...]:
+        """The other loops, clockwise."""
+        return self._boundary.holes if self._holes else ()
+
+    @property
+    def boundary(self) -> tuple[NurbsCurve, ...]:
+        """All boundary curves, material to the left; none for a closed surface without loops."""
+        return self._boundary.curves
+
+    @property
+    def chains(self) -> tuple[range, ...]:
+        """Which boundary curves follow one another."""
+        return self._boundary.chains
+
+    def packed_trim(self, table_at: int = 0, pool_at: int = 0) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Table and pool of the boundary as kernels read it, for being appended at these places."""
+        return self._boundary.table.at(table_at, pool_at)
+
+    def _at(self, u: ArrayLike, v: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64], tuple[int, ...]]:
+        """Flat parameters and their common shape."""
+        at_u, at_v = parameters("u", u), parameters("v", v)
+        try:
+            shape = np.broadcast_shapes(at_u.shape, at_v.shape)
+        except ValueError:
+            raise InputError(
+                f"u and v have shapes {at_u.shape} and {at_v.shape}; expected shapes that broadcast"
+            ) from None
+        for name, at in (("u", at_u), ("v", at_v)):
+            if not np.isfinite(at).all():
+                raise InputError(f"{name} is {at[~np.isfinite(at)].flat[0]}; expected finite parameters")
+        return flat(np.broadcast_to(at_u, shape)), flat(np.broadcast_to(at_v, shape)), shape
+
+    def locate(self, u: ArrayLike, v: ArrayLike) -> NDArray[np.int64]:
+        """On which side of the boundary points are, decided on its true curves.
+
+        Parameters
+        ----------
+        u, v : arrays that broadcast
+            Any sheet of a closed direction.
+
+        Returns
+        -------
+        1 inside, 0 on the boundary (within 1e-12 of its size in (u, v)), -1 outside; the common shape.
+
+        Raises
+        ------
+        InputError
+            A parameter that is not finite.
+        """
+        at_u, at_v, shape = self._at(u, v)
+        table, pool = self.packed_trim()
+        side = np.empty(at_u.size, dtype=np.int64)
+        locate_points(table, pool, 0, at_u, at_v, side)
+        return side.reshape(shape)
+
+    def contains(self, u: ArrayLike, v: ArrayLike) -> NDArray[np.bool_]:
+        """Whether points are inside or on the boundary; see `locate`."""
+        return np.asarray(self.locate(u, v) >= 0)
+
+    def _nearest(self, u: ArrayLike, v: ArrayLike) -> tuple[NDArray[np.float64], tuple[int, ...]]:
+        at_u, at_v, shape = self._at(u, v)
+        table, pool = self.packed_trim()
+        out = np.empty((at_u.size, 7))
+        nearest_points(table, pool, 0, 0, len(self.boundary), at_u, at_v, out)
+        return out, shape
+
+    def trim_distance(self, u: ArrayLike, v: ArrayLike) -> NDArray[np.float64]:
+        """Signed Euclidean distance to the boundary in (u, v), positive inside, infinite without a boundary.
+
+        Parameters
+        ----------
+        u, v : arrays that broadcast
+
+        Raises
+        ------
+        InputError
+            A parameter that is not finite.
+        """
+        out, shape = self._nearest(u, v)
+        return out[:, 0].reshape(shape)
+
+    def nearest_on_boundary(self, u: ArrayLike, v: ArrayLike) -> BoundaryPoint:
+        """The nearest point of the boundary in (u, v), certified by branch and bound.
+
+        Parameters
+        ----------
+        u, v : arrays that broadcast
+
+        Raises
+        ------
+        InputError
+            A parameter that is not finite, or a face without a boundary.
+        """
+        if not self.boundary:
+            raise InputError(f"{self!r} has no boundary: its surface is closed and has no loops")
+        out, shape = self._nearest(u, v)
+        return BoundaryPoint(
+            distance=out[:, 0].reshape(shape),
+            curve=out[:, 1].astype(np.int64).reshape(shape),
+            t=out[:, 2].reshape(shape),
+            point=out[:, 3:5].reshape((*shape, 2)),
+        )
+
+    def space_distance(self, u: ArrayLike, v: ArrayLike) -> NDArray[np.float64]:
+        """Signed distance in space from S(u, v) to the boundary, positive inside, infinite without a boundary.
+
+        Parameters
+        ----------
+        u, v : arrays that broadcast
+            In the domain of open directions; beyond it they count as at its end.
+
+        Raises
+        ------
+        InputError
+            A parameter that is not finite.
+        """
+        at_u, at_v, shape = self._at(u, v)
+        record, surface_pool = self.surface.packed()
+        table, pool = self.packed_trim(record.size, surface_pool.size)
+        out = np.empty((at_u.size, 3))
+        nearest_in_space(
+            np.concatenate([record, table]),
+            np.concatenate([surface_pool, pool]),
+            0,
+            record.size,
+            self._derivative_bounds,
+            at_u,
+            at_v,
+            out,
+        )
+        return np.where(self.locate(at_u, at_v) < 0, -out[:, 0], out[:, 0]).reshape(shape)
+
+    @cached_property
+    def _derivative_bounds(self) -> NDArray[np.float64]:
+        return derivative_bounds(self.surface)
+
+    @cached_property
+    def _integrals(self) -> NDArray[np.float64]:
+        return area_and_volume(self.surface, self._boundary.table)
+
+    def area(self) -> float:
+        """Area of the face, to 1e-10 of itself."""
+        return float(self._integrals[0])
+
+    def volume_integral(self) -> float:
+        """One third of the integral of S.n over the face, n outward: summed over a closed body, its volume."""
+        return self.sign * float(self._integrals[1])
+
+    def __repr__(self) -> str:
+        label = "" if self.name is None else f"{self.name!r}, "
+        return f"Face({label}{self.surface!r}{', reversed' if self.reversed else ''})"
+
+    @property
+    def sign(self) -> int:
+        """1, or -1 when reversed."""
+        return -1 if self.reversed else 1
+
+    def normal(self, u: ArrayLike, v: ArrayLike) -> NDArray[np.float64]:
+        """Unit outward normal, shape of the parameters + (3,); see `NurbsSurface.normal`."""
+        return self.sign * self.surface.normal(u, v)
+
+    def packed(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """The surface's record and pool, with the sign of the outward normal in the record."""
+        record, pool = self.surface.packed()
+        if not self.reversed:
+            return record, pool
+        record = record.copy()
+        record[SIGN] = -1
+        return record, pool

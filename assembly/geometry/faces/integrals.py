@@ -1,0 +1,80 @@
+"""Integrals over a trimmed face, by Green's theorem in the cell of its trim table.
+
+With w(u, v) = 1 where there is material, w(u, v) = w(u, bottom) + the signs of u' of the pieces below (u, v). So
+
+    integral of g w  =  sum over pieces  of the integral of u'(t) G(u(t), v(t)) dt
+                        + the integral of w(u, bottom) G(u, bottom) du,       G(u, v) = integral of g from v to the top.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from assembly._kernel import kernel
+from assembly.geometry.faces.trim_pieces import piece_line
+from assembly.geometry.splines.evaluate import (
+    into_domain,
+    surface_at,
+    surface_point,
+)
+from assembly.geometry.vec import cross, dot
+
+
+@kernel(inner=True)
+def _column(table, pool, u, v, levels, nodes, weights):
+    """Integrals over a column from v to the top of |Su x Sv| and of S.(Su x Sv) / 3."""
+    patch = surface_at(table, 0)
+    area = 0.0
+    volume = 0.0
+    x, _fits = into_domain(pool, patch.breaks_u, patch.spans_u, patch.closed_u, u)
+    for k in range(levels.size - 1):
+        low = max(v, levels[k])
+        half = 0.5 * (levels[k + 1] - low)
+        if not half > 0.0:
+            continue
+        for n in range(nodes.size):
+            y = low + half * (1.0 + nodes[n])
+            y, _fits = into_domain(pool, patch.breaks_v, patch.spans_v, patch.closed_v, y)
+            s, su, sv, _suu, _suv, _svv = surface_point(table, pool, 0, x, y)
+            normal = cross(su, sv)
+            area += half * weights[n] * np.sqrt(dot(normal, normal))
+            volume += half * weights[n] * dot(s, normal) / 3.0
+    return area, volume
+
+
+@kernel(signatures="(i8[::1], f8[::1], f8[:, ::1], i8[::1], i8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1])")
+def along_pieces(table, pool, rows, coefficients, degrees, levels, nodes, weights, out):
+    """Integrals of u' G over parts of pieces.
+
+    A row of `rows` holds t0, t1, the middle of the span, and what moves the curve into the cell; `levels` are the
+    knots of v within the cell, with its ends.
+    """
+    for k in range(rows.shape[0]):
+        t0 = rows[k, 0]
+        half = 0.5 * (rows[k, 1] - t0)
+        area = 0.0
+        volume = 0.0
+        for n in range(nodes.size):
+            t = t0 + half * (1.0 + nodes[n])
+            u, v, du, _dv = piece_line(pool, coefficients[k], degrees[k], t - rows[k, 2])
+            a, b = _column(table, pool, u + rows[k, 3], v + rows[k, 4], levels, nodes, weights)
+            area += half * weights[n] * du * a
+            volume += half * weights[n] * du * b
+        out[k, 0] = area
+        out[k, 1] = volume
+
+
+@kernel(signatures="(i8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[:, ::1])")
+def along_bottom(table, pool, stretches, levels, nodes, weights, out):
+    """Integrals of G over stretches (u0, u1) of the bottom."""
+    for k in range(stretches.shape[0]):
+        u0 = stretches[k, 0]
+        half = 0.5 * (stretches[k, 1] - u0)
+        area = 0.0
+        volume = 0.0
+        for n in range(nodes.size):
+            a, b = _column(table, pool, u0 + half * (1.0 + nodes[n]), levels[0], levels, nodes, weights)
+            area += half * weights[n] * a
+            volume += half * weights[n] * b
+        out[k, 0] = area
+        out[k, 1] = volume

@@ -1,0 +1,167 @@
+"""Which side of its boundary a point of a face is on.
+
+The boundary has been cut into pieces that run one way in u and in v (`geometry/faces/monotone.py`) and moved into one
+cell of the periods. Material is to the left of every piece. Below a point (u, v) the signed number of pieces,
+
+    w(u, v) = w(u, bottom) + sum of sign(u') over the pieces that pass between (u, bottom) and (u, v),
+
+is 1 where there is material (the table is made so), 0 where there is none. A piece has to be solved for the point
+only inside its box. Everywhere else two comparisons decide.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from assembly._kernel import kernel
+from assembly.geometry.faces.trim_pieces import (
+    PIECE_DOUBLES,
+    PIECE_INTS,
+    piece_at,
+    piece_bounds_at,
+    piece_links_at,
+    trim_at,
+    trim_frame_at,
+)
+
+
+@kernel(inline=True)
+def into_cell(x, low, high, period):
+    """A coordinate moved by whole periods into its cell."""
+    if period == 0.0 or low <= x < high:
+        return x
+    moved = x - period * np.floor((x - low) / period)
+    if moved < low:
+        return low
+    return moved if moved < high else low
+
+
+@kernel(inline=True)
+def _steps(pool, first, count, start, u):
+    """w along the bottom."""
+    w = start
+    for k in range(count):
+        if u >= pool[first + 2 * k]:
+            w = pool[first + 2 * k + 1]
+    return w
+
+
+@kernel(inner=True)
+def _below(table, pool, o, i, u, v, tolerance):
+    """What a piece adds to w at a point, and whether the point is on it."""
+    piece = piece_bounds_at(pool, i)
+    links = piece_links_at(table, o)
+    if v > pool[i + 3] + tolerance:
+        return links.sign_u if pool[i] <= u < pool[i + 1] else 0, False
+    if v < pool[i + 2] - tolerance:
+        return 0, False
+    shift_u = piece.shift_u
+    shift_v = piece.shift_v
+    sign_u = links.sign_u
+    sign_v = links.sign_v
+    within = pool[i] <= u < pool[i + 1]
+    major = links.major
+    x = u
+    # The ends first: beyond them the curve is not the piece's.
+    near = (u - piece.start[0]) ** 2 + (v - piece.start[1]) ** 2
+    near = min(near, (u - piece.end[0]) ** 2 + (v - piece.end[1]) ** 2)
+    if near <= tolerance * tolerance:
+        return 0, True
+    if major == 0:
+        x = u
+        start = piece.start[0]
+        end = piece.end[0]
+        shift = shift_u
+        inside = pool[i] <= u <= pool[i + 1]
+    else:
+        x = v
+        start = piece.start[1]
+        end = piece.end[1]
+        shift = shift_v
+        inside = pool[i + 2] <= v <= pool[i + 3]
+    if not inside:
+        return sign_u if within and v > pool[i + 3] else 0, False
+    at, cu, cv, du, dv = piece_at(
+        pool,
+        links.coefficients,
+        links.degree,
+        piece.middle,
+        piece.t0,
+        piece.t1,
+        major,
+        x - shift,
+        start - shift,
+        end - shift,
+    )
+    off_u = u - shift_u - cu
+    off_v = v - shift_v - cv
+    speed = np.sqrt(du * du + dv * dv)
+    if abs(du * off_v - dv * off_u) <= tolerance * speed:
+        return 0, True
+    if not within:
+        return 0, False
+    above = off_v > 0.0 if major == 0 else (off_u < 0.0) == (sign_u * sign_v > 0)
+    return sign_u if above else 0, False
+
+
+@kernel(inner=True)
+def winding(table, pool, trim, u, v):
+    """w at a point, and whether the point is on the boundary."""
+    trim_record = trim_at(table, trim)
+    frame = trim_frame_at(pool, trim_record.frame)
+    tolerance = frame.on
+    x = into_cell(u, frame.low_u, frame.high_u, frame.period_u)
+    y = into_cell(v, frame.low_v, frame.high_v, frame.period_v)
+    # A pole edge is no boundary: its points belong to the face, with those just inside.
+    z = x
+    extent = frame.high_u - frame.low_u
+    if frame.period_u == 0.0 and 0.0 <= x - frame.high_u <= 1e-14 * extent:
+        z = frame.high_u - 1e-15 * extent
+    w = _steps(pool, trim_record.step_pool, trim_record.steps, frame.bottom, x)
+    o = trim_record.piece_table
+    i = trim_record.piece_pool
+    for _ in range(trim_record.pieces):
+        if pool[i] - tolerance <= x <= pool[i + 1] + tolerance:
+            part, on = _below(table, pool, o, i, x, y, tolerance)
+            if on:
+                return w, True
+            w += part
+        o += PIECE_INTS
+        i += PIECE_DOUBLES
+    for _ in range(trim_record.pieces, trim_record.all_pieces):
+        sign = piece_links_at(table, o).sign_u
+        if pool[i] <= z < pool[i + 1] and (y > pool[i + 2] or (y == pool[i + 2] and sign > 0)):
+            w += sign
+        o += PIECE_INTS
+        i += PIECE_DOUBLES
+    return w, False
+
+
+@kernel(inner=True)
+def trim_side(table, pool, trim, u, v):
+    """1 inside, 0 on the boundary (within 1e-12 of its size), -1 outside."""
+    w, on = winding(table, pool, trim, u, v)
+    if on:
+        return 0
+    frame = trim_frame_at(pool, trim_at(table, trim).frame)
+    slack = 1e-14 * (frame.high_u - frame.low_u)
+    if frame.period_u == 0.0 and not frame.low_u - slack <= u <= frame.high_u + slack:
+        return -1
+    slack = 1e-14 * (frame.high_v - frame.low_v)
+    if frame.period_v == 0.0 and not frame.low_v - slack <= v <= frame.high_v + slack:
+        return -1
+    return 1 if w == 1.0 else -1
+
+
+@kernel(signatures="(i8[::1], f8[::1], i8, f8[::1], f8[::1], i8[::1])")
+def locate_points(table, pool, trim, u, v, side):
+    """`trim_side` at flat points."""
+    for k in range(u.size):
+        side[k] = trim_side(table, pool, trim, u[k], v[k])
+
+
+@kernel(signatures="(i8[::1], f8[::1], i8, f8[::1], f8[::1], f8[::1])")
+def windings(table, pool, trim, u, v, out):
+    """w at flat points, before the table knows what w at the bottom is."""
+    for k in range(u.size):
+        out[k], _on = winding(table, pool, trim, u[k], v[k])

@@ -1,0 +1,311 @@
+"""Pieces of boundary curves that run one way in u and in v: where they pass a coordinate, and where they are nearest.
+
+Nearest points are found by branch and bound. With F(t) = |C(t) - (u, v)|^2 / 2 around the middle m of an interval
+of half width h, and a bound L on |F'''|,
+
+    F(t) >= F(m) + F'(m) (t - m) + (F''(m) - L h / 3) (t - m)^2 / 2,
+
+and |C(t) - C(m) - C'(m) (t - m)| <= max |C''| h^2 / 2; an interval with F'' > L h is convex and left to Newton.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from assembly._kernel import kernel
+from assembly._lanes import lane, load_lanes
+from assembly._record import place_of, record_dtype, record_view, size_of
+
+# A trim in the table: the boundary of a face in its parameters.
+TRIM = record_dtype(
+    "i8",
+    curves=1,  # how many boundary curves
+    first=1,  # where in the table their records begin
+    all_pieces=1,  # how many pieces
+    pieces=1,  # how many of them are of the boundary alone
+    piece_table=1,  # where in the table the pieces begin
+    piece_pool=1,  # where in the pool the pieces begin
+    curve_pieces=1,  # where in the table the first piece of every curve stands
+    frame=1,  # where in the pool the frame stands
+    steps=1,  # how many steps of w along the bottom
+    step_pool=1,  # where in the pool the steps begin
+)
+trim_at = record_view(TRIM)
+TRIM_CURVES = place_of(TRIM, "curves")
+TRIM_FIRST = place_of(TRIM, "first")
+TRIM_ALL = place_of(TRIM, "all_pieces")
+TRIM_PIECES = place_of(TRIM, "pieces")
+TRIM_PIECE_TABLE = place_of(TRIM, "piece_table")
+TRIM_PIECE_POOL = place_of(TRIM, "piece_pool")
+TRIM_CURVE_PIECES = place_of(TRIM, "curve_pieces")
+TRIM_FRAME = place_of(TRIM, "frame")
+TRIM_STEPS = place_of(TRIM, "steps")
+TRIM_STEP_POOL = place_of(TRIM, "step_pool")
+TRIM_RECORD = size_of(TRIM)
+# The frame of a trim in the pool; everything is in parameters.
+TRIM_FRAME_RECORD = record_dtype(
+    "f8",
+    low_u=1,  # the cell of a periodic surface, or the domain
+    low_v=1,
+    high_u=1,
+    high_v=1,
+    period_u=1,  # 0: open
+    period_v=1,
+    on=1,  # points nearer to the boundary than this are on it
+    bottom=1,  # winding number w at the bottom left
+    extent=1,  # size of the cell or domain
+)
+trim_frame_at = record_view(TRIM_FRAME_RECORD)
+LOW_U = place_of(TRIM_FRAME_RECORD, "low_u")
+LOW_V = place_of(TRIM_FRAME_RECORD, "low_v")
+HIGH_U = place_of(TRIM_FRAME_RECORD, "high_u")
+HIGH_V = place_of(TRIM_FRAME_RECORD, "high_v")
+PERIOD_U = place_of(TRIM_FRAME_RECORD, "period_u")
+PERIOD_V = place_of(TRIM_FRAME_RECORD, "period_v")
+BOTTOM = place_of(TRIM_FRAME_RECORD, "bottom")
+SIZE = place_of(TRIM_FRAME_RECORD, "extent")
+FRAME = size_of(TRIM_FRAME_RECORD)
+# A piece of a boundary curve, its integers.
+PIECE_LINKS = record_dtype(
+    "i8",
+    curve=1,  # number of its boundary curve
+    coefficients=1,  # where in the pool its coefficients are
+    degree=1,
+    before=1,  # the piece before it; -1: none
+    after=1,  # the piece after it; -1: none
+    sign_u=1,  # of u' all along
+    sign_v=1,  # of v' all along
+    major=1,  # the coordinate that changes faster (0: u, 1: v)
+)
+piece_links_at = record_view(PIECE_LINKS)
+PIECE_CURVE = place_of(PIECE_LINKS, "curve")
+PIECE_COEFFICIENTS = place_of(PIECE_LINKS, "coefficients")
+PIECE_DEGREE = place_of(PIECE_LINKS, "degree")
+PIECE_SIGN_U = place_of(PIECE_LINKS, "sign_u")
+PIECE_SIGN_V = place_of(PIECE_LINKS, "sign_v")
+PIECE_MAJOR = place_of(PIECE_LINKS, "major")
+PIECE_INTS = size_of(PIECE_LINKS)
+# The same piece, its doubles.
+PIECE_BOUNDS = record_dtype(
+    "f8",
+    box=4,  # low u, high u, low v, high v
+    t0=1,  # its interval on the curve
+    t1=1,
+    shift_u=1,  # moves its curve into the cell
+    shift_v=1,
+    middle=1,  # of its span
+    bound_1=1,  # on |C'|
+    bound_2=1,  # on |C''|
+    bound_3=1,  # on |C'''|
+    start=2,  # (u, v) at t0
+    end=2,  # (u, v) at t1
+)
+piece_bounds_at = record_view(PIECE_BOUNDS)
+PIECE_T0 = place_of(PIECE_BOUNDS, "t0")
+PIECE_T1 = place_of(PIECE_BOUNDS, "t1")
+SHIFT_U = place_of(PIECE_BOUNDS, "shift_u")
+SHIFT_V = place_of(PIECE_BOUNDS, "shift_v")
+MIDDLE = place_of(PIECE_BOUNDS, "middle")
+BOUND_1 = place_of(PIECE_BOUNDS, "bound_1")
+BOUND_3 = place_of(PIECE_BOUNDS, "bound_3")
+START = place_of(PIECE_BOUNDS, "start")
+END = place_of(PIECE_BOUNDS, "end")
+PIECE_DOUBLES = size_of(PIECE_BOUNDS)
+# Where the distance hardly changes, as from the center of a circle, this part of its square is let go.
+LET_GO = 1e-10
+_ROUNDING = 4e-15
+# Intervals that a query may look at on one piece before its bounds are taken as they are.
+_BUDGET = 100_000
+
+
+@kernel(inline=True)
+def piece_line(pool, o, degree, s):
+    """u, v, u', v' of a rational piece."""
+    p = load_lanes(pool, o + 4 * degree)
+    d = 0.0 * p
+    for k in range(degree - 1, -1, -1):
+        d = p + s * d
+        p = load_lanes(pool, o + 4 * k) + s * p
+    i = 1.0 / lane(p, 3)
+    a = i * p
+    b = i * (d - lane(d, 3) * a)
+    return lane(a, 0), lane(a, 1), lane(b, 0), lane(b, 1)
+
+
+@kernel(inline=True)
+def piece_bend(pool, o, degree, s):
+    """u, v, u', v', u'', v'' of a rational piece."""
+    p = load_lanes(pool, o + 4 * degree)
+    d = 0.0 * p
+    h = 0.0 * p
+    for k in range(degree - 1, -1, -1):
+        h = d + s * h
+        d = p + s * d
+        p = load_lanes(pool, o + 4 * k) + s * p
+    i = 1.0 / lane(p, 3)
+    a = i * p
+    b = i * (d - lane(d, 3) * a)
+    c = i * (2.0 * h - (2.0 * lane(d, 3)) * b - (2.0 * lane(h, 3)) * a)
+    return lane(a, 0), lane(a, 1), lane(b, 0), lane(b, 1), lane(c, 0), lane(c, 1)
+
+
+@kernel(inner=True)
+def piece_at(pool, o, degree, middle, t0, t1, axis, target, start, end):
+    """The parameter at which a piece that runs one way has a coordinate, and its point and direction there."""
+    rising = end > start
+    low = t0
+    high = t1
+    t = t0 + (t1 - t0) * (target - start) / (end - start)
+    x, y, dx, dy = piece_line(pool, o, degree, t - middle)
+    for _ in range(80):
+        value = x - target if axis == 0 else y - target
+        slope = dx if axis == 0 else dy
+        if value == 0.0:
+            break
+        if (value > 0.0) == rising:
+            high = t
+        else:
+            low = t
+        step = t - value / slope if slope != 0.0 else low
+        if not low < step < high:
+            step = 0.5 * (low + high)
+        if abs(step - t) <= 3e-16 * abs(step):
+            break
+        t = step
+        x, y, dx, dy = piece_line(pool, o, degree, t - middle)
+    return t, x, y, dx, dy
+
+
+@kernel(inner=True)
+def _newton(pool, o, degree, middle, a, b, t, qx, qy):
+    """The nearest point of an interval on which the distance is convex; half its square and its parameter."""
+    low = a
+    high = b
+    f = 0.0
+    for _ in range(60):
+        x, y, dx, dy, ddx, ddy = piece_bend(pool, o, degree, t - middle)
+        ex = x - qx
+        ey = y - qy
+        f = 0.5 * (ex * ex + ey * ey)
+        g = ex * dx + ey * dy
+        if g == 0.0:
+            break
+        if g > 0.0:
+            high = t
+            if t == a:
+                break
+        else:
+            low = t
+            if t == b:
+                break
+        curvature = dx * dx + dy * dy + ex * ddx + ey * ddy
+        step = t - g / curvature if curvature > 0.0 else 0.5 * (low + high)
+        if step <= a:
+            step = a
+        elif step >= b:
+            step = b
+        elif not low < step < high:
+            step = 0.5 * (low + high)
+        if abs(step - t) <= 2e-16 * max(abs(t), b - a):
+            break
+        t = step
+    return f, t
+
+
+@kernel(inner=True)
+def nearest_on_piece(pool, o, degree, middle, t0, t1, m1, m2, m3, qx, qy, best):
+    """Half the squared distance and the parameter of the nearest point of a piece, where it beats `best`.
+
+    The second value is `t0 - 1` where it does not.
+    """
+    found = t0 - 1.0
+    level = 0
+    index = 0
+    h = t1 - t0
+    for _ in range(_BUDGET):
+        half = 0.5 * h
+        m = t0 + (index + 0.5) * h
+        x, y, dx, dy, ddx, ddy = piece_bend(pool, o, degree, m - middle)
+        ex = x - qx
+        ey = y - qy
+        f = 0.5 * (ex * ex + ey * ey)
+        if f < best:
+            best = f
+            found = m
+        g = ex * dx + ey * dy
+        speed = dx * dx + dy * dy
+        curvature = speed + ex * ddx + ey * ddy
+        third = 3.0 * m1 * m2 + (np.sqrt(2.0 * f) + m1 * half) * m3
+        bent = curvature - third * half / 3.0
+        reach = half
+        if bent > 0.0:
+            reach = min(half, abs(g) / bent)
+        # What rounding may have added comes off: for a point near the curve the bound is a small difference.
+        low = f - abs(g) * reach + 0.5 * bent * reach * reach - _ROUNDING * (f + abs(g) * half)
+        if low < best:
+            # A tangent and how far the piece may be from it.
+            along = min(max(-g / speed, -half), half) if speed > 0.0 else 0.0
+            apart = np.sqrt((ex + along * dx) ** 2 + (ey + along * dy) ** 2) - 0.5 * m2 * half * half
+            apart -= _ROUNDING * (np.sqrt(2.0 * f) + m1 * half)
+            if apart > 0.0:
+                low = max(low, 0.5 * apart * apart)
+        if low < best:
+            if curvature > third * half:
+                at_low = t0 + index * h
+                f, t = _newton(pool, o, degree, middle, at_low, min(at_low + h, t1), m, qx, qy)
+                if f < best:
+                    best = f
+                    found = t
+            elif low < best - LET_GO * best and level < 50:
+                level += 1
+                index *= 2
+                h = half
+                continue
+        index += 1
+        while level > 0 and index % 2 == 0:
+            index //= 2
+            level -= 1
+            h *= 2.0
+        if level == 0:
+            break
+    return best, found
+
+
+@kernel(inner=True)
+def polished(pool, o, degree, middle, t0, t1, t, qx, qy):
+    """A parameter near that of a nearest point, brought to it by Newton's method as long as that goes downhill."""
+    x, y, dx, dy, ddx, ddy = piece_bend(pool, o, degree, t - middle)
+    for _ in range(8):
+        ex = x - qx
+        ey = y - qy
+        speed = dx * dx + dy * dy
+        curvature = speed + ex * ddx + ey * ddy
+        if not curvature > 1e-3 * speed:
+            break
+        step = min(max(t - (ex * dx + ey * dy) / curvature, t0), t1)
+        if step == t:
+            break
+        x, y, dx, dy, ddx, ddy = piece_bend(pool, o, degree, step - middle)
+        ax = x - qx
+        ay = y - qy
+        if ax * ax + ay * ay > (ex * ex + ey * ey) * (1.0 + 4e-16):
+            break
+        near = abs(step - t) <= 4e-16 * max(abs(t), t1 - t0)
+        t = step
+        if near:
+            break
+    return t
+
+
+@kernel(signatures="(f8[::1], i8[::1], i8[::1], f8[::1], f8[::1], f8[:, ::1])")
+def ends_of_pieces(pool, coefficients, degrees, middles, t, out):
+    """Points of pieces at parameters."""
+    for k in range(t.size):
+        out[k, 0], out[k, 1], _du, _dv = piece_line(pool, coefficients[k], degrees[k], t[k] - middles[k])
+
+
+@kernel(signatures="(f8[::1], i8, i8, f8, f8, f8, i8, f8, f8, f8)")
+def cut_of_piece(pool, coefficients, degree, middle, t0, t1, axis, target, start, end):
+    """The parameter at which a piece has a coordinate, and its point there."""
+    t, x, y, _dx, _dy = piece_at(pool, coefficients, degree, middle, t0, t1, axis, target, start, end)
+    return t, x, y

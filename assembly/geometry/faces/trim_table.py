@@ -1,0 +1,363 @@
+"""The table of a trim: boundary curves cut into pieces, moved into one cell of the periods, as kernels read them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import comb
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.geometry.faces import trim_pieces as layout
+from assembly.geometry.faces.crossing import first_crossing
+from assembly.geometry.faces.monotone import ROW, cut_curves
+from assembly.geometry.faces.trim import windings
+from assembly.geometry.faces.trim_pieces import PIECE_DOUBLES, PIECE_INTS, TRIM_RECORD
+from assembly.geometry.splines.curve import NurbsCurve
+from assembly.geometry.splines.curve_packing import packed_curves
+from assembly.geometry.splines.evaluate import (
+    CURVE_BREAKS,
+    CURVE_COEFFICIENTS,
+    CURVE_DEGREE,
+    CURVE_RECORD,
+    CURVE_SPANS,
+)
+
+__all__ = ["TrimTable", "build"]
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+# A point this part of the boundary's size from it is on it.
+ON_BOUNDARY = 1e-12
+# Some roundings of a coordinate, as a part of it.
+NOISE = 1e-14
+_BINOMIALS = np.array([[comb(n, k) for k in range(32)] for n in range(32)], dtype=float)
+# Fields that point into the table and into the pool.
+_TABLE_FIELDS = [layout.TRIM_FIRST, layout.TRIM_PIECE_TABLE, layout.TRIM_CURVE_PIECES]
+_POOL_FIELDS = [layout.TRIM_PIECE_POOL, layout.TRIM_FRAME, layout.TRIM_STEP_POOL]
+
+
+@dataclass(frozen=True, eq=False)
+class TrimTable:
+    """A trim for a table and a pool that begin with it.
+
+    Attributes
+    ----------
+    table, pool : arrays
+    curves, pieces : int
+    left, right : (chains,)
+        w beside every chain: 1 and 0 if the chains bound one face.
+    beyond : two pairs
+        w beyond the low and the high end of u, and of v, each where the other direction is closed.
+    """
+
+    table: Ints
+    pool: Array
+    curves: int
+    pieces: int
+    left: Array
+    right: Array
+    beyond: tuple[tuple[float, float], tuple[float, float]]
+
+    def at(self, table_at: int, pool_at: int) -> tuple[Ints, Array]:
+        """The same for being appended to a table and a pool of these lengths."""
+        if table_at == 0 and pool_at == 0:
+            return self.table, self.pool
+        table = self.table.copy()
+        table[_TABLE_FIELDS] += table_at
+        table[_POOL_FIELDS] += pool_at
+        records = table[TRIM_RECORD : TRIM_RECORD + CURVE_RECORD * self.curves].reshape(-1, CURVE_RECORD)
+        records[:, [CURVE_BREAKS, CURVE_COEFFICIENTS]] += pool_at
+        first = int(self.table[layout.TRIM_PIECE_TABLE])
+        table[first : first + PIECE_INTS * self.pieces].reshape(-1, PIECE_INTS)[:, layout.PIECE_COEFFICIENTS] += pool_at
+        return table, self.pool
+
+    def crossing(self, tolerance: float) -> tuple[int, int, Array] | None:
+        """Two boundary curves that cross, or come nearer than this part of the size, and where; None if none do."""
+        record = self.table
+        count, first = int(record[layout.TRIM_PIECES]), int(record[layout.TRIM_PIECE_POOL])
+        frame = self.pool[record[layout.TRIM_FRAME] : record[layout.TRIM_FRAME] + layout.FRAME]
+        size = float(frame[layout.SIZE])
+        boxes = self.pool[first : first + PIECE_DOUBLES * count].reshape(-1, PIECE_DOUBLES)[:, :4]
+        low = boxes[:, [0, 2]]
+        nearest = max(tolerance * size, NOISE * float(np.abs(boxes).max(initial=0.0)))
+        pieces, moves = np.arange(count), np.zeros((count, 2))
+        for axis in range(2):
+            period = frame[layout.PERIOD_U + axis]
+            if period:
+                # What touches the lower border of the cell meets what touches the upper one.
+                touches = low[pieces, axis] <= frame[layout.LOW_U + axis] + nearest
+                pieces = np.concatenate([pieces, pieces[touches]])
+                copies = moves[touches]
+                copies[:, axis] += period
+                moves = np.concatenate([moves, copies])
+        order = np.argsort(low[pieces, 0] + moves[:, 0])
+        where = np.empty(2)
+        places = int(record[layout.TRIM_PIECE_TABLE]), first
+        a, b = first_crossing(self.table, self.pool, *places, pieces, moves, order, nearest, size, where)
+        if a < 0:
+            return None
+        ints = self.table[places[0] : places[0] + PIECE_INTS * count].reshape(-1, PIECE_INTS)
+        return int(ints[a, layout.PIECE_CURVE]), int(ints[b, layout.PIECE_CURVE]), where
+
+
+def _largest_gap(low: Array, high: Array, period: float) -> float:
+    """The middle of the widest stretch of a period without an end of an interval, uncovered if there is one."""
+    ends = np.concatenate([low, high])
+    marks = np.unique(np.mod(ends, period))
+    middles = marks + 0.5 * np.diff(marks, append=marks[0] + period)
+    widths = np.diff(marks, append=marks[0] + period)
+    covered = ((middles[:, None] - low) % period < high - low).any(axis=1)
+    free = widths * ~covered
+    best = int(np.argmax(free)) if (free > 1e-6 * period).any() else int(np.argmax(widths))
+    return float(middles[best])
+
+
+class _Pieces:
+    """Pieces while they are made: columns of equal length, in the order of the curves."""
+
+    COLUMNS = ("curve", "degree", "coefficients", "middle", "bounds", "shift", "t", "ends", "before", "after")
+
+    def __init__(self, curves: Sequence[NurbsCurve], chains: Sequence[range], closing: Sequence[bool]) -> None:
+        bezier, self.pool, self.records = packed_curves(curves)
+        shape = np.ascontiguousarray(self.records[:, [CURVE_DEGREE, CURVE_SPANS]])
+        breaks = np.concatenate(
+            [np.empty(0)] + [self.pool[r[CURVE_BREAKS] : r[CURVE_COEFFICIENTS]] for r in self.records.tolist()]
+        )
+        rows = np.empty((int((8 * shape[:, 0] * shape[:, 1]).sum()), ROW))
+        count = cut_curves(bezier, breaks, shape, _BINOMIALS, rows)
+        if count > len(rows):
+            # Weights far apart.
+            rows = np.empty((count, ROW))
+            cut_curves(bezier, breaks, shape, _BINOMIALS, rows)
+        rows = rows[:count].copy()
+        self.curve = rows[:, 0].astype(np.int64)
+        span = rows[:, 1].astype(np.int64)
+        record = self.records[self.curve]
+        self.degree = np.ascontiguousarray(record[:, CURVE_DEGREE])
+        self.coefficients = record[:, CURVE_COEFFICIENTS] + 4 * (self.degree + 1) * span
+        at = record[:, CURVE_BREAKS] + span
+        self.middle = 0.5 * (self.pool[at] + self.pool[at + 1])
+        self.t = rows[:, 2:4].copy()
+        self.bounds = rows[:, 4:7]
+        self.shift = np.zeros((len(rows), 2))
+        self.ends = np.empty((len(rows), 2, 2))
+        for side in range(2):
+            out = np.empty((len(rows), 2))
+            layout.ends_of_pieces(self.pool, self.coefficients, self.degree, self.middle, self.t[:, side].copy(), out)
+            self.ends[:, side] = out
+        self._neighbors(chains, closing)
+
+    def _neighbors(self, chains: Sequence[range], closing: Sequence[bool]) -> None:
+        count = self.curve.size
+        self.before = np.arange(count) - 1
+        self.after = np.arange(count) + 1
+        first = np.searchsorted(self.curve, np.arange(self.records.shape[0] + 1))
+        for chain, closes in zip(chains, closing, strict=True):
+            begin, stop = first[chain.start], first[chain.stop]
+            self.before[begin] = stop - 1 if closes else -1
+            self.after[stop - 1] = begin if closes else -1
+        # Curves without a chain are pole edges.
+        silent = self.curve >= (chains[-1].stop if chains else 0)
+        self.before[silent] = self.after[silent] = -1
+
+    def cut(self, axis: int, low: float, period: float) -> None:
+        """Cut where a coordinate passes `low` plus a whole period, and move the pieces into the cell."""
+        values = self.ends[:, :, axis]
+        cell = np.floor((values - low) / period)
+        # A piece that ends on the border of a cell is in the cell it comes from.
+        least, most = values.min(axis=1), values.max(axis=1)
+        for piece in np.flatnonzero(np.floor((least - low) / period) < np.ceil((most - low) / period) - 1.0)[::-1]:
+            self._cut_piece(int(piece), axis, low, period)
+        middle = self.ends[:, :, axis].mean(axis=1)
+        cell = np.floor((middle - low) / period)
+        move = -cell * period
+        self.shift[:, axis] += move
+        self.ends[:, :, axis] += move[:, None]
+        np.clip(self.ends[:, :, axis], low, low + period, out=self.ends[:, :, axis])
+
+    def _cut_piece(self, piece: int, axis: int, low: float, period: float) -> None:
+        (a, b), (t0, t1) = self.ends[piece], self.t[piece]
+        sign = 1 if b[axis] > a[axis] else -1
+        lowest, highest = sorted((a[axis], b[axis]))
+        crossed = np.arange(np.floor((lowest - low) / period) + 1.0, np.ceil((highest - low) / period)) * period + low
+        times, points = [t0], [a]
+        for level in crossed[::sign]:
+            t, x, y = layout.cut_of_piece(
+                self.pool, int(self.coefficients[piece]), int(self.degree[piece]), float(self.middle[piece]),
+                float(t0), float(t1), axis, float(level), float(a[axis]), float(b[axis]),
+            )  # fmt: skip
+            # Cuts along u come first: nothing has been moved along the axis itself.
+            point = np.array([x, y]) + self.shift[piece]
+            point[axis] = level
+            times.append(t)
+            points.append(point)
+        times.append(t1)
+        points.append(b)
+        extra = len(times) - 2
+        for name in _Pieces.COLUMNS:
+            column = getattr(self, name)
+            setattr(self, name, np.insert(column, [piece] * extra, column[piece], axis=0))
+        self.before = np.where(self.before > piece, self.before + extra, self.before)
+        self.after = np.where(self.after > piece, self.after + extra, self.after)
+        part = slice(piece, piece + extra + 1)
+        self.t[part] = np.column_stack([times[:-1], times[1:]])
+        self.ends[part] = np.stack([points[:-1], points[1:]], axis=1)
+        # The piece and its parts follow one another; what came before the piece ends in its first part.
+        last = self.after[piece]
+        self.before[piece + 1 : piece + extra + 1] = np.arange(piece, piece + extra)
+        self.after[piece : piece + extra] = np.arange(piece + 1, piece + extra + 1)
+        self.after[piece + extra] = last
+        if last >= 0:
+            self.before[last] = piece + extra
+
+    def drop_empty(self, noise: float) -> None:
+        """Leave out pieces without length but rounding, of repeated control points: they have no direction."""
+        keep = (np.abs(self.ends[:, 0] - self.ends[:, 1]) > noise).any(axis=1)
+        if keep.all():
+            return
+        for k in np.flatnonzero(~keep).tolist():
+            before, after = self.before[k], self.after[k]
+            if before >= 0:
+                self.after[before] = after
+            if after >= 0:
+                self.before[after] = before
+        place = np.append(np.cumsum(keep) - 1, -1)
+        for name in _Pieces.COLUMNS:
+            setattr(self, name, getattr(self, name)[keep])
+        self.before, self.after = place[self.before], place[self.after]
+
+    def join(self, periods: tuple[float, float]) -> None:
+        """Let every piece begin exactly where the one before it ends, but for whole periods."""
+        has = np.flatnonzero(self.before >= 0)
+        for axis, period in enumerate(periods):
+            come, go = self.ends[self.before[has], 1, axis], self.ends[has, 0, axis]
+            if period:
+                jump = np.round((go - come) / period) * period
+                # At the border of the cell both have its exact value already.
+                come = np.where(jump == 0.0, come, go)
+            self.ends[has, 0, axis] = come
+
+
+def build(
+    curves: Sequence[NurbsCurve],
+    chains: Sequence[range],
+    closing: Sequence[bool],
+    silent: Sequence[NurbsCurve],
+    domain: tuple[tuple[float, float], tuple[float, float]],
+    periods: tuple[float, float],
+) -> TrimTable:
+    """The table of boundary curves.
+
+    Parameters
+    ----------
+    curves : boundary curves in order
+    chains, closing : which of them make one chain each, and whether it closes
+    silent : pole edges
+    domain, periods : of the surface; a period of 0 stands for a direction that is not closed
+    """
+    pieces = _Pieces([*curves, *silent], chains, closing)
+    low = np.array([domain[0][0], domain[1][0]])
+    high = np.array([domain[0][1], domain[1][1]])
+    size = float(np.linalg.norm(np.ptp(pieces.ends.reshape(-1, 2), axis=0))) if pieces.curve.size else 1.0
+    steps: list[tuple[float, float]] = []
+    for axis, period in enumerate(periods):
+        if period:
+            values = pieces.ends[:, :, axis]
+            if values.size:
+                low[axis] = _largest_gap(values.min(axis=1), values.max(axis=1), period)
+            high[axis] = low[axis] + period
+            pieces.cut(axis, float(low[axis]), period)
+    pieces.drop_empty(1e-15 * float(np.abs(pieces.ends).max(initial=0.0)))
+    pieces.join(periods)
+    pieces.drop_empty(0.0)
+    if periods[1]:
+        # Upward through the bottom of the cell: material is to the left, so w falls by one to the right.
+        begins, stops = pieces.ends[:, 0], pieces.ends[:, 1]
+        steps += [(float(u), -1.0) for u, v in begins if v == low[1]]
+        steps += [(float(u), 1.0) for u, v in stops if v == low[1]]
+    w = 0.0
+    walk = []
+    for u, step in sorted(steps):
+        w += step
+        walk.append((u, w))
+    return _table(pieces, len(curves), chains, (low, high), periods, size, np.array(walk).reshape(-1, 2))
+
+
+def _table(
+    pieces: _Pieces,
+    count: int,
+    chains: Sequence[range],
+    cell: tuple[Array, Array],
+    periods: tuple[float, float],
+    size: float,
+    walk: Array,
+) -> TrimTable:
+    total = pieces.curve.size
+    low, high = pieces.ends.min(axis=1), pieces.ends.max(axis=1)
+    extent = pieces.ends[:, 1] - pieces.ends[:, 0]
+    first = np.searchsorted(pieces.curve, np.arange(count + 1))
+    ints = np.column_stack(
+        [
+            pieces.curve,
+            pieces.coefficients,
+            pieces.degree,
+            pieces.before,
+            pieces.after,
+            np.sign(extent).astype(np.int64),
+            np.abs(extent[:, 1]) > np.abs(extent[:, 0]),
+        ]
+    ).astype(np.int64)
+    doubles = np.column_stack(
+        [low[:, 0], high[:, 0], low[:, 1], high[:, 1], pieces.t, pieces.shift, pieces.middle, pieces.bounds,
+         pieces.ends.reshape(-1, 4)]
+    )  # fmt: skip
+    assert ints.shape[1] == PIECE_INTS and doubles.shape[1] == PIECE_DOUBLES
+    record = np.zeros(TRIM_RECORD, dtype=np.int64)
+    records = pieces.records[:count]
+    piece_table = TRIM_RECORD + records.size
+    piece_pool = pieces.pool.size
+    frame_at = piece_pool + doubles.size
+    frame = np.array([*cell[0], *cell[1], *periods, ON_BOUNDARY * size, 0.0, size])
+    record[[layout.TRIM_CURVES, layout.TRIM_FIRST, layout.TRIM_ALL, layout.TRIM_PIECES]] = (
+        count,
+        TRIM_RECORD,
+        total,
+        first[-1],
+    )
+    record[[layout.TRIM_PIECE_TABLE, layout.TRIM_PIECE_POOL]] = piece_table, piece_pool
+    record[[layout.TRIM_CURVE_PIECES, layout.TRIM_FRAME]] = piece_table + ints.size, frame_at
+    record[[layout.TRIM_STEPS, layout.TRIM_STEP_POOL]] = len(walk), frame_at + frame.size
+    table = np.concatenate([record, records.ravel(), ints.ravel(), first])
+    pool = np.concatenate([pieces.pool, doubles.ravel(), frame, walk.ravel()])
+    left, right = np.empty(len(chains)), np.empty(len(chains))
+    if chains:
+        # The longest piece of every chain, and points beside its middle.
+        lengths = np.abs(extent).sum(axis=1)
+        begins = first[[chain.start for chain in chains]]
+        stops = first[[chain.stop for chain in chains]]
+        longest = np.array([b + int(np.argmax(lengths[b:s])) for b, s in zip(begins, stops, strict=True)])
+        t = pieces.t[longest].mean(axis=1)
+        point = np.empty((len(chains), 2))
+        layout.ends_of_pieces(
+            pool, pieces.coefficients[longest], pieces.degree[longest], pieces.middle[longest], t, point
+        )
+        point += pieces.shift[longest]
+        across = np.column_stack([-extent[longest, 1], extent[longest, 0]])
+        beside = max(1e-10 * size, NOISE * float(np.abs(pieces.ends).max()))
+        across *= beside / np.linalg.norm(across, axis=1, keepdims=True)
+        for probe, out in ((point + across, left), (point - across, right)):
+            windings(table, pool, 0, probe[:, 0].copy(), probe[:, 1].copy(), out)
+        # w is to be 1 where there is material.
+        bottom = 1.0 - left[0]
+        pool[frame_at + layout.BOTTOM] += bottom
+        pool[frame_at + frame.size + 1 :: 2] += bottom
+        left, right = left + bottom, right + bottom
+    else:
+        pool[frame_at + layout.BOTTOM] = 1.0
+    bottom = float(pool[frame_at + layout.BOTTOM])
+    across_u = float(pool[-1]) if len(walk) else bottom
+    # Once around, every u is passed by as many rings, net, as the whole way in u has periods.
+    rings = float(np.round(extent[:, 0].sum() / periods[0])) if periods[0] else 0.0
+    return TrimTable(table, pool, count, total, left, right, ((bottom, across_u), (bottom, bottom + rings)))

@@ -1,0 +1,1 @@
+"""Triangles and polygons of faces, with a bound of their distance from the surface."""

@@ -1,0 +1,1 @@
+"""NURBS curves and surfaces: evaluation, Bezier pieces, bounds of derivatives."""

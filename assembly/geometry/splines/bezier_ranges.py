@@ -1,0 +1,277 @@
+"""A curve of Bezier pieces, as kernels read it: points, and bounds over a part of a piece.
+
+Homogeneous points (w x, w y, w z, w) of a piece on s in [0, 1], and those of its first three derivatives, are
+restricted to [s0, s1] by de Casteljau's algorithm twice. The values of a polynomial are between its least and its
+greatest Bezier point there; of the quotient C = X / w,
+
+    C' = (X' - C w') / w,    C'' = (X'' - 2 C' w' - C w'') / w,    C''' = (X''' - 3 C'' w' - 3 C' w'' - C w''') / w.
+
+Weights are positive, so that of a part C is between the least and the greatest of its Bezier points X_i / w_i.
+
+Rounding: a step of de Casteljau is a mean of two numbers and errs by 3 units of 2^-53 of the larger; n steps, twice,
+and the means that made the piece from knots, by less than (16 n + 32) 2^-52 M with M the largest of the points.
+Sums of positive terms, as w, have relative errors of so many units, and X, each of whose points is at most w_i R, one
+of so many units of w R: X / w is off by parts of R, whatever the weights. The ends of a part are rounded, too; where
+weights differ much C moves far between two doubles, and the part is a few units longer.
+"""
+
+from __future__ import annotations
+
+import math
+
+from assembly._kernel import kernel
+from assembly._record import place_of, record_dtype, record_view, size_of
+from assembly.geometry.interval import UNIT, idifference, iproduct, iquotient, up, widened
+
+# A curve of pieces in the table.
+RANGED_CURVE = record_dtype(
+    "i8",
+    dimension=1,  # 2 or 3
+    degree=1,
+    pieces=1,  # how many
+    rational=1,  # 1: weights differ
+    points=4,  # where in the pool those of C, C', C'', C''' begin: four numbers each, (degree + 1 - order) a piece
+    largest=1,  # where in the pool the largest number of each order begins, four of them, and R behind them
+    gram=1,  # where in the pool the Gram matrix begins
+    breaks=1,  # where in the pool the knots begin
+)
+ranged_curve_at = record_view(RANGED_CURVE)
+DIMENSION = place_of(RANGED_CURVE, "dimension")
+DEGREE = place_of(RANGED_CURVE, "degree")
+PIECES = place_of(RANGED_CURVE, "pieces")
+RATIONAL = place_of(RANGED_CURVE, "rational")
+POINTS = place_of(RANGED_CURVE, "points")
+LARGEST = place_of(RANGED_CURVE, "largest")
+GRAM = place_of(RANGED_CURVE, "gram")
+BREAKS = place_of(RANGED_CURVE, "breaks")
+BEZIER_RECORD = size_of(RANGED_CURVE)
+# Room for bounds; Bezier points stand behind it.
+RANGE_ROOM = record_dtype(
+    "f8",
+    ranges=24,  # of C, C', C'', C''' over a part: pairs
+    middle=18,  # of C, C', C'' in its middle: pairs
+    first=3,  # point at its begin [length]
+    last=3,  # point at its end [length]
+    width=1,  # of its ellipsoid, squared length
+    spare=3,
+)
+range_room_at = record_view(RANGE_ROOM)
+RANGES = place_of(RANGE_ROOM, "ranges")
+BEZIER_AT = size_of(RANGE_ROOM)
+# A point with its weight.
+WEIGHTED_POINT = record_dtype(
+    "f8",
+    position=3,  # times the weight
+    weight=1,
+)
+weighted_point_at = record_view(WEIGHTED_POINT)
+WEIGHTED = size_of(WEIGHTED_POINT)
+# The largest numbers of a curve.
+LARGEST_RECORD = record_dtype(
+    "f8",
+    orders=4,  # of the points of C, C', C'', C'''
+    position=1,  # R, of the points without their weights [length]
+)
+largest_at = record_view(LARGEST_RECORD)
+
+
+@kernel(inner=True, exact=True)
+def restrict(pool, o, n, s0, s1, room, at):
+    """Bezier points of [s0, s1] of a polynomial of degree n, whose points begin at pool[o], to room[at:]."""
+    for k in range(4 * (n + 1)):
+        room[at + k] = pool[o + k]
+    if s1 < 1.0:
+        c = 1.0 - s1
+        for r in range(1, n + 1):
+            for i in range(n, r - 1, -1):
+                p = at + 4 * i
+                for k in range(4):
+                    room[p + k] = c * room[p - 4 + k] + s1 * room[p + k]
+    if s0 > 0.0:
+        s = s0 / s1
+        c = 1.0 - s
+        for r in range(1, n + 1):
+            for i in range(n - r + 1):
+                p = at + 4 * i
+                for k in range(4):
+                    room[p + k] = c * room[p + k] + s * room[p + 4 + k]
+
+
+@kernel(inner=True, exact=True)
+def value(pool, o, n, s, room, at):
+    """Values of a polynomial at s to room[at:], four; with room for its points there."""
+    for k in range(4 * (n + 1)):
+        room[at + k] = pool[o + k]
+    c = 1.0 - s
+    for r in range(1, n + 1):
+        for i in range(n - r + 1):
+            p = at + 4 * i
+            for k in range(4):
+                room[p + k] = c * room[p + k] + s * room[p + 4 + k]
+
+
+@kernel(inline=True)
+def piece_points(table, span, order):
+    """Where the points of a derivative of a piece begin, and their degree; a degree below zero is none."""
+    curve = ranged_curve_at(table, 0)
+    n = curve.degree - order
+    return curve.points[order] + 4 * (n + 1) * span, n
+
+
+@kernel(inline=True)
+def error_of(table, pool, order):
+    """How far values and Bezier points of a derivative may be off."""
+    return units(table) * largest_at(pool, ranged_curve_at(table, 0).largest).orders[order]
+
+
+@kernel(inline=True)
+def units(table):
+    """Roundings of a value, as a part of the largest."""
+    return (16.0 * ranged_curve_at(table, 0).degree + 32.0) * UNIT
+
+
+@kernel(inner=True, exact=True)
+def project(table, pool, free, count, room, at):
+    """Pairs of C and of w from homogeneous points at room[free:], to room[at:], eight numbers."""
+    part = units(table)
+    off = 4.0 * part * largest_at(pool, ranged_curve_at(table, 0).largest).position
+    for k in range(4):
+        lo = math.inf
+        hi = -math.inf
+        for i in range(count):
+            o = free + 4 * i
+            x = room[o + k] / room[o + 3] if k < 3 else room[o + 3]
+            lo = min(lo, x)
+            hi = max(hi, x)
+        if k < 3:
+            room[at + 2 * k], room[at + 2 * k + 1] = widened(lo - off, hi + off, 2.0 * UNIT)
+        else:
+            room[at + 6], room[at + 7] = lo * (1.0 - 2.0 * part), hi * (1.0 + 2.0 * part)
+
+
+@kernel(inner=True, exact=True)
+def quotients(room, at, orders):
+    """Derivatives of C from pairs (lo, hi) of C, w and of X, w by order (eight numbers each) at room[at:], in place.
+
+    Six numbers an order are written to room[at + 6 order:], behind what is still to be read.
+    """
+    w = (room[at + 6], room[at + 7])
+    w1 = (room[at + 14], room[at + 15])
+    w2 = (room[at + 22], room[at + 23])
+    w3 = (room[at + 30], room[at + 31]) if orders > 3 else (0.0, 0.0)
+    for k in range(3):
+        c = (room[at + 2 * k], room[at + 2 * k + 1])
+        x1 = (room[at + 8 + 2 * k], room[at + 9 + 2 * k])
+        c1 = iquotient(idifference(x1, iproduct(c, w1)), w)
+        x2 = (room[at + 16 + 2 * k], room[at + 17 + 2 * k])
+        twice = iproduct(c1, (2.0 * w1[0], 2.0 * w1[1]))
+        c2 = iquotient(idifference(idifference(x2, twice), iproduct(c, w2)), w)
+        room[at + 8 + 2 * k], room[at + 9 + 2 * k] = c1
+        room[at + 16 + 2 * k], room[at + 17 + 2 * k] = c2
+        if orders > 3:
+            x3 = (room[at + 24 + 2 * k], room[at + 25 + 2 * k])
+            thrice = iproduct(c2, (3.0 * w1[0], 3.0 * w1[1]))
+            c3 = idifference(idifference(x3, thrice), iproduct(c1, (3.0 * w2[0], 3.0 * w2[1])))
+            c3 = iquotient(idifference(c3, iproduct(c, w3)), w)
+            room[at + 24 + 2 * k], room[at + 25 + 2 * k] = c3
+    for order in range(1, orders):
+        for k in range(6):
+            room[at + 6 * order + k] = room[at + 8 * order + k]
+
+
+@kernel(inner=True, exact=True)
+def bezier_point_bounds(table, pool, span, s, room, at):
+    """Intervals of C, C', C'' (by s) at s of a piece to room[at:], nine pairs; room behind them is used."""
+    curve = ranged_curve_at(table, 0)
+    free = at + 32
+    for order in range(3):
+        o, n = piece_points(table, span, order)
+        error = error_of(table, pool, order)
+        for k in range(4):
+            room[free + k] = 0.0
+        if n >= 0:
+            value(pool, o, n, s, room, free)
+        if order == 0 and curve.rational != 0:
+            project(table, pool, free, 1, room, at)
+            continue
+        for k in range(4):
+            lo, hi = room[free + k] - error, room[free + k] + error
+            room[at + 8 * order + 2 * k], room[at + 8 * order + 2 * k + 1] = widened(lo, hi, UNIT)
+    if curve.rational == 0:
+        for order in range(1, 3):
+            for k in range(6):
+                room[at + 6 * order + k] = room[at + 8 * order + k]
+    else:
+        quotients(room, at, 3)
+
+
+@kernel(inner=True, exact=True)
+def bezier_range_bounds(table, pool, span, s0, s1, room):
+    """Intervals of C, C', C'', C''' (by s) over [s0, s1] of a piece to room, twelve pairs, and the width of an arc.
+
+    The width of a polynomial piece is (s1 - s0) int |C' - chi / (s1 - s0)|^2 ds by the closed form of its Bezier
+    points, a quadratic form in differences and so free of cancellation; of a rational piece it is infinite here.
+    """
+    work = range_room_at(room, 0)
+    polynomial = ranged_curve_at(table, 0).rational == 0
+    work.width = math.inf
+    free = BEZIER_AT
+    if not polynomial:
+        s0 *= 1.0 - 4.0 * UNIT
+        s1 = min(s1 * (1.0 + 4.0 * UNIT), 1.0)
+    for order in range(4):
+        o, n = piece_points(table, span, order)
+        error = error_of(table, pool, order)
+        if n < 0:
+            for k in range(8):
+                room[8 * order + k] = 0.0
+            continue
+        restrict(pool, o, n, s0, s1, room, free)
+        if order == 0 and not polynomial:
+            project(table, pool, free, n + 1, room, RANGES)
+            continue
+        for k in range(4):
+            lo = room[free + k]
+            hi = lo
+            for i in range(1, n + 1):
+                x = room[free + 4 * i + k]
+                lo = min(lo, x)
+                hi = max(hi, x)
+            place = RANGES + 8 * order + 2 * k
+            room[place], room[place + 1] = widened(lo - error, hi + error, UNIT)
+        if polynomial and order == 1:
+            work.width = gram_width(table, pool, n, s1 - s0, room, free, error)
+    if polynomial:
+        for order in range(1, 4):
+            for k in range(6):
+                room[6 * order + k] = room[8 * order + k]
+    else:
+        quotients(room, RANGES, 4)
+
+
+@kernel(inner=True, exact=True)
+def gram_width(table, pool, n, step, room, at, error):
+    """(step)^2 times the variance of C' from its Bezier points at room[at:], of degree n; rounded up."""
+    curve = ranged_curve_at(table, 0)
+    total = 0.0
+    off = 0.0
+    for k in range(3):
+        mean = 0.0
+        for i in range(n + 1):
+            mean += room[at + 4 * i + k]
+        mean /= n + 1
+        for i in range(n + 1):
+            room[at + 4 * i + k] -= mean
+    g = curve.gram
+    for i in range(n + 1):
+        for j in range(n + 1):
+            p = at + 4 * i
+            q = at + 4 * j
+            scalar = room[p] * room[q] + room[p + 1] * room[q + 1] + room[p + 2] * room[q + 2]
+            total += pool[g + (n + 1) * i + j] * scalar
+            off += pool[g + (n + 1) * i + j] * abs(scalar)
+    # Points are off by `error` each, and a mean by as much: in the norm of the variance, which is at most the largest
+    # of them. Sums of (n + 1)^2 positive and negative terms are off by that many units of their absolute sum.
+    root = math.sqrt(max(total, 0.0) + UNIT * (n + 2.0) * (n + 2.0) * off) * (1.0 + 8.0 * UNIT)
+    root += 2.0 * math.sqrt(3.0) * (error + UNIT * (n + 2.0) * largest_at(pool, curve.largest).orders[1])
+    return up(up(step * root) * up(step * root))

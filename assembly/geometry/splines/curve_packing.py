@@ -1,0 +1,64 @@
+"""Many plane curves packed at once, and what loops need of them: `NurbsCurve.packed` for the curves of a face."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.errors import InputError
+from assembly.geometry.splines.bezier import MAX_DEGREE, power_matrix
+from assembly.geometry.splines.curve import COINCIDENT, NurbsCurve, checked_table_degree
+from assembly.geometry.splines.curve_tables import bezier_tables, swept_area
+from assembly.geometry.splines.evaluate import CURVE_RECORD
+
+__all__ = ["packed_curves", "signed_area"]
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+def packed_curves(curves: Sequence[NurbsCurve]) -> tuple[Array, Array, Ints]:
+    """Bezier points, pool and records of plane curves."""
+    if not curves:
+        return np.empty(0), np.empty(0), np.empty((0, CURVE_RECORD), dtype=np.int64)
+    for curve in curves:
+        checked_table_degree(curve)
+    shape = np.array([(curve.degree, len(curve.weights)) for curve in curves], dtype=np.int64).reshape(-1, 2)
+    points = np.concatenate([curve.control_points for curve in curves])
+    weights = np.concatenate([curve.weights for curve in curves])
+    knots = np.concatenate([curve.knots for curve in curves])
+    degree, count = shape[:, 0], shape[:, 1]
+    room = (count - degree) * (degree + 1)
+    bezier, pool = np.empty(3 * int(room.sum())), np.empty(int((4 * room + count - degree + 1).sum()))
+    records = np.empty((len(curves), CURVE_RECORD), dtype=np.int64)
+    filled, used, finite = bezier_tables(
+        points, weights, knots, shape, _power_matrices(), COINCIDENT, bezier, pool, records
+    )
+    if not finite:
+        raise InputError("knots span a domain too short for doubles at this degree; expected a scale nearer to one")
+    return bezier[:filled], pool[:used], records
+
+
+@cache
+def _power_matrices() -> Array:
+    """`bezier.power_matrix` by degree, in one array."""
+    matrices = np.zeros((MAX_DEGREE + 1, MAX_DEGREE + 1, MAX_DEGREE + 1))
+    for degree in range(MAX_DEGREE + 1):
+        matrices[degree, : degree + 1, : degree + 1] = power_matrix(degree)
+    return matrices
+
+
+@cache
+def _gauss() -> tuple[Array, Array]:
+    nodes, weights = np.polynomial.legendre.leggauss(8)
+    return nodes, weights
+
+
+def signed_area(curves: Sequence[NurbsCurve]) -> float:
+    """Area to the left of curves that close, by Green's theorem with eight nodes a span: enough for its sign."""
+    _, pool, records = packed_curves(curves)
+    u, v = curves[0].control_points[0]
+    return float(swept_area(pool, records, float(u), float(v), *_gauss()))

@@ -1,0 +1,100 @@
+"""Tips of cones: vertices without edges, poles of a face where it has no tangent plane.
+
+A pair of a tip has n.e <= 0 for all directions e in which its face leaves it, as one of another vertex has along its
+edges (`proximity/features/switching.py`).
+"""
+
+from __future__ import annotations
+
+import math
+
+from assembly._kernel import kernel
+from assembly.geometry.splines.evaluate import surface_at
+from assembly.geometry.splines.pole import limits, nearest_pole, spoke
+from assembly.geometry.vec import dot, scale, sub
+from assembly.proximity.brep.records import (
+    FACE_RECORD,
+    VERTEX_RECORD,
+    face_at,
+    shell_at,
+    vertex_at,
+)
+
+# Sine of the angle by which a normal must lean over a face or along an edge before that takes over.
+LEAN = 1e-9
+# Of tips: how near a pole is to one, how many spokes are looked at, how far from it a face begins, and how near to it
+# Newton's method gives up (parts of the domain).
+TIP, SPOKES, BESIDE, NEAR_TIP = 1e-9, 16, 1e-3, 0.02
+
+
+@kernel(inline=True)
+def unit(a):
+    """A vector of length one, or zero."""
+    length = math.sqrt(dot(a, a))
+    return scale(1.0 / length, a) if length > 0.0 else a
+
+
+@kernel(inline=True)
+def pole_point(table, pool, surface, pole):
+    """The point of a pole."""
+    low, high, _closed = limits(table, pool, surface, 1 if pole <= 2 else 0)
+    return spoke(table, pool, surface, pole, 0.5 * (low + high))[0]
+
+
+@kernel(inner=True)
+def is_at(table, pool, vertex, p):
+    """Whether p is the point of a vertex."""
+    o = vertex_at(table, vertex).point
+    d = sub(p, (pool[o], pool[o + 1], pool[o + 2]))
+    return dot(d, d) <= TIP * TIP * (1.0 + dot(p, p))
+
+
+@kernel(inner=True)
+def from_tip(table, pool, shell, vertex, code, n):
+    """The face that takes over from the tip of a cone: code and (u, v) on the spoke along which the normal leans most.
+
+    Where it leans along none, the tip itself, `code`.
+    """
+    vertex_record = vertex_at(table, vertex)
+    best = LEAN
+    found = (0.0, 0.0)
+    for k in range(vertex_record.faces):
+        face = table[vertex_record.face_list + k]
+        surface = face_at(table, shell_at(table, shell).face_table + FACE_RECORD * face).surface
+        for bit in range(4):
+            pole = 1 << bit
+            if surface_at(table, surface).poles & pole == 0 or not is_at(
+                table, pool, vertex, pole_point(table, pool, surface, pole)
+            ):
+                continue
+            low, high, _closed = limits(table, pool, surface, 1 if pole <= 2 else 0)
+            first, last, _closed = limits(table, pool, surface, 0 if pole <= 2 else 1)
+            depth = first + BESIDE * (last - first) if pole == 1 or pole == 4 else last - BESIDE * (last - first)
+            for i in range(SPOKES):
+                along = low + (high - low) * (i + 0.5) / SPOKES
+                lean = dot(n, unit(spoke(table, pool, surface, pole, along)[1]))
+                if lean > best:
+                    best = lean
+                    code = face
+                    found = (depth, along) if pole <= 2 else (along, depth)
+    return code, found
+
+
+@kernel(inner=True)
+def tip_near(table, pool, shell, code, u, v):
+    """The tip of a cone next to a point of a face where Newton's method gave up; else the face itself."""
+    solid = shell_at(table, shell)
+    if code >= solid.faces:
+        return code
+    surface = face_at(table, solid.face_table + FACE_RECORD * code).surface
+    if surface_at(table, surface).poles == 0:
+        return code
+    pole, distance = nearest_pole(table, pool, surface, u, v)
+    if distance > NEAR_TIP:
+        return code
+    p = pole_point(table, pool, surface, pole)
+    for k in range(solid.vertices):
+        vertex = solid.vertex_table + VERTEX_RECORD * k
+        if vertex_at(table, vertex).edges == 0 and is_at(table, pool, vertex, p):
+            return solid.faces + solid.edges + k
+    return code

@@ -1,0 +1,97 @@
+"""Points along boundary curves of faces, C(t) = S(c(t)), and the nearest ones to given points: many at once."""
+
+from __future__ import annotations
+
+import math
+
+from assembly._kernel import kernel
+from assembly.geometry.splines.domain import into_domain
+from assembly.geometry.splines.evaluate import curve_lanes, surface_point, xyz
+from assembly.geometry.vec import blend, cross, dot, sub
+
+_NEWTON_STEPS = 12
+
+
+@kernel(inner=True)
+def _jet(table, pool, surface, curve, t):
+    """C, C_t and S_u x S_v."""
+    c, d, _h = curve_lanes(table, pool, curve, t)
+    at = xyz(c)
+    rate = xyz(d)
+    u, v, _clamped = into_domain(table, pool, surface, at[0], at[1])
+    s, su, sv, _suu, _suv, _svv = surface_point(table, pool, surface, u, v)
+    return s, blend(rate[0], su, rate[1], sv), cross(su, sv)
+
+
+@kernel(signatures="(i8[::1], f8[::1], i8[::1], i8[::1], i8[::1], f8[::1], f8[:, ::1])")
+def along_rims(table, pool, surfaces, curves, which, t, out):
+    """C, C_t and S_u x S_v of curves `which` at parameters t into rows of nine."""
+    for i in range(t.size):
+        k = which[i]
+        jet = _jet(table, pool, surfaces[k], curves[k], t[i])
+        for j in range(3):
+            for m in range(3):
+                out[i, 3 * j + m] = jet[j][m]
+
+
+@kernel(inner=True)
+def _nearest_sample(samples, first, stop, p):
+    """Index of the row (t, x, y, z) that is nearest to a point."""
+    best = math.inf
+    found = first
+    for i in range(first, stop):
+        x = samples[i, 1] - p[0]
+        y = samples[i, 2] - p[1]
+        z = samples[i, 3] - p[2]
+        d = x * x + y * y + z * z
+        if d < best:
+            best = d
+            found = i
+    return found
+
+
+@kernel(
+    signatures=(
+        "(i8[::1], f8[::1], i8[::1], i8[::1], b1[::1], i8[::1], f8[:, ::1], i8[::1], f8[:, ::1], f8[::1], f8, "
+        "f8[:, ::1])"
+    ),
+)
+def nearest_on_rims(table, pool, surfaces, curves, closed, begins, samples, which, points, guess, close, out):
+    """Nearest points of curves `which` to points near them: rows of the parameter and the distance.
+
+    Gauss and Newton's iteration, which converges quadratically for points on the curve: from the guess if it is right
+    to `close`, else from the nearest of the curve's samples. Distances are measured a step before the parameter.
+    """
+    for i in range(which.size):
+        k = which[i]
+        p = (points[i, 0], points[i, 1], points[i, 2])
+        first = begins[k]
+        stop = begins[k + 1]
+        low = samples[first, 0]
+        high = samples[stop - 1, 0]
+        t = guess[i]
+        c, rate, _normal = _jet(table, pool, surfaces[k], curves[k], t)
+        gap = sub(p, c)
+        best = t
+        least = math.sqrt(dot(gap, gap))
+        if least > close:
+            t = samples[_nearest_sample(samples, first, stop, p), 0]
+            least = math.inf
+            for _ in range(_NEWTON_STEPS):
+                c, rate, _normal = _jet(table, pool, surfaces[k], curves[k], t)
+                gap = sub(p, c)
+                distance = math.sqrt(dot(gap, gap))
+                speed = max(dot(rate, rate), 1e-300)
+                step = dot(gap, rate) / speed
+                t += step
+                if closed[k]:
+                    t -= (high - low) * math.floor((t - low) / (high - low))
+                t = min(max(t, low), high)
+                if not distance < least:
+                    break
+                best = t
+                least = distance
+                if abs(step) * math.sqrt(speed) <= close:
+                    break
+        out[i, 0] = best
+        out[i, 1] = least

@@ -1,0 +1,1 @@
+"""Trees of boxes over the facets of surfaces."""

@@ -1,0 +1,132 @@
+"""Pairs of patches that may face each other, or of parts of spines, kept from look to look of a pair of bodies.
+
+A descent of two trees (`proximity/bvh/tree.py`, `proximity/manager/centerlines/parts.py`) finds pairs for one pose. One
+that allows for a ring of
+poses finds all that any of them has, and not many more: what a look at one of these poses finds is sifted from the
+list. A list is a function of shapes and of the pose that it was made for, whoever asks; there are a few of them in the
+table, and pairs of bodies take turns.
+
+Lists are in the table, their lengths multiples of GRAIN: the pool is shared by all who solve a scene at the same time,
+and a table is one's own.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from assembly._kernel import kernel
+from assembly._record import place_of, record_dtype, record_view, size_of
+from assembly.geometry.vec import add, dot, matvec, sub
+from assembly.proximity.bvh.tree import node_at, pairs_about, still_within, three_of, tree_at
+
+# A list in the table. Lengths are multiples of GRAIN; pairs of elements (k, 2) follow.
+NEIGHBOR_LIST = record_dtype(
+    "i8",
+    owner=1,  # the pair of bodies it is for; -1: none
+    count=1,  # number of entries; -1: more than there is room for
+    turn=4,  # the pose it is for: quaternion of the body that moves
+    place=3,  # and the middle of its tree
+    ring=1,  # skin: how far that body may go from there
+    reach=1,  # query margin
+)
+neighbor_list_at = record_view(NEIGHBOR_LIST)
+OWNER = place_of(NEIGHBOR_LIST, "owner")
+COUNT = place_of(NEIGHBOR_LIST, "count")
+ENTRIES = size_of(NEIGHBOR_LIST)
+# An entry: elements of the two bodies that may be near.
+NEIGHBORS = record_dtype("i8", f=1, g=1)
+neighbors_at = record_view(NEIGHBORS)
+ENTRY = size_of(NEIGHBORS)
+# Room for entries, and integers of a list.
+ROOM = 512
+LIST_INTS = ENTRIES + ENTRY * ROOM
+# Multiples of this are within it of what they stand for; a list is not made for what is farther away than FAR.
+GRAIN, FAR = 2.0**-48, 1000.0
+
+
+@kernel(inner=True)
+def moved_since(table, pool, at, p, moving):
+    """How far the body that moves is at most from where it was when the list at `at` was made; infinite for another's.
+
+    `moving` is the body whose motion is measured (`manager/motion_bounds.Mover`).
+    """
+    neighbors = neighbor_list_at(table, at)
+    if neighbors.owner != p:
+        return math.inf
+    root = tree_at(table, moving.tree).node_pool
+    middle = add(matvec(moving.turn, three_of(node_at(pool, root).center)), moving.shift)
+    e = moving.quaternion
+    square = 0.0
+    other = 0.0
+    for k in range(4):
+        was = GRAIN * neighbors.turn[k]
+        square += (e[k] - was) * (e[k] - was)
+        other += (e[k] + was) * (e[k] + was)
+    way = sub(middle, (GRAIN * neighbors.place[0], GRAIN * neighbors.place[1], GRAIN * neighbors.place[2]))
+    return math.sqrt(dot(way, way)) + 2.0 * node_at(pool, root).radius * math.sqrt(min(square, other))
+
+
+@kernel(inner=True)
+def reaches(table, at, moved, reach):
+    """Whether the list at `at` has what is within a reach after so far a motion: 1; 0 if not; -1 if it had no room."""
+    neighbors = neighbor_list_at(table, at)
+    if moved > GRAIN * neighbors.ring:
+        return 0
+    if neighbors.count < 0:
+        return -1
+    return 1 if reach + moved <= GRAIN * (neighbors.reach + neighbors.ring) else 0
+
+
+@kernel(inner=True)
+def can_be_listed(table, pool, moving, reach):
+    """Whether lengths of a list are in its range."""
+    root = tree_at(table, moving.tree).node_pool
+    middle = add(matvec(moving.turn, three_of(node_at(pool, root).center)), moving.shift)
+    return dot(middle, middle) < FAR * FAR and reach < FAR and node_at(pool, root).radius < FAR
+
+
+@kernel(inner=True)
+def write_list(table, pool, at, p, moving, reach, ring, found, count):
+    """Keep `count` pairs (k, 2), made for motions up to `ring`; none where there is no room. Whether there was."""
+    neighbors = neighbor_list_at(table, at)
+    root = node_at(pool, tree_at(table, moving.tree).node_pool)
+    middle = add(matvec(moving.turn, three_of(root.center)), moving.shift)
+    neighbors.owner = p
+    for k in range(4):
+        neighbors.turn[k] = np.int64(moving.quaternion[k] / GRAIN)
+    for k in range(3):
+        neighbors.place[k] = np.int64(middle[k] / GRAIN)
+    # Less by more than what the pose is rounded by, at a radius of FAR.
+    neighbors.ring = np.int64((ring - 1e-10) / GRAIN)
+    neighbors.reach = np.int64(reach / GRAIN)
+    if count < 0 or count > ROOM or count > found.shape[0]:
+        neighbors.count = -1
+        return False
+    neighbors.count = count
+    for k in range(count):
+        entry = neighbors_at(table, at + ENTRIES + ENTRY * k)
+        entry.f = found[k, 0]
+        entry.g = found[k, 1]
+    return True
+
+
+@kernel(inner=True)
+def listed_pairs(table, pool, at, p, trees, turn, shift, moving, reach, ring, stack, candidates):
+    """What `pairs_within` finds, from the list at `at`, which is made anew where it does not reach.
+
+    The pose is that of g seen from f; `moving` is a Mover (`manager/motion_bounds.py`), and
+    a new list is for motions of it up to `ring`. -1 where there is no room for a list.
+    """
+    fits = reaches(table, at, moved_since(table, pool, at, p, moving), reach)
+    if fits < 0 or (fits == 0 and not can_be_listed(table, pool, moving, ring + reach)):
+        return -1
+    if fits == 0:
+        tilt = ring / node_at(pool, tree_at(table, moving.tree).node_pool).radius
+        count = pairs_about(table, pool, trees[0], trees[1], turn, shift, reach, ring, tilt, stack, candidates)
+        if not write_list(table, pool, at, p, moving, reach, ring, candidates, count):
+            return -1
+    return still_within(
+        table, pool, trees[0], trees[1], turn, shift, reach, at + ENTRIES, neighbor_list_at(table, at).count, candidates
+    )

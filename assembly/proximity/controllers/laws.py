@@ -1,0 +1,418 @@
+"""The switching closest-point controllers of paper 000: witness points that run down to the closest ones.
+
+With D = f - h, h a point or a point of another patch, the projections psi_i = D.f_i (and psi_r = -D.h_r there) drive
+
+    u' = -K B psi,      d|D|/dt = -K psi.B psi / |D|,
+
+    unit: B = diag(1/|f_u|, 1/|f_v|),    covariant: B = 1,    contravariant: B = I^-1,  I the first fundamental form.
+
+A component that would leave the patch is set to zero, the other is then that of the curve at the end (psi_v B_vv, or
+psi_v / G), and after a step parameters are clamped: `docs/controllers.md` says where the printed laws differ. With
+feed-forward the motion's part of the closest point's rate, H^-1 f_i.q, is added, q the velocity of h seen from f and H
+the second derivative of |D|^2 / 2.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import namedtuple
+
+from assembly._kernel import kernel
+from assembly._record import place_of, record_dtype, record_view, size_of
+from assembly.geometry.splines.domain import into_domain
+from assembly.geometry.splines.evaluate import (
+    surface_at,
+    surface_point,
+)
+from assembly.geometry.vec import add, dot, matvec, matvec_t, sub
+from assembly.kinematics.motion import relative_pose, rotation
+from assembly.proximity.extrema.feedback import descent_step, end_of
+
+# Forms of the projections.
+UNIT, COVARIANT, CONTRAVARIANT = 0, 1, 2
+# Statuses of a run.
+CLOSEST, ON_ITS_WAY, MEETING, IRREGULAR = 0, 1, 2, 3
+# What is written of a step.
+STEP_ROW = record_dtype(
+    "f8",
+    parameters=4,  # (u_f, v_f, u_g, v_g) where it begins
+    distance=1,  # of the witness points [length]
+    error=1,  # norm of the projections on unit tangents, those that are held left out [length]
+    mode_f=1,  # how many parameters of f are held at ends
+    mode_g=1,
+    gain=1,
+)
+step_row_at = record_view(STEP_ROW)
+ROW = size_of(STEP_ROW)
+DISTANCE = place_of(STEP_ROW, "distance")
+ERROR = place_of(STEP_ROW, "error")
+MODE_F = place_of(STEP_ROW, "mode_f")
+MODE_G = place_of(STEP_ROW, "mode_g")
+GAIN = place_of(STEP_ROW, "gain")
+# How a controller moves, as four numbers.
+ControlLaw = namedtuple(
+    "ControlLaw",
+    [
+        "gain",  # 0: as large as the step allows
+        "rate",  # exponential rate of the distance [1 / time]; 0: none
+        "nearest",  # the distance that the rate leads to [length]
+        "feed_forward",  # 1: the motion's part of the closest point's rate is added
+    ],
+)
+# Where the target stands, seen from f, and how it moves.
+Target = namedtuple(
+    "Target",
+    [
+        "turn",  # rotation of the target's body
+        "shift",  # its origin; of a point, the point
+        "drift_f",  # velocity of the other witness point seen from f, in its axes
+        "drift_g",  # the same seen from g
+    ],
+)
+# What a law says of a state.
+ControlStep = namedtuple("ControlStep", ["rates", "distance", "error", "mode_f", "mode_g", "gain"])
+# A step without a given gain is halved at most so often.
+HALVINGS = 30
+# How region-of-attraction runs move.
+NEWTON, NEWTON_SATURATED, SWITCHING = 0, 1, 2
+
+
+@kernel(inline=True)
+def law_weights(form, su, sv):
+    """B (11, 12, 22) of a form; zero where a tangent vanishes, as at a pole."""
+    e = dot(su, su)
+    f = dot(su, sv)
+    g = dot(sv, sv)
+    if form == COVARIANT:
+        return (1.0, 0.0, 1.0)
+    det = e * g - f * f
+    if form == UNIT or not det > 1e-18 * e * g:
+        return (1.0 / math.sqrt(e) if e > 0.0 else 0.0, 0.0, 1.0 / math.sqrt(g) if g > 0.0 else 0.0)
+    return (g / det, -f / det, e / det)
+
+
+@kernel(inline=True)
+def saturate(end_u, end_v, psi, b, su, sv, form):
+    """-B psi with the components that leave the patch set to zero; whether u and v are held.
+
+    `end_u` is -1 or 1 at the low or high end.
+    """
+    ru = -(b[0] * psi[0] + b[1] * psi[1])
+    rv = -(b[1] * psi[0] + b[2] * psi[1])
+    held_u = end_u * ru > 0.0
+    held_v = end_v * rv > 0.0
+    if held_u and held_v:
+        # Both may be led out by a skewed B where only one descends: the slopes decide, one of which leads out.
+        held_u = end_u * psi[0] < 0.0
+        held_v = end_v * psi[1] < 0.0
+    if held_u and not held_v:
+        rv = -psi[1] * (1.0 / dot(sv, sv) if form == CONTRAVARIANT else b[2])
+        held_v = end_v * rv > 0.0
+    elif held_v and not held_u:
+        ru = -psi[0] * (1.0 / dot(su, su) if form == CONTRAVARIANT else b[0])
+        held_u = end_u * ru > 0.0
+    return 0.0 if held_u else ru, 0.0 if held_v else rv, held_u, held_v
+
+
+@kernel(inline=True)
+def second_form(s, d):
+    """f_i.f_j + d.f_ij (11, 12, 22) of a surface point s as `surface_point` gives it."""
+    return (
+        dot(s[1], s[1]) + dot(d, s[3]),
+        dot(s[1], s[2]) + dot(d, s[4]),
+        dot(s[2], s[2]) + dot(d, s[5]),
+    )
+
+
+@kernel(inline=True)
+def largest(h, b, held_u, held_v):
+    """Largest eigenvalue of B H in size, over the parameters that are not held."""
+    if held_u and held_v:
+        return 0.0
+    if held_u:
+        return abs(b[2] * h[2])
+    if held_v:
+        return abs(b[0] * h[0])
+    trace = b[0] * h[0] + 2.0 * b[1] * h[1] + b[2] * h[2]
+    det = (b[0] * b[2] - b[1] * b[1]) * (h[0] * h[2] - h[1] * h[1])
+    return 0.5 * (abs(trace) + math.sqrt(max(trace * trace - 4.0 * det, 0.0)))
+
+
+@kernel(inline=True)
+def ends(table, pool, r, u, v):
+    patch = surface_at(table, r)
+    return (
+        end_of(pool, patch.breaks_u, patch.spans_u, patch.closed_u, 0, 0, u),
+        end_of(pool, patch.breaks_v, patch.spans_v, patch.closed_v, 0, 0, v),
+    )
+
+
+@kernel(inline=True)
+def free_error(psi, su, sv, held_u, held_v):
+    """Sum of squares of the projections on unit tangents, those that are held left out."""
+    a = dot(su, su)
+    b = dot(sv, sv)
+    square = 0.0
+    if not held_u and a > 0.0:
+        square += psi[0] * psi[0] / a
+    if not held_v and b > 0.0:
+        square += psi[1] * psi[1] / b
+    return square
+
+
+@kernel(inline=True)
+def keep(h, held_u, held_v):
+    """A second form without the parameters that are held: one in their places."""
+    return (
+        1.0 if held_u else h[0],
+        0.0 if held_u or held_v else h[1],
+        1.0 if held_v else h[2],
+    )
+
+
+@kernel(inner=True)
+def control_rates(table, pool, f, g, placed, x, form, law, dt):
+    """The `ControlStep` of a `ControlLaw` at x, of a `Target`. With g < 0 that is the point `placed.shift`."""
+    turn, shift = placed.turn, placed.shift
+    s = surface_point(table, pool, f, x[0], x[1])
+    t = s
+    target = shift
+    if g >= 0:
+        t = surface_point(table, pool, g, x[2], x[3])
+        target = add(matvec(turn, t[0]), shift)
+    d = sub(s[0], target)
+    square = dot(d, d)
+    distance = math.sqrt(square)
+    psi = (dot(d, s[1]), dot(d, s[2]))
+    b = law_weights(form, s[1], s[2])
+    end_u, end_v = ends(table, pool, f, x[0], x[1])
+    ru, rv, held_u, held_v = saturate(end_u, end_v, psi, b, s[1], s[2], form)
+    h = second_form(s, d)
+    power = -(psi[0] * ru + psi[1] * rv)
+    error = free_error(psi, s[1], s[2], held_u, held_v)
+    zero = (0.0, 0.0, 0.0)
+    # Where D's curvature cancels that of the metric, H says nothing of larger steps: B I bounds the gain then.
+    metric_f = largest(second_form(s, zero), b, held_u, held_v)
+    top = max(largest(h, b, held_u, held_v), metric_f)
+    rr = 0.0
+    rs = 0.0
+    held_r = False
+    held_s = False
+    p = (0.0, 0.0, 0.0, 0.0)
+    k = (1.0, 0.0, 1.0)
+    if g >= 0:
+        dg = matvec_t(turn, d)
+        chi = (-dot(dg, t[1]), -dot(dg, t[2]))
+        c = law_weights(form, t[1], t[2])
+        end_u, end_v = ends(table, pool, g, x[2], x[3])
+        rr, rs, held_r, held_s = saturate(end_u, end_v, chi, c, t[1], t[2], form)
+        k = second_form(t, (-dg[0], -dg[1], -dg[2]))
+        power -= chi[0] * rr + chi[1] * rs
+        error += free_error(chi, t[1], t[2], held_r, held_s)
+        # A bound for both together: the couplings -f_i.h_j add at most the mean of those of B I.
+        metric_g = largest(second_form(t, zero), c, held_r, held_s)
+        top = max(top, largest(k, c, held_r, held_s), metric_g) + math.sqrt(metric_f * metric_g)
+    limit = 1.0 / (dt * top) if top > 0.0 else 0.0
+    gain = law.gain if law.gain > 0.0 else limit
+    if law.rate > 0.0:
+        wanted = law.rate * max(distance - law.nearest, 0.0) * distance
+        gain = wanted / power if wanted < limit * power else limit
+    mode_f = int(held_u) + int(held_v)
+    mode_g = int(held_r) + int(held_s)
+    rates = (gain * ru, gain * rv, gain * rr, gain * rs)
+    if law.feed_forward > 0.0:
+        bf = (0.0 if held_u else -dot(s[1], placed.drift_f), 0.0 if held_v else -dot(s[2], placed.drift_f))
+        bg = (0.0, 0.0)
+        if g >= 0:
+            bg = (0.0 if held_r else -dot(t[1], placed.drift_g), 0.0 if held_s else -dot(t[2], placed.drift_g))
+            fu = matvec_t(turn, s[1])
+            fv = matvec_t(turn, s[2])
+            p = (
+                0.0 if held_u or held_r else -dot(fu, t[1]),
+                0.0 if held_u or held_s else -dot(fu, t[2]),
+                0.0 if held_v or held_r else -dot(fv, t[1]),
+                0.0 if held_v or held_s else -dot(fv, t[2]),
+            )
+        add_f, add_g, definite = descent_step(keep(h, held_u, held_v), p, keep(k, held_r, held_s), bf, bg, 0.0)
+        if definite:
+            rates = (rates[0] + add_f[0], rates[1] + add_f[1], rates[2] + add_g[0], rates[3] + add_g[1])
+    return ControlStep(rates, distance, math.sqrt(error), mode_f, mode_g, gain)
+
+
+@kernel(inline=True)
+def moved(table, pool, f, g, x, rates, dt):
+    """Parameters after an Euler step, wrapped and clamped."""
+    uf, vf, _end = into_domain(table, pool, f, x[0] + dt * rates[0], x[1] + dt * rates[1])
+    ug, vg = x[2], x[3]
+    if g >= 0:
+        ug, vg, _end = into_domain(table, pool, g, x[2] + dt * rates[2], x[3] + dt * rates[3])
+    return (uf, vf, ug, vg)
+
+
+@kernel(inner=True)
+def lowering(table, pool, f, g, turn, shift, x, rates, dt, distance):
+    """Parameters after a step that does not lead farther apart: a whole one, or the largest of its halves."""
+    y = x
+    for _ in range(HALVINGS):
+        y = moved(table, pool, f, g, x, rates, dt)
+        target = shift
+        if g >= 0:
+            target = add(matvec(turn, surface_point(table, pool, g, y[2], y[3])[0]), shift)
+        p = surface_point(table, pool, f, y[0], y[1])[0]
+        d = sub(p, target)
+        # At rest distances differ by the rounding of the points.
+        rounding = 1e-14 * (math.sqrt(dot(p, p)) + math.sqrt(dot(target, target)))
+        if dot(d, d) <= distance * (distance + rounding):
+            return y
+        dt *= 0.5
+    return y
+
+
+@kernel(inline=True)
+def relative(table, poses, k, g, point):
+    """Rotation and shift of the target seen from f at the poses of step k; of a point, its place."""
+    k = min(k, poses.shape[0] - 1)
+    turn_f = rotation(poses[k], 0)
+    turn, shift = relative_pose(poses[k], 0, turn_f, 1, rotation(poses[k], 1))
+    if g < 0:
+        shift = add(matvec(turn, point), shift)
+    return turn, shift
+
+
+@kernel(inline=True)
+def write_row(out, row, x, step):
+    written = step_row_at(out, row)
+    for k in range(4):
+        written.parameters[k] = x[k]
+    written.distance = step.distance
+    written.error = step.error
+    written.mode_f = step.mode_f
+    written.mode_g = step.mode_g
+    written.gain = step.gain
+
+
+@kernel(
+    signatures=(
+        "(i8[::1], f8[::1], i8, i8, UniTuple(f8, 3), f8[:, :, ::1], UniTuple(f8, 4), f8, i8, i8, UniTuple(f8, 4), f8, "
+        "f8, f8[:, ::1])"
+    ),
+)
+def run_control(table, pool, f, g, point, poses, x, dt, steps, form, law, tolerance, meet, out):
+    """`steps` Euler steps of the controller from x, along poses (n, 2, 7), the last of which stays: status and steps.
+
+    `law` are the numbers of a `ControlLaw`. Row k of `out` is the state after k steps; one with a single row gets the
+    last state. Where nothing moves any more the run ends with an error of at most `tolerance`. The points meet at a
+    distance of `meet`.
+    """
+    law = ControlLaw(law[0], law[1], law[2], law[3])
+    turn, shift = relative(table, poses, 0, g, point)
+    last = out.shape[0] - 1
+    zero = (0.0, 0.0, 0.0)
+    for k in range(steps + 1):
+        drift_f = zero
+        drift_g = zero
+        still = k >= poses.shape[0] - 1
+        next_turn, next_shift = turn, shift
+        if not still:
+            next_turn, next_shift = relative(table, poses, k + 1, g, point)
+            i = 1.0 / dt
+            there = zero
+            if g >= 0:
+                there = surface_point(table, pool, g, x[2], x[3])[0]
+                here = surface_point(table, pool, f, x[0], x[1])[0]
+                before = matvec_t(turn, sub(here, shift))
+                after = matvec_t(next_turn, sub(here, next_shift))
+                drift_g = (i * (after[0] - before[0]), i * (after[1] - before[1]), i * (after[2] - before[2]))
+            before = shift
+            after = next_shift
+            if g >= 0:
+                before = add(matvec(turn, there), shift)
+                after = add(matvec(next_turn, there), next_shift)
+            drift_f = (i * (after[0] - before[0]), i * (after[1] - before[1]), i * (after[2] - before[2]))
+        step = control_rates(table, pool, f, g, Target(turn, shift, drift_f, drift_g), x, form, law, dt)
+        if not step.distance < 1e300:
+            return IRREGULAR, max(k - 1, 0)
+        write_row(out, min(k, last), x, step)
+        if step.distance <= meet:
+            return MEETING, k
+        if still and step.error <= tolerance:
+            # Where patches cross the error is of the distance itself.
+            return CLOSEST if step.distance > 10.0 * tolerance else MEETING, k
+        if k == steps:
+            break
+        if still and law.gain == 0.0:
+            x = lowering(table, pool, f, g, turn, shift, x, step.rates, dt, step.distance)
+        else:
+            x = moved(table, pool, f, g, x, step.rates, dt)
+        turn, shift = next_turn, next_shift
+    return ON_ITS_WAY, steps
+
+
+@kernel(inner=True)
+def newton_change(s, d, form):
+    """Newton's step to zeros of psi: of D.f_i (covariant), or of D.f_i / |f_i| (unit); zero where that is singular."""
+    psi = (dot(d, s[1]), dot(d, s[2]))
+    h = second_form(s, d)
+    m11, m12, m21, m22 = h[0], h[1], h[1], h[2]
+    if form == UNIT:
+        # Rows of the derivative of psi_i / |f_i|, times |f_i|.
+        e = psi[0] / dot(s[1], s[1])
+        g = psi[1] / dot(s[2], s[2])
+        m11 -= e * dot(s[1], s[3])
+        m12 -= e * dot(s[1], s[4])
+        m21 -= g * dot(s[2], s[4])
+        m22 -= g * dot(s[2], s[5])
+    det = m11 * m22 - m12 * m21
+    du = -(m22 * psi[0] - m12 * psi[1]) / det
+    dv = -(m11 * psi[1] - m21 * psi[0]) / det
+    if not (abs(du) < 1e300 and abs(dv) < 1e300):
+        return 0.0, 0.0
+    return du, dv
+
+
+@kernel(signatures="(i8[::1], f8[::1], UniTuple(f8, 3), f8[:, ::1], i8, i8, i8, f8, f8[:, ::1])")
+def attraction(table, pool, point, starts, method, form, limit, tolerance, out):
+    """Where a witness point ends from every start (n, 2): out (n, 3) of parameters and error; how many ended.
+
+    Newton's method without saturation fails where it leaves the patch; with it, components that lead out are set to
+    zero and the rest is clamped. The switching controller takes the gain that its eigenvalues allow.
+    """
+    law = ControlLaw(0.0, 0.0, 0.0, 0.0)
+    same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+    zero = (0.0, 0.0, 0.0)
+    placed = Target(same, point, zero, zero)
+    ended = 0
+    for i in range(starts.shape[0]):
+        x = (starts[i, 0], starts[i, 1], 0.0, 0.0)
+        error = math.inf
+        for _ in range(limit):
+            if method == SWITCHING:
+                step = control_rates(table, pool, 0, -1, placed, x, form, law, 1.0)
+                error = step.error
+                y = lowering(table, pool, 0, -1, same, point, x, step.rates, 1.0, step.distance)
+                clamped = False
+            else:
+                s = surface_point(table, pool, 0, x[0], x[1])
+                d = sub(s[0], point)
+                du, dv = newton_change(s, d, form)
+                held_u = False
+                held_v = False
+                if method == NEWTON_SATURATED:
+                    end_u, end_v = ends(table, pool, 0, x[0], x[1])
+                    held_u = end_u * du > 0.0
+                    held_v = end_v * dv > 0.0
+                    du = 0.0 if held_u else du
+                    dv = 0.0 if held_v else dv
+                error = math.sqrt(free_error((dot(d, s[1]), dot(d, s[2])), s[1], s[2], held_u, held_v))
+                u, v, clamped = into_domain(table, pool, 0, x[0] + du, x[1] + dv)
+                y = (u, v, 0.0, 0.0)
+            if error <= tolerance:
+                ended += 1
+                break
+            if clamped and method == NEWTON:
+                error = math.inf
+                break
+            x = y
+        out[i, 0], out[i, 1] = x[0], x[1]
+        out[i, 2] = min(error, 1e300)
+    return ended

@@ -1,0 +1,1 @@
+"""Extremal pairs of two surfaces, curves or edges: equations, derivatives, Newton, and rates under motion."""

@@ -1,0 +1,94 @@
+"""Where two features cross: Newton's method for d = 0 with least steps."""
+
+from __future__ import annotations
+
+import math
+
+from assembly._kernel import kernel
+from assembly.geometry.splines.domain import into_domain
+from assembly.geometry.splines.evaluate import (
+    spline_curve_at,
+    surface_point,
+)
+from assembly.geometry.vec import add, blend, cross, dot, matvec, scale, sub
+from assembly.proximity.brep.records import EDGE, FACE, edge_at, face_at
+from assembly.proximity.extrema.feature_jets import edge_jet, vertex_point
+
+
+@kernel(inner=True)
+def tangents(table, pool, kind, record, turn, shift, u, v):
+    """Point and tangents of a feature, moved by a pose."""
+    zero = (0.0, 0.0, 0.0)
+    if kind == FACE:
+        p, su, sv, _uu, _uv, _vv = surface_point(table, pool, face_at(table, record).surface, u, v)
+    elif kind == EDGE:
+        p, su, _tt = edge_jet(table, pool, record, u)
+        sv = zero
+    else:
+        p = vertex_point(table, pool, record)
+        su = zero
+        sv = zero
+    return add(matvec(turn, p), shift), matvec(turn, su), matvec(turn, sv)
+
+
+@kernel(inner=True)
+def within(table, pool, kind, record, u, v):
+    """Coordinates wrapped, or held at the ends of the domain."""
+    edge = edge_at(table, record)
+    if kind == FACE:
+        u, v, _clamped = into_domain(table, pool, face_at(table, record).surface, u, v)
+        return u, v
+    if kind == EDGE:
+        c = spline_curve_at(table, edge.curve)
+        o = c.breaks
+        low = pool[o]
+        high = pool[o + c.spans]
+        if edge.start < 0 and not low <= u <= high:
+            u -= (high - low) * math.floor((u - low) / (high - low))
+        return min(max(u, low), high), v
+    return u, v
+
+
+@kernel(inner=True)
+def crossing_point(table, pool, kind_f, f, kind_g, g, turn, shift, x, size):
+    """Coordinates where d = 0 near x, by least steps, and whether they were found."""
+    same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+    origin = (0.0, 0.0, 0.0)
+    previous = math.inf
+    for _ in range(12):
+        p, pu, pv = tangents(table, pool, kind_f, f, same, origin, x[0], x[1])
+        q, qu, qv = tangents(table, pool, kind_g, g, turn, shift, x[2], x[3])
+        d = sub(q, p)
+        off = math.sqrt(dot(d, d))
+        if off <= 1e-13 * size:
+            return x, True
+        if off > 0.9 * previous:
+            return x, False
+        previous = off
+        # W = J J^T over tangents of unit length: steps in lengths, the least that remove d.
+        su = 1.0 / max(math.sqrt(dot(pu, pu)), 1e-300)
+        sv = 1.0 / max(math.sqrt(dot(pv, pv)), 1e-300)
+        tu = 1.0 / max(math.sqrt(dot(qu, qu)), 1e-300)
+        tv = 1.0 / max(math.sqrt(dot(qv, qv)), 1e-300)
+        a = scale(su, pu)
+        b = scale(sv, pv)
+        c = scale(tu, qu)
+        e = scale(tv, qv)
+        xx = a[0] * a[0] + b[0] * b[0] + c[0] * c[0] + e[0] * e[0]
+        xy = a[0] * a[1] + b[0] * b[1] + c[0] * c[1] + e[0] * e[1]
+        xz = a[0] * a[2] + b[0] * b[2] + c[0] * c[2] + e[0] * e[2]
+        yy = a[1] * a[1] + b[1] * b[1] + c[1] * c[1] + e[1] * e[1]
+        yz = a[1] * a[2] + b[1] * b[2] + c[1] * c[2] + e[1] * e[2]
+        zz = a[2] * a[2] + b[2] * b[2] + c[2] * c[2] + e[2] * e[2]
+        row0 = (xx, xy, xz)
+        row1 = (xy, yy, yz)
+        row2 = (xz, yz, zz)
+        det = dot(row0, cross(row1, row2))
+        if not det > 1e-14:
+            return x, False
+        y = blend(d[0] / det, cross(row1, row2), d[1] / det, cross(row2, row0))
+        y = add(y, scale(d[2] / det, cross(row0, row1)))
+        uf, vf = within(table, pool, kind_f, f, x[0] + su * dot(a, y), x[1] + sv * dot(b, y))
+        ug, vg = within(table, pool, kind_g, g, x[2] - tu * dot(c, y), x[3] - tv * dot(e, y))
+        x = (uf, vf, ug, vg)
+    return x, False

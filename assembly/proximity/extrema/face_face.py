@@ -1,0 +1,421 @@
+"""The extremal pair of two surfaces: where they are closest, or deepest in each other.
+
+With n the outward unit normal of f, d = g - f and m the normal of g scaled so that m.n = 1, the pair solves
+
+    P^T d = 0   (d is normal to f)      and      r2 = P^T (m - n) = 0   (the normals are parallel),
+
+P = [x y] an orthonormal tangent frame of f. Unlike "d orthogonal to all four tangents" this stays
+regular through touching and interpenetration. Newton's step is taken in tangent lengths
+a = E u_f', b = T u_g' with E = P^T [f_u f_v], T = P^T [g_u g_v]; A and C are the shape operators of f and g
+with respect to n (dn = P A a), and
+
+    H a = C r1 - r2,   b = (I + beta A) a - r1,   H = C (I + beta A) - A,   beta = n.d
+
+(the two 2x2 solves of paper 001, appendix A, in one common frame, so that no angle between the
+parameterizations and no sign of the second normal appears).
+"""
+
+from __future__ import annotations
+
+import math
+from collections import namedtuple
+
+from assembly._kernel import kernel
+from assembly.geometry.splines.domain import into_domain
+from assembly.geometry.splines.evaluate import (
+    surface_at,
+    surface_point,
+)
+from assembly.geometry.splines.pole import CHART, SurfaceFrame, limits, nearest_pole, polar_step, pole_frame
+from assembly.geometry.vec import add, blend, cross, dot, matvec, matvec_t, scale, sub
+from assembly.proximity.extrema.pair_matrix import (
+    PairMatrix,
+    across_first,
+    curvature_bound,
+    null_ways,
+    pair_matrix,
+    right_side,
+)
+
+# A step that turns about a pole by more than this part of the domain is taken in the pole's plane.
+TURN = 0.08
+# What became of a pair.
+CONVERGED, SINGULAR, LEFT_PATCH, NOT_CONVERGED = 0, 1, 2, 3
+# A parameterization counts as regular where |Su x Sv| is above this times |Su| |Sv|.
+POLE = 1e-9
+# Newton's steps: four or five near a solution, more while steps are cut; around a ring whose wire turns a normal by as
+# much as a step may, some 60 lead halfway.
+LIMIT, AROUND = 40, 120
+# After so many steps a singular pair whose residual vanishes is one; for who searches it is where normals are as
+# parallel as this, in radians, above each other to as much of the size.
+PATIENCE, SETTLED = 12, 1e-12
+# The most, in radians, that a step may turn a normal.
+BEND = 0.5
+# Steps below this many radians that do not shrink any more are rounding; where the end of a patch held the last one,
+# below the second, and some roundings of coordinates.
+STAGNANT, HELD_STILL, HELD_ROUNDING = 1e-7, 1e-12, 4e-15
+# A step that turns the normals by less leaves an error below rounding when a solve carries the frame along it.
+CLOSE = 2e-7
+
+# A surface seen in the tangent frame of another one: [S_u S_v] = [x y] T along it.
+SeenFrame = namedtuple(
+    "SeenFrame",
+    [
+        "point",
+        "rates",  # T^-1 (11, 12, 21, 22); zero at a pole
+        "shape",  # shape operator (11, 12, 22) with respect to the other's normal
+        "tilt",  # its normal, scaled to one along the other's, less that: two numbers
+        "regular",  # whether there is a tangent plane, not orthogonal to the other's
+    ],
+)
+# Everything about a pair of faces at some parameters, extremal or not, in the axes of body f.
+PairFrame = namedtuple(
+    "PairFrame",
+    [
+        "normal",  # outward unit normal of f
+        "tangent_x",
+        "tangent_y",  # with the normal a frame of f: [f_u f_v] = [tangent_x tangent_y] E
+        "point_f",
+        "point_g",
+        "rates_f",  # E^-1 (11, 12, 22), upper triangular: parameters by tangential moves; zero at a pole
+        "rates_g",  # T^-1 (11, 12, 21, 22); zero at a pole
+        "shape_f",  # shape operator (11, 12, 22) with respect to the normal
+        "shape_g",
+        "residual",  # (r1x, r1y, r2x, r2y): lengths, then tilts
+        "gap",  # beta = normal.(point_g - point_f)
+        "regular",  # whether both have a tangent plane here, and those are not orthogonal
+    ],
+)
+# What Newton's method from some parameters came to.
+PairSolution = namedtuple(
+    "PairSolution",
+    [
+        "status",
+        "parameters",  # (u_f, v_f, u_g, v_g)
+        "steps",
+        "frame",  # a `PairFrame`
+        "matrix",  # a `PairMatrix`
+    ],
+)
+
+
+@kernel(inline=True)
+def shape_operator(p, q, r, s, luu, luv, lvv):
+    """-J^T L J, J = [[p, q], [r, s]] the inverse of tangent coordinates, L_ij = S_ij.n; symmetric, +1/r on a ball."""
+    a = luu * p + luv * r
+    b = luv * p + lvv * r
+    return (
+        -(p * a + r * b),
+        -(q * a + s * b),
+        -(q * (luu * q + luv * s) + s * (luv * q + lvv * s)),
+    )
+
+
+@kernel(inline=True)
+def own_frame(table, pool, r, u, v):
+    """A `SurfaceFrame` at parameters (u, v).
+
+    At a pole E^-1 is zero: the point moves, its polar coordinates have no rates.
+    """
+    patch = surface_at(table, r)
+    zero = (0.0, 0.0, 0.0)
+    if patch.poles != 0:
+        edge, distance = nearest_pole(table, pool, r, u, v)
+        if distance < CHART:
+            return pole_frame(table, pool, r, edge, u, v)
+    p, su, sv, suu, suv, svv = surface_point(table, pool, r, u, v)
+    sign = float(patch.sign)
+    normal = cross(su, sv)
+    uu = dot(su, su)
+    nn = dot(normal, normal)
+    if not (nn > POLE * POLE * uu * dot(sv, sv) and nn > 1e-290):
+        return SurfaceFrame(p, zero, zero, zero, zero, zero, False)
+    length = math.sqrt(nn)
+    n = scale(sign / length, normal)
+    i11 = 1.0 / math.sqrt(uu)
+    x = scale(i11, su)
+    # |Su x Sv| = e11 e22.
+    i22 = sign * uu * i11 / length
+    i12 = -dot(x, sv) * i11 * i22
+    a = shape_operator(i11, i12, 0.0, i22, dot(suu, n), dot(suv, n), dot(svv, n))
+    return SurfaceFrame(p, n, x, cross(n, x), (i11, i12, i22), a, True)
+
+
+@kernel(inline=True)
+def other_frame(table, pool, r, u, v, n, x, y):
+    """A `SeenFrame` at parameters (u, v), with another surface's n, x, y.
+
+    m = n + [x y] r2 is orthogonal to S_u and S_v: T^T r2 = -(n.S_u, n.S_v), with T = [x y]^T [S_u S_v].
+    """
+    zero = (0.0, 0.0, 0.0)
+    none = (0.0, 0.0, 0.0, 0.0)
+    if surface_at(table, r).poles != 0:
+        edge, distance = nearest_pole(table, pool, r, u, v)
+        if distance < CHART:
+            own = pole_frame(table, pool, r, edge, u, v)
+            p, m, gx, gy, b = own.point, own.normal, own.tangent_x, own.tangent_y, own.shape
+            s = dot(m, n)
+            if not own.regular or abs(s) < 1e-3:
+                return SeenFrame(p, none, zero, (0.0, 0.0), False)
+            side = 1.0 if s > 0.0 else -1.0
+            xx = dot(x, gx)
+            xy = dot(x, gy)
+            yx = dot(y, gx)
+            yy = dot(y, gy)
+            c = (
+                side * (xx * (b[0] * xx + b[1] * xy) + xy * (b[1] * xx + b[2] * xy)),
+                side * (xx * (b[0] * yx + b[1] * yy) + xy * (b[1] * yx + b[2] * yy)),
+                side * (yx * (b[0] * yx + b[1] * yy) + yy * (b[1] * yx + b[2] * yy)),
+            )
+            return SeenFrame(p, none, c, (dot(x, m) / s, dot(y, m) / s), True)
+    p, su, sv, suu, suv, svv = surface_point(table, pool, r, u, v)
+    t11 = dot(x, su)
+    t12 = dot(x, sv)
+    t21 = dot(y, su)
+    t22 = dot(y, sv)
+    det = t11 * t22 - t12 * t21
+    if not (det * det > POLE * POLE * dot(su, su) * dot(sv, sv) and abs(det) > 1e-145):
+        return SeenFrame(p, none, zero, (0.0, 0.0), False)
+    i = 1.0 / det
+    t = (i * t22, -i * t12, -i * t21, i * t11)
+    c = shape_operator(t[0], t[1], t[2], t[3], dot(suu, n), dot(suv, n), dot(svv, n))
+    nu = dot(n, su)
+    nv = dot(n, sv)
+    return SeenFrame(p, t, c, (-(t[0] * nu + t[2] * nv), -(t[1] * nu + t[3] * nv)), True)
+
+
+@kernel(inline=True)
+def pair_frame(table, pool, f, g, rotation, shift, x):
+    """The `PairFrame` at parameters x = (u_f, v_f, u_g, v_g), in the axes of body f."""
+    own = own_frame(table, pool, f, x[0], x[1])
+    n, tx, ty = own.normal, own.tangent_x, own.tangent_y
+    # The normal and the frame go to the axes of g, rather than six derivatives to those of f.
+    ng = matvec_t(rotation, n)
+    xg = matvec_t(rotation, tx)
+    yg = matvec_t(rotation, ty)
+    seen = other_frame(table, pool, g, x[2], x[3], ng, xg, yg)
+    pg = add(matvec(rotation, seen.point), shift)
+    d = sub(pg, own.point)
+    return PairFrame(
+        normal=n,
+        tangent_x=tx,
+        tangent_y=ty,
+        point_f=own.point,
+        point_g=pg,
+        rates_f=own.rates,
+        rates_g=seen.rates,
+        shape_f=own.shape,
+        shape_g=seen.shape,
+        residual=(dot(tx, d), dot(ty, d), seen.tilt[0], seen.tilt[1]),
+        gap=dot(n, d),
+        regular=own.regular and seen.regular,
+    )
+
+
+@kernel(inline=True)
+def advance(table, pool, r, u, v, du, dv, step):
+    """Parameters moved by (du, dv), or over a pole by the tangential step (body axes); whether an end held them."""
+    if surface_at(table, r).poles != 0:
+        edge, distance = nearest_pole(table, pool, r, u, v)
+        ulo, uhi, _ = limits(table, pool, r, 0)
+        vlo, vhi, _ = limits(table, pool, r, 1)
+        turn = abs(dv) / (vhi - vlo) if edge <= 2 else abs(du) / (uhi - ulo)
+        if edge <= 2:
+            beyond = u + du < ulo if edge == 1 else u + du > uhi
+        else:
+            beyond = v + dv < vlo if edge == 4 else v + dv > vhi
+        if distance < CHART or turn > TURN or beyond:
+            u, v = polar_step(table, pool, r, edge, u, v, step)
+            return u, v, False
+    return into_domain(table, pool, r, u + du, v + dv)
+
+
+@kernel(inline=True)
+def pair_step(a, c, r, k, inverse, size):
+    """Newton's step along the tangents of f and of g, and by how much either turns its surface's normal."""
+    s0, s1 = right_side(c, r)
+    ax = inverse[0] * s0 + inverse[1] * s1
+    ay = inverse[2] * s0 + inverse[3] * s1
+    bx = k[0] * ax + k[1] * ay - r[0]
+    by = k[1] * ax + k[2] * ay - r[1]
+    bend_f = (abs(ax) + abs(ay)) * max(curvature_bound(a), 2.0 / size)
+    bend_g = (abs(bx) + abs(by)) * max(curvature_bound(c), 2.0 / size)
+    return (ax, ay), (bx, by), bend_f, bend_g
+
+
+@kernel(inline=True)
+def step_of_other(a, c, k, h, step_f, step_g, size):
+    """A step of a pair of a continuum, without its part along the continuum on g: f makes that one, backwards.
+
+    Where an end of g is in the way the pair may go on along the continuum, to where both surfaces are. Along it H = 0,
+    so that f moved by s and g by K s, K = I + beta A, leave what the step solves as it is. Returns as `pair_step`.
+    """
+    ax, ay = step_f
+    bx, by = step_g
+    if abs(h[0]) + abs(h[1]) + abs(h[2]) + abs(h[3]) <= 1e-9 / size:
+        # Two planes: all ways are along it.
+        ax, ay, bx, by = ax - bx, ay - by, 0.0, 0.0
+    else:
+        _v, w = null_ways(h)
+        kx = k[0] * w[0] + k[1] * w[1]
+        ky = k[1] * w[0] + k[2] * w[1]
+        stretch = w[0] * kx + w[1] * ky
+        s = -(bx * w[0] + by * w[1]) / stretch if abs(stretch) > 1e-9 else 0.0
+        ax, ay, bx, by = ax + s * w[0], ay + s * w[1], bx + s * kx, by + s * ky
+    bend_f = (abs(ax) + abs(ay)) * max(curvature_bound(a), 2.0 / size)
+    bend_g = (abs(bx) + abs(by)) * max(curvature_bound(c), 2.0 / size)
+    return (ax, ay), (bx, by), bend_f, bend_g
+
+
+@kernel(inline=True)
+def bent_at_most(bend):
+    """The part of a step that turns a normal by `BEND` at most."""
+    return 1.0 if bend <= BEND else BEND / bend
+
+
+@kernel(inline=True)
+def move_pair(table, pool, f, g, rotation, x, frame, step_f, step_g):
+    """Parameters after steps along the tangents of either surface; whether either was clamped; how far they were to go.
+
+    The steps are in the tangent frame of f for both; `frame` is the `PairFrame` at x.
+    """
+    e, t = frame.rates_f, frame.rates_g
+    tx, ty = frame.tangent_x, frame.tangent_y
+    ax, ay = step_f
+    bx, by = step_g
+    du = e[0] * ax + e[1] * ay
+    dv = e[2] * ay
+    ds = t[0] * bx + t[1] * by
+    dt = t[2] * bx + t[3] * by
+    uf, vf, clamped_f = advance(table, pool, f, x[0], x[1], du, dv, blend(ax, tx, ay, ty))
+    move = matvec_t(rotation, blend(bx, tx, by, ty))
+    ug, vg, clamped_g = advance(table, pool, g, x[2], x[3], ds, dt, move)
+    return (uf, vf, ug, vg), clamped_f or clamped_g, abs(du) + abs(dv) + abs(ds) + abs(dt)
+
+
+@kernel(inline=True)
+def vanishes(r, size):
+    """Whether a residual is as good as zero."""
+    return abs(r[2]) + abs(r[3]) < 1e-9 and abs(r[0]) + abs(r[1]) < 1e-9 * size
+
+
+@kernel(inline=True)
+def settled(c, r, size):
+    """Whether a pair is one as far as anything tells that is not rounding."""
+    s0, s1 = right_side(c, r)
+    return abs(s0) + abs(s1) <= SETTLED and abs(r[0]) + abs(r[1]) <= SETTLED * size
+
+
+@kernel(inline=True)
+def stagnates(step, bend, previous, status, p, q, size):
+    """Whether a step that does not shrink any more is rounding: one that an end held does not shrink either."""
+    least = STAGNANT
+    if status == LEFT_PATCH:
+        least = min(HELD_STILL + HELD_ROUNDING * math.sqrt(dot(p, p) + dot(q, q)) / size, least)
+    return bend < least and step > 0.25 * previous
+
+
+@kernel(inline=True)
+def carried_along(frame, ax, ay, bx, by):
+    """The frame after a last, small step: its gap, points, normal and tangents; what depends on curvature stays."""
+    n, tx, ty = frame.normal, frame.tangent_x, frame.tangent_y
+    a, r = frame.shape_f, frame.residual
+    wx = a[0] * ax + a[1] * ay
+    wy = a[1] * ax + a[2] * ay
+    return PairFrame(
+        normal=add(n, blend(wx, tx, wy, ty)),
+        tangent_x=sub(tx, scale(wx, n)),
+        tangent_y=sub(ty, scale(wy, n)),
+        point_f=add(frame.point_f, blend(ax, tx, ay, ty)),
+        point_g=add(frame.point_g, blend(bx, tx, by, ty)),
+        rates_f=frame.rates_f,
+        rates_g=frame.rates_g,
+        shape_f=a,
+        shape_g=frame.shape_g,
+        residual=r,
+        gap=frame.gap + 0.5 * (r[0] * wx + r[1] * wy - r[2] * bx - r[3] * by),
+        regular=frame.regular,
+    )
+
+
+@kernel(inner=True)
+def solve_pair(table, pool, f, g, rotation, shift, x, size, turn, close, downhill):
+    """Newton from x to the extremal pair: a `PairSolution`.
+
+    `size` is the length against which steps are measured. A step that would turn a normal by more than `BEND` is
+    shortened, so that the iteration follows the surface; one that would turn it by more than `turn` says that x was not
+    near a pair at all. After a step that turns it by less than `close` the frame is carried along, not evaluated again:
+    what is left is of the order of close^2, and of close^3 in the gap. With `downhill` a start along a level valley is
+    led to its least, as a search asks; without, a pair that is followed stays where it is in a continuum.
+    """
+    tolerance = 4e-14 * size
+    flat = 1e-9 / size
+    previous = 1e300
+    status = NOT_CONVERGED
+    level = False
+    # Whether it is f that goes along a continuum, because an end of g is in the way; steps in a row that ends undid.
+    by_other = False
+    stills = 0
+    iteration = 0
+    while True:
+        frame = pair_frame(table, pool, f, g, rotation, shift, x)
+        a, c, r = frame.shape_f, frame.shape_g, frame.residual
+        matrix = pair_matrix(a, c, frame.gap, flat)
+        isolated = matrix.isolated
+        if not frame.regular:
+            # An apex or a crease: there is no tangent plane to go on.
+            break
+        if downhill:
+            inverse, levels = across_first(a, c, r, matrix.k, matrix.h, matrix.inverse, flat)
+            matrix = PairMatrix(matrix.k, matrix.h, inverse, isolated)
+            level = level or levels
+        step_f, step_g, bend_f, bend_g = pair_step(a, c, r, matrix.k, matrix.inverse, size)
+        if by_other and not isolated:
+            step_f, step_g, bend_f, bend_g = step_of_other(a, c, matrix.k, matrix.h, step_f, step_g, size)
+        ax, ay = step_f
+        bx, by = step_g
+        step = max(abs(ax) + abs(ay), abs(bx) + abs(by))
+        bend = max(bend_f, bend_g)
+        small = bend < close and isolated
+        # Small against the scene and against the bodies' own curvature; or as small as rounding lets it become.
+        if (step <= tolerance and bend < 1e-9) or stagnates(
+            step, bend, previous, status, frame.point_f, frame.point_g, size
+        ):
+            # In a singular system a vanishing step is a solution only if the residual vanishes too.
+            status = CONVERGED if isolated else (SINGULAR if vanishes(r, size) else NOT_CONVERGED)
+            break
+        ends = iteration >= (AROUND if level and status != LEFT_PATCH else LIMIT) or not step < 1e300 or bend > turn
+        if not isolated and vanishes(r, size):
+            # Along the valley of a fold there is nothing to tell places apart; steps need not shrink.
+            if (ends or settled(c, r, size)) if downhill else iteration >= PATIENCE:
+                status = SINGULAR
+                break
+        if ends:
+            break
+        previous = step
+        # Each surface by its own measure: a pebble turns while the hill beside it is crossed.
+        factor_f = bent_at_most(bend_f)
+        factor_g = bent_at_most(bend_g)
+        step_f = (factor_f * ax, factor_f * ay)
+        step_g = (factor_g * bx, factor_g * by)
+        y, clamped, way = move_pair(table, pool, f, g, rotation, x, frame, step_f, step_g)
+        status = NOT_CONVERGED
+        if clamped:
+            status = LEFT_PATCH
+            still = abs(y[0] - x[0]) + abs(y[1] - x[1]) + abs(y[2] - x[2]) + abs(y[3] - x[3]) <= 1e-12 * way
+            stills = stills + 1 if still else 0
+            # Held at the end of the patch and nothing else moves, nor the other surface's point: the pair has left.
+            if stills == 2 or (still and isolated):
+                break
+            if not isolated:
+                by_other = not by_other
+                previous = 1e300
+        elif small:
+            frame = carried_along(frame, ax, ay, bx, by)
+            x = y
+            status = CONVERGED
+            iteration += 1
+            break
+        x = y
+        iteration += 1
+    return PairSolution(status, x, iteration, frame, matrix)

@@ -1,0 +1,323 @@
+"""From any start down to the nearest pair of two patches: the controller that takes over where Newton's method fails.
+
+The controller of theorem 2 of paper 000 moves the two witness points against the projection errors. With d = g - f and
+orthonormal tangents P, the slopes of |d|^2 / 2 over lengths on the surfaces are -P_f^T d and P_g^T d, and any positive
+definite gain lowers |d|. Here the gain is (H + mu I)^-1 with a mu that makes it positive definite,
+
+    H = [[I + (d.n_f) A_f, -P_f^T P_g], [-P_g^T P_f, I - (d.n_g) A_g]],
+
+the second derivative of |d|^2 / 2, A the shape operators: steepest descent far away, Newton's method near a minimum.
+What would leave a patch is set to zero component by component before the step and clamped after it
+(`docs/controllers.md`), and a step is taken only if the points come closer.
+"""
+
+from __future__ import annotations
+
+import math
+
+from assembly._kernel import kernel
+from assembly.geometry.splines.evaluate import (
+    surface_at,
+    surface_point,
+)
+from assembly.geometry.vec import add, blend, dot, matvec, matvec_t, sub
+from assembly.kinematics.motion import position, relative_pose, rotation
+from assembly.proximity.extrema.face_face import (
+    BEND,
+    CONVERGED,
+    LEFT_PATCH,
+    NOT_CONVERGED,
+    SINGULAR,
+    PairSolution,
+    advance,
+    own_frame,
+    pair_frame,
+    solve_pair,
+)
+from assembly.proximity.extrema.pair_matrix import curvature_bound, pair_matrix
+
+# Beside the statuses of `solve_pair`: the surfaces cross where the descent led.
+CROSSED = 4
+# Newton's method takes over where a step turns the normals by less than this many radians.
+NEAR = 0.1
+# Newton's method is given up where a step would turn a normal by more: from points that are apart, or that meet.
+TURN_APART, TURN_MET = 0.5, 1.0
+# A root is that of the descent if no normal turned by more than the angle with this cosine on the way.
+SAME_APART, SAME_MET = 0.8, 0.5
+# Points nearer than this part of the size meet; steps shorter than it end the descent.
+MEET = 1e-10
+# Where the descent ends with points nearer than this part of the size, they would meet: surfaces that touch.
+TOUCH = 1e-5
+# What of a gradient is rounding, as a part of the size.
+ROUNDING = 1e-13
+# A first damping, against curvatures of |d|^2 / 2, which are one for points that move along a plane.
+DAMPING = 1e-2
+# The least damping, so that points that may slide without coming closer stay; one whose steps are too short to count.
+LEAST, STUCK = 1e-8, 1e9
+
+
+@kernel(inline=True)
+def end_of(pool, breaks, spans, closed, pole_low, pole_high, u):
+    """-1 or 1 where u is at the low or high end of a patch, else 0; poles and seams are no ends."""
+    if closed == 1:
+        return 0
+    low = pool[breaks]
+    high = pool[breaks + spans]
+    slack = 1e-14 * (high - low)
+    if u <= low + slack and pole_low == 0:
+        return -1
+    if u >= high - slack and pole_high == 0:
+        return 1
+    return 0
+
+
+@kernel(inline=True)
+def free_directions(table, pool, r, u, v, e, gx, gy, slack):
+    """Two directions (tx, ty) in which a point may descend, zero where an end of the patch takes one away; how many.
+
+    e is E^-1 of `own_frame`, (gx, gy) the gradient over tangent lengths, `slack` what of it is rounding. Along an end
+    the direction is that of the end: S_v at an end of u.
+    """
+    patch = surface_at(table, r)
+    if e[0] == 0.0:
+        # At a pole.
+        return 1.0, 0.0, 0.0, 1.0, 2
+    poles = patch.poles
+    end_u = end_of(pool, patch.breaks_u, patch.spans_u, patch.closed_u, poles & 1, poles & 2, u)
+    end_v = end_of(pool, patch.breaks_v, patch.spans_v, patch.closed_v, poles & 4, poles & 8, v)
+    # S_v = (e12, e22) in the tangent frame, up to a positive factor; S_u = (1, 0).
+    scale_v = 1.0 if e[2] > 0.0 else -1.0
+    vx = -scale_v * e[1]
+    vy = scale_v * e[0]
+    # An end holds where descent leads out of it: at the low one where the gradient is positive.
+    length = math.sqrt(vx * vx + vy * vy)
+    held_u = end_u * gx < -slack
+    held_v = end_v * (vx * gx + vy * gy) < -slack * length
+    if held_u and held_v:
+        return 0.0, 0.0, 0.0, 0.0, 0
+    if held_v:
+        return 1.0, 0.0, 0.0, 0.0, 1
+    if held_u:
+        return vx / length, vy / length, 0.0, 0.0, 1
+    return 1.0, 0.0, 0.0, 1.0, 2
+
+
+@kernel(inner=True)
+def end_curvature(table, pool, r, u, v, along_v, d):
+    """d.C'' of the curve C at the end of a patch that a point is held at, by arc length."""
+    _p, su, sv, suu, _suv, svv = surface_point(table, pool, r, u, v)
+    tangent = sv if along_v else su
+    second = svv if along_v else suu
+    i = 1.0 / dot(tangent, tangent)
+    return i * (dot(d, second) - i * dot(second, tangent) * dot(d, tangent))
+
+
+@kernel(inline=True)
+def reduced(h11, h12, h22, t):
+    """T^T H T for the directions t, with one on the diagonal in the place of a direction that is taken away."""
+    a = t[0] * (h11 * t[0] + h12 * t[1]) + t[1] * (h12 * t[0] + h22 * t[1])
+    b = t[0] * (h11 * t[2] + h12 * t[3]) + t[1] * (h12 * t[2] + h22 * t[3])
+    c = t[2] * (h11 * t[2] + h12 * t[3]) + t[3] * (h12 * t[2] + h22 * t[3])
+    return (a if t[4] > 0 else 1.0), b, (c if t[4] > 1 else 1.0)
+
+
+@kernel(inline=True)
+def descent_step(p, c, q, gf, gg, mu):
+    """-(H + mu I)^-1 (gf, gg) for H = [[p, c], [c^T, q]] of 2x2 blocks, and whether H + mu I is positive definite."""
+    p11 = p[0] + mu
+    p22 = p[2] + mu
+    det = p11 * p22 - p[1] * p[1]
+    if not (p11 > 0.0 and det > 1e-12 * p11 * p11 and p22 > 0.0):
+        return (0.0, 0.0), (0.0, 0.0), False
+    i = 1.0 / det
+    i11 = i * p22
+    i12 = -i * p[1]
+    i22 = i * p11
+    # w = p^-1 c, then the complement q - c^T w.
+    w11 = i11 * c[0] + i12 * c[2]
+    w12 = i11 * c[1] + i12 * c[3]
+    w21 = i12 * c[0] + i22 * c[2]
+    w22 = i12 * c[1] + i22 * c[3]
+    q11 = q[0] + mu - (c[0] * w11 + c[2] * w21)
+    q12 = q[1] - (c[0] * w12 + c[2] * w22)
+    q22 = q[2] + mu - (c[1] * w12 + c[3] * w22)
+    det = q11 * q22 - q12 * q12
+    if not (q11 > 1e-13 * q[0] and q22 > 1e-13 * q[2] and det > 1e-13 * q11 * q22):
+        return (0.0, 0.0), (0.0, 0.0), False
+    i = 1.0 / det
+    r1 = -gg[0] + w11 * gf[0] + w21 * gf[1]
+    r2 = -gg[1] + w12 * gf[0] + w22 * gf[1]
+    b1 = i * (q22 * r1 - q12 * r2)
+    b2 = i * (q11 * r2 - q12 * r1)
+    a1 = -(i11 * gf[0] + i12 * gf[1]) - w11 * b1 - w12 * b2
+    a2 = -(i12 * gf[0] + i22 * gf[1]) - w21 * b1 - w22 * b2
+    return (a1, a2), (b1, b2), True
+
+
+@kernel(inline=True)
+def both_frames(table, pool, f, g, turn, shift, x):
+    """`own_frame` of either surface, each in its own axes, and the vector d from f to g in both."""
+    own_f = own_frame(table, pool, f, x[0], x[1])
+    own_g = own_frame(table, pool, g, x[2], x[3])
+    d = sub(add(matvec(turn, own_g.point), shift), own_f.point)
+    return own_f, own_g, d, matvec_t(turn, d)
+
+
+@kernel(inner=True)
+def finish(table, pool, f, g, turn, shift, x, size, reach):
+    """Newton's method from x: whether it came to the extremum that the descent leads to, and the `PairSolution`.
+
+    That is one no farther apart than x, off by no more than `reach` on either surface; with reach = 0, where the
+    surfaces meet, one where they touch or, solids, are deepest in each other.
+    """
+    start = pair_frame(table, pool, f, g, turn, shift, x)
+    most = TURN_APART if reach > 0.0 else TURN_MET
+    cosine = SAME_APART if reach > 0.0 else SAME_MET
+    found = solve_pair(table, pool, f, g, turn, shift, x, size, most, 0.0, False)
+    y, frame = found.parameters, found.frame
+    same = (found.status == CONVERGED or found.status == SINGULAR) and dot(start.normal, frame.normal) > cosine
+    if same:
+        before = own_frame(table, pool, g, x[2], x[3]).normal
+        after = own_frame(table, pool, g, y[2], y[3]).normal
+        same = dot(before, after) > cosine
+        if reach > 0.0:
+            d = sub(start.point_g, start.point_f)
+            moved_f = sub(frame.point_f, start.point_f)
+            moved_g = sub(frame.point_g, start.point_g)
+            limit = reach * reach
+            same = same and abs(frame.gap) <= math.sqrt(dot(d, d)) + 1e-12 * size
+            same = same and dot(moved_f, moved_f) <= limit and dot(moved_g, moved_g) <= limit
+        else:
+            opposed = dot(after, matvec_t(turn, frame.normal)) < 0.0
+            same = same and (abs(frame.gap) <= 1e-9 * size or (opposed and frame.gap < 0.0))
+    return same, found
+
+
+@kernel(inline=True)
+def with_steps(found, count):
+    """What was found, after so many steps more."""
+    return PairSolution(found.status, found.parameters, count + found.steps, found.frame, found.matrix)
+
+
+@kernel(inner=True)
+def descend_pair(table, pool, f, g, turn, shift, x, size, limit):
+    """From any parameters x down to the nearest pair that the descent leads to, in at most `limit` steps.
+
+    Returns a `PairSolution`, as `solve_pair` does. The points never move apart.
+
+    CONVERGED, SINGULAR: Newton's method finished, at the root the descent led to.
+    LEFT_PATCH: nearest at the end of a patch.
+    CROSSED: the points met, and there is no pair of a shallow penetration beside them.
+    NOT_CONVERGED: the steps were spent, there is no tangent plane to go on, or x is a maximum or a saddle.
+    """
+    status = NOT_CONVERGED
+    mu = LEAST
+    near = NEAR
+    count = 0
+    own_f, own_g, d, dg = both_frames(table, pool, f, g, turn, shift, x)
+    square = dot(d, d)
+    while own_f.regular and own_g.regular:
+        if square <= MEET * MEET * size * size:
+            status = CROSSED
+            break
+        nf, xf, yf, ef, a = own_f.normal, own_f.tangent_x, own_f.tangent_y, own_f.rates, own_f.shape
+        ng, xg, yg, eg, b = own_g.normal, own_g.tangent_x, own_g.tangent_y, own_g.rates, own_g.shape
+        gf = (-dot(xf, d), -dot(yf, d))
+        gg = (dot(xg, dg), dot(yg, dg))
+        tf = free_directions(table, pool, f, x[0], x[1], ef, gf[0], gf[1], ROUNDING * size)
+        tg = free_directions(table, pool, g, x[2], x[3], eg, gg[0], gg[1], ROUNDING * size)
+        held = tf[4] < 2 or tg[4] < 2
+        # The second derivative of |d|^2 / 2 over those directions.
+        k = dot(nf, d)
+        p = reduced(1.0 + k * a[0], k * a[1], 1.0 + k * a[2], tf)
+        k = -dot(ng, dg)
+        q = reduced(1.0 + k * b[0], k * b[1], 1.0 + k * b[2], tg)
+        if tf[4] == 1:
+            p = (1.0 - end_curvature(table, pool, f, x[0], x[1], tf[1] != 0.0, d), 0.0, 1.0)
+        if tg[4] == 1:
+            q = (1.0 + end_curvature(table, pool, g, x[2], x[3], tg[1] != 0.0, dg), 0.0, 1.0)
+        f1 = matvec_t(turn, blend(tf[0], xf, tf[1], yf))
+        f2 = matvec_t(turn, blend(tf[2], xf, tf[3], yf))
+        g1 = blend(tg[0], xg, tg[1], yg)
+        g2 = blend(tg[2], xg, tg[3], yg)
+        c = (-dot(f1, g1), -dot(f1, g2), -dot(f2, g1), -dot(f2, g2))
+        rf = (tf[0] * gf[0] + tf[1] * gf[1], tf[2] * gf[0] + tf[3] * gf[1])
+        rg = (tg[0] * gg[0] + tg[1] * gg[1], tg[2] * gg[0] + tg[3] * gg[1])
+        bend_f = max(curvature_bound(a), 2.0 / size)
+        bend_g = max(curvature_bound(b), 2.0 / size)
+        first = max(DAMPING, DAMPING * math.sqrt(square) * max(bend_f, bend_g))
+        lower = False
+        while mu < STUCK * (1.0 + first):
+            sf, sg, definite = descent_step(p, c, q, rf, rg, mu)
+            if not definite:
+                mu = max(4.0 * mu, 1e-4 * first)
+                continue
+            step = max(abs(sf[0]) + abs(sf[1]), abs(sg[0]) + abs(sg[1]))
+            bend = max((abs(sf[0]) + abs(sf[1])) * bend_f, (abs(sg[0]) + abs(sg[1])) * bend_g)
+            if not held and bend < near and mu <= 1e-3 * first:
+                # `solve_pair` takes the rest; should it go elsewhere, the descent goes on to a nearer start.
+                same, found = finish(table, pool, f, g, turn, shift, x, size, 8.0 * step + 1e-9 * size)
+                if same:
+                    return with_steps(found, count)
+                near *= 0.1
+            if step <= MEET * size or count >= limit:
+                break
+            factor = 1.0 if bend <= BEND else BEND / bend
+            ax = factor * (tf[0] * sf[0] + tf[2] * sf[1])
+            ay = factor * (tf[1] * sf[0] + tf[3] * sf[1])
+            bx = factor * (tg[0] * sg[0] + tg[2] * sg[1])
+            by = factor * (tg[1] * sg[0] + tg[3] * sg[1])
+            uf, vf, end_f = advance(
+                table, pool, f, x[0], x[1], ef[0] * ax + ef[1] * ay, ef[2] * ay, blend(ax, xf, ay, yf)
+            )
+            ug, vg, end_g = advance(
+                table, pool, g, x[2], x[3], eg[0] * bx + eg[1] * by, eg[2] * by, blend(bx, xg, by, yg)
+            )
+            y = (uf, vf, ug, vg)
+            next_f, next_g, d_next, dg_next = both_frames(table, pool, f, g, turn, shift, y)
+            now = dot(d_next, d_next)
+            count += 1
+            # What the slope alone would give over this step.
+            slope = factor * (rf[0] * sf[0] + rf[1] * sf[1] + rg[0] * sg[0] + rg[1] * sg[1])
+            if now < square + 2e-4 * slope or (now < square and (held or end_f or end_g)):
+                lower = True
+                # Half of the slope is what Newton's method gives near a minimum.
+                mu = 0.1 * mu if now < square + 0.5 * slope else mu
+                mu = mu if mu > 1e-4 * first else LEAST
+                break
+            mu = max(4.0 * mu, first)
+        if not lower:
+            # Nothing lower: stationary, or the steps are spent.
+            if held and count < limit:
+                status = LEFT_PATCH
+            break
+        x = y
+        own_f, own_g, d, dg = next_f, next_g, d_next, dg_next
+        square = now
+    if status == NOT_CONVERGED and square <= TOUCH * TOUCH * size * size:
+        status = CROSSED
+    if status == CROSSED:
+        same, found = finish(table, pool, f, g, turn, shift, x, size, 0.0)
+        if same:
+            return with_steps(found, count)
+    frame = pair_frame(table, pool, f, g, turn, shift, x)
+    return PairSolution(status, x, count, frame, pair_matrix(frame.shape_f, frame.shape_g, frame.gap, 1e-9 / size))
+
+
+@kernel(signatures="(i8[::1], f8[::1], i8, i8, f8[:, ::1], UniTuple(f8, 4), f8, i8, f8[::1])")
+def find_descent(table, pool, f, g, q, x, size, limit, out):
+    """The descent for Python.
+
+    out: parameters (4), point of f (3), point of g (3), normal (3), gap; all in world axes. Returns the status.
+    """
+    turn_f = rotation(q, 0)
+    turn, shift = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
+    found = descend_pair(table, pool, f, g, turn, shift, x, size, limit)
+    frame = found.frame
+    origin = position(q, 0)
+    out[0], out[1], out[2], out[3] = found.parameters
+    out[4], out[5], out[6] = add(matvec(turn_f, frame.point_f), origin)
+    out[7], out[8], out[9] = add(matvec(turn_f, frame.point_g), origin)
+    out[10], out[11], out[12] = matvec(turn_f, frame.normal)
+    out[13] = frame.gap
+    return found.status

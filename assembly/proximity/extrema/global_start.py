@@ -1,0 +1,325 @@
+"""A global start for an extremal pair: the nearest cells of two surfaces, then Newton.
+
+Every surface carries cells: small pieces with a sample point and a bounding sphere. For every cell of f the nearest
+sample of g is found, which leads to the closest points where the surfaces are apart; where they are not, the best by
+
+    |d|^2 + w (1 + n_f.n_g),
+
+which prefers normals that oppose each other and leads to the deepest points where the surfaces overlap. From the best
+such pairs, far enough from one another to belong to different extrema, Newton runs. Of what it finds, extrema with
+opposed outward normals (solids face each other) come first, then the smallest |gap|.
+
+Newton's method goes to any extremum, the far side of a ball as well. A pair farther apart than the samples it came from
+is not theirs, nor is, of coarse cells, one from which direct search, which knows no curvature and passes poles and
+edges, leads nearer: then Newton runs from where that ends.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import namedtuple
+
+import numpy as np
+
+from assembly._kernel import kernel
+from assembly.geometry.splines.domain import into_domain
+from assembly.geometry.splines.evaluate import (
+    CELL_SIZE,
+    cell_at,
+    surface_at,
+    surface_point,
+)
+from assembly.geometry.vec import add, cross, dot, matvec, matvec_t, scale, sub
+from assembly.kinematics.motion import position, relative_pose, rotation
+from assembly.proximity.extrema.face_face import (
+    CONVERGED,
+    LEFT_PATCH,
+    NOT_CONVERGED,
+    SINGULAR,
+    own_frame,
+    pair_frame,
+    solve_pair,
+)
+
+# How many of the nearest and of the best aligned samples are tried.
+NEAREST = 16
+ALIGNED = 8
+# Direct search: at most so many rounds, from steps of 1/32 of the domain down to 1e-5 of that.
+LEVELS = 200
+# Cells are coarse where their spheres are larger than this part of the smaller surface's extent.
+COARSE = 0.25
+# Surfaces nearer than this part of the samples' distance cross there.
+CROSSING = 1e-3
+# w as a part of the square of the smaller extent.
+ALIGNMENT = 0.1
+
+# A pair that was found, with what it is judged by.
+RankedPair = namedtuple(
+    "RankedPair",
+    [
+        "rank",  # 0: solids face each other; 1: they do not; 2: no extremum, at the end of a patch; 3: none yet
+        "gap",  # signed
+        "status",
+        "parameters",  # (u_f, v_f, u_g, v_g)
+    ],
+)
+
+
+@kernel(inner=True)
+def cell_samples(table, pool, r, turn, shift, samples):
+    """Points and outward normals of the cells' samples, moved by a pose, (count, 6). Returns their extent."""
+    patch = surface_at(table, r)
+    lo = (math.inf, math.inf, math.inf)
+    hi = (-math.inf, -math.inf, -math.inf)
+    for i in range(patch.cell_count):
+        cell = cell_at(pool, patch.cells + CELL_SIZE * i)
+        p, su, sv, _uu, _uv, _vv = surface_point(table, pool, r, cell.parameters[0], cell.parameters[1])
+        normal = cross(su, sv)
+        length = math.sqrt(dot(normal, normal))
+        n = matvec(turn, scale(float(patch.sign) / length if length > 0.0 else 0.0, normal))
+        p = add(matvec(turn, p), shift)
+        samples[i, 0], samples[i, 1], samples[i, 2] = p
+        samples[i, 3], samples[i, 4], samples[i, 5] = n
+        lo = (min(lo[0], p[0]), min(lo[1], p[1]), min(lo[2], p[2]))
+        hi = (max(hi[0], p[0]), max(hi[1], p[1]), max(hi[2], p[2]))
+    d = (hi[0] - lo[0], hi[1] - lo[1], hi[2] - lo[2])
+    return math.sqrt(dot(d, d))
+
+
+@kernel(inner=True)
+def best_samples(a, b, weight, nearest, score):
+    """For every sample of f the best sample of g: the nearest one, or with a weight the best aligned one too."""
+    for i in range(a.shape[0]):
+        x = a[i, 0]
+        y = a[i, 1]
+        z = a[i, 2]
+        u = weight * a[i, 3]
+        v = weight * a[i, 4]
+        w = weight * a[i, 5]
+        best = math.inf
+        where = 0
+        for j in range(b.shape[0]):
+            dx = b[j, 0] - x
+            dy = b[j, 1] - y
+            dz = b[j, 2] - z
+            d = dx * dx + dy * dy + dz * dz
+            if weight > 0.0:
+                d += u * b[j, 3] + v * b[j, 4] + w * b[j, 5]
+            if d < best:
+                best = d
+                where = j
+        nearest[i] = where
+        score[i] = math.sqrt(max(best + weight, 0.0))
+
+
+@kernel(inner=True)
+def opposed(frame, rotation, table, pool, g, x):
+    """Whether the outward normal of g opposes that of f."""
+    normal = own_frame(table, pool, g, x[2], x[3]).normal
+    return dot(normal, matvec_t(rotation, frame.normal)) < 0.0
+
+
+@kernel(inner=True, allocates=True)
+def approach(table, pool, f, g, rotation, shift, x):
+    """Parameters with a smaller distance, and it, by direct search: nine points of each surface around the best."""
+    patch = surface_at(table, f)
+    other = surface_at(table, g)
+    fu = 0.03125 * (pool[patch.breaks_u + patch.spans_u] - pool[patch.breaks_u])
+    fv = 0.03125 * (pool[patch.breaks_v + patch.spans_v] - pool[patch.breaks_v])
+    gu = 0.03125 * (pool[other.breaks_u + other.spans_u] - pool[other.breaks_u])
+    gv = 0.03125 * (pool[other.breaks_v + other.spans_v] - pool[other.breaks_v])
+    finest = 1e-5 * fu
+    points = np.empty((9, 3))
+    at = np.empty((9, 2))
+    best = 1e300
+    for _ in range(LEVELS):
+        cu, cv, cs, ct = x
+        for k in range(9):
+            u, v, _clamped = into_domain(table, pool, g, cs + (k % 3 - 1) * gu, ct + (k // 3 - 1) * gv)
+            at[k, 0] = u
+            at[k, 1] = v
+            point = surface_point(table, pool, g, u, v)[0]
+            points[k, 0], points[k, 1], points[k, 2] = add(matvec(rotation, point), shift)
+        before = best
+        for k in range(9):
+            u, v, _clamped = into_domain(table, pool, f, cu + (k % 3 - 1) * fu, cv + (k // 3 - 1) * fv)
+            p = surface_point(table, pool, f, u, v)[0]
+            for j in range(9):
+                d = (points[j, 0] - p[0]) ** 2 + (points[j, 1] - p[1]) ** 2 + (points[j, 2] - p[2]) ** 2
+                if d < best:
+                    best = d
+                    x = (u, v, at[j, 0], at[j, 1])
+        # Closer by a little only: the valley is as wide as the steps.
+        if best > 0.998 * before:
+            fu *= 0.5
+            fv *= 0.5
+            gu *= 0.5
+            gv *= 0.5
+        if fu <= finest:
+            break
+    return x, math.sqrt(best)
+
+
+@kernel(inner=True)
+def is_near(found, distance):
+    """Whether Newton's result is no farther apart than points that are known; else it is another pair."""
+    if found.status == NOT_CONVERGED:
+        return False
+    if found.status == LEFT_PATCH:
+        d = sub(found.frame.point_g, found.frame.point_f)
+        return dot(d, d) <= distance * distance
+    return abs(found.frame.gap) <= distance
+
+
+@kernel(inner=True)
+def take(table, pool, g, rotation, found, best):
+    """The better one, as a `RankedPair`, of a pair that Newton's method found and the best one so far.
+
+    A true extremum beats a point held at the end of a patch, and one where solids face each other beats all.
+    """
+    rank = 2.0
+    if found.status == CONVERGED or found.status == SINGULAR:
+        rank = 0.0 if opposed(found.frame, rotation, table, pool, g, found.parameters) else 1.0
+    gap = found.frame.gap
+    if rank < best.rank or (rank == best.rank and abs(gap) < abs(best.gap)):
+        return RankedPair(rank, gap, np.int64(found.status), found.parameters)
+    return best
+
+
+@kernel(inner=True)
+def next_candidate(table, pool, f, a, nearest, score, i):
+    """The cell with the best score, after the neighbors of cell i, which lead to the same extremum, are struck out."""
+    patch = surface_at(table, f)
+    radius = cell_at(pool, patch.cells + CELL_SIZE * i).radius
+    for k in range(a.shape[0]):
+        dx = a[k, 0] - a[i, 0]
+        dy = a[k, 1] - a[i, 1]
+        dz = a[k, 2] - a[i, 2]
+        reach = radius + cell_at(pool, patch.cells + CELL_SIZE * k).radius
+        if dx * dx + dy * dy + dz * dz <= reach * reach:
+            score[k] = math.inf
+    return lowest(score)
+
+
+@kernel(inline=True)
+def start_in(cell_f, cell_g):
+    """The parameters of two cells' points."""
+    u, v = cell_f.parameters[0], cell_f.parameters[1]
+    return u, v, cell_g.parameters[0], cell_g.parameters[1]
+
+
+@kernel(inner=True)
+def lowest(score):
+    """Index of the least score."""
+    i = 0
+    for k in range(score.size):
+        if score[k] < score[i]:
+            i = k
+    return i
+
+
+@kernel(inner=True, allocates=True)
+def global_start(table, pool, f, g, rotation, shift, size):
+    """Status, parameters and gap of the best extremal pair found; where there is none, the nearest points known."""
+    patch = surface_at(table, f)
+    other = surface_at(table, g)
+    nf = patch.cell_count
+    a = np.empty((nf, 6))
+    b = np.empty((other.cell_count, 6))
+    same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+    extent = cell_samples(table, pool, f, same, (0.0, 0.0, 0.0), a)
+    extent = min(extent, cell_samples(table, pool, g, rotation, shift, b))
+    nearest = np.empty(nf, np.int64)
+    score = np.empty(nf)
+    best_samples(a, b, 0.0, nearest, score)
+    best = RankedPair(3.0, math.inf, np.int64(NOT_CONVERGED), (0.0, 0.0, 0.0, 0.0))
+    crossing = False
+    upper = math.inf
+    i = lowest(score)
+    for attempt in range(NEAREST):
+        if score[i] == math.inf:
+            break
+        cell_f = cell_at(pool, patch.cells + CELL_SIZE * i)
+        cell_g = cell_at(pool, other.cells + CELL_SIZE * nearest[i])
+        # Cells whose spheres are farther apart than the best pair hold no nearer one.
+        if score[i] - 1.5 * (cell_f.radius + cell_g.radius) > min(abs(best.gap), upper):
+            break
+        start = start_in(cell_f, cell_g)
+        if attempt == 0:
+            best = RankedPair(3.0, math.inf, np.int64(NOT_CONVERGED), start)
+        found = solve_pair(table, pool, f, g, rotation, shift, start, size, math.inf, 0.0, False)
+        limit = score[i]
+        near = is_near(found, limit)
+        coarse = cell_f.radius + cell_g.radius > COARSE * extent
+        if near and coarse and found.status != LEFT_PATCH and found.frame.gap > 0.0:
+            # Samples are far apart: an extremum that is no minimum is nearer than they are, and others nearer yet.
+            start, limit = approach(table, pool, f, g, rotation, shift, found.parameters)
+            limit += 1e-12 * size
+            near = found.frame.gap <= limit
+        elif not near:
+            start, limit = approach(table, pool, f, g, rotation, shift, start)
+            limit += 1e-12 * size
+        if not near:
+            if limit <= CROSSING * min(score[i], extent):
+                # Every distance vanishes where the surfaces cross: nearness says nothing there.
+                crossing = True
+                break
+            # The minimum is no farther than the points found.
+            upper = min(upper, limit)
+            found = solve_pair(table, pool, f, g, rotation, shift, start, size, math.inf, 0.0, False)
+        if is_near(found, limit):
+            best = take(table, pool, g, rotation, found, best)
+        i = next_candidate(table, pool, f, a, nearest, score, i)
+    weight = ALIGNMENT * extent * extent
+    for _ in range(3):
+        # The surfaces overlap, or do not face each other; the deeper, the more the normals tell.
+        if not crossing and best.rank == 0.0 and best.gap >= 0.0:
+            break
+        best_samples(a, b, weight, nearest, score)
+        i = lowest(score)
+        for _ in range(ALIGNED):
+            if score[i] == math.inf:
+                break
+            cell_f = cell_at(pool, patch.cells + CELL_SIZE * i)
+            cell_g = cell_at(pool, other.cells + CELL_SIZE * nearest[i])
+            start = start_in(cell_f, cell_g)
+            found = solve_pair(table, pool, f, g, rotation, shift, start, size, math.inf, 0.0, False)
+            if found.status != NOT_CONVERGED:
+                best = take(table, pool, g, rotation, found, best)
+            i = next_candidate(table, pool, f, a, nearest, score, i)
+        if best.rank == 0.0:
+            break
+        weight *= 5.0
+    return best.status, best.parameters, best.gap
+
+
+@kernel(signatures="(i8[::1], f8[::1], i8, i8, i8, i8, f8[:, ::1], f8[:, ::1], i8)")
+def start_surfaces(table, pool, f, g, i, j, q, tracked, r):
+    """A global start for surfaces f and g of bodies i and j of a scene, into tracked[r]. A status."""
+    turn, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
+    status, x, _gap = global_start(table, pool, f, g, turn, shift, 1.0)
+    tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3] = x
+    return status
+
+
+@kernel(signatures="(i8[::1], f8[::1], i8, i8, f8[:, ::1], UniTuple(f8, 4), f8, f8[::1])")
+def find_pair(table, pool, f, g, q, x, size, out):
+    """One pair for Python: from x, or a global start where x is NaN.
+
+    out: parameters (4), point of f (3), point of g (3), normal (3), gap; all in world axes. Returns the status.
+    """
+    turn_f = rotation(q, 0)
+    turn, shift = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
+    if math.isnan(x[0]):
+        status, x, _gap = global_start(table, pool, f, g, turn, shift, size)
+        frame = pair_frame(table, pool, f, g, turn, shift, x)
+    else:
+        found = solve_pair(table, pool, f, g, turn, shift, x, size, math.inf, 0.0, False)
+        status, x, frame = found.status, found.parameters, found.frame
+    origin = position(q, 0)
+    out[0], out[1], out[2], out[3] = x
+    out[4], out[5], out[6] = add(matvec(turn_f, frame.point_f), origin)
+    out[7], out[8], out[9] = add(matvec(turn_f, frame.point_g), origin)
+    out[10], out[11], out[12] = matvec(turn_f, frame.normal)
+    out[13] = frame.gap
+    return status

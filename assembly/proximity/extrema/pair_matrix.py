@@ -1,0 +1,138 @@
+"""The matrix of Newton's method for an extremal pair, and its inverse where surfaces hardly part: along a valley.
+
+With A and C the shape operators of two surfaces and beta their gap, H = C (I + beta A) - A
+(`proximity/extrema/face_face.py`); -H is how
+they part. Where it is singular, or nearly so, the pair is one of a continuum, of which the least may be far away.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import namedtuple
+
+from assembly._kernel import kernel
+
+# H counts as singular below this ratio of its smallest singular value to its scale, and is not inverted as it is below
+# the second.
+RANK, WEAK = 1e-7, 1e-5
+# Along a valley -H counts as this part of the angle by which the pair is off, if it is less, and as this at least: what
+# the pair is off across it says nothing of where it is least, and below the second curvatures are rounding.
+UNSURE, LEVEL = 0.1, 1e-10
+# Farther off than this, in radians, it is not known whether there is a valley.
+NEAR = 0.1
+# A highest pair along a valley that bends by so many times as much is kept.
+PLAIN = 10.0
+
+# How the normals of a pair part as it moves, with A and C the shape operators of its surfaces and beta the gap.
+PairMatrix = namedtuple(
+    "PairMatrix",
+    [
+        "k",  # I + beta A (11, 12, 22)
+        "h",  # H = C (I + beta A) - A (11, 12, 21, 22)
+        "inverse",  # of H (11, 12, 21, 22), damped where it is nearly singular
+        "isolated",  # whether H is regular: else the pair is one of a continuum
+    ],
+)
+
+
+@kernel(inline=True)
+def curvature_bound(a):
+    """A bound of the largest principal curvature."""
+    return abs(a[0]) + 2.0 * abs(a[1]) + abs(a[2])
+
+
+@kernel(inline=True)
+def scale_of(a, c, k):
+    """What H = C K - A is measured against, K = I + beta A."""
+    return curvature_bound(c) * (abs(k[0]) + 2.0 * abs(k[1]) + abs(k[2])) + curvature_bound(a)
+
+
+@kernel(inline=True)
+def damped_inverse(h, damping):
+    """(H^T H + damping^2 I)^-1 H^T, in products that do not cancel where H is singular."""
+    square = damping * damping
+    det = h[0] * h[3] - h[1] * h[2]
+    i = 1.0 / (det * det + square * (h[0] * h[0] + h[1] * h[1] + h[2] * h[2] + h[3] * h[3] + square))
+    return (
+        i * (det * h[3] + square * h[0]),
+        i * (square * h[2] - det * h[1]),
+        i * (square * h[1] - det * h[2]),
+        i * (det * h[0] + square * h[3]),
+    )
+
+
+@kernel(inline=True)
+def pair_matrix(a, c, beta, flat):
+    """The `PairMatrix` of shape operators A and C and the gap beta.
+
+    Where H is (nearly) singular the inverse is damped: the least step, so that the current pair of a continuum is kept.
+    `flat` is the curvature below which a scene counts as flat.
+    """
+    k11 = 1.0 + beta * a[0]
+    k12 = beta * a[1]
+    k22 = 1.0 + beta * a[2]
+    h11 = c[0] * k11 + c[1] * k12 - a[0]
+    h12 = c[0] * k12 + c[1] * k22 - a[1]
+    h21 = c[1] * k11 + c[2] * k12 - a[1]
+    h22 = c[1] * k12 + c[2] * k22 - a[2]
+    size = scale_of(a, c, (k11, k12, k22))
+    det = h11 * h22 - h12 * h21
+    norm = abs(h11) + abs(h12) + abs(h21) + abs(h22)
+    # The smallest singular value is at least |det| / norm.
+    regular = abs(det) > RANK * size * norm and size > flat
+    if abs(det) > WEAK * size * norm and size > flat:
+        i = 1.0 / det
+        inverse = (i * h22, -i * h12, -i * h21, i * h11)
+    else:
+        inverse = damped_inverse((h11, h12, h21, h22), max(RANK * size, flat))
+    return PairMatrix((k11, k12, k22), (h11, h12, h21, h22), inverse, regular)
+
+
+@kernel(inline=True)
+def right_side(c, r):
+    """C r1 - r2, by which H turns the step: how far normals are from parallel above each other's points, in radians."""
+    return c[0] * r[0] + c[1] * r[1] - r[2], c[1] * r[0] + c[2] * r[1] - r[3]
+
+
+@kernel(inline=True)
+def null_ways(h):
+    """Unit vectors v and w such that H w and v^T H are the least, as far as H is singular; v.w >= 0."""
+    by_row = h[0] * h[0] + h[1] * h[1] >= h[2] * h[2] + h[3] * h[3]
+    w = (-h[1], h[0]) if by_row else (-h[3], h[2])
+    by_column = h[0] * h[0] + h[2] * h[2] >= h[1] * h[1] + h[3] * h[3]
+    v = (-h[2], h[0]) if by_column else (-h[3], h[1])
+    i = 1.0 / max(math.sqrt(w[0] * w[0] + w[1] * w[1]), 1e-300)
+    j = math.copysign(1.0, v[0] * w[0] + v[1] * w[1]) / max(math.sqrt(v[0] * v[0] + v[1] * v[1]), 1e-300)
+    return (j * v[0], j * v[1]), (i * w[0], i * w[1])
+
+
+@kernel(inline=True)
+def across_first(a, c, r, k, h, inverse, flat):
+    """The inverse of H for a step from here, and whether it goes along a valley that is all but level.
+
+    There Newton's step is the quotient of two small numbers: until the pair is at the bottom either is mostly what it
+    is off across it, and beyond an inflection the step leads up. So -H is raised along the valley to its amount and a
+    part of what the pair is off: steps go across first, and then down. Near the solution they are Newton's.
+    """
+    size = scale_of(a, c, k)
+    norm = abs(h[0]) + abs(h[1]) + abs(h[2]) + abs(h[3])
+    if abs(h[0] * h[3] - h[1] * h[2]) > WEAK * size * norm:
+        return inverse, False
+    s0, s1 = right_side(c, r)
+    off = abs(s0) + abs(s1)
+    if off > NEAR:
+        return inverse, False
+    damping = max(max(UNSURE * off, LEVEL) * size, flat)
+    v, w = null_ways(h)
+    bend = v[0] * (h[0] * w[0] + h[1] * w[1]) + v[1] * (h[2] * w[0] + h[3] * w[1])
+    if not h[0] + h[3] < -damping or bend > PLAIN * damping:
+        # A ridge, or near the highest pair along a valley, which is one as well.
+        return damped_inverse(h, damping), True
+    more = -(abs(bend) + damping) - bend
+    b = (h[0] + more * v[0] * w[0], h[1] + more * v[0] * w[1], h[2] + more * v[1] * w[0], h[3] + more * v[1] * w[1])
+    det = b[0] * b[3] - b[1] * b[2]
+    if not det > 0.25 * damping * max(abs(b[0]), abs(b[3])):
+        # Too far from singular for these to be its axes.
+        return damped_inverse(h, damping), True
+    i = 1.0 / det
+    return (i * b[3], -i * b[1], -i * b[2], i * b[0]), True

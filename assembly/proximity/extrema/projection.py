@@ -1,0 +1,103 @@
+"""Feet of points on a surface by Newton's method, and the way down the slope of a gap, from foot to foot."""
+
+from __future__ import annotations
+
+import math
+
+from assembly._kernel import kernel
+from assembly.geometry.splines.domain import into_domain, is_within
+from assembly.geometry.splines.evaluate import surface_at, surface_point
+from assembly.geometry.vec import cross, dot, matvec, matvec_t, scale, sub
+from assembly.proximity.extrema.singular import BESIDE
+
+# Steps down the slope of a gap.
+SLIDES = 24
+
+
+@kernel(inner=True)
+def foot_of(table, pool, g, y, s, t):
+    """The foot on surface g of a point y, by Newton's method from (s, t): parameters, signed distance, normal.
+
+    Positive outside. A step is never longer than what brings the tangent plane's foot. And whether four of them did:
+    they may not be there yet, or where the distance has no minimum.
+    """
+    distance = 0.0
+    n = (0.0, 0.0, 0.0)
+    settled = False
+    for _ in range(4):
+        p, su, sv, suu, suv, svv = surface_point(table, pool, g, s, t)
+        d = sub(y, p)
+        n = cross(su, sv)
+        length = math.sqrt(dot(n, n))
+        if not length > 0.0:
+            break
+        n = scale(float(surface_at(table, g).sign) / length, n)
+        distance = dot(n, d)
+        a = dot(su, su)
+        b = dot(su, sv)
+        c = dot(sv, sv)
+        first = dot(d, su)
+        second = dot(d, sv)
+        h11 = a - distance * dot(n, suu)
+        h12 = b - distance * dot(n, suv)
+        h22 = c - distance * dot(n, svv)
+        det = h11 * h22 - h12 * h12
+        bent = det > 0.1 * (a * c - b * b) and h11 > 0.0
+        if not bent:
+            h11, h12, h22 = a, b, c
+            det = a * c - b * b
+        s, t, _held = into_domain(
+            table, pool, g, s + (h22 * first - h12 * second) / det, t + (h11 * second - h12 * first) / det
+        )
+        if first * first / a + second * second / c < 1e-16:
+            settled = bent
+            break
+    return s, t, distance, n, settled
+
+
+@kernel(inner=True)
+def slide_down(table, pool, f, g, turn, shift, start, stride, half):
+    """Parameters at which the gap is smaller than at the start: down its slope on f, the foot on g following.
+
+    And whether they are beside the start, within BESIDE times half widths on f; it goes no farther. Newton's method
+    goes to saddles of the gap as well; this does not. The first step is `stride` times the sine of the angle between
+    the normals; then steps are those of Barzilai and Borwein, halved where the gap grows.
+    """
+    u, v, s, t = start
+    p, su, sv, _uu, _uv, _vv = surface_point(table, pool, f, u, v)
+    s, t, gap, n, _settled = foot_of(table, pool, g, matvec_t(turn, sub(p, shift)), s, t)
+    slope = matvec(turn, n)
+    normal = cross(su, sv)
+    across = scale(1.0 / max(math.sqrt(dot(normal, normal)), 1e-300), normal)
+    slope = sub(slope, scale(dot(slope, across), across))
+    length = stride
+    for _ in range(SLIDES):
+        if dot(slope, slope) < 1e-12:
+            break
+        a = dot(su, su)
+        b = dot(su, sv)
+        c = dot(sv, sv)
+        det = a * c - b * b
+        if not det > 0.0:
+            break
+        first = -length * dot(slope, su)
+        second = -length * dot(slope, sv)
+        u_new, v_new, _held = into_domain(
+            table, pool, f, u + (c * first - b * second) / det, v + (a * second - b * first) / det
+        )
+        q, ru, rv, _uu, _uv, _vv = surface_point(table, pool, f, u_new, v_new)
+        s_new, t_new, gap_new, n, _settled = foot_of(table, pool, g, matvec_t(turn, sub(q, shift)), s, t)
+        if gap_new > gap:
+            length *= 0.25
+            continue
+        normal = cross(ru, rv)
+        across = scale(1.0 / max(math.sqrt(dot(normal, normal)), 1e-300), normal)
+        there = matvec(turn, n)
+        there = sub(there, scale(dot(there, across), across))
+        moved = sub(q, p)
+        bent = dot(moved, sub(there, slope))
+        length = min(dot(moved, moved) / bent, 4.0 * length) if bent > 0.0 else 2.0 * length
+        u, v, s, t, gap, p, su, sv, slope = u_new, v_new, s_new, t_new, gap_new, q, ru, rv, there
+        if not is_within(table, pool, f, u, v, start[0], start[1], BESIDE * half[0], BESIDE * half[1]):
+            return (u, v, s, t), False
+    return (u, v, s, t), True

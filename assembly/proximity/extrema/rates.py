@@ -1,0 +1,262 @@
+"""The contact velocity formulation: how an extremal pair moves with its bodies.
+
+With v the velocity of body g less that of body f, both taken at the point g, and omega = w_g - w_f,
+
+    z = (x.v, y.v, x.(omega x n), y.(omega x n))
+
+holds all that matters. Then H a = C z_12 - z_34, b = (I + beta A) a - z_12 are the tangent velocities of the
+two contact points over their own surfaces, and u_f' = E^-1 a, u_g' = T^-1 b (paper 001, eqs. 10 to 21, with
+the signs that finite differences confirm). The gap's rate is n.v; differentiating it once more needs
+only these rates:
+
+    beta'' = a.(A z_12 - (I + beta A) z_34) + z_12.z_34
+             + 2 w_f.(n x v) + n.(w_g x (w_g x (g - x_g))) - n.(w_f x (w_f x (g - x_f))).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from assembly._kernel import kernel
+from assembly._record import place_of, record_dtype, record_view, size_of
+from assembly.geometry.vec import cross, dot, matvec, scale, sub
+from assembly.kinematics.motion import quaternion_columns, relative_pose, rotation
+from assembly.proximity.extrema.face_face import pair_frame
+from assembly.proximity.extrema.pair_matrix import pair_matrix
+
+# What the derivatives of one gap need, in world axes.
+GAP_DERIVATIVES = record_dtype(
+    "f8",
+    gap=1,  # signed [length]
+    normal=3,  # unit normal from f towards g
+    arm_f=3,  # from the origin of body f to the point of g [length]
+    arm_g=3,  # from the origin of body g to the point of g [length]
+    rates=(4, 4),  # map from z to rates of the parameters (u_f, v_f, u_g, v_g)
+    form=(4, 4),  # beta'' is z.(form z), but for terms of rotation
+    zed=(4, 12),  # z over the twists of f, then g
+)
+derivatives_at = record_view(GAP_DERIVATIVES)
+GAP = place_of(GAP_DERIVATIVES, "gap")
+NORMAL = place_of(GAP_DERIVATIVES, "normal")
+ARM_F = place_of(GAP_DERIVATIVES, "arm_f")
+ARM_G = place_of(GAP_DERIVATIVES, "arm_g")
+RATES = place_of(GAP_DERIVATIVES, "rates")
+ZED = place_of(GAP_DERIVATIVES, "zed")
+RECORD = size_of(GAP_DERIVATIVES)
+
+
+@kernel(inline=True)
+def load(array, row, o):
+    return (array[row, o], array[row, o + 1], array[row, o + 2])
+
+
+@kernel(inline=True)
+def put(array, row, o, a):
+    array[row, o] = a[0]
+    array[row, o + 1] = a[1]
+    array[row, o + 2] = a[2]
+
+
+@kernel(inner=True)
+def store_record(turn, shift, frame, matrix, records, row):
+    """Fill a record from a pair's frame in the axes of body f, whose rotation is `turn`; g's origin is at `shift`."""
+    derivatives = derivatives_at(records, row)
+    e, t = frame.rates_f, frame.rates_g
+    a, c = frame.shape_f, frame.shape_g
+    k, i = matrix.k, matrix.inverse
+    x = matvec(turn, frame.tangent_x)
+    y = matvec(turn, frame.tangent_y)
+    arm_f = matvec(turn, frame.point_g)
+    arm_g = matvec(turn, sub(frame.point_g, shift))
+    derivatives.gap = frame.gap
+    put(records, row, NORMAL, matvec(turn, frame.normal))
+    put(records, row, ARM_F, arm_f)
+    put(records, row, ARM_G, arm_g)
+    # z over the twists: x.v, y.v, and (x, y).(omega x n) = (y.omega, -x.omega).
+    put(records, row, ZED, scale(-1.0, x))
+    put(records, row, ZED + 3, cross(x, arm_f))
+    put(records, row, ZED + 6, x)
+    put(records, row, ZED + 9, cross(arm_g, x))
+    put(records, row, ZED + 12, scale(-1.0, y))
+    put(records, row, ZED + 15, cross(y, arm_f))
+    put(records, row, ZED + 18, y)
+    put(records, row, ZED + 21, cross(arm_g, y))
+    for j in range(3):
+        derivatives.zed[2, j] = 0.0
+        derivatives.zed[2, 3 + j] = -y[j]
+        derivatives.zed[2, 6 + j] = 0.0
+        derivatives.zed[2, 9 + j] = y[j]
+        derivatives.zed[3, j] = 0.0
+        derivatives.zed[3, 3 + j] = x[j]
+        derivatives.zed[3, 6 + j] = 0.0
+        derivatives.zed[3, 9 + j] = -x[j]
+    # The map from z to a is [H^-1 C, -H^-1].
+    m = (
+        i[0] * c[0] + i[1] * c[1],
+        i[0] * c[1] + i[1] * c[2],
+        -i[0],
+        -i[1],
+        i[2] * c[0] + i[3] * c[1],
+        i[2] * c[1] + i[3] * c[2],
+        -i[2],
+        -i[3],
+    )
+    w = (a[0], a[1], -k[0], -k[1], a[1], a[2], -k[1], -k[2])
+    for j in range(4):
+        ax = m[j]
+        ay = m[4 + j]
+        bx = k[0] * ax + k[1] * ay - (1.0 if j == 0 else 0.0)
+        by = k[1] * ax + k[2] * ay - (1.0 if j == 1 else 0.0)
+        derivatives.rates[0, j] = e[0] * ax + e[1] * ay
+        derivatives.rates[1, j] = e[2] * ay
+        derivatives.rates[2, j] = t[0] * bx + t[1] * by
+        derivatives.rates[3, j] = t[2] * bx + t[3] * by
+        for l in range(4):
+            # a.(A z_12 - (I + beta A) z_34), made symmetric; z_12.z_34 adds a half off the diagonal.
+            value = 0.5 * (ax * w[l] + ay * w[4 + l] + m[l] * w[j] + m[4 + l] * w[4 + j])
+            derivatives.form[j, l] = value + (0.5 if l == j + 2 or j == l + 2 else 0.0)
+
+
+@kernel(inline=True)
+def gradient_row(records, row, out, r):
+    """The gap's gradient in the twists of f, then g, into out[r]: the contact wrench."""
+    n = load(records, row, NORMAL)
+    put(out, r, 0, scale(-1.0, n))
+    put(out, r, 3, cross(n, load(records, row, ARM_F)))
+    put(out, r, 6, n)
+    put(out, r, 9, cross(load(records, row, ARM_G), n))
+
+
+@kernel(inline=True)
+def add_spin(n, arm, factor, out, o):
+    """out[o.., o..] += factor (sym(n arm^T) - n.arm I): a body's own rotation seen by the gap."""
+    s = factor * dot(n, arm)
+    for i in range(3):
+        for j in range(3):
+            out[o + i, o + j] += factor * 0.5 * (n[i] * arm[j] + n[j] * arm[i])
+        out[o + i, o + i] -= s
+
+
+@kernel(inline=True)
+def add_cross(n, factor, out, o, p):
+    """out[o.., p..] += factor [n]x, and the transpose at [p.., o..]."""
+    for i in range(3):
+        j = (i + 1) % 3
+        k = (i + 2) % 3
+        # [n]x has -n_k at (i, j) and +n_j at (i, k).
+        out[o + i, p + j] -= factor * n[k]
+        out[p + j, o + i] -= factor * n[k]
+        out[o + i, p + k] += factor * n[j]
+        out[p + k, o + i] += factor * n[j]
+
+
+@kernel(inner=True)
+def add_gap_terms(records, row, jacobian, r, factor, weight, out, f, g):
+    """Upper triangle of out += factor (Hessian of the gap) + weight (gradient gradient^T), twists at f.. and g...
+
+    A negative f or g is a body that does not move: its block is left out.
+    """
+    derivatives = derivatives_at(records, row)
+    for i in range(12):
+        if (f if i < 6 else g) < 0:
+            continue
+        p0 = 0.0
+        p1 = 0.0
+        p2 = 0.0
+        p3 = 0.0
+        for k in range(4 if factor != 0.0 else 0):
+            s = factor * derivatives.zed[k, i]
+            p0 += s * derivatives.form[k, 0]
+            p1 += s * derivatives.form[k, 1]
+            p2 += s * derivatives.form[k, 2]
+            p3 += s * derivatives.form[k, 3]
+        w = weight * jacobian[r, i]
+        for j in range(i, 12 if g >= 0 else 6):
+            value = (
+                p0 * derivatives.zed[0, j]
+                + p1 * derivatives.zed[1, j]
+                + p2 * derivatives.zed[2, j]
+                + p3 * derivatives.zed[3, j]
+                + w * jacobian[r, j]
+            )
+            if i >= 6:
+                out[g + i - 6, g + j - 6] += value
+            elif j < 6:
+                out[f + i, f + j] += value
+            elif f < g:
+                out[f + i, g + j - 6] += value
+            else:
+                out[g + j - 6, f + i] += value
+    if factor == 0.0:
+        return
+    n = load(records, row, NORMAL)
+    arm_f = load(records, row, ARM_F)
+    arm_g = load(records, row, ARM_G)
+    if f >= 0:
+        add_spin(n, arm_f, factor, out, f + 3)
+        add_cross(n, -factor, out, f + 3, f)
+    if g >= 0:
+        add_spin(n, arm_g, factor, out, g + 3)
+    if f >= 0 and g >= 0:
+        add_cross(n, factor, out, f + 3, g)
+        s = factor * dot(n, arm_g)
+        for i in range(3):
+            for j in range(3):
+                value = (s if i == j else 0.0) - factor * arm_g[i] * n[j]
+                out[f + 3 + i, g + 3 + j] += value
+                out[g + 3 + j, f + 3 + i] += value
+
+
+@kernel(inline=True)
+def into_quaternions(row, q, out, r):
+    """A row over the twists of two bodies as row r of out, over (q_f, q_g)."""
+    for b in range(2):
+        for k in range(3):
+            out[r, 7 * b + k] = row[6 * b + k]
+        w = (row[6 * b + 3], row[6 * b + 4], row[6 * b + 5])
+        out[r, 7 * b + 3], out[r, 7 * b + 4], out[r, 7 * b + 5], out[r, 7 * b + 6] = quaternion_columns(
+            w, q[b, 3], q[b, 4], q[b, 5], q[b, 6]
+        )
+
+
+@kernel(signatures="(i8[::1], f8[::1], i8, i8, f8[:, ::1], UniTuple(f8, 4), f8, f8[:, ::1], f8[:, ::1])")
+def pair_derivatives(table, pool, f, g, q, x, size, first, hessian):
+    """The public derivatives of one pair: d(parameters)/dq and d(gap)/dq in `first` (5, 14), the Hessian (12, 12).
+
+    Returns the pair's residual (lengths over `size`, and the tilt) and whether everything is regular.
+    """
+    turn = rotation(q, 0)
+    relative, shift = relative_pose(q, 0, turn, 1, rotation(q, 1))
+    frame = pair_frame(table, pool, f, g, relative, shift, x)
+    r = frame.residual
+    error = max(abs(r[0]), abs(r[1])) / size + max(abs(r[2]), abs(r[3]))
+    if not frame.regular:
+        return error, False
+    matrix = pair_matrix(frame.shape_f, frame.shape_g, frame.gap, 1e-9 / size)
+    records = np.empty((1, RECORD))
+    derivatives = derivatives_at(records, 0)
+    gradient = np.empty((1, 12))
+    row = np.empty(12)
+    store_record(turn, shift, frame, matrix, records, 0)
+    gradient_row(records, 0, gradient, 0)
+    for j in range(12):
+        row[j] = gradient[0, j]
+    into_quaternions(row, q, first, 4)
+    for i in range(4):
+        for j in range(12):
+            # At a pole the polar coordinates have no rates.
+            at_pole = frame.rates_f[0] == 0.0 if i < 2 else frame.rates_g[0] == 0.0 and frame.rates_g[1] == 0.0
+            row[j] = math.nan if at_pole else 0.0
+            for l in range(4):
+                row[j] += derivatives.rates[i, l] * derivatives.zed[l, j]
+        into_quaternions(row, q, first, i)
+    for i in range(12):
+        for j in range(12):
+            hessian[i, j] = 0.0
+    add_gap_terms(records, 0, gradient, 0, 1.0, 0.0, hessian, 0, 6)
+    for i in range(12):
+        for j in range(i):
+            hessian[i, j] = hessian[j, i]
+    return error, matrix.isolated

@@ -1,0 +1,76 @@
+"""How far an extremal pair is from a fold, where two of them merge: det H over |H|^2, on both sides of knot lines.
+
+Across a knot line the curvature of a smooth surface may jump, as where a straight wire begins to bend: a pair that is
+alone by its own curvature may have another one beside it there.
+"""
+
+from __future__ import annotations
+
+import math
+
+from assembly._kernel import kernel
+from assembly.geometry.splines.evaluate import BREAKS_U, BREAKS_V, CLOSED_U, CLOSED_V, SPANS_U, SPANS_V, find_span
+from assembly.proximity.extrema.face_face import pair_frame
+from assembly.proximity.extrema.pair_matrix import pair_matrix
+
+# A root this far from a fold is the only one in its patches and those beside them, which turn by half a radian at most.
+ALONE, BESIDE = 0.05, 3.0
+
+
+@kernel(inline=True)
+def fold_of(h):
+    """How far a pair with this H is from a fold."""
+    norm2 = h[0] * h[0] + h[1] * h[1] + h[2] * h[2] + h[3] * h[3]
+    return (h[0] * h[3] - h[1] * h[2]) / norm2 if norm2 > 1e-18 else 0.0
+
+
+@kernel(inline=True)
+def across(table, pool, r, breaks, spans, closed, x, most):
+    """A parameter just beyond the knot line nearest to x, or x itself where none is within `most`."""
+    o = table[r + breaks]
+    count = table[r + spans]
+    k = find_span(pool, o, count, x)
+    lo = pool[o + k]
+    hi = pool[o + k + 1]
+    end = lo if x - lo < hi - x else hi
+    if abs(x - end) > most:
+        return x
+    first = pool[o]
+    last = pool[o + count]
+    if end == lo:
+        if k > 0:
+            return lo - 1e-9 * (lo - pool[o + k - 1])
+        return last - 1e-9 * (last - pool[o + count - 1]) if table[r + closed] == 1 else x
+    if k + 1 < count:
+        return hi + 1e-9 * (pool[o + k + 2] - hi)
+    return first + 1e-9 * (pool[o + 1] - first) if table[r + closed] == 1 else x
+
+
+@kernel(inner=True)
+def fold_beyond(table, pool, posed, x, half):
+    """The least distance from a fold of a root with the curvatures beyond knot lines within BESIDE half widths.
+
+    Across them the curvature of a smooth surface may jump, as where a straight wire begins to bend.
+    """
+    f, g = posed.surfaces[0], posed.surfaces[1]
+    y = (
+        across(table, pool, f, BREAKS_U, SPANS_U, CLOSED_U, x[0], BESIDE * half[0]),
+        across(table, pool, f, BREAKS_V, SPANS_V, CLOSED_V, x[1], BESIDE * half[1]),
+        across(table, pool, g, BREAKS_U, SPANS_U, CLOSED_U, x[2], BESIDE * half[2]),
+        across(table, pool, g, BREAKS_V, SPANS_V, CLOSED_V, x[3], BESIDE * half[3]),
+    )
+    least = math.inf
+    for i in range(4):
+        u = y[0] if i % 2 == 1 else x[0]
+        v = y[1] if i >= 2 else x[1]
+        if i > 0 and (u, v) == (x[0], x[1]):
+            continue
+        for j in range(4):
+            s = y[2] if j % 2 == 1 else x[2]
+            t = y[3] if j >= 2 else x[3]
+            if (i == 0 and j == 0) or (j > 0 and (s, t) == (x[2], x[3])):
+                continue
+            frame = pair_frame(table, pool, f, g, posed.turn, posed.shift, (u, v, s, t))
+            if frame.regular:
+                least = min(least, fold_of(pair_matrix(frame.shape_f, frame.shape_g, frame.gap, 1e-9).h))
+    return least

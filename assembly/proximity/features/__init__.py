@@ -1,0 +1,1 @@
+"""The nearest features of two solids: global search, and tracking over faces, edges and vertices."""

@@ -1,0 +1,178 @@
+"""Shells with conforming faces that seem deep in each other and only touch: a peg in a bore of its own radius.
+
+They have points in common all over a face, and the least way apart is as long as the peg. What tells that they touch
+is that the smaller one made smaller is free. With c the middle of the shell g and R how far it reaches from there,
+
+    g' = c + (1 - t) (g - c)
+
+is no farther from g than t R, so that no point of g is deeper in f than that where g' is free of f; and f may be the
+one that shrinks, which is the same, seen from f, as g that grows about the middle of f. So flat faces, walls, balls in
+their seats are parted, which no move does for all of them at once.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from assembly._kernel import kernel
+from assembly.geometry.splines.evaluate import surface_at
+from assembly.geometry.vec import add, dot, matvec, scale, sub
+from assembly.proximity.brep.apexes import unit
+from assembly.proximity.brep.borders import feature_at, feature_kind, on_surface, other_parameter
+from assembly.proximity.brep.records import (
+    EDGE,
+    EDGE_RECORD,
+    edge_at,
+    shell_at,
+)
+from assembly.proximity.extrema.crossing import tangents
+from assembly.proximity.extrema.face_face import CONVERGED, SINGULAR
+from assembly.proximity.extrema.feature_pair import solve_features
+from assembly.proximity.features.ball_tree import feature_cells, used_cell
+from assembly.proximity.features.global_search import CROSSING, FoundPair, search
+from assembly.proximity.features.separating_normals import WAYS, add_ways
+
+# Points of shells that are deeper in each other than this part of the size tell a crossing from conforming faces.
+NEARLY = 1e-6
+# The nearest features of what was made smaller are looked for to this part of their distance: they are one of many.
+ROUGH = 0.1
+
+
+@kernel(inner=True)
+def middle_of(table, pool, shell):
+    """The middle of the cells of a shell's faces, and how far these reach from there."""
+    lo = (math.inf, math.inf, math.inf)
+    hi = (-math.inf, -math.inf, -math.inf)
+    reach = 0.0
+    center = (0.0, 0.0, 0.0)
+    for step in range(2):
+        for k in range(shell_at(table, shell).faces):
+            own = feature_cells(table, shell, k)
+            kind, record, count, cells, stride, ball = own.kind, own.record, own.count, own.pool, own.stride, own.ball
+            for i in range(count):
+                if not used_cell(table, pool, record, kind, i):
+                    continue
+                o = cells + stride * i + ball
+                c = (pool[o], pool[o + 1], pool[o + 2])
+                r = pool[o + 3]
+                if step == 0:
+                    lo = (min(lo[0], c[0] - r), min(lo[1], c[1] - r), min(lo[2], c[2] - r))
+                    hi = (max(hi[0], c[0] + r), max(hi[1], c[1] + r), max(hi[2], c[2] + r))
+                else:
+                    d = sub(c, center)
+                    reach = max(reach, math.sqrt(dot(d, d)) + r)
+        if step == 0:
+            center = scale(0.5, add(lo, hi))
+    return center, reach
+
+
+@kernel(inner=True)
+def grown(turn, shift, about, factor):
+    """A pose with which a shell grows by a factor about a point of the axes that it is seen from."""
+    larger = (
+        factor * turn[0],
+        factor * turn[1],
+        factor * turn[2],
+        factor * turn[3],
+        factor * turn[4],
+        factor * turn[5],
+        factor * turn[6],
+        factor * turn[7],
+        factor * turn[8],
+    )
+    return larger, add(about, scale(factor, sub(shift, about)))
+
+
+@kernel(inner=True)
+def leans(table, pool, shell, code, u, v, turn, n, size, ways):
+    """How much the normals of a shell's faces at a point of a feature lean along n, all together."""
+    s = 0.0
+    for k in range(add_ways(table, pool, shell, code, u, v, turn, 1.0, size, ways, 0)):
+        s += dot(n, (ways[k, 0], ways[k, 1], ways[k, 2]))
+    return s
+
+
+@kernel(inner=True)
+def face_beside(table, pool, shell, code, u, v, turn, n):
+    """The face that leans most along n at a point of an edge, and the point on it; what is no edge stays as it is."""
+    solid = shell_at(table, shell)
+    if feature_kind(table, shell, code) != EDGE:
+        return code, u, v
+    edge = solid.edge_table + EDGE_RECORD * (code - solid.faces)
+    edge_record = edge_at(table, edge)
+    surface = edge_record.surface
+    face = edge_record.face_a
+    on_edge = on_surface(table, pool, surface, edge_record.curve, u)
+    a, b, p, m = on_edge.u, on_edge.v, on_edge.point, on_edge.normal
+    if edge_record.face_b >= 0:
+        other = edge_record.surface_b
+        s = other_parameter(table, pool, edge, u, p)
+        on_edge = on_surface(table, pool, other, edge_record.curve_b, s)
+        c, d, k = on_edge.u, on_edge.v, on_edge.normal
+        lean = float(surface_at(table, surface).sign) * dot(unit(matvec(turn, m)), n)
+        if float(surface_at(table, other).sign) * dot(unit(matvec(turn, k)), n) > lean:
+            return edge_record.face_b, c, d
+    return face, a, b
+
+
+@kernel(inner=True)
+def pair_from(table, pool, shells, pose, codes, x, n, size):
+    """The pair of two features of shells from x, and whether it is one at which they touch with a normal near n."""
+    f, g = codes
+    kind_f = feature_kind(table, shells[0], f)
+    kind_g = feature_kind(table, shells[1], g)
+    a = feature_at(table, shells[0], f)
+    b = feature_at(table, shells[1], g)
+    status, y, frame = solve_features(table, pool, kind_f, a, kind_g, b, pose[0], pose[1], x, n, size, math.inf)
+    found = (
+        (status == CONVERGED or status == SINGULAR) and abs(frame.gap) <= NEARLY * size and dot(frame.normal, n) > 0.5
+    )
+    return found, y, frame.normal, frame.gap
+
+
+@kernel(inner=True, allocates=True)
+def conforming_pair(table, pool, shell_f, shell_g, turn, shift, size):
+    """The pair at which two shells that have points in common touch along conforming faces.
+
+    Made smaller, a shell within the other one's material is free as well: there normals do not oppose each other.
+    It is not deeper than `NEARLY` of the size.
+    """
+    none = (0.0, 0.0, 0.0)
+    same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+    ways = np.empty((WAYS, 3))
+    for side in range(2):
+        center, reach = middle_of(table, pool, shell_g if side == 0 else shell_f)
+        if not reach > 0.0:
+            continue
+        about = add(matvec(turn, center), shift) if side == 0 else center
+        part = NEARLY * size / reach
+        other, place = grown(turn, shift, about, 1.0 - part if side == 0 else 1.0 / (1.0 - part))
+        nearest = search(table, pool, shell_f, shell_g, other, place, size, ROUGH)
+        f, g, x = nearest.f, nearest.g, nearest.x
+        if nearest.status == CROSSING or f < 0:
+            continue
+        kind_f = feature_kind(table, shell_f, f)
+        kind_g = feature_kind(table, shell_g, g)
+        p = tangents(table, pool, kind_f, feature_cells(table, shell_f, f).record, same, none, x[0], x[1])[0]
+        q = tangents(table, pool, kind_g, feature_cells(table, shell_g, g).record, other, place, x[2], x[3])[0]
+        d = sub(q, p)
+        length = math.sqrt(dot(d, d))
+        if not length > 0.0:
+            continue
+        n = scale(1.0 / length, d)
+        if not leans(table, pool, shell_f, f, x[0], x[1], same, n, size, ways) > 0.0:
+            continue
+        if not leans(table, pool, shell_g, g, x[2], x[3], turn, n, size, ways) < 0.0:
+            continue
+        shells, pose = (shell_f, shell_g), (turn, shift)
+        found, y, m, gap = pair_from(table, pool, shells, pose, (f, g), x, n, size)
+        if not found:
+            # Edges that lie on each other have no normal: the faces beside them do.
+            f, u, v = face_beside(table, pool, shell_f, f, x[0], x[1], same, n)
+            g, s, w = face_beside(table, pool, shell_g, g, x[2], x[3], turn, scale(-1.0, n))
+            found, y, m, gap = pair_from(table, pool, shells, pose, (f, g), (u, v, s, w), n, size)
+        if found:
+            return FoundPair(True, f, g, y, m, gap)
+    return FoundPair(False, -1, -1, (0.0, 0.0, 0.0, 0.0), none, 0.0)

@@ -1,0 +1,171 @@
+"""The model of `proximity/features/quadratic_model.py` for a part of an edge S(c(t)), t = t0 + h x with |x| <= 1.
+
+With c = c0 + c1 x + c2 x^2 + r_c, |r_c| <= (e_u, e_v), the part lies over the box c0 +- (a, b), and with S quadratic
+there, the terms of C(x) = S(c(x)) to second order follow; all others are bounded one by one.
+"""
+
+from __future__ import annotations
+
+import math
+
+from assembly._kernel import kernel
+from assembly.geometry.splines.domain import into_domain
+from assembly.geometry.splines.evaluate import (
+    curve_point,
+    find_span,
+    spline_curve_at,
+    surface_at,
+    surface_point,
+)
+from assembly.geometry.vec import add, blend, dot, scale
+from assembly.proximity.brep.records import edge_at
+from assembly.proximity.features.quadratic_model import (
+    LEAST_WEIGHT,
+    ROUNDING,
+    model_at,
+    place_model,
+    remainder,
+)
+
+
+@kernel(inner=True)
+def curve_remainder(table, pool, curve, t0, h, c0, c1, c2, work):
+    """Bounds of |x|, |y|, |z| of what the quadratic leaves of a curve over one part of a span."""
+    arc = spline_curve_at(table, curve)
+    span = find_span(pool, arc.breaks, arc.spans, t0)
+    at = arc.breaks + span
+    s = t0 - 0.5 * (pool[at] + pool[at + 1])
+    n = arc.degree
+    o = arc.coefficients + 4 * (n + 1) * span
+    for i in range(n + 1):
+        w = pool[o + 4 * i + 3]
+        for c in range(3):
+            work[c, 0, i] = pool[o + 4 * i + c] - w * c0[c]
+        work[3, 0, i] = w
+    for c in range(4):
+        for first in range(n):
+            for i in range(n - 1, first - 1, -1):
+                work[c, 0, i] += s * work[c, 0, i + 1]
+    factor = 1.0
+    for i in range(n + 1):
+        for c in range(4):
+            work[c, 0, i] *= factor
+        factor *= h
+    least = 2.0 * work[3, 0, 0]
+    for i in range(n + 1):
+        least -= abs(work[3, 0, i])
+    if not least > LEAST_WEIGHT * work[3, 0, 0]:
+        return (math.inf, math.inf, math.inf)
+    ex = 0.0
+    ey = 0.0
+    ez = 0.0
+    for i in range(n + 3):
+        x = 0.0
+        y = 0.0
+        z = 0.0
+        if i <= n:
+            x = work[0, 0, i]
+            y = work[1, 0, i]
+            z = work[2, 0, i]
+        if 1 <= i <= n + 1:
+            w = work[3, 0, i - 1]
+            x -= w * c1[0]
+            y -= w * c1[1]
+            z -= w * c1[2]
+        if i >= 2:
+            w = work[3, 0, i - 2]
+            x -= w * c2[0]
+            y -= w * c2[1]
+            z -= w * c2[2]
+        ex += abs(x)
+        ey += abs(y)
+        ez += abs(z)
+    return (ex / least, ey / least, ez / least)
+
+
+@kernel(inline=True)
+def meets(pool, breaks, k, move, u, a):
+    """Whether span k, moved by `move`, meets the interval u - a to u + a."""
+    return pool[breaks + k] + move <= u + a and pool[breaks + k + 1] + move >= u - a
+
+
+@kernel(inner=True)
+def wide_remainder(table, pool, r, u0, v0, a, b, s0, p, q, l, m, k, work):
+    """`remainder` over a box that may lie over several spans, and over seams."""
+    patch = surface_at(table, r)
+    bu = patch.breaks_u
+    bv = patch.breaks_v
+    nu = patch.spans_u
+    nv = patch.spans_v
+    period_u = pool[bu + nu] - pool[bu]
+    period_v = pool[bv + nv] - pool[bv]
+    around_u = 1 if patch.closed_u == 1 else 0
+    around_v = 1 if patch.closed_v == 1 else 0
+    if (around_u == 1 and a >= 0.5 * period_u) or (around_v == 1 and b >= 0.5 * period_v):
+        return math.inf
+    most = 0.0
+    none = (0.0, 0.0, 0.0)
+    for turn_u in range(-around_u, around_u + 1):
+        move_u = turn_u * period_u
+        for iu in range(nu):
+            if not meets(pool, bu, iu, move_u, u0, a):
+                continue
+            for turn_v in range(-around_v, around_v + 1):
+                move_v = turn_v * period_v
+                for iv in range(nv):
+                    if meets(pool, bv, iv, move_v, v0, b):
+                        u = u0 - move_u
+                        v = v0 - move_v
+                        e = remainder(table, pool, r, iu, iv, u, v, a, b, s0, p, q, l, m, k, none, work).rest
+                        most = max(most, e)
+    return most
+
+
+@kernel(inline=True)
+def length(a):
+    return math.sqrt(dot(a, a))
+
+
+@kernel(inner=True)
+def edge_model(table, pool, edge, turn, shift, nodes, i, work):
+    """Fill in a node of an edge, whose interval stands in it already, moved by a pose."""
+    model = model_at(nodes, i)
+    edge_record = edge_at(table, edge)
+    t0 = model.u0
+    h = model.half_u
+    curve = edge_record.curve
+    zero = (0.0, 0.0, 0.0)
+    c0, d, w = curve_point(table, pool, curve, t0)
+    c1 = scale(h, d)
+    c2 = scale(0.5 * h * h, w)
+    left = curve_remainder(table, pool, curve, t0, h, c0, c1, c2, work)
+    r = edge_record.surface
+    far = abs(shift[0]) + abs(shift[1]) + abs(shift[2])
+    if r < 0:
+        e = length(left) + ROUNDING * (far + abs(c0[0]) + abs(c0[1]) + abs(c0[2]))
+        place_model(turn, shift, c0, c1, zero, c2, zero, zero, e, nodes, i)
+        return
+    u0, v0, _clamped = into_domain(table, pool, r, c0[0], c0[1])
+    s0, su, sv, suu, suv, svv = surface_point(table, pool, r, u0, v0)
+    linear = blend(c1[0], su, c1[1], sv)
+    bent = add(blend(c1[0] * c1[0], suu, 2.0 * c1[0] * c1[1], suv), scale(c1[1] * c1[1], svv))
+    square = add(blend(c2[0], su, c2[1], sv), scale(0.5, bent))
+    # What is beyond first order in u and v, and all of it: a and b.
+    more_u = abs(c2[0]) + left[0]
+    more_v = abs(c2[1]) + left[1]
+    a = abs(c1[0]) + more_u
+    b = abs(c1[1]) + more_v
+    e = math.inf
+    if a < math.inf and b < math.inf:
+        p = scale(a, su)
+        q = scale(b, sv)
+        l = scale(0.5 * a * a, suu)
+        m = scale(a * b, suv)
+        k = scale(0.5 * b * b, svv)
+        e = wide_remainder(table, pool, r, u0, v0, a, b, s0, p, q, l, m, k, work)
+        e += left[0] * length(su) + left[1] * length(sv)
+        e += 0.5 * length(suu) * more_u * (2.0 * abs(c1[0]) + more_u)
+        e += 0.5 * length(svv) * more_v * (2.0 * abs(c1[1]) + more_v)
+        e += length(suv) * (abs(c1[0]) * more_v + abs(c1[1]) * more_u + more_u * more_v)
+        e += ROUNDING * (far + abs(s0[0]) + abs(s0[1]) + abs(s0[2]))
+    place_model(turn, shift, s0, linear, zero, square, zero, zero, e, nodes, i)

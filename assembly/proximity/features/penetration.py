@@ -1,0 +1,134 @@
+"""The pair of two shells that cross: how they would come apart, and where they are deepest in each other on that way.
+
+Nearest points say nothing where shells cross: all crossing points are at distance zero. The pair wanted has normals
+that oppose each other and a negative gap. Two faces without boundaries have it by `global_start`. Of other shells, g is
+moved along normals of the faces that cross (`proximity/features/separating_normals.py`) until they are apart on one of
+them; from the nearest
+points there the pair is followed on the way back (`switching.py`), through touching, to a negative gap.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from assembly._kernel import kernel
+from assembly.geometry.vec import add, blend, dot, scale
+from assembly.proximity.brep.borders import feature_at
+from assembly.proximity.brep.records import face_at, shell_at
+from assembly.proximity.extrema.face_face import CONVERGED, SINGULAR
+from assembly.proximity.extrema.global_start import global_start
+from assembly.proximity.features.global_search import CROSSING, FoundPair, search
+from assembly.proximity.features.separating_normals import WAYS, add_end_ways, add_way, add_ways
+from assembly.proximity.features.switching import track_features
+
+# A pair of shells that cross was found.
+PENETRATING = 3
+# The first move apart, as a part of the size; it is doubled so many times at most.
+FIRST, DOUBLINGS = 0.02, 7
+# Steps of the way back, and how often one may be halved.
+STEPS, HALVINGS = 12, 8
+# On the way out the nearest points are good to this part of their distance: of parallel faces all are nearest.
+ROUGH = 0.01
+# Shells that are apart by this part of the size may seem to cross: rounding says so of those that touch.
+TOUCHING = 1e-12
+# A move by this part of the size parts what only touches.
+PARTED = 1e-6
+
+
+@kernel(inner=True)
+def has_one_face(table, shell):
+    """Whether a shell is one face without a boundary."""
+    solid = shell_at(table, shell)
+    if solid.faces != 1 or solid.edges != 0 or solid.vertices != 0:
+        return False
+    return face_at(table, solid.face_table).trim < 0
+
+
+@kernel(inner=True)
+def walk_back(table, pool, shell_f, shell_g, turn, shift, away, f, g, x, size):
+    """The pair of g moved by `away`, followed until g is back."""
+    none = (0.0, 0.0, 0.0)
+    done = 0.0
+    step = 1.0 / STEPS
+    n = none
+    gap = 0.0
+    halved = 0
+    while done < 1.0:
+        part = min(done + step, 1.0)
+        place = blend(1.0, shift, 1.0 - part, away)
+        there = track_features(table, pool, shell_f, shell_g, turn, place, f, g, x, n, size, 1.0)
+        if there.status != CONVERGED and there.status != SINGULAR:
+            if halved == HALVINGS:
+                return FoundPair(False, f, g, x, n, gap)
+            halved += 1
+            step *= 0.5
+            continue
+        f = there.f
+        g = there.g
+        x = there.x
+        n = there.frame.normal
+        gap = there.frame.gap
+        done = part
+    return FoundPair(True, f, g, x, n, gap)
+
+
+@kernel(inner=True, allocates=True)
+def deepest(table, pool, shell_f, shell_g, turn, shift, f, g, x, size):
+    """The pair of two shells that cross at x of features f and g."""
+    none = (0.0, 0.0, 0.0)
+    if has_one_face(table, shell_f) and has_one_face(table, shell_g):
+        a = feature_at(table, shell_f, 0)
+        b = feature_at(table, shell_g, 0)
+        status, y, gap = global_start(table, pool, a, b, turn, shift, size)
+        # The far side of a thin body may be nearer than where it is in the other one.
+        if (status == CONVERGED or status == SINGULAR) and gap <= TOUCHING * size:
+            return FoundPair(True, 0, 0, y, none, gap)
+    same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+    ways = np.empty((WAYS, 3))
+    count = add_ways(table, pool, shell_f, f, x[0], x[1], same, 1.0, size, ways, 0)
+    count = add_ways(table, pool, shell_g, g, x[2], x[3], turn, -1.0, size, ways, count)
+    # Out of a corner it leads between the walls.
+    total = none
+    for k in range(count):
+        total = add(total, (ways[k, 0], ways[k, 1], ways[k, 2]))
+    count = add_way(total, ways, count)
+    # Flush bodies meet all along edges, also where another face leads out sooner.
+    count = add_end_ways(table, pool, shell_f, f, x[0], x[1], same, 1.0, size, ways, count)
+    count = add_end_ways(table, pool, shell_g, g, x[2], x[3], turn, -1.0, size, ways, count)
+    best = FoundPair(False, f, g, x, none, -math.inf)
+    other = best
+    for attempt in range(2):
+        if attempt == 1:
+            # From one body's origin to the other's, where no normal leads out.
+            count = add_way(shift if dot(shift, shift) > 1e-18 * size * size else (0.0, 0.0, 1.0), ways, 0)
+        reach = FIRST * size
+        # The shortest way out, of all of them.
+        for _ in range(DOUBLINGS):
+            for k in range(count):
+                away = scale(reach, (ways[k, 0], ways[k, 1], ways[k, 2]))
+                place = add(shift, away)
+                out = search(table, pool, shell_f, shell_g, turn, place, size, ROUGH)
+                if out.status == CROSSING or not out.lower > 0.0:
+                    continue
+                back = walk_back(table, pool, shell_f, shell_g, turn, shift, away, out.f, out.g, out.x, size)
+                gap = back.gap
+                if not back.found or not TOUCHING * size >= gap > best.gap:
+                    continue
+                if gap < -reach:
+                    # The way back went off to another pair: it is not so far as that.
+                    if gap > other.gap:
+                        other = back
+                    continue
+                if gap >= -TOUCHING * size:
+                    # They touch here. If that is all, the least move parts them. Where they touch along a line or
+                    # all over a face a search so near may not come to its proof: that none is found has to do.
+                    place = add(shift, scale(PARTED / reach * size, away))
+                    if search(table, pool, shell_f, shell_g, turn, place, size, ROUGH).status == CROSSING:
+                        continue
+                best = back
+            if best.found:
+                return best
+            reach *= 2.0
+    return other

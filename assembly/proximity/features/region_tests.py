@@ -1,0 +1,225 @@
+"""What may be in a pair of cells: whether they are inside their trims, hold an extremum, or only one that is known.
+
+Where features are nearest, d = g - f is normal to both, so that d.S_u = d.S_v = 0 on a face and d.C_t = 0 on an edge.
+An extremum of two faces with relative curvature of least eigenvalue l > 0 is the only one as far as the curvatures of
+both change by less than l.
+"""
+
+from __future__ import annotations
+
+import math
+
+from assembly._kernel import kernel
+from assembly._record import record_dtype, record_view, size_of
+from assembly.geometry.faces.trim import trim_side
+from assembly.geometry.faces.trim_nearest import trim_nearest
+from assembly.geometry.faces.trim_pieces import trim_at
+from assembly.geometry.splines.evaluate import (
+    spline_curve_at,
+    surface_at,
+)
+from assembly.geometry.vec import cross, dot, sub
+from assembly.proximity.brep.records import (
+    EDGE,
+    FACE,
+    VERTEX,
+    edge_at,
+    face_at,
+)
+from assembly.proximity.features.ball_tree import (
+    INSIDE,
+    MIXED_SIDE,
+    OUTSIDE,
+    UNKNOWN,
+    cell_node_at,
+)
+from assembly.proximity.features.quadratic_model import (
+    LINEAR_U,
+    LINEAR_V,
+    MIXED,
+    NORMAL,
+    POINT,
+    SQUARE_U,
+    SQUARE_V,
+    get,
+    model_at,
+)
+
+# Boxes whose normals turn by less hold at most one extremum.
+TRUSTED = 0.05
+# Boxes that hold an extremum this many half widths from their middles still take it for their own.
+BESIDE = 1.5
+FAR = 6.0
+
+
+@kernel(inner=True)
+def is_feasible(table, pool, kind, record, u, v):
+    """Whether a point of a feature is one of the shell."""
+    face = face_at(table, record)
+    if kind != FACE or face.trim < 0:
+        return True
+    return trim_side(table, pool, face.trim, u, v) >= 0
+
+
+@kernel(inner=True)
+def side_of(table, pool, nodes, info, i):
+    """Where a cell is from the trim of its face."""
+    cell = cell_node_at(info, i)
+    model = model_at(nodes, i)
+    if cell.kind != FACE or cell.side != UNKNOWN:
+        return cell.side
+    trim = face_at(table, cell.record).trim
+    s = trim_nearest(table, pool, trim, 0, trim_at(table, trim).curves, model.u0, model.v0)[0]
+    reach = math.sqrt(model.half_u**2 + model.half_v**2)
+    side = INSIDE if s >= reach else (OUTSIDE if s < -1.000001 * reach else MIXED_SIDE)
+    cell.side = side
+    return side
+
+
+@kernel(inner=True)
+def grows(a, i, p, q, first, second, b, j, d, length):
+    """Whether d.S_u, p = S_u over half a box and q = S_v so, cannot vanish over a node a[i] and another b[j].
+
+    `first` and `second` are half the derivatives of p along both directions.
+    """
+    model = model_at(a, i)
+    model_record = model_at(b, j)
+    pp = dot(p, p)
+    if pp == 0.0:
+        return False
+    long = math.sqrt(pp)
+    moves = pp + abs(dot(p, q)) + abs(dot(p, get(b, j, LINEAR_U))) + abs(dot(p, get(b, j, LINEAR_V)))
+    turn = 2.0 * math.sqrt(dot(first, first)) + math.sqrt(dot(second, second)) + 6.0 * model.rest
+    return (
+        abs(dot(d, p))
+        > moves + long * (model.curved + model_record.curved) + (length + model.radius + model_record.radius) * turn
+    )
+
+
+@kernel(inner=True)
+def monotone(a, i, kind, b, j, d, length):
+    """Whether d.S_u or d.S_v cannot vanish over a node of one feature, and any point of one of another."""
+    if kind == VERTEX:
+        return False
+    p = get(a, i, LINEAR_U)
+    q = get(a, i, LINEAR_V)
+    m = get(a, i, MIXED)
+    if grows(a, i, p, q, get(a, i, SQUARE_U), m, b, j, d, length):
+        return True
+    return kind == FACE and grows(a, i, q, p, get(a, i, SQUARE_V), m, b, j, d, length)
+
+
+@kernel(inner=True)
+def excluded(a, i, kind_f, b, j, kind_g, are_apart):
+    """Whether no extremum of two features, and no crossing, is in a pair of their cells."""
+    d = sub(get(b, j, POINT), get(a, i, POINT))
+    length = math.sqrt(dot(d, d))
+    if monotone(a, i, kind_f, b, j, d, length) or monotone(b, j, kind_g, a, i, d, length):
+        return True
+    bend = model_at(a, i).bend + model_at(b, j).bend
+    # Where features cross, their normals need not be parallel.
+    if not (are_apart and bend < 1.5):
+        return False
+    if kind_f == FACE and kind_g == FACE:
+        s = cross(get(a, i, NORMAL), get(b, j, NORMAL))
+        return dot(s, s) > math.sin(bend) ** 2
+    if kind_f == FACE and kind_g == EDGE:
+        t = get(b, j, LINEAR_U)
+        return abs(dot(t, get(a, i, NORMAL))) > math.sin(bend) * math.sqrt(dot(t, t))
+    if kind_f == EDGE and kind_g == FACE:
+        t = get(a, i, LINEAR_U)
+        return abs(dot(t, get(b, j, NORMAL))) > math.sin(bend) * math.sqrt(dot(t, t))
+    return False
+
+
+@kernel(inner=True)
+def relative_curvature(k, h, beta):
+    """Least eigenvalue of the curvature of g relative to f moved to it, towards each other; and 1 / the least of K."""
+    det = k[0] * k[2] - k[1] * k[1]
+    if not (k[0] > 0.0 and det > 0.0):
+        return -math.inf, 1.0
+    s = -1.0 / det if beta >= 0.0 else 1.0 / det
+    # -H K^-1, symmetric but for rounding.
+    a = s * (h[0] * k[2] - h[1] * k[1])
+    b = s * 0.5 * (h[1] * k[0] - h[0] * k[1] + h[2] * k[2] - h[3] * k[1])
+    c = s * (h[3] * k[0] - h[2] * k[1])
+    least = 0.5 * (a + c) - math.sqrt(0.25 * (a - c) ** 2 + b * b)
+    low = 0.5 * (k[0] + k[2]) - math.sqrt(0.25 * (k[0] - k[2]) ** 2 + k[1] * k[1])
+    return least, 1.0 / max(low, 1e-12)
+
+
+@kernel(inline=True)
+def off_middle(x, middle, half, period):
+    """How many half widths x is from the middle of an interval."""
+    d = abs(x - middle)
+    if period > 0.0:
+        d = min(d, abs(period - d))
+    if half > 0.0:
+        return d / half
+    return 0.0
+
+
+@kernel(inner=True)
+def periods(table, pool, kind, record):
+    """Periods of a feature's coordinates; 0 where there is none."""
+    edge = edge_at(table, record)
+    if kind == FACE:
+        r = surface_at(table, face_at(table, record).surface)
+        bu = r.breaks_u
+        bv = r.breaks_v
+        u = pool[bu + r.spans_u] - pool[bu] if r.closed_u == 1 else 0.0
+        v = pool[bv + r.spans_v] - pool[bv] if r.closed_v == 1 else 0.0
+        return u, v
+    if kind == EDGE and edge.start < 0:
+        c = spline_curve_at(table, edge.curve)
+        o = c.breaks
+        return pool[o + c.spans] - pool[o], 0.0
+    return 0.0, 0.0
+
+
+@kernel(inner=True)
+def from_middles(table, pool, a, ai, i, b, bi, j, x):
+    """The most half widths that coordinates x are from the middles of two cells."""
+    model = model_at(a, i)
+    model_record = model_at(b, j)
+    cell = cell_node_at(ai, i)
+    cell_node = cell_node_at(bi, j)
+    pu, pv = periods(table, pool, cell.kind, cell.record)
+    s = off_middle(x[0], model.u0, model.half_u, pu)
+    s = max(s, off_middle(x[1], model.v0, model.half_v, pv))
+    pu, pv = periods(table, pool, cell_node.kind, cell_node.record)
+    s = max(s, off_middle(x[2], model_record.u0, model_record.half_u, pu))
+    return max(s, off_middle(x[3], model_record.v0, model_record.half_v, pv))
+
+
+# An extremum of two faces that is known.
+KNOWN_EXTREMUM = record_dtype(
+    "f8",
+    parameters=4,  # (u, v) of f, then of g
+    curvature=1,  # least relative curvature
+    stretch=1,  # 1 / the least eigenvalue of K of f
+)
+known_extremum_at = record_view(KNOWN_EXTREMUM)
+KNOWN = size_of(KNOWN_EXTREMUM)
+
+
+@kernel(inner=True)
+def is_known(table, pool, a, ai, i, b, bi, j, extrema, owners, count):
+    """Whether the only extremum that two cells may hold is one that is known; half widths from the nearest one."""
+    model = model_at(a, i)
+    model_record = model_at(b, j)
+    bend = max(model.bend, model_record.bend)
+    nearest = math.inf
+    for k in range(count):
+        if owners[k, 0] != cell_node_at(ai, i).feature or owners[k, 1] != cell_node_at(bi, j).feature:
+            continue
+        extremum = known_extremum_at(extrema, k)
+        s = from_middles(table, pool, a, ai, i, b, bi, j, extremum.parameters)
+        nearest = min(nearest, s)
+        if s <= BESIDE and bend <= TRUSTED:
+            return True, s
+        if s <= FAR:
+            change = model.change * extremum.stretch * extremum.stretch + model_record.change
+            if extremum.curvature > 1.5 * max(s, 1.0) * change:
+                return True, s
+    return False, nearest

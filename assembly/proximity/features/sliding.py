@@ -1,0 +1,88 @@
+"""Pairs of faces that are straight along each other and come to lean: down the slope, to the border that ends it.
+
+Flat faces that lie parallel are nearest all over, and a face and a cylinder along a line; Newton's method has no step
+there once they lean. The height of g over the tangent plane of f falls along the way w that is the part of g's normal m
+along f, over m.n: all of it, if both are flat, or as much of it as goes along the valley.
+"""
+
+from __future__ import annotations
+
+import math
+
+from assembly._kernel import kernel
+from assembly.geometry.vec import add, blend, dot, matvec
+from assembly.proximity.brep.borders import feature_at, nearest_edge
+from assembly.proximity.brep.records import (
+    EDGE_RECORD,
+    FACE_RECORD,
+    face_at,
+    shell_at,
+)
+from assembly.proximity.extrema.face_face import own_frame, pair_frame
+from assembly.proximity.extrema.feature_jets import edge_jet
+from assembly.proximity.extrema.pair_matrix import null_ways, pair_matrix
+
+# Relative curvature, over the size, below which faces are straight along each other; a slope that is none; the way,
+# over the size, that leads beyond every border.
+STRAIGHT, LEVEL, FAR = 1e-9, 1e-12, 1e3
+
+
+@kernel(inner=True)
+def border_ahead(table, pool, shell, code, at, move, pose, way):
+    """The edge of a face at which parameters leave it that go far beyond its border.
+
+    `at` are (u, v), `move` what is added to them, `pose` how the body is turned and shifted.
+
+    Returns
+    -------
+    code, (t, 0), and how far that is along a unit way; infinitely far where the face has no border.
+    """
+    solid = shell_at(table, shell)
+    if face_at(table, solid.face_table + FACE_RECORD * code).trim < 0:
+        return code, at, math.inf
+    code, found = nearest_edge(table, pool, shell, code, at[0] + move[0], at[1] + move[1])
+    edge = solid.edge_table + EDGE_RECORD * (code - solid.faces)
+    p = add(matvec(pose[0], edge_jet(table, pool, edge, found[0])[0]), pose[1])
+    return code, found, dot(way, p)
+
+
+@kernel(inner=True)
+def slide_off(table, pool, shell_f, shell_g, rotation, shift, code_f, code_g, x, size):
+    """Two faces that are straight along each other and lean: on to the border that ends the way down.
+
+    Returns whether there is such a way, the two features then, and the coordinates.
+    """
+    f = feature_at(table, shell_f, code_f)
+    g = feature_at(table, shell_g, code_g)
+    frame = pair_frame(table, pool, f, g, rotation, shift, x)
+    tx, ty, e, t = frame.tangent_x, frame.tangent_y, frame.rates_f, frame.rates_g
+    straight = STRAIGHT / size
+    matrix = pair_matrix(frame.shape_f, frame.shape_g, frame.gap, straight)
+    h = matrix.h
+    if matrix.isolated or not frame.regular:
+        return False, code_f, code_g, x
+    m = matvec(rotation, own_frame(table, pool, g, x[2], x[3]).normal)
+    lean = 1.0 / dot(m, frame.normal)
+    wx = lean * dot(m, tx)
+    wy = lean * dot(m, ty)
+    if abs(h[0]) + abs(h[1]) + abs(h[2]) + abs(h[3]) > straight:
+        _v, w = null_ways(h)
+        along = w[0] * wx + w[1] * wy
+        wx = along * w[0]
+        wy = along * w[1]
+    slope = math.sqrt(wx * wx + wy * wy)
+    if not slope > LEVEL:
+        return False, code_f, code_g, x
+    way = blend(wx / slope, tx, wy / slope, ty)
+    wx *= FAR * size / slope
+    wy *= FAR * size / slope
+    # Parameters of a flat face go with lengths, and those along a valley do.
+    on_f = (e[0] * wx + e[1] * wy, e[2] * wy)
+    on_g = (t[0] * wx + t[1] * wy, t[2] * wx + t[3] * wy)
+    same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+    here = (same, (0.0, 0.0, 0.0))
+    edge_f, at_f, way_f = border_ahead(table, pool, shell_f, code_f, (x[0], x[1]), on_f, here, way)
+    edge_g, at_g, way_g = border_ahead(table, pool, shell_g, code_g, (x[2], x[3]), on_g, (rotation, shift), way)
+    if way_f <= way_g:
+        return way_f < math.inf, edge_f, code_g, (at_f[0], at_f[1], x[2], x[3])
+    return True, code_f, edge_g, (x[0], x[1], at_g[0], at_g[1])

@@ -1,0 +1,1 @@
+"""Pairs of wires by their centerlines."""

@@ -1,0 +1,158 @@
+"""Edges of one body that go through flat faces of the other: where plates cross no middle of a patch is in the other.
+
+A part of an edge is its chord here, off by what it bends. The edge goes through the plane of a patch where the ends of
+the chord are farther from it than that, on either side; and through the face, where all points of the plane that are as
+near to the chord are inside of the face's boundary: bodies that touch along edges do not cross. Facets of a bent face
+stand out of it where it is hollow, so that a peg in a bore may cut them: of such faces nothing is told here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import namedtuple
+
+import numpy as np
+
+from assembly._kernel import kernel
+from assembly.geometry.faces.trim import trim_side
+from assembly.geometry.splines.evaluate import surface_point
+from assembly.geometry.vec import add, cross, dot, matvec, matvec_t, scale, sub
+from assembly.proximity.brep.borders import feature_at, feature_kind
+from assembly.proximity.brep.records import EDGE, FACE, FACE_RECORD, face_at, shell_at
+from assembly.proximity.bvh.tree import (
+    ELEMENT,
+    element_at,
+    node_at,
+    node_of,
+    tree_at,
+)
+from assembly.proximity.extrema.feature_jets import edge_jet, edge_limits
+
+# A part of an edge is looked at with so much of its neighbors, in half widths: what goes through where two meet counts.
+WIDER = 1.5
+# Sine of the angle by which normals of a flat patch turn, at most.
+FLAT = 1e-9
+
+
+# Where a segment cuts a triangle. hit: whether it does; part: which part of the way; q, r: the shares of these corners
+# there; turns: whether the segment goes to the side to which the corners turn left.
+TriangleCut = namedtuple("TriangleCut", "hit part q r turns")
+
+
+@kernel(inline=True)
+def cut_at(a, d, p, q, r, end, beside):
+    """Where a segment from a along d cuts a triangle (Möller and Trumbore).
+
+    What is nearer to an end than that part of the segment does not count; what passes `beside` the triangle by so small
+    a part of its sides does.
+    """
+    e = sub(q, p)
+    f = sub(r, p)
+    h = cross(d, f)
+    det = dot(e, h)
+    if abs(det) < 1e-300:
+        return TriangleCut(False, 0.0, 0.0, 0.0, False)
+    s = sub(a, p)
+    u = dot(s, h) / det
+    w = cross(s, e)
+    v = dot(d, w) / det
+    t = dot(f, w) / det
+    hit = min(u, v, 1.0 - u - v) >= -beside and end < t < 1.0 - end
+    return TriangleCut(hit=hit, part=t, q=u, r=v, turns=det < 0.0)
+
+
+@kernel(inner=True)
+def chord_of(table, pool, edge, t, half):
+    """The ends of a part of an edge, and how far its middle is from the middle of its chord."""
+    lo, hi, endless = edge_limits(table, pool, edge)
+    first = t - WIDER * half
+    last = t + WIDER * half
+    if not endless:
+        first = max(first, lo)
+        last = min(last, hi)
+    a = edge_jet(table, pool, edge, max(first, lo))[0]
+    b = edge_jet(table, pool, edge, min(last, hi))[0]
+    off = sub(edge_jet(table, pool, edge, 0.5 * (max(first, lo) + min(last, hi)))[0], scale(0.5, add(a, b)))
+    return a, b, math.sqrt(dot(off, off))
+
+
+@kernel(inner=True)
+def is_well_inside(table, pool, trim, u, v, du, dv):
+    """Whether parameters are inside a boundary with all that is beside them."""
+    return (
+        trim_side(table, pool, trim, u - du, v) > 0
+        and trim_side(table, pool, trim, u + du, v) > 0
+        and trim_side(table, pool, trim, u, v - dv) > 0
+        and trim_side(table, pool, trim, u, v + dv) > 0
+    )
+
+
+@kernel(inline=True)
+def patch_corners(table, pool, surface, patch):
+    """The first (u, v) of a patch and its widths, and its corners, counterclockwise in (u, v) from there."""
+    u = patch.middle[0] - patch.half[0]
+    v = patch.middle[1] - patch.half[1]
+    wide = 2.0 * patch.half[0]
+    high = 2.0 * patch.half[1]
+    p = surface_point(table, pool, surface, u, v)[0]
+    q = surface_point(table, pool, surface, u + wide, v)[0]
+    s = surface_point(table, pool, surface, u + wide, v + high)[0]
+    t = surface_point(table, pool, surface, u, v + high)[0]
+    return (u, v, wide, high), (p, q, s, t)
+
+
+@kernel(inner=True)
+def goes_through(table, pool, tree, shell, e, a, b, margin):
+    """Whether what is within a margin of a chord goes through the face of a body at a flat patch; body axes."""
+    node = node_at(pool, node_of(table, pool, tree, e))
+    if node.cosine <= 0.0 or node.sine > FLAT:
+        return False
+    patch = element_at(pool, tree_at(table, tree).element_pool + ELEMENT * e)
+    code = np.int64(patch.feature)
+    face = face_at(table, shell_at(table, shell).face_table + FACE_RECORD * code)
+    r = feature_at(table, shell, code)
+    (u, v, wide, high), (p, q, s, t) = patch_corners(table, pool, r, patch)
+    for k in range(2):
+        second, third = (q, s) if k == 0 else (s, t)
+        cut = cut_at(a, sub(b, a), p, second, third, 0.0, 0.0)
+        hit, x, y = cut.hit, cut.q, cut.r
+        n = cross(sub(second, p), sub(third, p))
+        away = margin * math.sqrt(dot(n, n))
+        if not hit or min(abs(dot(n, sub(a, p))), abs(dot(n, sub(b, p)))) <= away:
+            continue
+        if face.trim < 0:
+            return True
+        # A chord that leans over the plane is near to more of it.
+        beside = margin * math.sqrt(dot(n, n) * dot(sub(b, a), sub(b, a))) / abs(dot(n, sub(b, a)))
+        du = beside * wide / max(math.sqrt(dot(sub(s, t), sub(s, t))), 1e-300)
+        dv = beside * high / max(math.sqrt(dot(sub(s, q), sub(s, q))), 1e-300)
+        here_u = u + (x + y if k == 0 else x) * wide
+        here_v = v + (y if k == 0 else x + y) * high
+        if is_well_inside(table, pool, face.trim, here_u, here_v, du, dv):
+            return True
+    return False
+
+
+@kernel(inner=True)
+def pierces(table, pool, posed, pair, margin, offsets):
+    """Whether of two elements, of f and of g, one is a part of an edge that goes through the other, a patch."""
+    for side in range(2):
+        tree, shell = posed.trees[side], posed.shells[side]
+        other, other_shell = posed.trees[1 - side], posed.shells[1 - side]
+        o = tree_at(table, tree).element_pool + ELEMENT * pair[side]
+        p = tree_at(table, other).element_pool + ELEMENT * pair[1 - side]
+        part = element_at(pool, o)
+        code = np.int64(part.feature)
+        patch = np.int64(element_at(pool, p).feature)
+        if feature_kind(table, shell, code) != EDGE or feature_kind(table, other_shell, patch) != FACE:
+            continue
+        a, b, bent = chord_of(table, pool, feature_at(table, shell, code), part.middle[0], part.half[0])
+        if side == 0:
+            a = matvec_t(posed.turn, sub(a, posed.shift))
+            b = matvec_t(posed.turn, sub(b, posed.shift))
+        else:
+            a = add(matvec(posed.turn, a), posed.shift)
+            b = add(matvec(posed.turn, b), posed.shift)
+        if goes_through(table, pool, other, other_shell, pair[1 - side], a, b, margin + 2.0 * bent + offsets[1 - side]):
+            return True
+    return False

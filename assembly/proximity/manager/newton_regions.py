@@ -1,0 +1,128 @@
+"""Whether a pair of patches has a root that is known, or one to which Newton's method stays near where it starts.
+
+The patches of two bodies that face each other are tiles of where they may touch. What is in a tile is found from its
+middle in a few steps; a sequence that leaves it, and those beside it, is on its way to what other tiles have.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from assembly._kernel import kernel
+from assembly._record import record_dtype, record_view, size_of
+from assembly.geometry.splines.domain import is_within
+from assembly.proximity.bvh.tree import ELEMENT, element_at, tree_at
+from assembly.proximity.extrema.face_face import bent_at_most, move_pair, pair_frame, pair_step
+from assembly.proximity.extrema.pair_matrix import across_first, pair_matrix
+from assembly.proximity.extrema.singular import ALONE, BESIDE, fold_beyond
+from assembly.proximity.features.holding import POINT
+from assembly.proximity.features.solid_contact import pair_parameters
+from assembly.proximity.manager.extrema import extremum_at, is_alone
+
+# Steps; and below so many radians, that a step turns a normal, it is as good as there.
+STEPS, CLOSE = 6, 0.02
+# Curvatures below this, over the scene's size, are rounding.
+FLAT = 1e-9
+# What became of it.
+LEFT, STAYED = -1, -2
+# Sequences whose first steps lead as close together as this part of a patch go the same way.
+TOGETHER = 0.25
+# A sequence that was followed.
+NEWTON_WAY = record_dtype(
+    "f8",
+    parameters=4,  # where its first step led
+    barren=1,  # 1: it came to no extremum of its own
+)
+newton_way_at = record_view(NEWTON_WAY)
+PASSED = size_of(NEWTON_WAY)
+
+
+@kernel(inline=True)
+def half_widths(table, pool, trees, pair):
+    """Half the widths, in parameters, of the patches of a pair of elements."""
+    f = element_at(pool, tree_at(table, trees[0]).element_pool + ELEMENT * pair[0])
+    g = element_at(pool, tree_at(table, trees[1]).element_pool + ELEMENT * pair[1])
+    return (f.half[0], f.half[1], g.half[0], g.half[1])
+
+
+@kernel(inline=True)
+def is_beside(table, pool, surfaces, x, y, half, part):
+    """Whether parameters x are within a part of half widths from y, on both surfaces."""
+    f, g = surfaces[0], surfaces[1]
+    return is_within(table, pool, f, x[0], x[1], y[0], y[1], part * half[0], part * half[1]) and is_within(
+        table, pool, g, x[2], x[3], y[2], y[3], part * half[2], part * half[3]
+    )
+
+
+@kernel(inner=True)
+def is_known(table, pool, posed, e, d, roots, count):
+    """The features of elements e and d, the parameters of their middles, whether a known root is all there is.
+
+    And whether one is there that is near a fold, on this side of a knot line or beyond: a second root may be beside it.
+    """
+    f = element_at(pool, tree_at(table, posed.trees[0]).element_pool + ELEMENT * e)
+    g = element_at(pool, tree_at(table, posed.trees[1]).element_pool + ELEMENT * d)
+    codes = (np.int64(f.feature), np.int64(g.feature))
+    start = (f.middle[0], f.middle[1], g.middle[0], g.middle[1])
+    half = half_widths(table, pool, posed.trees, (e, d))
+    folds = False
+    for k in range(count):
+        extremum = extremum_at(roots, k)
+        if extremum.code_f != codes[0] or extremum.code_g != codes[1]:
+            continue
+        if not extremum.fold > ALONE or extremum.corner >= POINT:
+            # A point that stays where it is is no root: where the edge, or the face, is nearest may be beside it.
+            continue
+        x = pair_parameters(extremum)
+        if not is_beside(table, pool, posed.surfaces, x, start, half, BESIDE):
+            continue
+        if posed.surfaces[0] >= 0 and math.isnan(extremum.beyond):
+            # Beyond a knot line curvatures may be others.
+            extremum.beyond = fold_beyond(table, pool, posed, x, half)
+        if is_alone(roots, k):
+            return codes, start, True, False
+        folds = True
+    return codes, start, False, folds
+
+
+@kernel(inner=True)
+def stays(table, pool, surfaces, turn, shift, start, half, passed, count):
+    """Whether Newton's method from `start` stays beside it, within BESIDE times half widths in (u, v) and (s, t).
+
+    Returns STAYED or LEFT, or which of the `count` sequences in `passed` (n, PASSED) it goes along with; where it came
+    to; and how many sequences there are now.
+    """
+    f, g = surfaces[0], surfaces[1]
+    x = start
+    for step in range(STEPS):
+        frame = pair_frame(table, pool, f, g, turn, shift, x)
+        if not frame.regular:
+            return STAYED, x, count
+        a, c, r = frame.shape_f, frame.shape_g, frame.residual
+        matrix = pair_matrix(a, c, frame.gap, FLAT)
+        inverse, _level = across_first(a, c, r, matrix.k, matrix.h, matrix.inverse, FLAT)
+        step_f, step_g, bend_f, bend_g = pair_step(a, c, r, matrix.k, inverse, 1.0)
+        if not max(bend_f, bend_g) > CLOSE:
+            return STAYED, x, count
+        # Each surface by its own measure, as in `solve_pair`.
+        factor_f = bent_at_most(bend_f)
+        factor_g = bent_at_most(bend_g)
+        step_f = (factor_f * step_f[0], factor_f * step_f[1])
+        step_g = (factor_g * step_g[0], factor_g * step_g[1])
+        x, _held, _way = move_pair(table, pool, f, g, turn, x, frame, step_f, step_g)
+        if not is_beside(table, pool, surfaces, x, start, half, BESIDE):
+            return LEFT, x, count
+        if step == 0:
+            for way in range(count):
+                there = pair_parameters(newton_way_at(passed, way))
+                if is_beside(table, pool, surfaces, x, there, half, TOGETHER):
+                    return way, x, count
+            if count < passed.shape[0]:
+                led = newton_way_at(passed, count)
+                for l in range(4):
+                    led.parameters[l] = x[l]
+                led.barren = 0.0
+                count += 1
+    return STAYED, x, count

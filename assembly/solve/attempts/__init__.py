@@ -1,0 +1,1 @@
+"""Solves from more than one start: the loop again where it did not end solved."""

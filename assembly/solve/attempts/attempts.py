@@ -1,0 +1,148 @@
+"""The loop on a packed scene, and again another way where it did not end SOLVED."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.constraints.packing.scene import Packed
+from assembly.constraints.program.records import DEEPEST_AT
+from assembly.solve.attempts.assembled import run_gathered
+from assembly.solve.attempts.balance import balanced
+from assembly.solve.attempts.fit import Loop, fitted, fitted_again
+from assembly.solve.attempts.postures import following_none
+from assembly.solve.interruption import Interruption
+from assembly.solve.loop.augmented_lagrangian import solve_program
+from assembly.solve.loop.settings import (
+    CONTACT_LOST,
+    FIT,
+    FREE_TRIMS,
+    GATHER,
+    HISTORY,
+    ITERATIONS,
+    OBJECTIVE,
+    SCATTER,
+    SOLVED,
+    TOUCHING,
+    UNSURE,
+    VIOLATION,
+)
+from assembly.solve.options import Options
+from assembly.solve.second_order.leave import Fit, Outcome, settle
+
+__all__ = ["attempt", "begin", "go_on_once", "load"]
+
+Array = NDArray[np.float64]
+Table = NDArray[np.int64]
+# Rows of history that are kept.
+MOST_HISTORY = 1000
+_LOADING = Options(max_iterations=0).settings()
+_loaded: set[int | None] = set()
+
+
+def load(packed: Packed, start: Callable[[], Array]) -> None:
+    """Have the loop for such a scene in this process: loading it, or compiling it, is no part of a solve's time."""
+    if packed.tips not in _loaded:
+        solve_program(packed.table.copy(), packed.pool, _LOADING, start(), np.empty((1, HISTORY)), packed.tips)
+        _loaded.add(packed.tips)
+
+
+def attempt(
+    packed: Packed,
+    settings: Array,
+    start: Callable[[], Array],
+    interruption: Interruption,
+    turns: Array | None = None,
+    apart: Array | None = None,
+) -> Outcome:
+    """The outcome of a solve from the states that `start` makes; no other attempt is made once it is interrupted.
+
+    `turns` are the values that angles are near, where they start on a turn of their own; zeros by default. `apart` is
+    what rows disagree by, where that is known.
+    """
+    if apart is not None:
+        known = fitted_again(packed, settings, start(), apart, _loop(interruption, turns))
+        if known is not None:
+            return known
+    # The loop writes contacts of clearances into its table: every solve has its own, also in another thread.
+    table = packed.table.copy() if packed.guards else packed.table
+    outcome = begin(packed, interruption, table, settings, start(), turns)
+    if outcome.code == SOLVED:
+        return outcome
+    loop = _loop(interruption, turns)
+
+    def again(settings: Array) -> Outcome:
+        return fitted(packed, settings, begin(packed, interruption, table, settings, start(), turns), loop)
+
+    if outcome.code == CONTACT_LOST and packed.seek_penetration():
+        # Perhaps solids cross at the start.
+        table[DEEPEST_AT] = packed.table[DEEPEST_AT]
+        outcome = begin(packed, interruption, table, settings, start(), turns)
+    outcome = fitted(packed, settings, outcome, loop)
+    if not interruption.is_over():
+        outcome = balanced(packed, settings, outcome, loop.go_on)
+    if packed.trims and not _holds(outcome) and not interruption.is_over():
+        # With the coordinates of contacts as unknowns trims have exact second derivatives, except at poles.
+        settings = settings.copy()
+        settings[FREE_TRIMS] = 1.0
+        other = again(settings)
+        outcome = other if _holds(other) else outcome
+    is_scattered = settings[GATHER] == 0.0 and outcome.state[packed.results_at + SCATTER] == 1.0
+    if is_scattered and not _holds(outcome) and not interruption.is_over():
+        # What the start itself did not lead to may be reached from gathered bodies.
+        settings = settings.copy()
+        settings[GATHER] = 1.0
+        other = again(settings)
+        outcome = other if _holds(other) else outcome
+    if not interruption.is_over():
+        outcome = settle(packed, settings, outcome, partial(go_on_once, interruption, packed))
+    return outcome._replace(fit=outcome.fit or Fit(float(settings[FIT])))
+
+
+def begin(
+    packed: Packed, interruption: Interruption, table: Table, settings: Array, state: Array, turns: Array | None
+) -> Outcome:
+    """The outcome of the loop from a state, with turns chosen anew where bodies are gathered; see `attempt`."""
+    if packed.chooses_turns and settings[GATHER] > 0.0:
+        return run_gathered(packed, table, settings, state, turns, partial(_run, packed, interruption))
+    return _run(packed, interruption, table, settings, state)
+
+
+def _loop(interruption: Interruption, turns: Array | None) -> Loop:
+    """The loop from the start of a solve and from a state that a solve has led to, its end settled."""
+
+    def first(packed: Packed, settings: Array, state: Array) -> Outcome:
+        outcome = begin(packed, interruption, packed.table.copy(), settings, state, turns)
+        return settle(packed, settings, outcome, partial(go_on_once, interruption, packed))
+
+    def go_on(packed: Packed, settings: Array, state: Array) -> Outcome:
+        outcome = go_on_once(interruption, packed, settings, state)
+        return settle(packed, settings, outcome, partial(go_on_once, interruption, packed))
+
+    return Loop(first, go_on)
+
+
+def _holds(outcome: Outcome) -> bool:
+    """Whether rows hold and the objective is stationary, whatever it is of second order."""
+    return outcome.code in (SOLVED, UNSURE)
+
+
+def _run(packed: Packed, interruption: Interruption, table: Table, settings: Array, state: Array) -> Outcome:
+    history = np.empty((min(int(settings[ITERATIONS]), MOST_HISTORY) + 1, HISTORY))
+    if interruption.callback is not None:
+        state[packed.results_at + OBJECTIVE], state[packed.results_at + VIOLATION] = np.nan, np.inf
+        interruption.watched = (state, packed.results_at)
+    return Outcome(solve_program(table, packed.pool, settings, state, history, packed.tips), state, history)
+
+
+def go_on_once(interruption: Interruption, packed: Packed, settings: Array, state: Array) -> Outcome:
+    """The loop from a state that a solve has led to, with postures measured from where they were.
+
+    Bodies may stay in each other only by what they were where the solve began: the state has that.
+    """
+    settings = settings.copy()
+    settings[TOUCHING] = 0.0
+    return _run(packed, interruption, following_none(packed), settings, state)

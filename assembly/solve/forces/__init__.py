@@ -1,0 +1,1 @@
+"""Forces of a solution: statics, and what an end effector can do."""

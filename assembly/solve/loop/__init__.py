@@ -1,0 +1,1 @@
+"""The augmented Lagrangian (paper 001) and its phases."""

@@ -1,0 +1,80 @@
+"""Whether a solve has arrived: rows hold where bodies are now, and the Lagrangian is stationary."""
+
+from __future__ import annotations
+
+from assembly._kernel import kernel
+from assembly.constraints.program.records import header_at, pool_header_at
+from assembly.solve.linear_algebra.factorize import greatest_on_diagonal
+from assembly.solve.loop.inertia import DOWNWARD
+from assembly.solve.loop.multipliers import strongest
+from assembly.solve.loop.residuals import turned
+from assembly.solve.loop.settings import (
+    MOST_ROUNDING,
+    ROUNDING,
+    TESTED,
+    results_at,
+    settings_at,
+)
+
+# A saddle is left from where the dual residual and the violation are no more.
+NEAR_SADDLE, OFF_SADDLE = 1e-3, 1e-6
+# What a step must gain of violations that rounding of far coordinates may explain.
+GAIN = 0.5
+# A step of so many roundings of a coordinate at most is no move.
+STEPS_OF_ROUNDING = 8.0
+
+
+@kernel(inner=True)
+def reach_of(table, pool, q):
+    """How far out the user's coordinates are, over the size."""
+    units = pool_header_at(pool, 0)
+    reach = 0.0
+    for b in range(header_at(table, 0).bodies):
+        for k in range(3):
+            reach = max(reach, abs(q[b, k] + units.reference[k] / units.scale))
+    return reach
+
+
+@kernel(inner=True)
+def rounding_at(table, pool, settings, here):
+    """The violation that is none: what is asked for, or what rounding of coordinates and of whole turns violates."""
+    reach = max(reach_of(table, pool, here.q), turned(table, pool, here.tracked))
+    return max(settings_at(settings, 0).feasibility, min(ROUNDING * reach, MOST_ROUNDING))
+
+
+@kernel(inner=True)
+def is_rounding(program, here, lagrangian, n, rows, y, moved, dual):
+    """Whether a step moved poses by no more than doubles tell apart, and rounding explains the slope that is left.
+
+    Poses' rounding by the objective's curvature, and that of forces.
+    """
+    table, pool, shape = program.table, program.pool, program.structure
+    reach = max(1.0, reach_of(table, pool, here.q))
+    most = ROUNDING * (reach * greatest_on_diagonal(lagrangian, n, shape.sparsity) + strongest(y, rows))
+    return moved <= STEPS_OF_ROUNDING * ROUNDING * reach and dual <= most
+
+
+@kernel(inner=True)
+def is_near_saddle(table, settings, results, violation, dual):
+    """Whether a solve is near a saddle that is to be left: steps toward one gain little, and are of no use."""
+    limits = settings_at(settings, 0)
+    if limits.second_order != TESTED or limits.tick == 1.0 or header_at(table, 0).implicit == 1:
+        return False
+    return results_at(results, 0).curved == DOWNWARD and violation <= OFF_SADDLE and dual <= NEAR_SADDLE
+
+
+@kernel(inner=True)
+def has_arrived(program, settings, results, here, violation, last_violation, feasible, dual):
+    """Whether rows hold and the Lagrangian is stationary, or all but so at a saddle that is to be left.
+
+    Of a start that was far out rows held to its rounding. They are to hold to that of where bodies are now, unless
+    steps gain nothing more.
+    """
+    limits = settings_at(settings, 0)
+    table, pool = program.table, program.pool
+    if is_near_saddle(table, settings, results, violation, dual):
+        return True
+    if not (violation <= feasible and dual <= limits.stationarity):
+        return False
+    gains = violation > limits.feasibility and not violation > GAIN * last_violation
+    return not gains or violation <= rounding_at(table, pool, settings, here)

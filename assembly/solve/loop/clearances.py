@@ -1,0 +1,261 @@
+"""Rows of clearances: places of a watch (`proximity/manager/update.py`) as one-sided contacts of a packed scene."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from assembly._address import call_address
+from assembly._kernel import kernel
+from assembly.constraints.program.contact import is_of_solids
+from assembly.constraints.program.records import (
+    ROW,
+    contact_row_at,
+    header_at,
+    row_at,
+)
+from assembly.proximity.features.solid_contact import TRACK, contact_record_at
+from assembly.proximity.manager.motion_bounds import STILL
+from assembly.proximity.manager.state import (
+    IN_PLACE,
+    PAIR_MEMORY,
+    PAIR_RECORD,
+    PLACE_MEMORY,
+    SLICE,
+    lengths_at,
+    manager_at,
+    memory_header_at,
+    memory_places,
+    pair_at,
+    pair_state_at,
+    place_at,
+)
+from assembly.proximity.manager.update import USED
+from assembly.solve.loop.residuals import move
+
+# Where solids are in each other by no more, in sizes of the scene, the next look lists what is to part them.
+SLIGHTLY = 1e-5
+
+
+@kernel(inner=True)
+def clear_guards(table):
+    """No row has a contact: so a packed scene is left, whose solutions have contacts of their own."""
+    header = header_at(table, 0)
+    for k in range(header.first_guard, header.first_guard + header.guards):
+        row = header.row_table + ROW * k
+        fields = row_at(table, row)
+        fields.body_f = -1
+        fields.body_g = -1
+        contact_row_at(table, row).guard_number = 0
+
+
+@kernel(inner=True)
+def forget_guards(table, memory):
+    """Begin again: nothing has been looked at, and no contact has a place."""
+    header = header_at(table, 0)
+    watch = header.watch
+    pairs, places, _events = memory_places(table, watch)
+    for p in range(manager_at(table, watch).pairs):
+        pair_state_at(memory, pairs + PAIR_MEMORY * p).turn[0] = math.nan
+    for k in range(header.guards):
+        place_at(memory, places + PLACE_MEMORY * k).pair = -1.0
+
+
+@kernel(inner=True)
+def place_guards(table, memory, here, y, better_y, free, begins):
+    """Make every row the contact that its place has; multipliers of one that is new are zero.
+
+    Where a solve begins, rows know no contacts yet, and multipliers are those of the places.
+    """
+    header = header_at(table, 0)
+    watch = header.watch
+    places = memory_places(table, watch)[1]
+    for k in range(header.guards):
+        slot = place_at(memory, places + PLACE_MEMORY * k)
+        r = header.first_guard + k
+        contact_record = contact_record_at(here.records, r)
+        row = header.row_table + ROW * r
+        contact = contact_row_at(table, row)
+        fields = row_at(table, row)
+        p = np.int64(slot.pair)
+        number = np.int64(slot.number) if p >= 0 else 0
+        if number == contact.guard_number:
+            continue
+        contact.guard_number = number
+        if not begins:
+            y[r] = 0.0
+            better_y[r] = 0.0
+        free[r] = -1
+        # Nothing is known of it yet.
+        contact_record.fold = 1.0
+        contact_record.slack = 0.0
+        here.residual[r] = 1.0
+        if p < 0:
+            fields.body_f = -1
+            fields.body_g = -1
+            continue
+        pair_record = pair_at(table, manager_at(table, watch).pair_table + PAIR_RECORD * p)
+        fields.body_f = pair_record.body_f
+        fields.body_g = pair_record.body_g
+        in_place = slot.given == 1.0
+        contact.minimum = pair_record.minimum + (IN_PLACE if in_place else 0)
+        contact.surface_f = pair_record.surface_f
+        contact.surface_g = pair_record.surface_g
+        contact.shell_f = pair_record.shell_f
+        contact.shell_g = pair_record.shell_g
+
+
+@kernel(inner=True)
+def look_around(table, pool, memory, point, how):
+    """The watch's look at a point; whether rows changed.
+
+    A long one asks between two slices whether it is to go on. Where what it is for is thrown away, it ends as one that
+    is cut (`solve/loop/deadline.py`), and so do those that come after it; they say that rows changed: nothing is known
+    to hold.
+    """
+    header = header_at(table, 0)
+    state = memory_header_at(memory, 0)
+    watch = header.watch
+    manager = manager_at(table, watch)
+    asks = manager.go_on_address != 0 and manager.clock != 0
+    if asks and state.deadline < 0.0:
+        return True
+    if asks:
+        state.deadline = call_address(manager.clock, ()) + SLICE
+    changed = call_address(header.look_address, (table, pool, watch, memory, point.q, point.tracked, how)) > 0
+    aborted = asks and state.deadline < 0.0
+    if asks and not aborted:
+        state.deadline = math.inf
+    return changed or aborted
+
+
+@kernel(inner=True)
+def look_again(table, pool, memory, point, how, free, scratch):
+    """The watch's look at a point that is evaluated; whether rows changed.
+
+    A look puts contacts on their extrema. Those whose coordinates are unknowns are on their way there: their rows have
+    been evaluated where they are, and they stay. One that is as far from the extremum that it stands for as two
+    contacts are from each other may be on its way to a saddle, and goes there.
+    """
+    header = header_at(table, 0)
+    tracked = point.tracked
+    first = header.first_guard
+    for r in range(first, first + header.guards):
+        if free[r] >= 0:
+            for i in range(TRACK):
+                scratch[r, i] = tracked[r, i]
+    changed = look_around(table, pool, memory, point, how)
+    places = memory_places(table, header.watch)[1]
+    neglect = lengths_at(pool, manager_at(table, header.watch).lengths).neglect
+    for r in range(first, first + header.guards):
+        place = places + PLACE_MEMORY * (r - first)
+        number = np.int64(place_at(memory, place).number) if place_at(memory, place).pair >= 0.0 else 0
+        if free[r] >= 0 and number == contact_row_at(table, header.row_table + ROW * r).guard_number:
+            row = contact_row_at(table, header.row_table + ROW * r)
+            f, g = row.surface_f, row.surface_g
+            if call_address(header.stayed_address, (table, pool, f, g, tracked, scratch, r, neglect)) == 1:
+                for i in range(TRACK):
+                    tracked[r, i] = scratch[r, i]
+            else:
+                changed = True
+    return changed
+
+
+@kernel(inner=True)
+def numbers_of(table, out):
+    """The numbers of the contacts that rows have now."""
+    header = header_at(table, 0)
+    for k in range(header.guards):
+        out[k] = contact_row_at(table, header.row_table + ROW * (header.first_guard + k)).guard_number
+
+
+@kernel(inner=True)
+def go_back(table, memory, numbers):
+    """Keep the contacts that rows had with these numbers; where others came or went, everything is looked at again."""
+    header = header_at(table, 0)
+    watch = header.watch
+    pairs, places, _events = memory_places(table, watch)
+    same = True
+    for k in range(header.guards):
+        number = contact_row_at(table, header.row_table + ROW * (header.first_guard + k)).guard_number
+        if number != numbers[k]:
+            same = False
+            place_at(memory, places + PLACE_MEMORY * k).pair = -1.0
+    if not same:
+        for p in range(manager_at(table, watch).pairs):
+            pair_state_at(memory, pairs + PAIR_MEMORY * p).turn[0] = math.nan
+
+
+@kernel(inner=True)
+def measure(table, pool, memory, first, end, q):
+    """Measure what pairs from first to before `end` used of their allowances. The largest part that is known."""
+    header = header_at(table, 0)
+    watch = header.watch
+    most = call_address(header.parts_address, (table, pool, watch, memory, first, end, q))
+    return pair_state_at(memory, memory_places(table, watch)[0] + PAIR_MEMORY * most).part
+
+
+@kernel(inner=True)
+def allowed_share(table, pool, memory, here, trial, step, share):
+    """How much of a step the watch allows, at most `share`, and whether it is all of that.
+
+    The poses at the end of the share go into the trial point. Of what it would use of allowances there it is then known
+    of which pairs more is known by another look.
+    """
+    move(table, here.q, step, share, trial.q)
+    watch = header_at(table, 0).watch
+    manager = manager_at(table, watch)
+    if measure(table, pool, memory, 0, manager.pairs, trial.q) <= 1.0:
+        return share, True
+    at = memory_places(table, watch)[0]
+    allowed = 1.0
+    for p in range(manager.pairs):
+        # Of every pair by itself: one that is nearly spent, but hardly moves, is not in the way.
+        o = pair_state_at(memory, at + PAIR_MEMORY * p)
+        end = o.part
+        o.cut_short = end * o.allowance
+        begin = end
+        if end > USED:
+            measure(table, pool, memory, p, p + 1, here.q)
+            begin = o.part
+            o.part = end
+        if end > max(begin, 1.0):
+            allowed = min(allowed, max(0.95 - begin, 0.05) / (end - begin))
+        flank = pool[pair_at(table, manager.pair_table + PAIR_RECORD * p).minimum + 1]
+        most = min(flank, lengths_at(pool, manager.lengths).last_reach)
+        if begin <= STILL and o.reach >= min(o.cut_short, most):
+            # It was looked at right here, as far as another look would.
+            o.part = begin
+    return share * allowed, False
+
+
+@kernel(inner=True)
+def is_too_far(table, pool, memory, point):
+    """Whether the poses of a point are farther than the watch allows."""
+    return measure(table, pool, memory, 0, manager_at(table, header_at(table, 0).watch).pairs, point.q) > 1.0
+
+
+@kernel(inner=True)
+def ends_unseen(table, pool, memory, before, after):
+    """Whether a clearance's contact of solids ends along a step that goes farther than it is open.
+
+    What takes its place, where features meet, is not listed yet, and was no nearer: over such a step it could pass
+    through, and be found at the far side, or nowhere.
+    """
+    header = header_at(table, 0)
+    watch = header.watch
+    places = memory_places(table, watch)[1]
+    for k in range(header.guards):
+        r = header.first_guard + k
+        p = np.int64(place_at(memory, places + PLACE_MEMORY * k).pair)
+        if (
+            p >= 0
+            and math.isnan(after.tracked[r, 0])
+            and not math.isnan(before.tracked[r, 0])
+            and is_of_solids(table, r)
+        ):
+            most = max(before.residual[r], SLIGHTLY)
+            if call_address(header.went_address, (table, pool, watch, p, before.q, after.q, most)) == 1:
+                return True
+    return False

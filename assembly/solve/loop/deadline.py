@@ -1,0 +1,92 @@
+"""The time of a tick: when it is spent, and how the next tick goes on with what is not done.
+
+A tick whose budget is spent where its pose does not hold, or where not everything that is near is known yet, leaves
+where it is (`CARRIED`): the tracker returns the last pose that held, and the next tick goes on from there. Each does
+something for good: a step of the loop, or a look at a pair of bodies.
+"""
+
+from __future__ import annotations
+
+import math
+
+from assembly._address import call_address
+from assembly._kernel import kernel
+from assembly.constraints.program.records import header_at
+from assembly.proximity.manager.state import (
+    manager_at,
+    memory_header_at,
+)
+from assembly.solve.loop.settings import results_at, settings_at
+
+# No look begins, and no step from a pose that holds, where so much of a budget is spent: either may take as long as the
+# rest of it.
+HALF = 0.5
+# A tick may end with a look until there were so many of every pair; then a step has to come first.
+LOOKS_ALONE = 4
+
+
+@kernel(inline=True)
+def is_spent(table, settings, begin, part):
+    """Whether so much of a tick's budget is spent."""
+    limits = settings_at(settings, 0)
+    return limits.budget > 0.0 and call_address(header_at(table, 0).clock_address, ()) - begin > part * limits.budget
+
+
+@kernel(inline=True)
+def is_cut(table, memory):
+    """Whether a look left out pairs that were due: then this call ends."""
+    return header_at(table, 0).watch >= 0 and memory_header_at(memory, 0).deadline < 0.0
+
+
+@kernel(inner=True)
+def begin_tick(table, settings, results, memory):
+    """When this call began; how many steps it goes on from; how many looks there were before it.
+
+    These are infinitely many where there is no budget, or a tick has to make a step: then looks take their time. Those
+    of solves ask whether they are to go on (`solve/loop/clearances.py`).
+    """
+    header = header_at(table, 0)
+    state = memory_header_at(memory, 0)
+    result = results_at(results, 0)
+    limits = settings_at(settings, 0)
+    manager = manager_at(table, header.watch)
+    begin = call_address(header.clock_address, ()) if limits.budget > 0.0 else 0
+    is_new = result.carried == 0.0
+    done = 0 if is_new else int(result.carried) - 1
+    result.carried = 0.0
+    looks = math.inf
+    if header.watch >= 0:
+        state.deadline = math.inf
+        # Looks of ticks are short, and with a budget end by it.
+        asks = limits.tick == 0.0
+        manager.go_on_address = int(limits.ask_address) if asks else 0
+        if asks:
+            manager.clock = header.clock_address
+        if is_new:
+            state.earlier = state.looks
+        if limits.carries == 1.0 and state.looks - state.earlier < LOOKS_ALONE * manager.pairs:
+            looks = state.looks
+            state.deadline = begin + HALF * limits.budget
+    return begin, done, looks
+
+
+@kernel(inner=True)
+def may_end(table, settings, memory, clock, iteration, part):
+    """Whether a tick may leave the rest to the next one, and so much of its budget is spent.
+
+    What it is to go on from after a step is as good as at its begin; without one, there has to be a look.
+    """
+    begin, looks = clock
+    if settings_at(settings, 0).carries == 0.0:
+        return False
+    if iteration == 0 and not (looks < math.inf and memory_header_at(memory, 0).looks > looks):
+        return False
+    return is_cut(table, memory) or is_spent(table, settings, begin, part)
+
+
+@kernel(inline=True)
+def set_deadline(table, settings, memory, begin):
+    """After a step looks may end early."""
+    limits = settings_at(settings, 0)
+    if limits.carries == 1.0 and header_at(table, 0).watch >= 0 and not is_cut(table, memory):
+        memory_header_at(memory, 0).deadline = begin + HALF * limits.budget

@@ -1,0 +1,391 @@
+"""Dexterity: what the tip of a mechanism can do with its inputs, as a term of the objective with an exact gradient.
+
+Rows A of joints and contacts (drives and limits left out) and rows B of the inputs: rates V of all unknowns, a column
+an input, make B V = 1 and change the rows as little as can be (`solve/loop/rates.py`). J = T V is the Jacobian of the
+tip, whose
+velocity T v is. Of J a measure w is taken (`solve/linear_algebra/singular_values.py`), with W = dw / dJ. With
+
+    A^T A V + B^T Z = 0,   B V = 1,   A^T A P + B^T Y = T^T,   B P = 0,
+
+where J = Y^T as well, p = P w_i and y = Y w_i for column i of W,
+
+    dw = sum_i  w_i . (dT v_i) - (A p) . (dA v_i) - y . (dB v_i) - (A v_i) . (dA p) - z_i . (dB p).
+
+The last two vanish where the rows hold. dA v takes the second derivatives H of the rows along twists, as
+X_b X_a = H_ab + (gradient of rotation) . (a x b) / 2; of the second part only T^T w_i is left in the sum.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import namedtuple
+
+import numpy as np
+
+from assembly._kernel import kernel
+from assembly._record import place_of, record_dtype, record_view, size_of
+from assembly.constraints.program.evaluate import evaluate
+from assembly.constraints.program.objective_terms import (
+    DEXTERITY,
+    TERM,
+    load,
+    term_at,
+)
+from assembly.constraints.program.primitives import add_coordinate_hessian, coordinate
+from assembly.constraints.program.records import (
+    BODY_COORDINATE,
+    ROW,
+    Iterate,
+    body_coordinate_at,
+    header_at,
+    row_at,
+)
+from assembly.constraints.program.row_terms import add_row_terms
+from assembly.geometry.vec import add, cross, matvec, scale
+from assembly.kinematics.motion import rotation
+from assembly.solve.linear_algebra.singular_values import measure_jacobian
+from assembly.solve.loop.predict import carry
+from assembly.solve.loop.rates import rate_system, settle
+from assembly.solve.loop.residuals import move, slot, times
+
+# A term in the table; behind it a `BODY_COORDINATE` an input.
+DEXTERITY_TERM = record_dtype(
+    "i8",
+    measure=1,  # `singular_values.py`
+    task=1,  # POSITION, ROTATION or POSE
+    inputs=1,  # how many
+)
+dexterity_at = record_view(DEXTERITY_TERM)
+INPUT_LIST, INPUT = size_of(DEXTERITY_TERM), size_of(BODY_COORDINATE)
+POSITION, ROTATION, POSE = 0, 1, 2
+# Its parameters in the pool; behind them the factor of every input's unit.
+DEXTERITY_WEIGHTS = record_dtype(
+    "f8",
+    weight=1,  # of the term
+    arm=3,  # the tip, in the axes of its body
+    linear=1,  # factor of velocities
+    angular=1,  # factor of angular velocities
+    direction=6,  # along which some measures look
+)
+dexterity_weights_at = record_view(DEXTERITY_WEIGHTS)
+ARM = place_of(DEXTERITY_WEIGHTS, "arm")
+DIRECTION = place_of(DEXTERITY_WEIGHTS, "direction")
+FACTORS = size_of(DEXTERITY_WEIGHTS)
+# Outcomes of `tip_map`.
+DETERMINED, DEPENDENT, OPEN = 0, 1, 2
+# The outcome, the tip's Jacobian, the rows that hold the mechanism, rates of inputs and what the tip needs (vectors in
+# rows): the heading's V, Z and A V; P, Y and A P.
+TipMap = namedtuple("TipMap", "outcome jacobian used inputs adjoint")
+InputRates = namedtuple("InputRates", "v z changes")
+Adjoint = namedtuple("Adjoint", "p y loads")
+# What rows may change by unit rates of the inputs, and how much of the tip's motion may be left open.
+UNDETERMINED = 1e-6
+# Rows that change by less than this are as good as kept.
+KEPT = 1e-12
+# Step of the differences of the gradient that make the Hessian, which only speeds the loop.
+STEP = 1e-6
+
+
+@kernel(inner=True)
+def input_row(table, at, records, tracked, b, r):
+    """Row r of b: the gradient of an input's coordinate."""
+    asked = body_coordinate_at(table, at)
+    near = tracked[asked.angle, 0] if asked.angle >= 0 else 0.0
+    found = coordinate(asked.kind, asked.component, records, header_at(table, 0).contacts + asked.joint, near)
+    n, h = found.n, found.h
+    for side in range(2):
+        s = slot(table, asked.body_f if side == 0 else asked.body_g)
+        if s < 0:
+            continue
+        sign = -1.0 if side == 0 else 1.0
+        turn = cross(found.arm_f if side == 0 else found.arm_g, n)
+        for i in range(3):
+            b[r, s + i] += sign * n[i]
+            b[r, s + 3 + i] += sign * (turn[i] + h[i])
+
+
+@kernel(inner=True)
+def task_rows(task):
+    return 6 if task == POSE else 3
+
+
+@kernel(inner=True)
+def tip_velocity(pool, o, task, p, v, s, out, column):
+    """Column of out: the tip's velocity for rates v; s is the place of its body's twist, p its arm."""
+    weights = dexterity_weights_at(pool, o)
+    for i in range(task_rows(task)):
+        out[i, column] = 0.0
+    if s < 0:
+        return
+    w = (v[s + 3], v[s + 4], v[s + 5])
+    swept = cross(w, p)
+    if task != ROTATION:
+        for i in range(3):
+            out[i, column] = weights.linear * (v[s + i] + swept[i])
+    if task != POSITION:
+        first = 0 if task == ROTATION else 3
+        for i in range(3):
+            out[first + i, column] = weights.angular * w[i]
+
+
+@kernel(inner=True)
+def add_tip_force(pool, o, task, p, w, column, s, out):
+    """out += T^T w, with w a column over the task."""
+    weights = dexterity_weights_at(pool, o)
+    if s < 0:
+        return
+    if task != ROTATION:
+        f = (weights.linear * w[0, column], weights.linear * w[1, column], weights.linear * w[2, column])
+        turn = cross(p, f)
+        for i in range(3):
+            out[s + i] += f[i]
+            out[s + 3 + i] += turn[i]
+    if task != POSITION:
+        first = 0 if task == ROTATION else 3
+        for i in range(3):
+            out[s + 3 + i] += weights.angular * w[first + i, column]
+
+
+@kernel(inner=True)
+def add_tip_bend(pool, o, task, p, w, column, v, s, gradient):
+    """gradient += w . (dT v), less half of what turns do not commute by."""
+    weights = dexterity_weights_at(pool, o)
+    f = (0.0, 0.0, 0.0)
+    moment = (0.0, 0.0, 0.0)
+    if task != ROTATION:
+        f = scale(weights.linear, (w[0, column], w[1, column], w[2, column]))
+    if task != POSITION:
+        first = 0 if task == ROTATION else 3
+        moment = scale(weights.angular, (w[first, column], w[first + 1, column], w[first + 2, column]))
+    spin = (v[s + 3], v[s + 4], v[s + 5])
+    bent = cross(p, cross(f, spin))
+    turn = cross(add(moment, cross(p, f)), spin)
+    for k in range(3):
+        gradient[s + 3 + k] += bent[k] - 0.5 * turn[k]
+
+
+@kernel(inner=True, allocates=True)
+def used_rows(table, rows):
+    """The rows that hold the mechanism together: neither drives nor one-sided; with those of free pairs."""
+    header = header_at(table, 0)
+    used = np.empty(rows, np.int64)
+    count = 0
+    for r in range(rows):
+        row = row_at(table, header.row_table + ROW * r)
+        if r >= header.rows or (row.one_sided == 0 and row.drive == 0):
+            used[count] = r
+            count += 1
+    return used[:count]
+
+
+@kernel(inner=True, allocates=True)
+def row_rates(bases, jacobian, used, v):
+    """A v for every row of v."""
+    out = np.empty((v.shape[0], used.size))
+    for i in range(v.shape[0]):
+        for l in range(used.size):
+            out[i, l] = times(bases, jacobian, used[l], v[i])
+    return out
+
+
+@kernel(inner=True)
+def largest(values):
+    """The largest absolute value; infinite if one is no number."""
+    worst = 0.0
+    for value in values.flat:
+        if not abs(value) <= worst:
+            worst = abs(value) if abs(value) > worst else math.inf
+    return worst
+
+
+@kernel(inner=True, allocates=True)
+def tip_map(table, pool, term, bases, rows, n, point, order):
+    """The tip's Jacobian in the user's units, at a point whose rows are evaluated.
+
+    What the tip needs, and so whether its motion is open, is found from order 1 on.
+    """
+    term_record = term_at(table, term)
+    q, tracked, records, residual, jacobian = point.q, point.tracked, point.records, point.residual, point.jacobian
+    record = term_record.tape
+    dexterity_record = dexterity_at(table, record)
+    o = term_record.parameters
+    factors = o + FACTORS
+    body = term_record.body
+    k = dexterity_record.inputs
+    task = dexterity_record.task
+    m = task_rows(task)
+    s = slot(table, body)
+    arm = matvec(rotation(q, body), load(pool, o + ARM))
+    used = used_rows(table, rows)
+    b = np.zeros((k, n))
+    for i in range(k):
+        input_row(table, record + INPUT_LIST + INPUT * i, records, tracked, b, i)
+    tip = np.zeros((m, k))
+    v = np.zeros((k, n))
+    z = np.zeros((k, k))
+    p = np.zeros((m, n))
+    y = np.zeros((m, k))
+    changes = np.zeros((k, used.size))
+    exists, system = rate_system(bases, jacobian, used, b)
+    outcome = DETERMINED if exists else DEPENDENT
+    if exists:
+        # Where rows do not hold, redundant ones contradict each other and idle motions move the tip a little: singular
+        # values are off by up to the root of the residuals.
+        leeway = UNDETERMINED
+        for l in range(used.size):
+            leeway = max(leeway, 10.0 * math.sqrt(abs(residual[used[l]])))
+        g = np.zeros(n)
+        h = np.zeros(k)
+        missed = 0.0
+        for i in range(k):
+            h[i] = 1.0
+            missed = max(missed, settle(system, bases, jacobian, used, b, g, h, v[i], z[i]))
+            h[i] = 0.0
+            tip_velocity(pool, o, task, arm, v[i], s, tip, i)
+            for r in range(m):
+                tip[r, i] *= pool[factors + i]
+        unit = np.zeros((m, 1))
+        for r in range(m if order > 0 else 0):
+            for i in range(n):
+                g[i] = 0.0
+            unit[r, 0] = 1.0
+            add_tip_force(pool, o, task, arm, unit, 0, s, g)
+            unit[r, 0] = 0.0
+            left = settle(system, bases, jacobian, used, b, g, h, p[r], y[r])
+            if not left <= leeway * largest(g):
+                outcome = OPEN
+        changes = row_rates(bases, jacobian, used, v)
+        if not max(missed, largest(changes)) <= leeway:
+            outcome = DEPENDENT
+    return TipMap(outcome, tip, used, InputRates(v, z, changes), Adjoint(p, y, row_rates(bases, jacobian, used, p)))
+
+
+@kernel(inner=True)
+def bend(table, pool, record, shape, loose, room, point, forces, weights, inputs, rates, hessian, gradient):
+    """gradient -= H v, H the second derivative of forces . rows + inputs . (values of the inputs).
+
+    `weights` are no weights of rows: zeros.
+    """
+    n = rates.size
+    for r in range(n):
+        for c in range(r, n):
+            hessian[r, c] = 0.0
+    add_row_terms(table, pool, loose, room, shape, point, forces, weights, hessian)
+    for j in range(inputs.size):
+        asked = body_coordinate_at(table, record + INPUT_LIST + INPUT * j)
+        add_coordinate_hessian(
+            asked.kind,
+            asked.component,
+            point.records,
+            header_at(table, 0).contacts + asked.joint,
+            inputs[j],
+            hessian,
+            slot(table, asked.body_f),
+            slot(table, asked.body_g),
+        )
+    for r in range(n):
+        for c in range(r, n):
+            gradient[r] -= hessian[r, c] * rates[c]
+            if c > r:
+                gradient[c] -= hessian[r, c] * rates[r]
+
+
+@kernel(inner=True, allocates=True)
+def dexterity(table, pool, term, shape, rows, loose, room, point, order, gradient):
+    """Value of the term at a point whose rows are evaluated; from order 1 on its gradient is added."""
+    term_record = term_at(table, term)
+    bases = shape.bases
+    n = gradient.size
+    record = term_record.tape
+    dexterity_record = dexterity_at(table, record)
+    o = term_record.parameters
+    factors = o + FACTORS
+    task = dexterity_record.task
+    weight = dexterity_weights_at(pool, o).weight
+    tip = tip_map(table, pool, term, bases, rows, n, point, order)
+    jacobian, used = tip.jacobian, tip.used
+    v, z, changes = tip.inputs
+    p, y, loads = tip.adjoint
+    if tip.outcome != DETERMINED:
+        return math.inf
+    slopes = np.empty(jacobian.shape)
+    value = measure_jacobian(dexterity_record.measure, pool, o + DIRECTION, jacobian, slopes)
+    if not math.isfinite(value):
+        return math.inf
+    if order == 0:
+        return weight * value
+    body = term_record.body
+    s = slot(table, body)
+    arm = matvec(rotation(point.q, body), load(pool, o + ARM))
+    m, k = jacobian.shape
+    # Room for one combination at a time: p, y, A p as forces on all rows.
+    pull = np.empty(n)
+    turn = np.empty(k)
+    forces = np.zeros(rows)
+    none = np.zeros(rows)
+    hessian = np.empty((n, n))
+    for i in range(k):
+        for c in range(n):
+            pull[c] = 0.0
+        for j in range(k):
+            turn[j] = 0.0
+        for l in range(used.size):
+            forces[used[l]] = 0.0
+        for r in range(m):
+            w = slopes[r, i] * weight * pool[factors + i]
+            slopes[r, i] = w
+            for c in range(n):
+                pull[c] += w * p[r, c]
+            for j in range(k):
+                turn[j] += w * y[r, j]
+            for l in range(used.size):
+                forces[used[l]] += w * loads[r, l]
+        bend(table, pool, record, shape, loose, room, point, forces, none, turn, v[i], hessian, gradient)
+        if largest(changes[i]) > KEPT:
+            for l in range(used.size):
+                forces[used[l]] = changes[i, l]
+            bend(table, pool, record, shape, loose, room, point, forces, none, z[i], pull, hessian, gradient)
+        if s >= 0:
+            add_tip_bend(pool, o, task, arm, slopes, i, v[i], s, gradient)
+    return weight * value
+
+
+@kernel(inner=True, allocates=True)
+def add_dexterities(table, pool, shape, rows, loose, room, here, order, gradient, hessian):
+    """Values of all terms of this kind; from order 1 on gradients, and Hessians by differences of these."""
+    header = header_at(table, 0)
+    value = 0.0
+    n = gradient.size
+    for t in range(header.terms):
+        term = header.term_table + TERM * t
+        if term_at(table, term).kind != DEXTERITY:
+            continue
+        slope = np.zeros(n)
+        value += dexterity(table, pool, term, shape, rows, loose, room, here, order, slope)
+        if order == 0 or not math.isfinite(value):
+            continue
+        for i in range(n):
+            gradient[i] += slope[i]
+        beside = Iterate(
+            here.q.copy(),
+            here.tracked.copy(),
+            np.empty(here.records.shape),
+            np.empty(here.residual.size),
+            np.empty(here.jacobian.shape),
+        )
+        step = np.zeros(n)
+        other = np.empty(n)
+        for j in range(n):
+            for i in range(n):
+                other[i] = 0.0
+            step[j] = STEP
+            move(table, here.q, step, 1.0, beside.q)
+            carry(table, pool, shape.bases, loose, here, beside, step, 1.0)
+            step[j] = 0.0
+            if evaluate(table, pool, loose.guess, math.inf, loose, room, beside) >= 0:
+                continue
+            if math.isfinite(dexterity(table, pool, term, shape, rows, loose, room, beside, 1, other)):
+                for i in range(n):
+                    bend = 0.5 * (other[i] - slope[i]) / STEP
+                    hessian[min(i, j), max(i, j)] += 2.0 * bend if i == j else bend
+    return value

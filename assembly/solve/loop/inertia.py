@@ -1,0 +1,110 @@
+"""What factorizations tell of second order: whether no curvature is negative along motions that keep the rows.
+
+With H the Hessian of the Lagrangian, J the rows that push and Z a basis of the motions that keep them, Z^T H Z has no
+eigenvalue below -d if H + J^T J / mu + d I has a Cholesky factor, whatever mu is (Debreu, Finsler). The last step of a
+solve has made one. Rows that touch without pushing count for nothing: in the factor they would hide a half space.
+"""
+
+from __future__ import annotations
+
+from assembly._kernel import kernel
+from assembly.constraints.program.records import header_at
+from assembly.constraints.program.row_terms import add_row_terms
+from assembly.solve.linear_algebra.factorize import factorize_shifted
+from assembly.solve.loop.direction import LEAST_SHIFT
+from assembly.solve.loop.line_search import goal
+from assembly.solve.loop.multipliers import NEAR, WEAK, strongest
+from assembly.solve.loop.settings import (
+    SOLVED,
+    UNSURE,
+    results_at,
+    settings_at,
+)
+
+# A factorization tells of the end with a shift up to this, at a point where the dual residual was no more than that.
+SMALL_SHIFT, NEAR_END = 1e-7, 1e-3
+# One that needed more than this near an end tells of negative curvature, any other one of nothing.
+CLEAR_SHIFT, DOWNWARD, UNKNOWN = 1e-3, -2.0, -1.0
+# A one-sided row with a multiplier below this does not push. Nor do multipliers bend anything that are all below it.
+IDLE = 1e-7
+
+
+@kernel(inner=True)
+def pushing_sum(rows, one_sided, weights, least):
+    """A sum that tells which one-sided rows have a weight above the least: of the squares of their places."""
+    total = 0.0
+    for r in range(rows):
+        if one_sided[r] == 1 and weights[r] > least:
+            total += (r + 1.0) * (r + 1.0)
+    return total
+
+
+@kernel(inner=True)
+def note_factor(settings, results, iteration, shift, dual, restoring, is_fresh, rows, one_sided, active, y):
+    """Keep what the factorization of a step told: its shift, for the first step of a tick, and whether it is convex.
+
+    One that is leaves one and a sum that tells which one-sided rows it had; one that tells of negative curvature is
+    DOWNWARD: near an end a step tries a shift no larger than the dual residual first.
+    """
+    result = results_at(results, 0)
+    if iteration == 0:
+        result.first_shift = shift
+    if not is_fresh or settings_at(settings, 0).tick == 1.0:
+        return
+    force = strongest(y, rows)
+    # Weak multipliers are left out of the matrix (`multipliers.curve_rows`).
+    bends = force >= WEAK or force <= IDLE
+    if shift <= SMALL_SHIFT and dual <= NEAR_END and bends and not restoring:
+        result.curved = 1.0 + pushing_sum(rows, one_sided, active, 0.0)
+    else:
+        result.curved = DOWNWARD if shift >= CLEAR_SHIFT > dual and not restoring else UNKNOWN
+
+
+@kernel(inner=True)
+def told_convex(results, rows, one_sided, residual, y, scratch):
+    """Whether the last factorization had the rows that push at the end, and none that only touches."""
+    result = results_at(results, 0)
+    if not result.curved > 0.0:
+        return False
+    for r in range(rows):
+        scratch[r] = -y[r]
+        if one_sided[r] == 1 and abs(residual[r]) <= NEAR and y[r] >= -IDLE:
+            return False
+    return result.curved == 1.0 + pushing_sum(rows, one_sided, scratch, IDLE)
+
+
+@kernel(inner=True)
+def is_convex(program, tips, here, rows, y, active, system, mu, shift):
+    """Whether the matrix of the rows that push, shifted by so much, has a factor at this point."""
+    table, pool, shape, loose, room = program.table, program.pool, program.structure, program.lifted, program.tapes
+    gradient, lagrangian, matrix = system.gradient, system.hessian, system.factor
+    goal(table, pool, shape, rows, loose, room, tips, here, 1, gradient, lagrangian)
+    for r in range(rows):
+        active[r] = 0.0 if shape.one_sided[r] == 1 and y[r] >= -IDLE else 1.0 / mu
+    add_row_terms(table, pool, loose, room, shape, here, y, active, lagrangian)
+    return factorize_shifted(lagrangian, gradient.size, shape.sparsity, shift, matrix) == shift
+
+
+@kernel(inline=True)
+def test_end(program, settings, results, status, tips, here, rows, y, active, forces, system):
+    """The status of a solve that is SOLVED: UNSURE where no factorization tells that no curvature is negative.
+
+    Of a tick that is asked for it the result says whether its end is a minimum. A first solve that ends where it began
+    is looked at: what it is may be decided by higher orders. Scenes without an objective are left as they are.
+    """
+    result = results_at(results, 0)
+    limits = settings_at(settings, 0)
+    table, shape = program.table, program.structure
+    tick = limits.tick == 1.0
+    if not tick and (status != SOLVED or header_at(table, 0).implicit == 1):
+        return status
+    mu = limits.penalty_floor
+    if not tick:
+        if result.curved == DOWNWARD or (result.curved == 0.0 and limits.penalty > mu):
+            return UNSURE
+        if told_convex(results, rows, shape.one_sided, here.residual, y, forces):
+            return status
+    shift = 0.0 if tick else LEAST_SHIFT
+    convex = is_convex(program, tips, here, rows, y, active, system, mu, shift)
+    result.curved = 1.0 if convex else -1.0
+    return status if tick or convex else UNSURE

@@ -1,0 +1,237 @@
+"""Scattered bodies put together one after the other, so that the loop starts near where joints hold.
+
+Bodies are taken in an order (`constraints/packing/numbering.py`) in which each has joints with bodies that stand
+already. Each is moved by
+Levenberg and Marquardt's method until the rows it shares with those are as small as they get: exactly zero where the
+joints make a tree. Rows that close a loop are left to the loop of the solve. Where a driven angle stays far from its
+value, because it would have to go around the other way, the body is put where one of its joints holds, and then where
+all are as small as they get.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import namedtuple
+
+import numpy as np
+
+from assembly._kernel import kernel
+from assembly.constraints.program.evaluate import joint_row
+from assembly.constraints.program.primitives import place_frames
+from assembly.constraints.program.records import (
+    EXTRA_COLUMN,
+    JOINT_RECORD,
+    JOINT_ROW,
+    ROW,
+    coordinate_at,
+    header_at,
+    joint_at,
+    joint_row_at,
+    row_at,
+)
+from assembly.kinematics.motion import retract
+from assembly.solve.linear_algebra.factorize import factorize, substitute
+
+# Bodies are gathered where a start violates a row of a joint by more than this.
+SCATTERED = 0.5
+STEPS = 50
+# Half the sum of squares of a body's rows that is as good as zero.
+ENOUGH = 1e-26
+# The damping at first, and where no step is found any more.
+DAMPING, STUCK = 1e-4, 1e6
+# A place where rows are smaller by less than this is no better one.
+LOWER = 0.9
+# What the fit of one body works in: J^T J, the same with damping, how far its rows reach, a row, J^T c, the step.
+FitRoom = namedtuple("FitRoom", "matrix damped last row slope step")
+
+
+@kernel(inner=True)
+def scattered(table, residual, one_sided):
+    """Whether a row of a joint is far from holding."""
+    header = header_at(table, 0)
+    for r in range(header.contacts, header.rows):
+        if row_at(table, header.row_table + ROW * r).kind == JOINT_ROW:
+            c = min(residual[r], 0.0) if one_sided[r] == 1 else residual[r]
+            if abs(c) > SCATTERED:
+                return True
+    return False
+
+
+@kernel(inner=True)
+def place_joint(table, pool, k, q, records):
+    """The world frames of joint k."""
+    header = header_at(table, 0)
+    joint = joint_at(table, header.joint_table + JOINT_RECORD * k)
+    place_frames(pool, joint.frames, q, joint.body_f, joint.body_g, records, header.contacts + k)
+
+
+@kernel(inline=True)
+def is_of(table, row, joint):
+    """Whether a row is one of a joint alone; of any where `joint` is negative."""
+    joint_there = joint_row_at(table, row)
+    return joint < 0 or (joint_there.joint == joint and joint_there.second < 0)
+
+
+@kernel(inner=True)
+def body_rows(table, pool, first, count, joint, point):
+    """Evaluate rows listed in the table, of a joint or of all (-1); half the sum of squares of what does not hold."""
+    q, tracked, records, residual, jacobian = point.q, point.tracked, point.records, point.residual, point.jacobian
+    cost = 0.0
+    for l in range(first, first + count):
+        r = table[l]
+        row = header_at(table, 0).row_table + ROW * r
+        joint_there = joint_row_at(table, row)
+        if not is_of(table, row, joint):
+            continue
+        second = joint_there.second
+        place_joint(table, pool, joint_there.joint, q, records)
+        if second >= 0:
+            place_joint(table, pool, coordinate_at(table, second).joint, q, records)
+        joint_row(table, pool, r, tracked, tracked, records, residual, jacobian)
+        if row_at(table, row).one_sided == 0 or residual[r] < 0.0:
+            cost += 0.5 * residual[r] * residual[r]
+    return cost
+
+
+@kernel(inner=True)
+def follow_drives(table, pool, first, count, tracked):
+    """Driven angles of rows listed in the table are looked for near their values again."""
+    for l in range(first, first + count):
+        row = header_at(table, 0).row_table + ROW * table[l]
+        joint = joint_row_at(table, row)
+        if row_at(table, row).one_sided == 0 and joint.second < 0 and joint.angle >= 0:
+            o = joint.parameters
+            tracked[joint.angle, 0] = pool[o + 2] / pool[o]
+
+
+@kernel(inner=True)
+def body_row(bases, jacobian, r, s, out):
+    """Row r of the Jacobian in the one body whose twist stands at s."""
+    for i in range(6):
+        out[i] = 0.0
+    for b in range(bases.shape[1]):
+        if bases[r, b] == s and b != 2:
+            column = 6 * b if b < 2 else EXTRA_COLUMN + 6 * (b - 3)
+            for i in range(6):
+                out[i] += jacobian[r, column + i]
+
+
+@kernel(inner=True)
+def is_half_around(table, residual, first, count):
+    """Whether an angle of rows listed in the table is far from where it is driven to."""
+    for l in range(first, first + count):
+        row = header_at(table, 0).row_table + ROW * table[l]
+        joint = joint_row_at(table, row)
+        driven = row_at(table, row).one_sided == 0 and joint.second < 0 and joint.angle >= 0
+        if driven and abs(residual[table[l]]) > SCATTERED:
+            return True
+    return False
+
+
+@kernel(inner=True)
+def normal_equations(table, bases, first, count, joint, s, point, room):
+    """J^T J and J^T c of rows that do not hold, in the twist that stands at s."""
+    residual, jacobian = point.residual, point.jacobian
+    matrix, row, slope = room.matrix, room.row, room.slope
+    for i in range(6):
+        slope[i] = 0.0
+        for j in range(i, 6):
+            matrix[i, j] = 0.0
+    for l in range(first, first + count):
+        r = table[l]
+        at = header_at(table, 0).row_table + ROW * r
+        if not is_of(table, at, joint) or (row_at(table, at).one_sided == 1 and residual[r] >= 0.0):
+            continue
+        body_row(bases, jacobian, r, s, row)
+        for i in range(6):
+            slope[i] += row[i] * residual[r]
+            for j in range(i, 6):
+                matrix[i, j] += row[i] * row[j]
+
+
+@kernel(inner=True)
+def fit_body(table, pool, bases, body, first, count, joint, s, point, room):
+    """Move a body until rows listed in the table, of a joint or of all (-1), are as small as they get.
+
+    Returns half the sum of squares of those that do not hold.
+    """
+    q = point.q
+    matrix, damped, last, slope, step = room.matrix, room.damped, room.last, room.slope, room.step
+    damping = DAMPING
+    cost = body_rows(table, pool, first, count, joint, point)
+    for _step in range(STEPS):
+        if cost <= ENOUGH or damping > STUCK:
+            break
+        normal_equations(table, bases, first, count, joint, s, point, room)
+        before = pose_of(q, body)
+        while damping <= STUCK:
+            for i in range(6):
+                step[i] = -slope[i]
+                for j in range(i, 6):
+                    damped[i, j] = matrix[i, j]
+                damped[i, i] += damping
+            if factorize(damped, 6, last):
+                substitute(damped, 6, last, step)
+                turn = math.sqrt(step[3] * step[3] + step[4] * step[4] + step[5] * step[5])
+                cut = 1.0 if turn <= 1.0 else 1.0 / turn
+                for i in range(6):
+                    step[i] *= cut
+                retract(q, body, (step[0], step[1], step[2]), (step[3], step[4], step[5]), q)
+                there = body_rows(table, pool, first, count, joint, point)
+                if there < cost:
+                    cost = there
+                    damping = max(0.1 * damping, 1e-12)
+                    break
+            put_pose(q, body, before)
+            damping *= 10.0
+    return body_rows(table, pool, first, count, joint, point)
+
+
+@kernel(inline=True)
+def pose_of(q, body):
+    return (q[body, 0], q[body, 1], q[body, 2], q[body, 3], q[body, 4], q[body, 5], q[body, 6])
+
+
+@kernel(inline=True)
+def put_pose(q, body, pose):
+    for k in range(7):
+        q[body, k] = pose[k]
+
+
+@kernel(inner=True, allocates=True)
+def gather(table, pool, bases, slots, point):
+    """Move the bodies of the point one by one."""
+    header = header_at(table, 0)
+    q, tracked, residual = point.q, point.tracked, point.residual
+    room = FitRoom(np.empty((6, 6)), np.empty((6, 6)), np.full(6, 5), np.empty(6), np.empty(6), np.empty(6))
+    o = header.gather_table + 1
+    for _entry in range(table[header.gather_table]):
+        body = table[o]
+        count = table[o + 1]
+        first = o + 2
+        o = first + count
+        s = 6 * table[slots + body]
+        start = pose_of(q, body)
+        cost = fit_body(table, pool, bases, body, first, count, -1, s, point, room)
+        if cost <= ENOUGH or not is_half_around(table, residual, first, count):
+            continue
+        best = pose_of(q, body)
+        tried = -1
+        for l in range(first, first + count):
+            joint = joint_row_at(table, header.row_table + ROW * table[l]).joint
+            if cost <= ENOUGH:
+                break
+            if joint == tried:
+                continue
+            tried = joint
+            put_pose(q, body, start)
+            follow_drives(table, pool, first, count, tracked)
+            fit_body(table, pool, bases, body, first, count, joint, s, point, room)
+            follow_drives(table, pool, first, count, tracked)
+            there = fit_body(table, pool, bases, body, first, count, -1, s, point, room)
+            if there < LOWER * cost:
+                cost = there
+                best = pose_of(q, body)
+        put_pose(q, body, best)
+        follow_drives(table, pool, first, count, tracked)
+        body_rows(table, pool, first, count, -1, point)

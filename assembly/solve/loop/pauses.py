@@ -1,0 +1,40 @@
+"""When the loop asks whether it is to go on (`interruption.py`): after 50 ms, or after the step that took longer."""
+
+from __future__ import annotations
+
+from assembly._address import call_address
+from assembly._kernel import kernel
+from assembly.constraints.program.records import header_at, pool_header_at
+from assembly.proximity.manager.state import GOES_ON, SLICE, manager_at
+from assembly.solve.loop.settings import results_at, settings_at
+
+# Steps of which a short solve has no more: it never looks at the clock, but in a large scene, where a step takes long.
+# A scene with more pairs of bodies to look at is large.
+SHORT, MANY_PAIRS = 4, 256
+
+
+@kernel(inline=True)
+def is_large(table):
+    """Whether a step may take long: of many bodies, or of a look at many pairs of them."""
+    header = header_at(table, 0)
+    return header.block_record != 0 or (header.watch >= 0 and manager_at(table, header.watch).pairs > MANY_PAIRS)
+
+
+@kernel(inline=True)
+def pause(table, pool, settings, results, asked, iteration, value, violation):
+    """The time of the last question, or of the first look at the clock [ns]; and whether the solve is to end."""
+    header = header_at(table, 0)
+    result = results_at(results, 0)
+    limits = settings_at(settings, 0)
+    if limits.ask_address == 0.0 or (iteration < SHORT and not is_large(table)):
+        return asked, False
+    now = call_address(header.clock_address, ()) if header.clock_address != 0 else asked + SLICE
+    if asked == 0 or now - asked < SLICE:
+        return now if asked == 0 else asked, False
+    result.count, result.objective, result.violation = (
+        float(iteration),
+        value,
+        violation * pool_header_at(pool, 0).scale,
+    )
+    ends = call_address(int(limits.ask_address), ()) != GOES_ON
+    return call_address(header.clock_address, ()) if header.clock_address != 0 else now, ends

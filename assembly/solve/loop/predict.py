@@ -1,0 +1,111 @@
+"""Contacts along a step: where their pairs are expected at its end, and which rows stay open for certain."""
+
+from __future__ import annotations
+
+import math
+
+from assembly._kernel import kernel
+from assembly.constraints.program.contact import copy_tracked, is_guard, predict_pair, surface_of
+from assembly.constraints.program.records import (
+    FREE_COLUMN,
+    ROW,
+    contact_row_at,
+    header_at,
+    row_at,
+)
+from assembly.geometry.splines.domain import into_domain
+from assembly.proximity.extrema.rates import derivatives_at
+from assembly.proximity.features.solid_contact import (
+    CONTACT_RECORD,
+    contact_record_at,
+    tracked_at,
+)
+from assembly.solve.loop.residuals import times
+
+
+@kernel(inline=True)
+def longest_way(d, at, alpha, far):
+    """How far a body's points go along alpha d, which are not farther than `far` from its origin."""
+    if at < 0:
+        return 0.0
+    shift = math.sqrt(d[at] * d[at] + d[at + 1] * d[at + 1] + d[at + 2] * d[at + 2])
+    turn = math.sqrt(d[at + 3] * d[at + 3] + d[at + 4] * d[at + 4] + d[at + 5] * d[at + 5])
+    return alpha * (shift + far * turn)
+
+
+@kernel(inner=True)
+def stays_open(table, pool, bases, k, here, trial, d, alpha):
+    """Whether row k, of a clearance, is open all along alpha d for certain; if so, what is known of it goes on.
+
+    No gap changes by more than points of the two bodies go, those of each seen from where they were.
+    """
+    left = contact_record_at(here.records, k).slack
+    if not left > 0.0 or bases[k, 2] >= 0:
+        return False
+    minimum = contact_row_at(table, header_at(table, 0).row_table + ROW * k).minimum
+    left -= longest_way(d, bases[k, 0], alpha, pool[minimum + 4])
+    left -= longest_way(d, bases[k, 1], alpha, pool[minimum + 5])
+    if not left > 0.0:
+        return False
+    for i in range(CONTACT_RECORD):
+        trial.records[k, i] = here.records[k, i]
+    for i in range(FREE_COLUMN):
+        trial.jacobian[k, i] = here.jacobian[k, i]
+    contact_record_at(trial.records, k).slack = left
+    return True
+
+
+@kernel(inner=True)
+def carry(table, pool, bases, loose, here, trial, d, alpha):
+    """Contact coordinates along alpha d: by the contact velocity, or, for a free pair, by its own unknowns.
+
+    Gaps follow to first order, angles start from where they are: a step turns no body by more than a radian. The guess
+    goes into `loose`. Rows of clearances that stay open for certain are marked there as IDLE, and their derivatives go
+    on to the trial point as they are.
+    """
+    header = header_at(table, 0)
+    tracked, records, jacobian = here.tracked, here.records, here.jacobian
+    lengths = loose.lengths
+    out = loose.guess
+    for k in range(header.tracked):
+        copy_tracked(tracked, k, out)
+    for k in range(header.contacts):
+        row = header.row_table + ROW * k
+        if row_at(table, row).body_f < 0:
+            continue
+        f = bases[k, 0]
+        g = bases[k, 1]
+        u = bases[k, 2]
+        tracked_at(out, k).gap += alpha * times(bases, jacobian, k, d)
+        if u >= 0:
+            for i in range(4):
+                out[k, i] += alpha * d[u + i] / lengths[k, i]
+            keep_inside(table, pool, row, k, out)
+        else:
+            for j in range(4):
+                s = 0.0
+                for i in range(6):
+                    if f >= 0:
+                        s += derivatives_at(records, k).zed[j, i] * d[f + i]
+                    if g >= 0:
+                        s += derivatives_at(records, k).zed[j, 6 + i] * d[g + i]
+                s *= alpha
+                for i in range(4):
+                    out[k, i] += derivatives_at(records, k).rates[i, j] * s
+            predict_pair(table, pool, row, k, tracked, out)
+        if is_guard(table, k) and stays_open(table, pool, bases, k, here, trial, d, alpha):
+            tracked_at(out, k).idle = 1.0
+            tracked_at(out, k).gap = max(
+                tracked_at(out, k).gap,
+                pool[contact_row_at(table, row).minimum] + contact_record_at(trial.records, k).slack,
+            )
+
+
+@kernel(inner=True)
+def keep_inside(table, pool, row, k, out):
+    """Coordinates that are unknowns may run over the end of a patch."""
+    for side in range(2):
+        i = 2 * side
+        out[k, i], out[k, i + 1], _clamped = into_domain(
+            table, pool, surface_of(table, row, side), out[k, i], out[k, i + 1]
+        )

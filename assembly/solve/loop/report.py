@@ -1,0 +1,138 @@
+"""What a solve leaves in its state: the pose judged afresh, rows in the user's units."""
+
+from __future__ import annotations
+
+import math
+
+from assembly._kernel import kernel
+from assembly.constraints.program.contact import TOUCHING
+from assembly.constraints.program.evaluate import evaluate
+from assembly.constraints.program.records import (
+    ROW,
+    header_at,
+    pool_header_at,
+    row_at,
+)
+from assembly.proximity.extrema.face_face import BEND
+from assembly.proximity.features.solid_contact import TRACK, contact_record_at
+from assembly.solve.loop.contacts import free_pairs_hold
+from assembly.solve.loop.settings import HISTORY
+from assembly.solve.loop.violation import off_rows, off_tangency
+
+
+@kernel(inner=True)
+def log(history, iteration, figures):
+    """Write the figures of an iteration, if there is room for them."""
+    if iteration < history.shape[0]:
+        for k in range(HISTORY):
+            history[iteration, k] = figures[k]
+
+
+@kernel(inner=True)
+def scaled_poses(table, pool, state, q):
+    """Poses of a state as the program has them."""
+    units = pool_header_at(pool, 0)
+    for b in range(header_at(table, 0).bodies):
+        for k in range(3):
+            q[b, k] = (state[7 * b + k] - units.reference[k]) / units.scale
+        for k in range(3, 7):
+            q[b, k] = state[7 * b + k]
+
+
+@kernel(inner=True)
+def write_pose(table, pool, q, state):
+    """Poses of the moving bodies into the state, in the user's coordinates; what did not move keeps its bits."""
+    units = pool_header_at(pool, 0)
+    header = header_at(table, 0)
+    for b in range(header.bodies):
+        if table[header.slots + b] >= 0:
+            for k in range(3):
+                if q[b, k] != (state[7 * b + k] - units.reference[k]) / units.scale:
+                    state[7 * b + k] = q[b, k] * units.scale + units.reference[k]
+            for k in range(3, 7):
+                state[7 * b + k] = q[b, k]
+
+
+@kernel(inner=True)
+def is_clear(table, residual):
+    """Whether no contact, given or of a clearance, is one of bodies in each other."""
+    for r in range(header_at(table, 0).contacts):
+        if residual[r] < -TOUCHING:
+            return False
+    return True
+
+
+@kernel(inner=True)
+def keep(here, y, rows, held):
+    """Copy poses, tracked values and multipliers of a point."""
+    for b in range(held.q.shape[0]):
+        for k in range(7):
+            held.q[b, k] = here.q[b, k]
+    for r in range(held.tracked.shape[0]):
+        for k in range(TRACK):
+            held.tracked[r, k] = here.tracked[r, k]
+    for r in range(rows):
+        held.y[r] = y[r]
+
+
+@kernel(inner=True)
+def bring_back(held, rows, here, y):
+    """The point that `keep` copied."""
+    for b in range(held.q.shape[0]):
+        for k in range(7):
+            here.q[b, k] = held.q[b, k]
+    for r in range(held.tracked.shape[0]):
+        for k in range(TRACK):
+            here.tracked[r, k] = held.tracked[r, k]
+    for r in range(rows):
+        y[r] = held.y[r]
+
+
+@kernel(inner=True)
+def judge(table, pool, state, loose, room, shape, rows, here, trial, bound, lax):
+    """The pose as it is returned, rounded to the user's coordinates, evaluated afresh into `trial`.
+
+    Residuals and pairs found are copied to `here`. Returns whether every row holds within the bound, and the largest
+    violation, tangency counted by gaps if `lax`.
+    """
+    q = trial.q
+    scaled_poses(table, pool, state, q)
+    lost = evaluate(table, pool, here.tracked, BEND, loose, room, trial)
+    if lost >= 0:
+        return False, math.inf
+    for r in range(rows):
+        here.residual[r] = trial.residual[r]
+    for k in range(header_at(table, 0).contacts):
+        for i in range(TRACK):
+            here.tracked[k, i] = trial.tracked[k, i]
+    violation = off_rows(table, loose, shape.one_sided, trial, lax)
+    holds = free_pairs_hold(table, pool, q, here.tracked, loose.free, 1e-9)
+    return holds and violation <= bound, violation
+
+
+@kernel(inner=True)
+def write_rows(table, here, y, loose, lax, size, state):
+    """Tracked values, multipliers and residuals into the state; returns at how many contacts surfaces cross."""
+    header = header_at(table, 0)
+    tracked, records, residual, jacobian = here.tracked, here.records, here.residual, here.jacobian
+    free = loose.free
+    m = header.rows
+    o = 7 * header.bodies
+    for k in range(header.tracked):
+        for i in range(TRACK):
+            state[o + TRACK * k + i] = tracked[k, i]
+    o += TRACK * header.tracked
+    crossing = 0.0
+    for r in range(m):
+        state[o + r] = y[r]
+        worst = residual[r]
+        if r < header.contacts:
+            if free[r] >= 0:
+                # What a free pair lacks to be extremal is a violation of its contact, too.
+                off = off_tangency(residual, jacobian, r, m + 4 * free[r], lax, loose.variables)
+                if off > abs(worst):
+                    worst = -off
+            elif contact_record_at(records, r).proper == 0.0 and abs(worst) <= TOUCHING:
+                crossing += 1.0
+        state[o + m + r] = worst * size if row_at(table, header.row_table + ROW * r).is_length == 1 else worst
+    return crossing

@@ -1,0 +1,117 @@
+"""Where whole steps gain nothing of the violation: rows contradict each other, or only a harder penalty holds them."""
+
+from __future__ import annotations
+
+import math
+
+from assembly._kernel import kernel
+from assembly.constraints.program.contact import TOUCHING
+from assembly.solve.loop.restoration import restoration_at
+from assembly.solve.loop.settings import NEIGHBORHOOD, settings_at
+
+# So many whole steps in a row that leave this part of the largest violation tell that rows contradict each other; one
+# may be by an old factor.
+STUCK, STILL = 2.0, 0.99
+# Rows that are off by this at most may repeat each other, tilted by so much. Rounding, in parts of what counts as held.
+LITTLE, MOST_TILTED, ROUNDED = 1e-2, 1e-3, 0.01
+# What is off by so many times what counts as held is not so by rounding.
+MUCH = 2.0
+# So many steps in a row, however long, that leave as much begin to restore, in steps no longer than a neighborhood; so
+# many of these tell that what rows are off is mended far away, if at all.
+DRAGGED, SETTLED = 4.0, 2.0
+# Where so many whole steps in a row do not halve the violation, the floor of the penalty gives way, down to here:
+# rounding, times its inverse, must stay small against the objective's curvature.
+SLOW, HARDEST = 3.0, 1e-10
+
+
+@kernel(inline=True)
+def out_of_reach(violation):
+    """The largest |J^T c|, but for rounding, where what rows are off is what no motion nearby changes.
+
+    Rows that repeat each other, tilted by s, have |J^T c| = s |c|, and agree a step |c| / s away. Of those that are off
+    by much J^T c = 0 tells.
+    """
+    return min(violation / NEIGHBORHOOD, MOST_TILTED) * violation if violation <= LITTLE else 0.0
+
+
+@kernel(inline=True)
+def stands_still(way, settings, feasible, violation, left, dual, force, mu):
+    """Whether whole steps in a row, at a stationary point, left what rows are off: it is what no motion changes.
+
+    The multipliers y + c / mu of the next step leave the Lagrangian as stationary as y only where J^T c = 0. `force` is
+    the strongest one, which grows by every step, `left` the part of the violation that the last whole step left.
+    """
+    progress = restoration_at(way, 0)
+    nearly = (
+        settings_at(settings, 0).stationarity * max(1.0, force) + (out_of_reach(violation) + ROUNDED * feasible) / mu
+    )
+    still = left > STILL and dual <= nearly
+    progress.stills = progress.stills + 1.0 if still else 0.0
+    return progress.stills == STUCK
+
+
+@kernel(inline=True)
+def drags(way, violation, before):
+    """Whether steps in a row, long or short, left what rows are off by a little; `before` is what it was a step ago.
+
+    A linkage with a freedom may be off by less and less along it, for as long as it moves: each step goes as far as
+    the rows' curvature lets it, and gains nothing.
+    """
+    progress = restoration_at(way, 0)
+    by_little = TOUCHING < violation <= LITTLE
+    progress.drags = progress.drags + 1.0 if by_little and violation > STILL * before else 0.0
+    if progress.drags < DRAGGED:
+        return False
+    progress.drags = 0.0
+    progress.nearby = 1.0
+    return True
+
+
+@kernel(inline=True)
+def bound_nearby(way, violation, before):
+    """How long steps may be that restore rows, of which `drags` told; as long as steps gain nothing."""
+    progress = restoration_at(way, 0)
+    if progress.nearby == 0.0:
+        return math.inf
+    if violation <= STILL * before < math.inf:
+        progress.nearby = 0.0
+        progress.drags = 0.0
+        return math.inf
+    progress.drags += 1.0 if before < math.inf else 0.0
+    return NEIGHBORHOOD
+
+
+@kernel(inline=True)
+def stays_off(way, feasible, steepest, violation, before):
+    """Whether what restored rows are off is what no motion nearby changes; `before` is what they were off a step ago.
+
+    Near a dead center |J^T c| falls faster than |c|, below its rounding in the end, but every step still gains.
+    """
+    progress = restoration_at(way, 0)
+    if progress.nearby == 1.0 and progress.drags >= SETTLED:
+        return True
+    gains = violation <= STILL * before
+    return steepest <= out_of_reach(violation) + (0.0 if gains else ROUNDED * feasible)
+
+
+@kernel(inline=True)
+def is_stuck(way):
+    """Whether the loop was found to stand still, and has not moved since but by restoring rows."""
+    return restoration_at(way, 0).stills == STUCK
+
+
+@kernel(inline=True)
+def contradicts(way, feasible, violation):
+    """Whether what restored rows are off tells of a contradiction; less does where the loop stood still."""
+    return violation > (MUCH * feasible if is_stuck(way) else TOUCHING)
+
+
+@kernel(inline=True)
+def next_floor(way, floor, is_slow):
+    """The floor of the penalty after a whole step by it, which gives way where such steps do not halve the violation.
+
+    Rows whose slopes all but vanish, at a dead center say: only a harder penalty holds them.
+    """
+    progress = restoration_at(way, 0)
+    progress.slow_steps = progress.slow_steps + 1.0 if is_slow else 0.0
+    return max(0.1 * floor, HARDEST) if progress.slow_steps >= SLOW else floor

@@ -1,0 +1,72 @@
+"""How far rows are from holding, with what free pairs lack of tangency: in full, or as their gaps feel it.
+
+A free pair's coordinates are unknowns; it is an extremum of the distance only where its rows of tangency t hold.
+"""
+
+from __future__ import annotations
+
+import math
+
+from assembly._kernel import kernel
+from assembly.constraints.program.records import FREE_COLUMN, header_at
+from assembly.solve.loop.residuals import violation_of
+
+
+@kernel(inner=True)
+def untouched(residual, jacobian, r, e, work):
+    """To first order, how the gap in row r changes where the rows of tangency, from e on, come to hold.
+
+    By d = -T^-1 t in the coordinates, T and t those of the tangency. Infinite where T is singular.
+    """
+    c = FREE_COLUMN
+    for i in range(4):
+        for j in range(4):
+            work[i, j] = jacobian[e + i, c + j]
+        work[i, 4] = -residual[e + i]
+    for k in range(4):
+        pivot = k
+        for i in range(k + 1, 4):
+            if abs(work[i, k]) > abs(work[pivot, k]):
+                pivot = i
+        if not abs(work[pivot, k]) > 1e-300:
+            return math.inf
+        for j in range(k, 5):
+            work[k, j], work[pivot, j] = work[pivot, j], work[k, j]
+        for i in range(k + 1, 4):
+            factor = work[i, k] / work[k, k]
+            for j in range(k, 5):
+                work[i, j] -= factor * work[k, j]
+    change = 0.0
+    for k in range(3, -1, -1):
+        for j in range(k + 1, 4):
+            work[k, 4] -= work[k, j] * work[j, 4]
+        work[k, 4] /= work[k, k]
+        change += jacobian[r, c + k] * work[k, 4]
+    return abs(change)
+
+
+@kernel(inner=True)
+def off_tangency(residual, jacobian, r, e, lax, work):
+    """What a free pair whose rows of tangency begin at e is off them, at most, or what its gap in row r changes by it.
+
+    The latter if `lax`: no more than the former, times a way that is no longer than the scene.
+    """
+    off = 0.0
+    for i in range(4):
+        if not abs(residual[e + i]) <= off:
+            off = abs(residual[e + i])
+    return min(off, untouched(residual, jacobian, r, e, work)) if lax and off > 0.0 else off
+
+
+@kernel(inner=True)
+def off_rows(table, loose, one_sided, point, lax):
+    """The largest violation of rows and of the tangency of free pairs, which is counted as by `off_tangency`."""
+    header = header_at(table, 0)
+    free = loose.free
+    worst = violation_of(point.residual, one_sided, header.rows)
+    for k in range(header.contacts):
+        if free[k] >= 0:
+            off = off_tangency(point.residual, point.jacobian, k, header.rows + 4 * free[k], lax, loose.variables)
+            if not off <= worst:
+                worst = off
+    return worst

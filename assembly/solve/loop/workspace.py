@@ -1,0 +1,174 @@
+"""Room that a solve works in: arrays in two blocks of memory, of doubles and of integers (`_carve.py`)."""
+
+from __future__ import annotations
+
+from collections import namedtuple
+
+import numpy as np
+
+from assembly._carve import carve
+from assembly._kernel import kernel
+from assembly.constraints.program.hessian_blocks import blocks_at, is_blocked
+from assembly.constraints.program.records import (
+    EXTRA_COLUMN,
+    Iterate,
+    LiftedPairs,
+    TapeRoom,
+    header_at,
+)
+from assembly.proximity.extrema.lifted_pair import VARIABLES, VECTORS
+from assembly.proximity.features.solid_contact import CONTACT_RECORD, TRACK
+from assembly.solve.loop.residuals import arrange, record_of_blocks, shape_of, size_of_shape
+from assembly.solve.loop.restoration import WAY
+
+# What a row has a number of: residuals at the current and the trial iterate, then these (`RowVectors`).
+BY_ROW = 7
+# Of every row: its multiplier, a better one, whether it counts (its weight), what it pushes with, whether a step would
+# break it.
+RowVectors = namedtuple("RowVectors", "y better_y active forces foreseen")
+# The last feasible iterate: poses, tracked values, multipliers.
+Held = namedtuple("Held", "q tracked y")
+# The linear system of a step: the objective's gradient, vectors, the Hessian of the Lagrangian, its Cholesky factor.
+System = namedtuple("System", "gradient directions hessian factor")
+# Of all unknowns: right side of the system, or scratch; the step; the step before its second-order correction.
+Directions = namedtuple("Directions", "descent step straight")
+# What stays as it is for a whole solve: table and pool, `Structure`, `LiftedPairs`, `TapeRoom`.
+Program = namedtuple("Program", "table pool structure lifted tapes")
+# All that a solve works in. `numbers`: of the contacts that clearances had at the last feasible iterate; `gram`: room
+# for least squares; `way`: what is known of a way back (`restoration.py`).
+Workspace = namedtuple("Workspace", "here trial held by_row structure lifted numbers tapes gram way system")
+
+
+@kernel(inline=True, allocates=True)
+def results_of(table, state):
+    """The end of a state, behind poses, tracked values, multipliers and residuals."""
+    header = header_at(table, 0)
+    return state[7 * header.bodies + TRACK * header.tracked + 2 * header.rows :]
+
+
+@kernel(inline=True)
+def room_needed(table):
+    """How many doubles and integers a solve works in: what is carved below, and by `shape_of`."""
+    header = header_at(table, 0)
+    pairs, bodies, tracks, tapes = header.contacts, header.bodies, header.tracked, header.tape_room
+    most, n = header.rows + 4 * pairs, 6 * header.moving
+    integers, doubles = size_of_shape(table, most, n + 4 * pairs)
+    # Poses, tracked values, records, Jacobians, what a row has one of.
+    doubles += 21 * bodies + 4 * TRACK * tracks + 2 * record_count(table) * CONTACT_RECORD
+    doubles += 2 * most * (EXTRA_COLUMN + 6 * header.extra) + (BY_ROW + 1) * most
+    # Of pairs; of tapes; multipliers of least squares; the way back.
+    doubles += 4 * pairs + (3 * VECTORS + VARIABLES) * VARIABLES
+    doubles += table[tapes] + table[tapes + 1] + table[tapes + 2] + (most + 1) * most + WAY
+    # Of unknowns, while no pair is at a fold.
+    blocks = header.block_record
+    layout = blocks_at(table, blocks)
+    doubles += 4 * n + (36 * (layout.blocks + layout.factored) if blocks > 0 else 2 * n * n)
+    return doubles, integers + pairs + header.guards
+
+
+@kernel(inline=True)
+def record_count(table):
+    """How many records a point has."""
+    header = header_at(table, 0)
+    return header.contacts + header.joints + header.vector_trims
+
+
+@kernel(inline=True, allocates=True)
+def carve_points(table, most, doubles, at):
+    """The iterates (current, trial, last feasible), vectors by row, room for a guess of tracked values; where it ends.
+
+    `most` rows at most.
+    """
+    header = header_at(table, 0)
+    bodies, tracks, columns = header.bodies, header.tracked, EXTRA_COLUMN + 6 * header.extra
+    poses = carve(doubles, at, (3, bodies, 7))
+    at += 21 * bodies
+    tracked = carve(doubles, at, (4, tracks, TRACK))
+    at += 4 * tracks * TRACK
+    records = carve(doubles, at, (2, record_count(table), CONTACT_RECORD))
+    at += 2 * record_count(table) * CONTACT_RECORD
+    jacobians = carve(doubles, at, (2, most, columns))
+    at += 2 * most * columns
+    by_row = carve(doubles, at, (BY_ROW + 1, most))
+    at += (BY_ROW + 1) * most
+    for k in range(BY_ROW):
+        for r in range(most):
+            by_row[k, r] = 0.0
+    here = Iterate(poses[0], tracked[0], records[0], by_row[0], jacobians[0])
+    trial = Iterate(poses[1], tracked[1], records[1], by_row[1], jacobians[1])
+    vectors = RowVectors(by_row[2], by_row[3], by_row[4], by_row[5], by_row[6])
+    return (here, trial, Held(poses[2], tracked[3], by_row[BY_ROW])), vectors, tracked[2], at
+
+
+@kernel(inline=True, allocates=True)
+def carve_pairs(table, guess, memory, doubles, at, integers):
+    """What pairs need: which are free, the lengths of their coordinates, room for their derivatives; a guess of all.
+
+    With what a watch of clearances remembers. No pair is free yet. And where it ends.
+    """
+    pairs = header_at(table, 0).contacts
+    free = carve(integers, 0, (pairs,))
+    for k in range(pairs):
+        free[k] = -1
+    lengths = carve(doubles, at, (pairs, 4))
+    at += 4 * pairs
+    vectors = carve(doubles, at, (VECTORS, 3, VARIABLES))
+    at += 3 * VECTORS * VARIABLES
+    values = carve(doubles, at, (VARIABLES, VARIABLES))
+    return LiftedPairs(free, lengths, vectors, values, guess, memory), at + VARIABLES * VARIABLES
+
+
+@kernel(inline=True, allocates=True)
+def carve_tapes(table, doubles, at):
+    """What the instructions of expressions work in, and where it ends."""
+    o = header_at(table, 0).tape_room
+    inputs = carve(doubles, at, (table[o],))
+    outputs = carve(doubles, at + table[o], (table[o + 1],))
+    work = carve(doubles, at + table[o] + table[o + 1], (table[o + 2],))
+    return TapeRoom(inputs, outputs, work), at + table[o] + table[o + 1] + table[o + 2]
+
+
+@kernel(inline=True)
+def sides_of(n, order):
+    """Rows and columns of the Hessian's array and of its factor's, for n unknowns."""
+    layout = blocks_at(order.blocks, 0)
+    if is_blocked(order):
+        return (6 * layout.blocks, 6), (1, 36 * layout.factored)
+    return (n, n), (n, n)
+
+
+@kernel(inline=True, allocates=True)
+def carve_unknowns(n, order, doubles, at):
+    """The system of a step of n unknowns."""
+    hessian, factor = sides_of(n, order)
+    vectors = carve(doubles, at, (4, n))
+    end = at + 4 * n + hessian[0] * hessian[1]
+    matrices = carve(doubles, at + 4 * n, hessian), carve(doubles, end, factor)
+    return System(vectors[0], Directions(vectors[1], vectors[2], vectors[3]), matrices[0], matrices[1])
+
+
+@kernel(inline=True, allocates=True)
+def carve_all(table, memory, doubles, integers):
+    """All that a solve works in, as `room_needed` counts it; rows and unknowns are those without lifted pairs."""
+    header = header_at(table, 0)
+    pairs = header.contacts
+    most, n = header.rows + 4 * pairs, 6 * header.moving
+    (here, trial, held), by_row, guess, at = carve_points(table, most, doubles, 0)
+    shape = shape_of(table, most, n + 4 * pairs, record_of_blocks(table), integers, doubles)
+    loose, at = carve_pairs(table, guess, memory, doubles, at, integers)
+    numbers = carve(integers, pairs, (header.guards,))
+    arrange(table, loose.free, shape, header.rows, n)
+    tapes, at = carve_tapes(table, doubles, at)
+    gram = carve(doubles, at, (most + 1, most))
+    at += (most + 1) * most
+    way = carve(doubles, at, (WAY,))
+    system = carve_unknowns(n, shape.sparsity, doubles, at + WAY)
+    return Workspace(here, trial, held, by_row, shape, loose, numbers, tapes, gram, way, system)
+
+
+@kernel(inline=True, allocates=True)
+def unknowns(n, order):
+    """The same of its own: where pairs at folds bring more unknowns."""
+    hessian, factor = sides_of(n, order)
+    vectors = np.empty((4, n))
+    return System(vectors[0], Directions(vectors[1], vectors[2], vectors[3]), np.empty(hessian), np.empty(factor))

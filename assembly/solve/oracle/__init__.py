@@ -1,0 +1,1 @@
+"""The same problem in CasADi, solved by IPOPT: an independent check."""

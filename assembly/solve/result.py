@@ -1,0 +1,171 @@
+"""What a solve ended with: the state of the loop, and what it says by itself. `Solution` has the rest."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly._read_only import ReadOnlyArrays, read_only
+from assembly.constraints.model.joint import Joint
+from assembly.constraints.packing.scene import Packed
+from assembly.kinematics.body import Body
+from assembly.kinematics.pose import Pose
+from assembly.proximity.features.solid_contact import TRACK
+from assembly.solve.loop.settings import COUNT, VIOLATION
+from assembly.solve.measure import measure, standing
+from assembly.solve.options import Options
+from assembly.solve.scene import Scene, Status
+
+if TYPE_CHECKING:
+    from assembly.solve.second_order.classification import SecondOrder
+    from assembly.solve.second_order.leave import Fit
+
+__all__ = ["Iteration", "Result"]
+
+Array = NDArray[np.float64]
+# A constraint that is off by less than this part of the worst is not one of those that disagree.
+IDLE = 1e-3
+
+
+class Iteration(tuple[float, ...]):
+    """Names of the columns of `Solution.history`."""
+
+    COLUMNS = ("objective", "feasibility", "stationarity", "penalty", "regularization", "step", "radius")
+
+
+class Result(ReadOnlyArrays):
+    """The state that a solve ended with; `Solution` documents the attributes."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        packed: Packed,
+        state: Array,
+        status: Status,
+        seconds: float,
+        history: Array,
+        order: SecondOrder | None = None,
+        fit: Fit | None = None,
+    ) -> None:
+        self._scene = scene
+        self._packed = packed
+        self._state = state
+        self._rows = history
+        self.status = status
+        self.seconds = seconds
+        self._order = order
+        self.restarted = False
+        self._fit = fit
+        # What bodies may be in each other and still touch, in parts of the scene's size.
+        self._touching = Options.touching
+        # Flat contacts alone need it again, for the center of their pressure.
+        self._wishes = packed.pool[scene.wished(packed)] if scene.contacts else None
+
+    @cached_property
+    def q(self) -> Array:
+        """Configuration, (n, 7)."""
+        return read_only(self._state[: self._packed.contacts_at].reshape(-1, 7).copy())
+
+    @property
+    def _parameters(self) -> Array:
+        return self._state[self._packed.contacts_at : self._packed.angles_at].reshape(-1, TRACK)
+
+    @property
+    def _residuals(self) -> Array:
+        return self._state[self._packed.residuals_at : self._packed.results_at]
+
+    def _result(self, place: int) -> float:
+        return float(self._state[self._packed.results_at + place])
+
+    @property
+    def iterations(self) -> int:
+        """Steps of the loop."""
+        return int(self._result(COUNT))
+
+    @property
+    def _is_lost(self) -> bool:
+        """Whether the loop could not evaluate its rows at the pose, because a contact had no pair there."""
+        return bool(self._scene.contacts) and self._result(VIOLATION) == np.inf
+
+    @property
+    def history(self) -> Array:
+        """A row an iteration, columns `Iteration.COLUMNS`; none where a contact was lost at the start."""
+        return read_only(self._rows[: 0 if self._is_lost and self.iterations == 0 else self.iterations + 1])
+
+    @property
+    def success(self) -> bool:
+        """Whether the status is SOLVED or FITTED."""
+        return self.status is Status.SOLVED or self.status is Status.FITTED
+
+    def _largest(self, unit: float) -> dict[str, float]:
+        """The largest violation of every constraint's rows, lengths in a unit."""
+        packed = self._packed
+        each = np.where(packed.one_sided, np.maximum(-self._residuals, 0.0), np.abs(self._residuals))
+        return self._by_constraint(np.where(packed.lengths, each / unit, each))
+
+    def _by_constraint(self, each: Array) -> dict[str, float]:
+        """The largest of what every constraint's rows have."""
+        return {
+            constraint.name: float(each[rows].max(initial=0.0))
+            for constraint, rows in zip(self._scene.constraints, self._packed.spans, strict=True)
+        }
+
+    @property
+    def _allowed(self) -> float:
+        """What rows that repeat each other may disagree by, over the size."""
+        return Options.fit if self._fit is None else self._fit.allowed
+
+    @cached_property
+    def disagreeing(self) -> dict[str, float]:
+        """Constraints that repeat each other and disagree, and how far each is off: lengths, radians; worst first."""
+        if self._fit is None or self._fit.apart is None:
+            return {}
+        packed = self._packed
+        off = np.abs(self._fit.apart)
+        parts = self._by_constraint(off)
+        amounts = self._by_constraint(np.where(packed.lengths, off * packed.scale, off))
+        least = IDLE * max(parts.values())
+        return {name: amounts[name] for name in sorted(parts, key=lambda name: -parts[name]) if parts[name] > least}
+
+    @cached_property
+    def multipliers(self) -> dict[str, Array]:
+        """Multipliers of every constraint's rows, by name: forces and torques when the objective is an energy."""
+        packed = self._packed
+        forces = self._state[packed.multipliers_at : packed.residuals_at] * packed.unit
+        forces = np.where(packed.lengths, forces / packed.scale, forces)
+        return {
+            constraint.name: read_only(forces[rows])
+            for constraint, rows in zip(self._scene.constraints, packed.spans, strict=True)
+        }
+
+    @cached_property
+    def values(self) -> dict[str, float]:
+        """Every freedom of every joint, "joint.freedom": lengths in the user's unit, angles in radians."""
+        packed = self._packed
+        near = dict(
+            zip(map(id, packed._angles), self._state[packed.angles_at : packed.multipliers_at : TRACK], strict=True)
+        )
+        values = {}
+        for joint in self._scene.constraints:
+            for name, freedom in joint.freedoms.items() if isinstance(joint, Joint) else ():
+                coordinate = freedom.coordinate
+                pair = coordinate.frames
+                frames = standing(
+                    coordinate, self.q, (self._scene.index(pair.frame_a.body), self._scene.index(pair.frame_b.body))
+                )
+                values[f"{joint.name}.{name}"] = measure(coordinate, frames, float(near.get(id(coordinate), 0.0)))
+        return values
+
+    def _wished_pool(self) -> Array:
+        """The pool with the objective as it was in this solve."""
+        pool = self._packed.pool.copy()
+        pool[self._scene.wished(self._packed)] = self._wishes
+        return pool
+
+    def pose(self, body: Body | str) -> Pose:
+        """Pose of a body, given itself or its name."""
+        row = self.q[self._scene.index(body)]
+        return Pose(row[:3], row[3:])

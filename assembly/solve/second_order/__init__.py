@@ -1,0 +1,1 @@
+"""What a stationary point is, and how a saddle is left."""

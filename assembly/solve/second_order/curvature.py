@@ -1,0 +1,246 @@
+"""The second derivatives of a scene at a state, and poses beside it that hold: what ends are judged by.
+
+Unknowns are those of the loop: twists of the moving bodies in the order of the table's slots, lengths over the scene's
+size, then four coordinates of every contact whose pair is at a fold. Rows are those of the program, then four of
+tangency a fold. All else that is asked of second order is done with these, outside
+(`solve/second_order/classification.py`).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from assembly._carve import carve
+from assembly._kernel import kernel
+from assembly.constraints.program.evaluate import evaluate
+from assembly.constraints.program.records import header_at
+from assembly.constraints.program.row_terms import add_row_terms
+from assembly.proximity.extrema.face_face import BEND
+from assembly.proximity.features.solid_contact import TRACK
+from assembly.solve.dense.row_table import new_point, point_at
+from assembly.solve.linear_algebra.factorize import factorize_shifted, solve_step
+from assembly.solve.loop.line_search import goal
+from assembly.solve.loop.multipliers import toward_rows
+from assembly.solve.loop.predict import carry
+from assembly.solve.loop.report import write_pose
+from assembly.solve.loop.residuals import add_row, arrange, move, record_of_blocks, shape_of, size_of_shape
+from assembly.solve.loop.violation import off_rows
+from assembly.solve.loop.workspace import unknowns
+
+# Rows that hold; so many steps lead back onto them, none longer than this.
+HOLDS, EXACT, STEPS, LONGEST = 1e-11, 1e-14, 12, 1.0
+# Of large scenes the least curvature is found by so many inverse iterations, from the shift that a step tries first.
+ITERATIONS, LEAST_SHIFT = 60, 1e-8
+# The weight of rows in these steps, and of the steps' own squares; a step that gains less than this factor is the last.
+MU, SOFTNESS, GAIN = 1e-6, 1e-2, 0.1
+
+
+@kernel(inner=True)
+def write_tracked(table, tracked, state):
+    """Tracked values of a point into a state."""
+    header = header_at(table, 0)
+    for k in range(header.tracked):
+        for i in range(TRACK):
+            state[7 * header.bodies + TRACK * k + i] = tracked[k, i]
+
+
+@kernel(inner=True, allocates=True)
+def write_curvature(table, pool, state, forces, out, tips, integers, doubles):
+    """The same as `curvature_at`, with what it works in."""
+    header = header_at(table, 0)
+    pairs = header.contacts
+    free = np.empty(pairs, np.int64)
+    found = point_at(table, pool, state, free)
+    lost, count, point, loose, room = found.lost, found.count, found.iterate, found.lifted, found.tapes
+    if lost >= 0:
+        return -1
+    write_tracked(table, point.tracked, state)
+    rows, n = header.rows + 4 * count, 6 * header.moving + 4 * count
+    shape = shape_of(table, header.rows + 4 * pairs, 6 * header.moving + 4 * pairs, table[:0], integers, doubles)
+    arrange(table, free, shape, rows, n)
+    jacobian = carve(out, 1 + rows + n, (rows, n))
+    hessian = carve(out, 1 + rows + n + rows * n, (n, n))
+    slopes = np.zeros(n)
+    for i in range(out.size):
+        out[i] = 0.0
+    out[0] = goal(table, pool, shape, rows, loose, room, tips, point, 1, slopes, hessian)
+    add_row_terms(table, pool, loose, room, shape, point, forces, np.zeros(rows), hessian)
+    for r in range(rows):
+        out[1 + r] = point.residual[r]
+        add_row(shape.bases, point.jacobian, r, 1.0, jacobian[r])
+    for i in range(n):
+        out[1 + rows + i] = slopes[i]
+        for j in range(i):
+            hessian[i, j] = hessian[j, i]
+    return count
+
+
+@kernel(
+    signatures=(
+        "(i8[::1], f8[::1], f8[::1], f8[::1], f8[::1], i8)",
+        "(i8[::1], f8[::1], f8[::1], f8[::1], f8[::1], none)",
+    ),
+)
+def curvature_at(table, pool, state, forces, out, tips):
+    """Evaluate a state; tracked values found are written into it. Returns how many folds there are, or -1: no pair.
+
+    With m rows and n unknowns, these included: out gets the objective's value, residuals (m), the objective's gradient
+    (n), the rows' Jacobian (m, n), and the Hessian of objective + forces . rows (n, n). `tips` is None where no term
+    of the objective is a dexterity.
+    """
+    header = header_at(table, 0)
+    pairs = header.contacts
+    integers, doubles = size_of_shape(table, header.rows + 4 * pairs, 6 * header.moving + 4 * pairs)
+    return write_curvature(table, pool, state, forces, out, tips, np.empty(integers, np.int64), np.empty(doubles))
+
+
+@kernel(inline=True)
+def is_at_most(values, limit):
+    """Whether no value is larger, without its sign, or no number."""
+    for value in values:
+        if not abs(value) <= limit:
+            return False
+    return True
+
+
+@kernel(inner=True, allocates=True)
+def walk_within(table, pool, state, step, share, kept, residual, tips, integers, doubles):
+    """The same as `walk`, with what it works in."""
+    header = header_at(table, 0)
+    pairs = header.contacts
+    free = np.empty(pairs, np.int64)
+    found = point_at(table, pool, state, free)
+    lost, count, here, loose, room = found.lost, found.count, found.iterate, found.lifted, found.tapes
+    rows, n = header.rows + 4 * count, 6 * header.moving + 4 * count
+    if lost >= 0 or n != step.size:
+        return math.inf
+    blocks = record_of_blocks(table)
+    shape = shape_of(table, header.rows + 4 * pairs, 6 * header.moving + 4 * pairs, blocks, integers, doubles)
+    arrange(table, free, shape, rows, n)
+    for r in range(header.rows):
+        if kept[r] > 0.0:
+            shape.one_sided[r] = 0
+    trial = new_point(table)
+    trial.q[:] = here.q
+    system = unknowns(n, shape.sparsity)
+    lagrangian, matrix = system.hessian, system.factor
+    active, forces, way = np.zeros(rows), np.zeros(rows), step.copy()
+    before = math.inf
+    for _ in range(STEPS):
+        move(table, here.q, way, share, trial.q)
+        carry(table, pool, shape.bases, loose, here, trial, way, share)
+        if evaluate(table, pool, loose.guess, BEND, loose, room, trial) >= 0:
+            return math.inf
+        here, trial = trial, here
+        share = 1.0
+        off = off_rows(table, loose, shape.one_sided, here, False)
+        if off <= EXACT or (off <= HOLDS and off > GAIN * before):
+            write_pose(table, pool, here.q, state)
+            write_tracked(table, here.tracked, state)
+            for r in range(rows):
+                residual[r] = here.residual[r]
+            return goal(table, pool, shape, rows, loose, room, tips, here, 0, way, lagrangian)
+        before = off
+        if not math.isfinite(off):
+            break
+        toward_rows(
+            shape,
+            header.rows,
+            rows,
+            here.residual,
+            here.jacobian,
+            MU,
+            active,
+            SOFTNESS,
+            EXACT,
+            lagrangian,
+            matrix,
+            n,
+            forces,
+            way,
+        )
+        if not is_at_most(way, LONGEST):
+            break
+    return math.inf
+
+
+@kernel(
+    signatures=(
+        "(i8[::1], f8[::1], f8[::1], f8[::1], f8, f8[::1], f8[::1], i8)",
+        "(i8[::1], f8[::1], f8[::1], f8[::1], f8, f8[::1], f8[::1], none)",
+    ),
+)
+def walk(table, pool, state, step, share, kept, residual, tips):
+    """Move a state by a share of a step, and by least steps back onto the rows. Returns the objective's value there.
+
+    One-sided rows that are `kept` (not zero) stay at their bound. Infinite, with the state as it was, where no pose
+    near it holds. The residuals left, within rounding, are written.
+    """
+    header = header_at(table, 0)
+    pairs = header.contacts
+    integers, doubles = size_of_shape(table, header.rows + 4 * pairs, 6 * header.moving + 4 * pairs)
+    return walk_within(
+        table, pool, state, step, share, kept, residual, tips, np.empty(integers, np.int64), np.empty(doubles)
+    )
+
+
+@kernel(inner=True, allocates=True)
+def least_within(table, pool, state, forces, active, direction, tips, integers, doubles):
+    """The same as `least_curvature`, with what it works in."""
+    header = header_at(table, 0)
+    found = point_at(table, pool, state, np.empty(header.contacts, np.int64))
+    lost, count, point, loose, room = found.lost, found.count, found.iterate, found.lifted, found.tapes
+    rows, n = header.rows, 6 * header.moving
+    if lost >= 0 or count > 0:
+        return math.nan
+    shape = shape_of(table, rows, n, record_of_blocks(table), integers, doubles)
+    arrange(table, loose.free, shape, rows, n)
+    system = unknowns(n, shape.sparsity)
+    gradient, lines, lagrangian, matrix = system.gradient, system.directions, system.hessian, system.factor
+    goal(table, pool, shape, rows, loose, room, tips, point, 1, gradient, lagrangian)
+    add_row_terms(table, pool, loose, room, shape, point, forces, active, lagrangian)
+    shift = factorize_shifted(lagrangian, n, shape.sparsity, LEAST_SHIFT, matrix)
+    if shift < 0.0:
+        return math.nan
+    for i in range(n):
+        direction[i] = math.sin(1.0 + i)
+    curvature = math.nan
+    before, after = lines.descent, lines.step
+    for _ in range(ITERATIONS):
+        square = 0.0
+        for i in range(n):
+            square += direction[i] * direction[i]
+        for i in range(n):
+            before[i] = direction[i] / math.sqrt(square)
+            after[i] = before[i]
+        # With A + s I the matrix and w = (A + s I)^-1 v: w^T A w = w.v - s w.w.
+        solve_step(matrix, n, shape.sparsity, after)
+        across, square = 0.0, 0.0
+        for i in range(n):
+            across += after[i] * before[i]
+            square += after[i] * after[i]
+            direction[i] = after[i]
+        curvature = across / square - shift
+        for i in range(n):
+            direction[i] /= math.sqrt(square)
+    return curvature
+
+
+@kernel(
+    signatures=(
+        "(i8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], i8)",
+        "(i8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], none)",
+    ),
+)
+def least_curvature(table, pool, state, forces, active, direction, tips):
+    """The least curvature of objective + forces . rows along motions that keep the rows; its direction is written.
+
+    `active` has the weight of every row that is to be kept, zero for others. No number where a contact is at a fold.
+    """
+    header = header_at(table, 0)
+    integers, doubles = size_of_shape(table, header.rows, 6 * header.moving)
+    return least_within(
+        table, pool, state, forces, active, direction, tips, np.empty(integers, np.int64), np.empty(doubles)
+    )

@@ -1,0 +1,37 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from assembly.geometry import shapes
+from assembly.geometry.faces.face import Face
+from assembly.geometry.splines import evaluate as spline
+
+
+def test_a_face_turns_the_normal_when_reversed():
+    ball = shapes.sphere(1.0, name="ball")
+    out, inward = Face(ball), Face(ball, name="socket", reversed=True)
+    assert (out.name, inward.name) == ("ball", "socket")
+    assert "reversed" in repr(inward) and "reversed" not in repr(out)
+    u, v = np.array([0.3, 2.0]), np.array([1.0, 2.0])
+    np.testing.assert_array_equal(inward.normal(u, v), -out.normal(u, v))
+    np.testing.assert_allclose(out.normal(u, v), ball.evaluate(u, v), rtol=0, atol=1e-14)
+
+
+def test_a_reversed_face_differs_from_its_surface_in_the_sign_alone():
+    ball = shapes.sphere(1.0)
+    record, pool = Face(ball, reversed=True).packed()
+    plain, plain_pool = Face(ball).packed()
+    assert pool is plain_pool
+    assert plain[spline.SIGN] == 1 and record[spline.SIGN] == -1
+    assert np.flatnonzero(record != plain).tolist() == [spline.SIGN]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [(("ball", None, False), "surface is 'ball'"), ((None, 3, False), "name is 3"), ((None, None, 2), "reversed is 2")],
+)
+def test_bad_arguments_are_named(arguments, text):
+    surface, name, reversed_ = arguments
+    with pytest.raises(TypeError, match=text):
+        Face(shapes.sphere(1.0) if surface is None else surface, name=name, reversed=reversed_)
