@@ -92,7 +92,7 @@ class Watch:
         scaled[:, :3] = (q[:, :3] - packed.reference) / packed.scale
         calls = memory[watch_memory.CALLS] + 1.0
         how = watch.EVERYTHING if everything else watch.IN_TURNS
-        watch.look(packed.table, packed.pool, self._at, memory, scaled, self.tracked, how)
+        watch.update(packed.table, packed.pool, self._at, memory, scaled, self.tracked, how)
         if memory[watch_memory.CROWDED]:
             raise RuntimeError("contacts are near for which there is no place")
         pairs = self._pairs()

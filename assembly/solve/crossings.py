@@ -231,7 +231,7 @@ def _seen(packed: Packed, posed: PosedBodies, interruption: Interruption) -> tup
         is_cut = True
         while is_cut and not interruption.is_over():
             memory[watch_memory.DEADLINE] = perf_counter_ns() + watch_memory.SLICE
-            watch.look(packed.table, packed.pool, watch_at, memory, q, tracked, watch.EVERYTHING)
+            watch.update(packed.table, packed.pool, watch_at, memory, q, tracked, watch.EVERYTHING)
             is_cut = memory[watch_memory.DEADLINE] < 0.0
         found |= set(np.flatnonzero(pairs[:, watch_memory.CROSSED] == 1.0).tolist())
         gaps = tracked[contacts:, PAIR_GAP]

@@ -16,7 +16,7 @@ from assembly.errors import InputError
 from assembly.kinematics.pose import retract
 from assembly.proximity.features.solid_contact import TRACK
 from assembly.proximity.manager.state import CROSSED, MEMORY_HEADER, PAIR_MEMORY
-from assembly.proximity.manager.update import EVERYTHING, look
+from assembly.proximity.manager.update import EVERYTHING, update
 from assembly.solve.dense.jacobian import rows_of
 from assembly.solve.dense.row_table import gradient_at
 from assembly.solve.diagnosis.nearby_poses import moves
@@ -87,6 +87,6 @@ def _crosses(packed: Packed, state: Array, q: Array) -> bool:
     state[packed.memory_at :] = packed.new_state()[packed.memory_at :]
     tracked = state[packed.contacts_at : packed.angles_at].reshape(-1, TRACK)
     memory = state[packed.memory_at :]
-    look(packed.table, packed.pool, packed.table[WATCH], memory, scaled, tracked, EVERYTHING)
+    update(packed.table, packed.pool, packed.table[WATCH], memory, scaled, tracked, EVERYTHING)
     pairs = memory[MEMORY_HEADER:][: PAIR_MEMORY * sum(map(len, packed.guarded))].reshape(-1, PAIR_MEMORY)
     return bool((pairs[:, CROSSED] == 1.0).any())

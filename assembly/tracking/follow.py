@@ -39,7 +39,7 @@ from assembly.proximity.manager.state import (
     place_at,
 )
 from assembly.proximity.manager.update import IN_TURNS
-from assembly.solve.loop.clearances import look_around, place_guards
+from assembly.solve.loop.clearances import place_clearance_rows, update_around
 
 # A correction by more than this part of the prediction and of the surface's domain puts the root in doubt; so does a
 # root as near as this to a fold (det H over |H|^2), where others are born.
@@ -220,10 +220,10 @@ def follow(table, pool, q, poses, tracked, records, room, free, memory):
         elif contact_row_at(table, row).shell_f < 0 and is_astray(table, pool, row, r, before, guess, tracked):
             look_at_all_of(table, memory, k)
         doubt_twins(table, pool, memory, k, records)
-    look_around(table, pool, memory, listed, IN_TURNS)
+    update_around(table, pool, memory, listed, IN_TURNS)
     for k in range(header.guards):
         before[first + k, 0] = float(contact_row_at(table, header.row_table + ROW * (first + k)).guard_number)
-    place_guards(table, memory, listed, rows[0], rows[1], free, False)
+    place_clearance_rows(table, memory, listed, rows[0], rows[1], free, False)
     for k in range(header.guards):
         r = first + k
         row = header.row_table + ROW * r

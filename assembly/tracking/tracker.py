@@ -21,13 +21,13 @@ from assembly.kinematics.pose import Pose, axes_quaternion
 from assembly.proximity.features.solid_contact import STAYS, TRACK
 from assembly.proximity.manager.state import (
     CLOCK,
-    CORNERS,
     EVENT_COUNT,
     MARK_AT,
     MEMORY_HEADER,
     PAIR_MEMORY,
     PAIRS,
     TURN,
+    VERTEX_CONTACTS,
 )
 from assembly.solve.loop.augmented_lagrangian import solve_program
 from assembly.solve.loop.settings import (
@@ -51,7 +51,7 @@ from assembly.solve.loop.settings import (
     TOUCHING,
     VIOLATION,
 )
-from assembly.solve.loop.warm_start import recall_size
+from assembly.solve.loop.warm_start import warm_start_size
 from assembly.solve.options import Options
 from assembly.solve.scene import Scene
 from assembly.solve.solution import Solution
@@ -79,7 +79,7 @@ def _follow_extrema(packed: Packed, state: Array, keeps_time: bool) -> None:
     Ticks have no last look. Which rows are in the place of a contact, or are its own pair, their first look tells.
     """
     watch = packed.table[WATCH]
-    packed.table[watch + CORNERS] = 0
+    packed.table[watch + VERTEX_CONTACTS] = 0
     packed.table[watch + CLOCK] = packed.table[CLOCK_AT] if keeps_time else 0
     state[packed.contacts_at : packed.angles_at].reshape(-1, TRACK)[:, STAYS] = 0.0
     if packed.table[watch + MARK_AT]:
@@ -204,7 +204,7 @@ class Tracker(InOneProcess):
         self._followed = Followed(self._scene, packed, names, self._hand, self._place, first.status)
         # Behind the state of a solve are the rows of the last tick; steps have no copy of those.
         self._size = first._state.size
-        recalled = recall_size(packed.count, packed.pair_rows)
+        recalled = warm_start_size(packed.count, packed.pair_rows)
         self._state = np.concatenate([first._state, np.zeros(recalled)])
         if packed.guards:
             _follow_extrema(packed, self._state, budget is not None)

@@ -47,7 +47,7 @@ class LoopPoint:
         free = np.full(pairs, -1, dtype=np.int64)
         room = (np.empty((VECTORS, 3, VARIABLES)), np.empty((VARIABLES, VARIABLES)))
         self.loose = layout.LiftedPairs(free, np.empty((pairs, 4)), *room, np.empty((tracks, TRACK)), np.empty(0))
-        at = table[layout.TAPE_ROOM]
+        at = table[layout.TAPE_WORKSPACE]
         self.room = layout.TapeRoom(*(np.empty(size) for size in table[at : at + 3]))
         arrange(table, free, self.shape, self.rows, self.n)
         if tracked is None:

@@ -14,7 +14,7 @@ from assembly.proximity.bvh.tree import ELEMENT, ELEMENT_FEATURE, tree_at
 from assembly.proximity.features.holding import FEATURES, NOTHING, POINT
 from assembly.proximity.features.solid_contact import TRACK
 from assembly.proximity.manager import update as watch
-from assembly.proximity.manager.extrema import CORNER, ROOT, ROOT_BEYOND, ROOT_FOLD
+from assembly.proximity.manager.extrema import EXTREMUM_BEYOND, EXTREMUM_FOLD, ROOT, VERTEX_CONTACT
 from assembly.proximity.manager.motion_bounds import part_used, went
 from assembly.proximity.manager.newton_regions import is_known
 from assembly.proximity.manager.state import (
@@ -55,7 +55,7 @@ class Looked:
         self.q = scene.q.copy()
         self.q[:, :3] = (self.q[:, :3] - packed.reference) / packed.scale
         tracked = np.full((packed.tracked, TRACK), np.nan)
-        watch.look(self.table, self.pool, self.watch, self.memory, self.q, tracked, watch.EVERYTHING)
+        watch.update(self.table, self.pool, self.watch, self.memory, self.q, tracked, watch.EVERYTHING)
         self.pairs = range(int(self.table[self.watch + PAIRS]))
 
     def parts(self, q):
@@ -156,9 +156,9 @@ def test_a_point_that_stays_on_an_edge_is_no_root():
                 continue
             roots = np.zeros((1, ROOT))
             roots[0, :6] = [*e[1:3], *d[1:3], e[1 + ELEMENT_FEATURE], d[1 + ELEMENT_FEATURE]]
-            roots[0, ROOT_FOLD], roots[0, ROOT_BEYOND] = 1.0, np.nan
+            roots[0, EXTREMUM_FOLD], roots[0, EXTREMUM_BEYOND] = 1.0, np.nan
             for corner, known in ((NOTHING, True), (FEATURES, True), (POINT, False)):
-                roots[0, CORNER] = corner
+                roots[0, VERTEX_CONTACT] = corner
                 assert is_known(table, pool, looked_into, e[0], d[0], roots, 1)[2] == known
             seen += 1
     assert seen > 4

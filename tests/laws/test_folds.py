@@ -21,7 +21,7 @@ from assembly.proximity.manager import motion_bounds as allowances
 from assembly.proximity.manager import state as watch_memory
 from assembly.proximity.manager import update as watch
 from assembly.proximity.manager.motion_bounds import MotionBall, allow_ball, mover
-from assembly.solve.loop.clearances import look_again, look_around, place_guards
+from assembly.solve.loop.clearances import place_clearance_rows, update_again, update_around
 from assembly.solve.loop.violation import untouched
 from benchmarks.center_lines import torus_wire
 from benchmarks.running import example
@@ -67,8 +67,8 @@ def root_at(table, pool, q, start):
     turn, shift = relative_pose(q, 0, rotation(q, 0), 1, rotation(q, 1))
     pair = posed(turn, shift, surfaces=(0, SURFACE_RECORD))
     out = np.full((1, roots.ROOT), np.nan)
-    assert roots.surfaces_root(table, pool, pair, tuple(start), out, 0) != roots.NOTHING
-    assert np.isnan(out[0, roots.ROOT_BEYOND])
+    assert roots.surfaces_extremum(table, pool, pair, tuple(start), out, 0) != roots.NOTHING
+    assert np.isnan(out[0, roots.EXTREMUM_BEYOND])
     return pair, out[0]
 
 
@@ -92,7 +92,7 @@ def test_a_fold_beyond_a_knot_line_is_that_of_the_pair_there(side):
         q = np.array([[0.0, 0.0, 0.0, *IDENTITY], [*(ring[1] + 0.1 * outward + along_line), *IDENTITY]])
         near_pair, root = root_at(table, pool, q, extremal_pair(clip, q[0], ball, q[1]).parameters)
         near = (0.05, -1.0, -1.0, -1.0)  # no other knot lines
-        folds.append((root[roots.ROOT_FOLD], fold_beyond(table, pool, near_pair, tuple(root[:4]), near)))
+        folds.append((root[roots.EXTREMUM_FOLD], fold_beyond(table, pool, near_pair, tuple(root[:4]), near)))
     (here, beyond), (there, behind) = folds
     assert abs(here - there) > 0.05
     # The two places are 2e-6 apart, where curvatures change by some hundreds a unit.
@@ -137,8 +137,8 @@ def test_a_given_contact_goes_from_a_saddle_to_the_nearest_minimum(swapped, list
     places = watch_memory.memory_places(table, watch)[1]
     tracked = np.zeros((row + place + int(table[watch + watch_memory.FIRST]) + 30, TRACK))
     found = np.zeros((3, roots.ROOT))
-    found[:, roots.ROOT_BEYOND] = np.nan
-    found[:, roots.ROOT_FOLD] = -1e-4, 2e-4, 1e-4
+    found[:, roots.EXTREMUM_BEYOND] = np.nan
+    found[:, roots.EXTREMUM_FOLD] = -1e-4, 2e-4, 1e-4
     found[:, roots.GAP] = 0.0, -2e-10, -1e-10
     found[:, roots.POINT_F] = 0.0, 0.02, 0.01
     found[:, :4] = np.arange(12.0).reshape(3, 4)
@@ -146,7 +146,7 @@ def test_a_given_contact_goes_from_a_saddle_to_the_nearest_minimum(swapped, list
     if listed:
         memory[places + watch_memory.PLACE_MEMORY * place] = pair
         memory[places + watch_memory.PLACE_MEMORY * place + watch_memory.PLACE_NUMBER] = 7.0
-    watch_memory.seat_given(table, watch, memory, pair, found, 3, tracked)
+    watch_memory.keep_slots_of_given(table, watch, memory, pair, found, 3, tracked)
     expected = [8.0, 9.0, 10.0, 11.0]
     assert tracked[row, :4].tolist() == (expected[2:] + expected[:2] if swapped else expected)
     assert tracked[row, PAIR_GAP] == -1e-10
@@ -157,9 +157,9 @@ def test_a_given_contact_goes_from_a_saddle_to_the_nearest_minimum(swapped, list
     # A minimum far below is another contact, and one that is a minimum stays.
     for gap, fold in ((-1e-3, -1e-4), (0.0, 1e-4)):
         found[:, roots.ORIGIN] = roots.GIVEN_CONTACT, roots.NEW, roots.USELESS
-        found[0, roots.ROOT_FOLD], found[1, roots.GAP] = fold, gap
+        found[0, roots.EXTREMUM_FOLD], found[1, roots.GAP] = fold, gap
         before = tracked.copy()
-        watch_memory.seat_given(table, watch, memory, pair, found, 3, tracked)
+        watch_memory.keep_slots_of_given(table, watch, memory, pair, found, 3, tracked)
         assert np.array_equal(before, tracked, equal_nan=True) and found[0, roots.ORIGIN] == roots.GIVEN_CONTACT
 
 
@@ -232,8 +232,8 @@ def test_a_free_contact_of_a_clearance_goes_to_its_extremum_if_it_is_off_it(off)
     rows = int(table[ROWS])
     tracked, free = np.full((packed.tracked, TRACK), np.nan), np.full(rows, -1)
     point = Iterate(q, tracked, np.zeros((rows, CONTACT_RECORD)), np.zeros(rows), None)
-    assert look_around(table, packed.pool, memory, point, watch.EVERYTHING)
-    place_guards(table, memory, point, np.zeros(rows), np.zeros(rows), free, True)
+    assert update_around(table, packed.pool, memory, point, watch.EVERYTHING)
+    place_clearance_rows(table, memory, point, np.zeros(rows), np.zeros(rows), free, True)
     row = int(np.flatnonzero(~np.isnan(tracked[:, 0]))[0])
     extremum = tracked[row].copy()
     free[row] = 0
@@ -241,7 +241,7 @@ def test_a_free_contact_of_a_clearance_goes_to_its_extremum_if_it_is_off_it(off)
     q[1, 0] += 1e-15
     tracked[row, :4] += off
     moved = tracked[row].copy()
-    changed = look_again(table, packed.pool, memory, point, watch.EVERYTHING, free, np.empty_like(tracked))
+    changed = update_again(table, packed.pool, memory, point, watch.EVERYTHING, free, np.empty_like(tracked))
     assert changed == (off > 1e-6)
     assert np.array_equal(tracked[row], moved) if off < 1e-6 else np.abs(tracked[row, :4] - extremum[:4]).max() < 1e-9
 
@@ -275,7 +275,7 @@ class Clips:
     def looked(self, how):
         """How many pairs a look looks at."""
         before = self.memory[watch_memory.LOOKS]
-        watch.look(self.table, self.pool, self.table[WATCH], self.memory, self.q, self.tracked, how)
+        watch.update(self.table, self.pool, self.table[WATCH], self.memory, self.q, self.tracked, how)
         return self.memory[watch_memory.LOOKS] - before
 
 
@@ -308,7 +308,7 @@ def test_pairs_are_looked_at_that_need_it(by_spines, part, as_needed, in_turns, 
         table, watch_at = clips.table, clips.table[WATCH]
         if not by_spines:
             first = int(table[watch_at + watch_memory.PAIR_TABLE])
-            table[first + watch_memory.SPINE_F :: watch_memory.PAIR_RECORD][: clips.count] = -1
+            table[first + watch_memory.CENTERLINE_F :: watch_memory.PAIR_RECORD][: clips.count] = -1
         assert clips.looked(how) == clips.count == 3
         clips.pairs[:, watch_memory.ALLOWANCE] = 1e-3
         for p in range(clips.count):

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from assembly.constraints.program.contact import HARDLY, MAY_GO, hold_all, lost_guard, may_go
+from assembly.constraints.program.contact import HARDLY, MAY_GO, hold_all, lost_clearance_row, may_go
 from assembly.constraints.program.records import (
+    CLEARANCE_ROWS,
     CONTACTS,
-    FIRST_GUARD,
+    FIRST_CLEARANCE_ROW,
     FREE_COLUMN,
-    GUARDS,
     HEADER,
     MINIMUM,
     ROW,
@@ -27,7 +27,7 @@ LEAST = 0.25
 def guards(gap, solids=True):
     """The table, the pool, what is tracked and a point of two rows of a clearance, of which the first is open."""
     table = np.zeros(HEADER + 2 * ROW, dtype=np.int64)
-    table[ROW_TABLE], table[FIRST_GUARD], table[GUARDS] = HEADER, 0, 2
+    table[ROW_TABLE], table[FIRST_CLEARANCE_ROW], table[CLEARANCE_ROWS] = HEADER, 0, 2
     table[[HEADER + MINIMUM, HEADER + ROW + MINIMUM]] = 1
     table[[HEADER + SHELL_F, HEADER + ROW + SHELL_F]] = 0 if solids else -1
     start = np.full((2, TRACK), 0.5)
@@ -42,7 +42,7 @@ def guards(gap, solids=True):
 @pytest.mark.parametrize("gap", [1.0, 1e-12, -1e-12, -5e-10, -2e-9, -0.5])
 def test_a_contact_that_ends_stays_behind_where_it_is_open_or_solids_touch(gap, solids):
     table, pool, start, point = guards(gap, solids)
-    stays_behind = lost_guard(table, pool, 1, start, point, False, False)
+    stays_behind = lost_clearance_row(table, pool, 1, start, point, False, False)
     assert stays_behind == (gap > (-1e-9 if solids else 0.0))
     _q, tracked, records, residual, jacobian = point
     if not stays_behind:
@@ -54,13 +54,15 @@ def test_a_contact_that_ends_stays_behind_where_it_is_open_or_solids_touch(gap, 
     assert np.isnan(tracked[1, 0]) and (jacobian[1, :FREE_COLUMN] == 0.0).all() and np.isfinite(records[1]).any()
     assert np.isnan(residual[0])
     # It may be evaluated again, however often.
-    assert lost_guard(table, pool, 1, tracked, point, False, False) and residual[1] == pytest.approx(gap, abs=1e-16)
+    assert lost_clearance_row(table, pool, 1, tracked, point, False, False) and residual[1] == pytest.approx(
+        gap, abs=1e-16
+    )
 
 
 def test_a_contact_that_is_not_open_stays_behind_where_it_goes_or_is_past_its_face():
     for past, goes, told in ((False, True, -0.5), (True, False, 0.0)):
         table, pool, start, point = guards(-0.5)
-        assert lost_guard(table, pool, 1, start, point, past, goes)
+        assert lost_clearance_row(table, pool, 1, start, point, past, goes)
         assert point.residual[1] == told and np.isnan(point.tracked[1, 0])
 
 
@@ -69,7 +71,7 @@ def test_only_contacts_of_solids_that_are_hardly_in_each_other_may_go():
         table, *_rest = guards(gap, solids)
         assert may_go(table, 1, np.array([1.0, gap])) == expected
     # A row of the scene's own is no clearance's.
-    table[FIRST_GUARD], table[GUARDS] = 0, 1
+    table[FIRST_CLEARANCE_ROW], table[CLEARANCE_ROWS] = 0, 1
     assert not may_go(table, 1, np.array([1.0, 0.0]))
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 
-from assembly.solve.loop.multipliers import EXCHANGES, NEAR, ROUNDS, foresee, leave_out, pushing_multipliers
+from assembly.solve.loop.multipliers import EXCHANGES, NEAR, ROUNDS, leave_out, predict_active_set, pushing_multipliers
 from assembly.solve.loop.residuals import Structure
 
 
@@ -78,7 +78,7 @@ def test_rows_are_foreseen_until_they_agree_and_left_out_again():
         given = (rows, residual, wide, y, mu)
         step = descent.copy()
         for count in range(100):
-            if foresee(table, shape, *given, step, False, active, foreseen, descent, None) == 0:
+            if predict_active_set(table, shape, *given, step, False, active, foreseen, descent, None) == 0:
                 rounds.append(count)
                 # The least of |d|^2 / 2 + g.d + sum min(c + J d, 0)^2 / 2 mu, and so downhill all the way.
                 below = np.minimum(residual + wide[:, :6] @ step, 0.0)

@@ -13,8 +13,8 @@ from assembly.proximity.extrema.lifted_pair import VARIABLES, VECTORS
 from assembly.proximity.features.solid_contact import CONTACT_RECORD, IDLE, PAIR_GAP, SLACK, TRACK
 from assembly.proximity.manager import update as watch
 from assembly.proximity.manager.state import PAIR_MEMORY, REACH, memory_places
-from assembly.solve.loop.clearances import place_guards
-from assembly.solve.loop.predict import carry
+from assembly.solve.loop.clearances import place_clearance_rows
+from assembly.solve.loop.predict import predict_pairs
 from assembly.solve.loop.residuals import arrange, move, record_of_blocks
 from tests.laws.loop_point import room_of_shape
 
@@ -43,7 +43,7 @@ class Near:
         room = np.empty((VECTORS, 3, VARIABLES)), np.empty((VARIABLES, VARIABLES))
         self.memory = packed._memory.copy()
         self.loose = layout.LiftedPairs(self.free, np.empty((rows, 4)), *room, np.zeros((rows, TRACK)), self.memory)
-        at = table[layout.TAPE_ROOM]
+        at = table[layout.TAPE_WORKSPACE]
         self.room = layout.TapeRoom(*(np.empty(size) for size in table[at : at + 3]))
         q = scene.q.copy()
         q[:, :3] = (q[:, :3] - packed.reference) / packed.scale
@@ -52,8 +52,8 @@ class Near:
         # What is listed is to be farther away, too.
         pairs, places, _ = memory_places(table, table[layout.WATCH])
         self.memory[pairs:places].reshape(-1, PAIR_MEMORY)[:, REACH] = 1.0
-        watch.look(table, pool, table[layout.WATCH], self.memory, q, self.here.tracked, watch.EVERYTHING)
-        place_guards(table, self.memory, self.here, np.zeros(rows), np.zeros(rows), self.free, True)
+        watch.update(table, pool, table[layout.WATCH], self.memory, q, self.here.tracked, watch.EVERYTHING)
+        place_clearance_rows(table, self.memory, self.here, np.zeros(rows), np.zeros(rows), self.free, True)
         arrange(table, self.free, self.shape, rows, self.n)
         self.rows = rows
         self.exactly(self.here)
@@ -73,7 +73,7 @@ class Near:
         """The point that a step leads to, as the loop evaluates it, and which rows it took as open."""
         trial = self.point(self.here.q)
         move(self.table, self.here.q, d, 1.0, trial.q)
-        carry(self.table, self.pool, self.shape.bases, self.loose, self.here, trial, d, 1.0)
+        predict_pairs(self.table, self.pool, self.shape.bases, self.loose, self.here, trial, d, 1.0)
         idle = self.loose.guess[:, IDLE] == 1.0
         found = evaluate(self.table, self.pool, self.loose.guess, np.inf, self.loose, self.room, trial) < 0
         return trial, idle, found

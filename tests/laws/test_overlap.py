@@ -40,7 +40,7 @@ def judge(f, g):
         tracked = np.full((packed.tracked, TRACK), np.nan)
         q = np.array(q, dtype=float)
         q[:, :3] = (q[:, :3] - packed.reference) / packed.scale
-        watch.look(packed.table, packed.pool, packed.table[layout.WATCH], memory, q, tracked, watch.EVERYTHING)
+        watch.update(packed.table, packed.pool, packed.table[layout.WATCH], memory, q, tracked, watch.EVERYTHING)
         gaps = tracked[np.isfinite(tracked[:, PAIR_GAP]), PAIR_GAP]
         crossed = memory[watch_memory.MEMORY_HEADER + watch_memory.CROSSED]
         assert crossed in (0.0, 1.0)

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 
 from assembly.geometry.vec import dot
 from assembly.proximity.manager.centerlines.box import FreeEnds, Lengths, apart
-from assembly.proximity.manager.centerlines.minima import MINIMA, valley_minima
+from assembly.proximity.manager.centerlines.minima import MINIMA, near_singular_minima
 from assembly.proximity.manager.centerlines.search import THIN
 from assembly.proximity.manager.wires import HALF, PART_BEND
 from benchmarks.motions import SHAPES
@@ -113,7 +113,7 @@ def compare(two, box, open_ends):
         # Of a level valley rounding tells where it has minima.
         return None
     places = np.empty((MINIMA, 2))
-    count, _level, certain = valley_minima(
+    count, _level, certain = near_singular_minima(
         two.pool, two.o, two.p, *two.pose(), Lengths(*box), FreeEnds(*open_ends), places
     )
     assert certain

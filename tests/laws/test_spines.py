@@ -15,17 +15,17 @@ from assembly.geometry.shapes.path import Path
 from assembly.geometry.vec import dot
 from assembly.proximity.manager import state as watch_memory
 from assembly.proximity.manager.centerlines.box import BARREN, CONVEX, EMPTY, FreeEnds, Lengths, apart, box_of
-from assembly.proximity.manager.centerlines.packing import pack_spine
+from assembly.proximity.manager.centerlines.packing import pack_centerline
 from assembly.proximity.manager.motion_bounds import part_used
 from assembly.proximity.manager.wires import (
     HALF,
     PART,
     PART_POOL,
     PARTS,
+    centerline_point,
     parameters_of,
     place_of,
     point_of,
-    spine_point,
 )
 from benchmarks.center_lines import path_wire
 from benchmarks.motions import HOOK, SHAPES
@@ -58,7 +58,7 @@ def test_points_of_a_wire_are_around_its_spine(name, view, cases):
     spine = spine_of(face)
     assert spine is not None
     record, pool = face.packed()
-    table, more, at = pack_spine(spine, 1.0, record.size, pool.size)
+    table, more, at = pack_centerline(spine, 1.0, record.size, pool.size)
     table, pool = np.append(record, table), np.append(pool, more)
     (u0, u1), (v0, v1) = face.surface.domain
     size = face.surface.size
@@ -84,13 +84,13 @@ def test_points_of_a_wire_are_around_its_spine(name, view, cases):
 
 @pytest.mark.parametrize("name", WIRES)
 def test_frames_of_a_spine_are_its_derivatives(name):
-    table, pool, at = pack_spine(spine_of(Face(WIRES[name])), 1.0)
+    table, pool, at = pack_centerline(spine_of(Face(WIRES[name])), 1.0)
     for part in range(table[at + PARTS]):
         o = part_at(table, at, part)
         for s in np.linspace(-1.5, 1.5, 7) * pool[o + HALF]:
             h = 1e-3 * pool[o + HALF]
-            p, t, c = (np.array(row) for row in spine_point(pool, o, s))
-            rows = [[np.array(row) for row in spine_point(pool, o, s + k * h)] for k in (-2, -1, 1, 2)]
+            p, t, c = (np.array(row) for row in centerline_point(pool, o, s))
+            rows = [[np.array(row) for row in centerline_point(pool, o, s + k * h)] for k in (-2, -1, 1, 2)]
             slopes = [(rows[0][k] - 8.0 * rows[1][k] + 8.0 * rows[2][k] - rows[3][k]) / (12.0 * h) for k in range(2)]
             # Rounding of points of size one over steps, that are short for short parts.
             assert np.linalg.norm(t) == pytest.approx(1.0, abs=1e-14)
@@ -122,8 +122,8 @@ def packed_pair(*names):
     """Two spines in one table and pool, and where their records are."""
     spines = [SPINES[name] for name in names]
     sizes = [float(np.ptp(spine.start, axis=0).max() + spine.length.max()) for spine in spines]
-    table, pool, f = pack_spine(spines[0], sizes[0])
-    more, doubles, g = pack_spine(spines[1], sizes[1], table.size, pool.size)
+    table, pool, f = pack_centerline(spines[0], sizes[0])
+    more, doubles, g = pack_centerline(spines[1], sizes[1], table.size, pool.size)
     return np.append(table, more), np.append(pool, doubles), f, g
 
 
@@ -157,8 +157,8 @@ class Two:
 
     def frames(self, s, t):
         """Point, tangent and curvature vector of both, in the axes of f."""
-        mine = [np.array(row) for row in spine_point(self.pool, self.o, s)]
-        other = [self.turn.apply(np.array(row)) for row in spine_point(self.pool, self.p, t)]
+        mine = [np.array(row) for row in centerline_point(self.pool, self.o, s)]
+        other = [self.turn.apply(np.array(row)) for row in centerline_point(self.pool, self.p, t)]
         return mine, [other[0] + self.shift, *other[1:]]
 
     def pose(self):

@@ -12,9 +12,19 @@ from assembly.geometry.splines.evaluate import BREAKS_U, BREAKS_V, SPANS_U, SPAN
 from assembly.proximity.brep.borders import feature_at
 from assembly.proximity.brep.records import FACES
 from assembly.proximity.features.holding import HELD_F, HELD_G
-from assembly.proximity.manager.extrema import CODE_F, CODE_G, CORNER, LISTED, NEW, ORIGIN, ROOT, ROOT_FOLD, USELESS
-from assembly.proximity.manager.near_singular import ARRIVED, across_valley, into_valley
-from assembly.proximity.manager.near_singular_points import hold_continua, is_next_in_valley, sunk
+from assembly.proximity.manager.extrema import (
+    CODE_F,
+    CODE_G,
+    EXTREMUM_FOLD,
+    LISTED,
+    NEW,
+    ORIGIN,
+    ROOT,
+    USELESS,
+    VERTEX_CONTACT,
+)
+from assembly.proximity.manager.near_singular import ARRIVED, across_near_singular, into_near_singular
+from assembly.proximity.manager.near_singular_points import hold_continua, is_next_in_near_singular, sunk
 from assembly.proximity.manager.state import PAIR_SHELL_F, PAIR_SHELL_G, PAIR_TABLE
 from tests.laws.scenes import posed
 
@@ -77,7 +87,7 @@ def test_the_bottom_is_the_lowest_point_across_a_ring(tilt):
         s = surface.evaluate(*start[2:])
         start_angle = np.arctan2(s[1], s[0]) % (2.0 * np.pi)
         matrix = tuple(turn.ravel())
-        found, x, on_f, along = into_valley(table, pool, top, ring, matrix, tuple(shift), start, WIDE)
+        found, x, on_f, along = into_near_singular(table, pool, top, ring, matrix, tuple(shift), start, WIDE)
         assert found and not on_f
         p = surface.evaluate(x[2], x[3])
         u = np.arctan2(p[1], p[0])
@@ -101,7 +111,7 @@ def test_a_patch_is_not_left():
     start = (0.0, 0.0, 0.3 * u1, v0 + 0.75 * (v1 - v0) + off)
     for part, inside in ((0.5, False), (2.0, True)):
         half = (np.inf, np.inf, np.inf, part * off)
-        assert into_valley(table, pool, top, ring, tuple(turn.ravel()), shift, start, half)[0] == inside
+        assert into_near_singular(table, pool, top, ring, tuple(turn.ravel()), shift, start, half)[0] == inside
 
 
 @pytest.mark.parametrize(
@@ -116,7 +126,7 @@ def test_no_valley_where_nothing_or_everything_is_level(shape, cases):
         turn, shift = tilted(rng, 0.1, scale)
         for other in others:
             x = lowest_start(table, pool, other, turn, shift)
-            assert not across_valley(table, pool, top, other, tuple(turn.ravel()), tuple(shift), x).found
+            assert not across_near_singular(table, pool, top, other, tuple(turn.ravel()), tuple(shift), x).found
 
 
 def ring_on_a_slab(slab=None):
@@ -170,15 +180,15 @@ def test_few_of_a_continuum_are_held():
     found = np.zeros((len(states), ROOT))
     for root, (eighth, origin, fold) in zip(found, states, strict=True):
         start = (0.0, 0.0, eighth / 8.0 * u1, v0 + 0.75 * (v1 - v0))
-        _found, root[:4], _on_f, _along = into_valley(
+        _found, root[:4], _on_f, _along = into_near_singular(
             table, pool, feature_at(table, shells[0], top), feature_at(table, shells[1], 0), turn, shift, start, WIDE
         )
-        root[CODE_F], root[CODE_G], root[ORIGIN], root[ROOT_FOLD] = top, 0, origin, fold
+        root[CODE_F], root[CODE_G], root[ORIGIN], root[EXTREMUM_FOLD] = top, 0, origin, fold
     before = found[[0, 2, 3, 4, 5], :4].copy()
     # What is a step from one that is held, or from the isolated one, is left out.
     assert hold_continua(table, pool, looked_into, found, len(states)) == 5
     np.testing.assert_array_equal(found[:5, :4], before)
-    assert found[:5, CORNER].tolist() == [HELD_G, HELD_G, 0.0, HELD_G, 0.0]
+    assert found[:5, VERTEX_CONTACT].tolist() == [HELD_G, HELD_G, 0.0, HELD_G, 0.0]
     assert found[:5, ORIGIN].tolist() == [NEW, LISTED, USELESS, NEW, NEW]
 
 
@@ -188,9 +198,9 @@ def test_what_lies_beside_a_point_is_in_another_valley():
     turn, shift = tuple(np.eye(3).ravel()), (0.0, 0.0, 0.35 / scale)
     surfaces = feature_at(table, shells[0], top), feature_at(table, shells[1], 0)
     start = (0.0, 0.0, 0.1 * u1, v0 + 0.75 * (v1 - v0))
-    _found, x, _on_f, along = into_valley(table, pool, *surfaces, turn, shift, start, WIDE)
+    _found, x, _on_f, along = into_near_singular(table, pool, *surfaces, turn, shift, start, WIDE)
     roots = np.zeros((1, ROOT))
-    roots[0, :4], roots[0, CODE_F], roots[0, ORIGIN], roots[0, CORNER] = x, top, NEW, HELD_G
+    roots[0, :4], roots[0, CODE_F], roots[0, ORIGIN], roots[0, VERTEX_CONTACT] = x, top, NEW, HELD_G
     pair = posed(turn, shift, shells=tuple(shells))
     # The slab's parameters are lengths. More beside than along is another valley; a turn by 60 degrees is far, too.
     across = np.cross([0.0, 0.0, 1.0], along)
@@ -202,4 +212,4 @@ def test_what_lies_beside_a_point_is_in_another_valley():
         (0.3 * turned, tuple(turned), True),
     ):
         there = (x[0] + way[0], x[1] + way[1], x[2], x[3])
-        assert is_next_in_valley(table, pool, pair, (top, 0), surfaces, there, direction, roots, 1) == other
+        assert is_next_in_near_singular(table, pool, pair, (top, 0), surfaces, there, direction, roots, 1) == other

@@ -14,7 +14,7 @@ from assembly.proximity.features.nearest_query import find_deepest, find_nearest
 from assembly.proximity.features.solid_contact import search_solids, track_solids
 from assembly.proximity.manager.contact_place import mark_places
 from assembly.proximity.manager.motion_bounds import measure_parts, went_beyond
-from assembly.proximity.manager.update import look
+from assembly.proximity.manager.update import update
 
 __all__ = ["blocks", "contacts", "deepest", "places", "solids", "surfaces", "tapes", "trims", "watch"]
 
@@ -61,4 +61,4 @@ def trims() -> tuple[int, int]:
 
 def watch() -> tuple[int, int, int, int]:
     """Of `look`, `has_stayed`, `measure_parts` and `went_beyond`."""
-    return address_of(look), address_of(has_stayed), address_of(measure_parts), address_of(went_beyond)
+    return address_of(update), address_of(has_stayed), address_of(measure_parts), address_of(went_beyond)

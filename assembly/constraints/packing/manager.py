@@ -22,7 +22,7 @@ from assembly.proximity.bvh.facet_tree import FacetTree
 from assembly.proximity.bvh.neighbor_list import LIST_INTS
 from assembly.proximity.bvh.packing import pack_tree
 from assembly.proximity.manager import state as watch_memory
-from assembly.proximity.manager.centerlines.packing import pack_spine
+from assembly.proximity.manager.centerlines.packing import pack_centerline
 from assembly.proximity.manager.extrema import GIVEN_RECORD
 
 __all__ = ["LAST_REACH", "guarded_pairs", "is_of_surfaces", "pack_watch", "place_count", "table_with_guards"]
@@ -94,7 +94,7 @@ def pack_watch(
         first += count
     count, pair_table = pairs.write()
     lengths = np.zeros(watch_memory.LENGTH_COUNT)
-    lengths[watch_memory.NEGLECT] = min(clearance.merge_radius for clearance in clearances)
+    lengths[watch_memory.MERGE_RADIUS] = min(clearance.merge_radius for clearance in clearances)
     lengths[watch_memory.FIRST_REACH], lengths[watch_memory.LAST_REACH] = FIRST_REACH, LAST_REACH
     _, lengths_place = writer.add(pool=lengths)
     lists = min(count, MOST_LISTS)
@@ -104,7 +104,7 @@ def pack_watch(
     record[watch_memory.PAIR_TABLE], record[watch_memory.FIRST] = pair_table, len(contacts)
     record[watch_memory.LENGTHS] = lengths_place
     record[watch_memory.LISTS], record[watch_memory.LIST_TABLE] = lists, list_table
-    record[watch_memory.CORNERS] = any(clearance.corners for clearance in clearances)
+    record[watch_memory.VERTEX_CONTACTS] = any(clearance.corners for clearance in clearances)
     # Where one is asked for, its address is written when the scene is ready.
     record[watch_memory.MARK_AT] = pairs.any_in_place
     return writer.add(record)[0]
@@ -118,7 +118,7 @@ def table_with_guards(table: Table, placed: Sequence[Sequence[int]]) -> Table:
     """
     table = table.copy()
     record = table[layout.WATCH]
-    first = table[layout.ROW_TABLE] + layout.ROW * table[layout.FIRST_GUARD]
+    first = table[layout.ROW_TABLE] + layout.ROW * table[layout.FIRST_CLEARANCE_ROW]
     rows = table[first:][: layout.ROW * len(placed)].reshape(-1, layout.ROW)
     size = watch_memory.PAIR_RECORD * table[record + watch_memory.PAIRS]
     pairs = table[table[record + watch_memory.PAIR_TABLE] :][:size].reshape(-1, watch_memory.PAIR_RECORD)
@@ -129,7 +129,7 @@ def table_with_guards(table: Table, placed: Sequence[Sequence[int]]) -> Table:
             shapes = pair[watch_memory.PAIR_SURFACE_F : watch_memory.PAIR_SHELL_G + 1]
             row[layout.SURFACE_F : layout.SHELL_G + 1] = shapes
             row[layout.MINIMUM] = pair[watch_memory.PAIR_MINIMUM] + watch_memory.IN_PLACE * given
-            row[layout.GUARD_NUMBER] = number
+            row[layout.CLEARANCE_ROW_NUMBER] = number
     return table
 
 
@@ -191,7 +191,7 @@ class _PairPacking:
                 return [-1, -1]
             if face not in self._spines:
                 writer = self._writer
-                table, pool, at = pack_spine(spine, writer.scale, writer.table_at, writer.pool_at)
+                table, pool, at = pack_centerline(spine, writer.scale, writer.table_at, writer.pool_at)
                 writer.add(table, pool)
                 self._spines[face] = at
         return [self._spines[f], self._spines[g]]

@@ -82,7 +82,7 @@ class RowPacking:
     def add_guards(self, clearances: Sequence[Clearance], places: Sequence[int]) -> None:
         """Idle rows, as many of each clearance as it has places."""
         header = self._writer.header
-        header[layout.FIRST_GUARD], header[layout.GUARDS] = len(self._rows), sum(places)
+        header[layout.FIRST_CLEARANCE_ROW], header[layout.CLEARANCE_ROWS] = len(self._rows), sum(places)
         for clearance, count in zip(clearances, places, strict=True):
             for _ in range(count):
                 self._add(clearance, [layout.CONTACT_ROW, -1, -1, 1, 0, 1, -1, -1, -1, -1, layout.ZERO, 0])

@@ -306,7 +306,7 @@ class Packed:
             table[table[layout.WATCH] + watch_memory.TRACK_SOLIDS] = table[layout.TRACK_AT]
             at = table[layout.WATCH] + watch_memory.MARK_AT
             table[at] = addresses.places() if table[at] else 0
-        if table[table[layout.TAPE_ROOM]] > 0:
+        if table[table[layout.TAPE_WORKSPACE]] > 0:
             table[layout.RUN_TAPE_AT] = addresses.tapes()
 
     def __setstate__(self, state: dict[str, Any]) -> None:

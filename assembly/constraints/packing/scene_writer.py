@@ -129,4 +129,4 @@ class SceneWriter(Writer):
         header[layout.JOINT_TABLE], _ = self.add(fields)
         header[layout.JOINTS] = len(self.frames)
         header[layout.TRACKED] = self._pair_rows + len(self.angles)
-        header[layout.TAPE_ROOM], _ = self.add(self._tape_room)
+        header[layout.TAPE_WORKSPACE], _ = self.add(self._tape_room)

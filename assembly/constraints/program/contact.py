@@ -197,7 +197,7 @@ def track_row(table, pool, row, q, start, patience, records, tracked, r):
 
 
 @kernel(inline=True)
-def is_guard(table, r):
+def is_clearance_row(table, r):
     """Whether row r is a clearance's."""
     header = header_at(table, 0)
     return header.first_guard <= r < header.first_guard + header.guards
@@ -218,7 +218,7 @@ def is_of_solids(table, r):
 @kernel(inline=True)
 def may_go(table, r, residual):
     """Whether row r is a clearance's of solids that are hardly in each other: there, its pair may end."""
-    return is_guard(table, r) and is_of_solids(table, r) and residual[r] > -HARDLY
+    return is_clearance_row(table, r) and is_of_solids(table, r) and residual[r] > -HARDLY
 
 
 @kernel(inner=True)
@@ -250,7 +250,7 @@ def idle_row(r, gap, point):
 
 
 @kernel(inner=True)
-def lost_guard(table, pool, r, start, point, past, goes):
+def lost_clearance_row(table, pool, r, start, point, past, goes):
     """Row r of a clearance whose pair was lost: idle, if its gap would be open, or it is a corner `past` its face.
 
     Solids need only touch. Or if it `goes`, though it is not open: one that ends where bodies are in each other would
@@ -309,12 +309,12 @@ def solids_row(table, pool, r, start, patience, point):
         tracked_at(tracked, r).stays = pair.stays
     status = track_row(table, pool, row, q, start, patience, records, tracked, r)
     found = (status == CONVERGED or status == SINGULAR) and (
-        contact_record_at(records, r).proper != 0.0 or is_guard(table, r)
+        contact_record_at(records, r).proper != 0.0 or is_clearance_row(table, r)
     )
     if not found:
-        if is_guard(table, r):
+        if is_clearance_row(table, r):
             past = pair.stays > 0.0 and status == LEFT_PATCH
-            return lost_guard(table, pool, r, start, point, past, goes)
+            return lost_clearance_row(table, pool, r, start, point, past, goes)
         # Near touching a search takes long, and steps are short.
         far = abs(pair.gap) > HARDLY
         if not (far or row_at(table, row).one_sided == 1 or patience == math.inf):
@@ -349,8 +349,8 @@ def row_of_pair(table, pool, r, start, patience, point):
         anywhere = status == OTHER_SIDE and patience == math.inf
         if row_at(table, row).one_sided == 0 and not anywhere:
             return False
-        if is_guard(table, r):
-            return lost_guard(table, pool, r, start, point, False, False)
+        if is_clearance_row(table, r):
+            return lost_clearance_row(table, pool, r, start, point, False, False)
         # A one-sided contact is of the nearest pair, whichever that is now.
         held = status == LEFT_PATCH and distance > 0.0
         status, x, facing = restart_contact(table, pool, row, q, tracked, records, r)
@@ -393,7 +393,7 @@ def contact_row(table, pool, r, start, patience, point):
         return False
     tracks = not math.isnan(tracked[r, 0])
     # Features of solids switch as they move: their rows are followed.
-    open_far = is_guard(table, r) and contact.shell_f < 0 and residual[r] > FAR
+    open_far = is_clearance_row(table, r) and contact.shell_f < 0 and residual[r] > FAR
     contact_record.slack = 0.0
     if tracks and open_far:
         # How far they may go is behind the least gap.

@@ -71,7 +71,7 @@ def joint_row(table, pool, r, start, tracked, records, residual, jacobian):
 
 
 @kernel(inner=True)
-def evaluate(table, pool, start, patience, loose, room, point):
+def evaluate(table, pool, start, patience, lifted, workspace, point):
     """Evaluate all rows at the point's poses. Returns the contact whose pair was lost, or -1.
 
     `start` are the tracked values to begin from. Of `point`, an `Iterate`, all but the poses is written. `loose` are
@@ -80,10 +80,10 @@ def evaluate(table, pool, start, patience, loose, room, point):
     header = header_at(table, 0)
     q, tracked, records, residual, jacobian = point.q, point.tracked, point.records, point.residual, point.jacobian
     pairs = header.contacts
-    free = loose.free
+    free = lifted.free
     for r in range(pairs):
         if free[r] >= 0:
-            one = (table, pool, r, start, free, loose.lengths, loose.vectors, q, tracked, records, residual, jacobian)
+            one = (table, pool, r, start, free, lifted.lengths, lifted.vectors, q, tracked, records, residual, jacobian)
             call_address(header.free_row_address, one)
     if pairs > 0:
         others = (table, pool, start, patience, free, q, tracked, records, residual, jacobian)
@@ -92,7 +92,7 @@ def evaluate(table, pool, start, patience, loose, room, point):
             return lost
     if header.trims > 0:
         call_address(
-            header.trim_rows_address, (table, pool, free, loose.lengths, q, tracked, records, residual, jacobian)
+            header.trim_rows_address, (table, pool, free, lifted.lengths, q, tracked, records, residual, jacobian)
         )
     for k in range(pairs, header.tracked):
         # Of an angle that no row has, only an input of a dexterity, this is all that is known.
@@ -104,5 +104,5 @@ def evaluate(table, pool, start, patience, loose, room, point):
         if row_at(table, header.row_table + ROW * r).kind == JOINT_ROW:
             joint_row(table, pool, r, start, tracked, records, residual, jacobian)
     for t in range(header.tapes):
-        tape_rows(table, pool, header.tape_table + TAPE_RECORD * t, q, room, residual, jacobian)
+        tape_rows(table, pool, header.tape_table + TAPE_RECORD * t, q, workspace, residual, jacobian)
     return -1

@@ -112,11 +112,11 @@ def posture(pool, o, q, body, s, order, gradient, hessian):
 
 
 @kernel(inner=True)
-def tape_term(table, pool, term, q, order, room, entries, gradient, hessian):
+def tape_term(table, pool, term, q, order, workspace, entries, gradient, hessian):
     """Weight times the one value of a tape."""
     header = header_at(table, 0)
     term_record = term_at(table, term)
-    inputs, outputs, work = room
+    inputs, outputs, work = workspace
     weight = pool[term_record.parameters]
     size = pool_header_at(pool, 0).scale
     # A term's tape has the record of a row's tape, one value.
@@ -179,7 +179,7 @@ def recenter(table, pool, q):
 
 
 @kernel(inner=True)
-def objective(table, pool, q, order, room, entries, gradient, hessian):
+def objective(table, pool, q, order, workspace, entries, gradient, hessian):
     """Value of the objective. From order 1 on the gradient and the upper triangle of the Hessian are overwritten.
 
     `entries` says where the Hessian has any (`constraints/program/envelope.py`).
@@ -206,5 +206,5 @@ def objective(table, pool, q, order, room, entries, gradient, hessian):
             s = 6 * table[header.slots + body]
             value += posture(pool, term_record.parameters, q, body, s, order, gradient, hessian)
         elif kind == TAPE_TERM:
-            value += tape_term(table, pool, term, q, order, room, entries, gradient, hessian)
+            value += tape_term(table, pool, term, q, order, workspace, entries, gradient, hessian)
     return value

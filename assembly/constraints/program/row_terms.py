@@ -94,7 +94,7 @@ def add_coordinate_blocks(kind, component, records, k, y, order, hessian, f, g):
 
 
 @kernel(inner=True)
-def add_row_terms(table, pool, loose, room, shape, point, y, weights, hessian):
+def add_row_terms(table, pool, lifted, workspace, shape, point, y, weights, hessian):
     """Upper triangle of hessian += second derivative of y . rows + J^T diag(weights) J.
 
     The rows of tangency of a free pair go with its row.
@@ -104,7 +104,7 @@ def add_row_terms(table, pool, loose, room, shape, point, y, weights, hessian):
     bases, order = shape.bases, shape.sparsity
     blocked = is_blocked(order)
     pairs = header.contacts
-    free, lengths, vectors, block = loose.free, loose.lengths, loose.vectors, loose.variables
+    free, lengths, vectors, block = lifted.free, lifted.lengths, lifted.vectors, lifted.variables
     for r in range(pairs):
         if free[r] >= 0:
             call_address(
@@ -152,4 +152,4 @@ def add_row_terms(table, pool, loose, room, shape, point, y, weights, hessian):
         for v in range(expression.values):
             idle = idle and y[expression.first_row + v] == 0.0
         if not idle:
-            add_tape_hessian(table, pool, tape, q, room, order, y, hessian)
+            add_tape_hessian(table, pool, tape, q, workspace, order, y, hessian)

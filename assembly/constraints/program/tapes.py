@@ -30,7 +30,7 @@ def run_scene_tape(table, pool, o, x, work, y):
 
 
 @kernel(inner=True)
-def place_tape(table, pool, tape, q, room):
+def place_tape(table, pool, tape, q, workspace):
     """The poses of a tape's bodies, in the user's units, to the front of its room. Returns where its inputs end."""
     units = pool_header_at(pool, 0)
     expression = tape_at(table, tape)
@@ -38,18 +38,18 @@ def place_tape(table, pool, tape, q, room):
     for b in range(expression.bodies):
         body = table[expression.body_list + b]
         for i in range(3):
-            room[7 * b + i] = q[body, i] * size + units.reference[i]
+            workspace[7 * b + i] = q[body, i] * size + units.reference[i]
         for i in range(3, 7):
-            room[7 * b + i] = q[body, i]
+            workspace[7 * b + i] = q[body, i]
     return 7 * expression.bodies
 
 
 @kernel(inner=True)
-def tape_rows(table, pool, tape, q, room, residual, jacobian):
+def tape_rows(table, pool, tape, q, workspace, residual, jacobian):
     """All rows of a tape; a value or a slope that is not finite is an infinite violation, of one side too."""
     header = header_at(table, 0)
     expression = tape_at(table, tape)
-    inputs, outputs, work = room
+    inputs, outputs, work = workspace
     place_tape(table, pool, tape, q, inputs)
     call_address(header.run_tape_address, (table, pool, expression.first_order, inputs, work, outputs))
     m = expression.values
@@ -71,11 +71,11 @@ def tape_rows(table, pool, tape, q, room, residual, jacobian):
 
 
 @kernel(inner=True)
-def add_tape_hessian(table, pool, tape, q, room, order, y, hessian):
+def add_tape_hessian(table, pool, tape, q, workspace, order, y, hessian):
     """Upper triangle of hessian += second derivative of y . rows, for the rows of a tape."""
     header = header_at(table, 0)
     expression = tape_at(table, tape)
-    inputs, outputs, work = room
+    inputs, outputs, work = workspace
     m = expression.values
     count = expression.bodies
     each = 1.0 / pool[expression.unit]

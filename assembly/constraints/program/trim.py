@@ -65,10 +65,10 @@ def clear(jacobian, r):
 
 
 @kernel(inner=True)
-def add_coordinate(loose, records, k, i, factor, jacobian, r):
+def add_coordinate(lifted, records, k, i, factor, jacobian, r):
     """Row r += factor times the derivative of coordinate i of contact k: an unknown, or by the contact velocity."""
-    free = loose.free
-    lengths = loose.lengths
+    free = lifted.free
+    lengths = lifted.lengths
     if free[k] >= 0:
         jacobian[r, FREE_COLUMN + i] += factor / lengths[k, i]
     else:
@@ -86,7 +86,7 @@ def add_rate(records, k, i, factor, jacobian, r):
 
 
 @kernel(inner=True)
-def signed_row(table, pool, r, loose, point):
+def signed_row(table, pool, r, lifted, point):
     """Row r, of a trim in the signed form."""
     tracked, records, residual, jacobian = point.tracked, point.records, point.residual, point.jacobian
     row = trim_row_at(table, header_at(table, 0).row_table + ROW * r)
@@ -96,8 +96,8 @@ def signed_row(table, pool, r, loose, point):
     s, n, _bend = trim_distance(table, pool, row.loop, tracked[k, o], tracked[k, o + 1])
     residual[r] = factor * s
     clear(jacobian, r)
-    add_coordinate(loose, records, k, o, factor * n[0], jacobian, r)
-    add_coordinate(loose, records, k, o + 1, factor * n[1], jacobian, r)
+    add_coordinate(lifted, records, k, o, factor * n[0], jacobian, r)
+    add_coordinate(lifted, records, k, o + 1, factor * n[1], jacobian, r)
 
 
 @kernel(inner=True)
@@ -175,7 +175,7 @@ def offset_tangents(pu, pv, puu, puv, pvv, n, beta):
 
 
 @kernel(inner=True)
-def vector_rows(table, pool, first, loose, point):
+def vector_rows(table, pool, first, lifted, point):
     """The rows of a trim from `first` on, in one of the paper's forms."""
     header = header_at(table, 0)
     q, tracked, records, residual, jacobian = point.q, point.tracked, point.records, point.residual, point.jacobian
@@ -212,7 +212,7 @@ def vector_rows(table, pool, first, loose, point):
     arm_g = sub(point_w, position(q, j))
     du = matvec(away, du)
     dv = matvec(away, dv)
-    free = loose.free[k] >= 0
+    free = lifted.free[k] >= 0
     # Seen from the side of the loop the other point is p + beta n.
     toward = (0.0, 0.0, 0.0)
     if form == BETWEEN and not free:
@@ -225,12 +225,12 @@ def vector_rows(table, pool, first, loose, point):
         if form == PARAMETRIC:
             residual[r] = factor * (x[o + l] - at[l])
             slope = factor * rate[l]
-            add_coordinate(loose, records, k, o + l, factor, jacobian, r)
+            add_coordinate(lifted, records, k, o + l, factor, jacobian, r)
         elif form == CARTESIAN:
             residual[r] = p[l] - c[l]
             slope = along[l]
-            add_coordinate(loose, records, k, o, pu[l], jacobian, r)
-            add_coordinate(loose, records, k, o + 1, pv[l], jacobian, r)
+            add_coordinate(lifted, records, k, o, pu[l], jacobian, r)
+            add_coordinate(lifted, records, k, o + 1, pv[l], jacobian, r)
         else:
             axis = (turn[l], turn[3 + l], turn[6 + l])
             arm = arm_f if side == 0 else arm_g
@@ -238,24 +238,24 @@ def vector_rows(table, pool, first, loose, point):
             slope = along[l]
             if not free:
                 # The other side's own coordinates have no rates at its poles.
-                add_coordinate(loose, records, k, o, pu[l], jacobian, r)
-                add_coordinate(loose, records, k, o + 1, pv[l], jacobian, r)
+                add_coordinate(lifted, records, k, o, pu[l], jacobian, r)
+                add_coordinate(lifted, records, k, o + 1, pv[l], jacobian, r)
                 for j in range(FREE_COLUMN):
                     jacobian[r, j] += toward[l] * jacobian[k, j]
                 if moves:
                     add_rate(records, scratch, o, -slope, jacobian, r)
                 continue
             material_rates(axis, arm_f, arm_g, 1.0 - 2.0 * side, jacobian, r)
-            add_coordinate(loose, records, k, 2 - o, dot(axis, du), jacobian, r)
-            add_coordinate(loose, records, k, 3 - o, dot(axis, dv), jacobian, r)
+            add_coordinate(lifted, records, k, 2 - o, dot(axis, du), jacobian, r)
+            add_coordinate(lifted, records, k, 3 - o, dot(axis, dv), jacobian, r)
         if moves:
             add_rate(records, scratch, o, -slope, jacobian, r)
     if trim.is_length == 1:
-        signed_length(table, pool, first, trim.count, 1.0 if kept * s >= 0.0 else -1.0, loose, point)
+        signed_length(table, pool, first, trim.count, 1.0 if kept * s >= 0.0 else -1.0, lifted, point)
 
 
 @kernel(inner=True)
-def signed_length(table, pool, first, count, side, loose, point):
+def signed_length(table, pool, first, count, side, lifted, point):
     """One row of a vector's rows: its length, positive on the right side of the loop. The others become zero.
 
     The length is smooth through zero, but its gradient is 0 / 0 there: as all columns of the rows are then along one
@@ -297,13 +297,13 @@ def signed_length(table, pool, first, count, side, loose, point):
     for l in range(1, count):
         residual[first + l] = 0.0
     residual[first] = side * length
-    if column > 0.0 and growth(table, pool, first, best, loose, point) < 0.0:
+    if column > 0.0 and growth(table, pool, first, best, lifted, point) < 0.0:
         for j in range(FREE_COLUMN + 4):
             jacobian[first, j] = -jacobian[first, j]
 
 
 @kernel(inner=True)
-def growth(table, pool, r, j, loose, point):
+def growth(table, pool, r, j, lifted, point):
     """The derivative along column j of the signed distance, positive on the right side of the loop."""
     tracked = point.tracked
     records = point.records
@@ -315,7 +315,7 @@ def growth(table, pool, r, j, loose, point):
     _s, n, _bend = trim_distance(table, pool, row.loop, tracked[k, o], tracked[k, o + 1])
     value = 0.0
     for i in range(2):
-        if loose.free[k] >= 0:
+        if lifted.free[k] >= 0:
             value += n[i] if j == FREE_COLUMN + o + i else 0.0
         elif j < FREE_COLUMN:
             for l in range(4):
@@ -327,15 +327,15 @@ def growth(table, pool, r, j, loose, point):
 def trim_rows(table, pool, free, lengths, q, tracked, records, residual, jacobian):
     """All rows of trims, and their gradients."""
     header = header_at(table, 0)
-    loose = LiftedCoordinates(free, lengths)
+    lifted = LiftedCoordinates(free, lengths)
     point = Iterate(q, tracked, records, residual, jacobian)
     r = header.contacts
     while r < header.contacts + header.trims:
         row = trim_row_at(table, header.row_table + ROW * r)
         if row.form == SIGNED:
-            signed_row(table, pool, r, loose, point)
+            signed_row(table, pool, r, lifted, point)
         else:
-            vector_rows(table, pool, r, loose, point)
+            vector_rows(table, pool, r, lifted, point)
         r += row.count
     return 0
 
@@ -372,7 +372,7 @@ def trim_terms(table, pool, r, free, lengths, bases, tracked, records, jacobian,
     row = trim_row_at(table, header_at(table, 0).row_table + ROW * r)
     k = row.contact
     o = 2 * row.side
-    loose = LiftedCoordinates(free, lengths)
+    lifted = LiftedCoordinates(free, lengths)
     _s, n, bend = trim_distance(table, pool, row.loop, tracked[k, o], tracked[k, o + 1])
     places = np.empty((1, bases.shape[1]), np.int64)
     for b in range(bases.shape[1]):
@@ -380,12 +380,12 @@ def trim_terms(table, pool, r, free, lengths, bases, tracked, records, jacobian,
     rates = np.zeros((1, jacobian.shape[1]))
     factor = pool[row.factor]
     if row.form != SIGNED:
-        add_coordinate(loose, records, k, o, n[0], rates, 0)
-        add_coordinate(loose, records, k, o + 1, n[1], rates, 0)
+        add_coordinate(lifted, records, k, o, n[0], rates, 0)
+        add_coordinate(lifted, records, k, o + 1, n[1], rates, 0)
         factor = part_of(jacobian, r, rates, k)
         clear(rates, 0)
     # s_uu = bend t t^T, t along the loop.
-    add_coordinate(loose, records, k, o, -n[1], rates, 0)
-    add_coordinate(loose, records, k, o + 1, n[0], rates, 0)
+    add_coordinate(lifted, records, k, o, -n[1], rates, 0)
+    add_coordinate(lifted, records, k, o + 1, n[0], rates, 0)
     add_gram(places, rates, 0, y * factor * bend, hessian)
     return 0

@@ -24,7 +24,7 @@ from assembly.proximity.brep.records import (
 LEAN = 1e-9
 # Of tips: how near a pole is to one, how many spokes are looked at, how far from it a face begins, and how near to it
 # Newton's method gives up (parts of the domain).
-TIP, SPOKES, BESIDE, NEAR_TIP = 1e-9, 16, 1e-3, 0.02
+APEX, SPOKES, BESIDE, NEAR_APEX = 1e-9, 16, 1e-3, 0.02
 
 
 @kernel(inline=True)
@@ -46,11 +46,11 @@ def is_at(table, pool, vertex, p):
     """Whether p is the point of a vertex."""
     o = vertex_at(table, vertex).point
     d = sub(p, (pool[o], pool[o + 1], pool[o + 2]))
-    return dot(d, d) <= TIP * TIP * (1.0 + dot(p, p))
+    return dot(d, d) <= APEX * APEX * (1.0 + dot(p, p))
 
 
 @kernel(inner=True)
-def from_tip(table, pool, shell, vertex, code, n):
+def from_apex(table, pool, shell, vertex, code, n):
     """The face that takes over from the tip of a cone: code and (u, v) on the spoke along which the normal leans most.
 
     Where it leans along none, the tip itself, `code`.
@@ -81,7 +81,7 @@ def from_tip(table, pool, shell, vertex, code, n):
 
 
 @kernel(inner=True)
-def tip_near(table, pool, shell, code, u, v):
+def apex_near(table, pool, shell, code, u, v):
     """The tip of a cone next to a point of a face where Newton's method gave up; else the face itself."""
     solid = shell_at(table, shell)
     if code >= solid.faces:
@@ -90,7 +90,7 @@ def tip_near(table, pool, shell, code, u, v):
     if surface_at(table, surface).poles == 0:
         return code
     pole, distance = nearest_pole(table, pool, surface, u, v)
-    if distance > NEAR_TIP:
+    if distance > NEAR_APEX:
         return code
     p = pole_point(table, pool, surface, pole)
     for k in range(solid.vertices):

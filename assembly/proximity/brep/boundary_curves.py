@@ -13,7 +13,7 @@ from assembly.geometry.faces.trim_pieces import TRIM_FIRST
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.curve_parts import CORNER, between, crease_knots
 from assembly.geometry.splines.evaluate import BREAKS_U, BREAKS_V, COEFFICIENTS, CURVE_RECORD, SPANS_U, SPANS_V
-from assembly.proximity.brep.boundary_points import along_rims, nearest_on_rims
+from assembly.proximity.brep.boundary_points import along_boundaries, nearest_on_boundaries
 
 __all__ = ["Batch", "Rim", "Survey", "cross", "turn"]
 
@@ -135,15 +135,15 @@ class Survey:
             add(table, pool)
         self.table, self.pool = np.concatenate(tables), np.concatenate(pools)
 
-    def measure(self, rims: Iterable[Rim]) -> None:
+    def measure(self, boundaries: Iterable[Rim]) -> None:
         """Sample rims and find their lengths."""
-        fresh = list(rims)
+        fresh = list(boundaries)
         if not fresh:
             return
         stations, counts = [], []
-        for rim in fresh:
-            at = rim.curve.breaks()
-            each = max(4, -(-(12 + 4 * self.spans[rim.number]) // (at.size - 1)))
+        for boundary in fresh:
+            at = boundary.curve.breaks()
+            each = max(4, -(-(12 + 4 * self.spans[boundary.number]) // (at.size - 1)))
             t = np.append((at[:-1, None] + np.diff(at)[:, None] * (np.arange(each) / each)).ravel(), at[-1])
             stations.append(t)
             counts.append(t.size)
@@ -168,30 +168,30 @@ class Survey:
         totals = np.add.reduceat(lengths, begins)
         moments = np.add.reduceat(lengths[:, None] * centers, begins)
         middles = moments / np.maximum(totals, 1e-300)[:, None]
-        for k, (rim, count) in enumerate(zip(fresh, counts, strict=True)):
-            rim.samples = samples[stops[k] - count : stops[k]]
-            rim.balls = balls[begins[k] : begins[k] + count - 1]
-            rim.length = float(totals[k])
-            rim.middle = middles[k]
+        for k, (boundary, count) in enumerate(zip(fresh, counts, strict=True)):
+            boundary.samples = samples[stops[k] - count : stops[k]]
+            boundary.balls = balls[begins[k] : begins[k] + count - 1]
+            boundary.length = float(totals[k])
+            boundary.middle = middles[k]
 
-    def corners(self, rims: Sequence[Rim]) -> dict[Rim, Array]:
+    def corners(self, boundaries: Sequence[Rim]) -> dict[Rim, Array]:
         """Parameters inside the domains of rims where the tangent in space jumps."""
-        knots = [crease_knots(rim.curve) for rim in rims]
-        rows = np.repeat(np.arange(len(rims)), [at.size for at in knots])
+        knots = [crease_knots(boundary.curve) for boundary in boundaries]
+        rows = np.repeat(np.arange(len(boundaries)), [at.size for at in knots])
         if not rows.size:
             return {}
         at = np.concatenate(knots)
-        batch = Batch(self, rims)
+        batch = Batch(self, boundaries)
         _, before, _ = batch.along(rows, np.nextafter(at, -np.inf))
         _, after, _ = batch.along(rows, at)
         bent = turn(before, after) > CORNER
-        return {rims[k]: at[bent & (rows == k)] for k in np.unique(rows[bent]).tolist()}
+        return {boundaries[k]: at[bent & (rows == k)] for k in np.unique(rows[bent]).tolist()}
 
-    def close_with_corners(self, rims: Sequence[Rim]) -> NDArray[np.bool_]:
+    def close_with_corners(self, boundaries: Sequence[Rim]) -> NDArray[np.bool_]:
         """Whether the tangents of closed rims jump from their ends to their beginnings."""
-        batch = Batch(self, rims)
-        domains = np.array([rim.curve.domain for rim in rims]).reshape(-1, 2)
-        rows = np.arange(len(rims))
+        batch = Batch(self, boundaries)
+        domains = np.array([boundary.curve.domain for boundary in boundaries]).reshape(-1, 2)
+        rows = np.arange(len(boundaries))
         _, starts, _ = batch.along(rows, domains[:, 0])
         _, ends, _ = batch.along(rows, domains[:, 1])
         return np.asarray(turn(ends, starts) > CORNER)
@@ -200,28 +200,28 @@ class Survey:
 class Batch:
     """Several rims of a survey, by their place in a sequence."""
 
-    def __init__(self, survey: Survey, rims: Sequence[Rim]) -> None:
+    def __init__(self, survey: Survey, boundaries: Sequence[Rim]) -> None:
         self.survey = survey
-        self.rims = rims
-        numbers = np.array([rim.number for rim in rims], dtype=np.int64)
+        self.rims = boundaries
+        numbers = np.array([boundary.number for boundary in boundaries], dtype=np.int64)
         self.surfaces = np.array(survey.surfaces, dtype=np.int64)[numbers]
         first = np.array(survey.curves, dtype=np.int64)[numbers]
-        self.curves = first + CURVE_RECORD * np.array([rim.index for rim in rims], dtype=np.int64)
+        self.curves = first + CURVE_RECORD * np.array([boundary.index for boundary in boundaries], dtype=np.int64)
 
     def along(self, which: Indices, t: Array) -> tuple[Array, Array, Array]:
         """Points, derivatives and Su x Sv at parameters (m,) of rims (m,), each (m, 3)."""
         out = np.empty((t.size, 9))
         t = np.ascontiguousarray(t)
-        along_rims(self.survey.table, self.survey.pool, self.surfaces, self.curves, which, t, out)
+        along_boundaries(self.survey.table, self.survey.pool, self.surfaces, self.curves, which, t, out)
         return out[:, :3], out[:, 3:6], out[:, 6:]
 
     def nearest(self, which: Indices, points: Array, guess: Array) -> tuple[Array, Array]:
         """Parameters (m,) of the nearest points of rims (m,), and distances of points (m, 3) near them."""
-        closed = np.array([rim.closed for rim in self.rims])
-        begins = np.cumsum([0, *(len(rim.samples) for rim in self.rims)])
-        samples = np.concatenate([rim.samples for rim in self.rims])
+        closed = np.array([boundary.closed for boundary in self.rims])
+        begins = np.cumsum([0, *(len(boundary.samples) for boundary in self.rims)])
+        samples = np.concatenate([boundary.samples for boundary in self.rims])
         out = np.empty((which.size, 2))
-        nearest_on_rims(
+        nearest_on_boundaries(
             self.survey.table,
             self.survey.pool,
             self.surfaces,

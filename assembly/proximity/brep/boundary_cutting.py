@@ -9,27 +9,27 @@ from numpy.typing import NDArray
 
 from assembly.proximity.brep.boundary_curves import Batch, Rim, Survey
 
-__all__ = ["all_live", "cut_at_vertices", "live_rims", "merged"]
+__all__ = ["all_live", "cut_at_vertices", "live_boundaries", "merged"]
 
 Array = NDArray[np.float64]
 
 
-def live_rims(rims: Iterable[Rim]) -> list[Rim]:
+def live_boundaries(boundaries: Iterable[Rim]) -> list[Rim]:
     """Those that are not points."""
-    return [rim for rim in rims if not rim.is_point]
+    return [boundary for boundary in boundaries if not boundary.is_point]
 
 
 def all_live(chains: Sequence[list[list[Rim]]]) -> list[Rim]:
     """Those that are not points, of the loops of all faces."""
-    return [rim for loops in chains for loop in loops for rim in live_rims(loop)]
+    return [boundary for loops in chains for loop in loops for boundary in live_boundaries(loop)]
 
 
 def _replaced(loops: list[list[Rim]], cuts: dict[Rim, Array], survey: Survey) -> None:
     """Cut rims of the loops of a face, in place."""
-    parts = {rim: rim.parts(at) for rim, at in cuts.items()}
+    parts = {boundary: boundary.parts(at) for boundary, at in cuts.items()}
     survey.measure(part for each in parts.values() for part in each)
     for k, loop in enumerate(loops):
-        loops[k] = [part for rim in loop for part in parts.get(rim, [rim])]
+        loops[k] = [part for boundary in loop for part in parts.get(boundary, [boundary])]
 
 
 def cut_at_vertices(chains: list[list[list[Rim]]], survey: Survey) -> set[int]:
@@ -37,28 +37,30 @@ def cut_at_vertices(chains: list[list[list[Rim]]], survey: Survey) -> set[int]:
     changed = set()
 
     def cut(found: dict[Rim, Array]) -> None:
-        for number in {rim.number for rim, at in found.items() if at.size}:
+        for number in {boundary.number for boundary, at in found.items() if at.size}:
             _replaced(
-                chains[number], {rim: at for rim, at in found.items() if rim.number == number and at.size}, survey
+                chains[number],
+                {boundary: at for boundary, at in found.items() if boundary.number == number and at.size},
+                survey,
             )
             changed.add(number)
 
     cut(survey.corners(all_live(chains)))
-    lone = [live[0] for loops in chains for loop in loops if len(live := live_rims(loop)) == 1 and live[0].closed]
-    for rim, corner in zip(lone, survey.close_with_corners(lone).tolist(), strict=True):
-        rim.anchored = corner
+    lone = [live[0] for loops in chains for loop in loops if len(live := live_boundaries(loop)) == 1 and live[0].closed]
+    for boundary, corner in zip(lone, survey.close_with_corners(lone).tolist(), strict=True):
+        boundary.anchored = corner
     while True:
-        rims = all_live(chains)
-        points, ends = merged(rims, survey.tolerance)
-        found = _crossings(rims, points, ends, survey)
+        boundaries = all_live(chains)
+        points, ends = merged(boundaries, survey.tolerance)
+        found = _crossings(boundaries, points, ends, survey)
         if not found:
             return changed
         cut(found)
 
 
-def merged(rims: Sequence[Rim], tolerance: float) -> tuple[Array, dict[Rim, tuple[int, int]]]:
+def merged(boundaries: Sequence[Rim], tolerance: float) -> tuple[Array, dict[Rim, tuple[int, int]]]:
     """Vertices (n, 3) where anchored rims end, and the pair of them of every such rim."""
-    anchored = [rim for rim in rims if rim.anchored]
+    anchored = [boundary for boundary in boundaries if boundary.anchored]
     if not anchored:
         return np.empty((0, 3)), {}
     # Loaded only here: it takes a tenth of a second, and bodies without edges do without.
@@ -66,7 +68,7 @@ def merged(rims: Sequence[Rim], tolerance: float) -> tuple[Array, dict[Rim, tupl
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
-    ends = np.concatenate([rim.ends for rim in anchored])
+    ends = np.concatenate([boundary.ends for boundary in anchored])
     pairs = cKDTree(ends).query_pairs(tolerance, output_type="ndarray")
     links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(ends), len(ends)))
     count, labels = connected_components(links, directed=False)
@@ -74,11 +76,11 @@ def merged(rims: Sequence[Rim], tolerance: float) -> tuple[Array, dict[Rim, tupl
     np.add.at(points, labels, ends)
     points /= np.bincount(labels, minlength=count)[:, None]
     numbers = labels.reshape(-1, 2).tolist()
-    return points, {rim: (start, end) for rim, (start, end) in zip(anchored, numbers, strict=True)}
+    return points, {boundary: (start, end) for boundary, (start, end) in zip(anchored, numbers, strict=True)}
 
 
 def _crossings(
-    rims: Sequence[Rim], points: Array, ends: dict[Rim, tuple[int, int]], survey: Survey
+    boundaries: Sequence[Rim], points: Array, ends: dict[Rim, tuple[int, int]], survey: Survey
 ) -> dict[Rim, Array]:
     """Where rims run through vertices that they do not end at: increasing parameters.
 
@@ -89,28 +91,30 @@ def _crossings(
     from scipy.spatial import cKDTree
 
     tolerance = survey.tolerance
-    balls = np.concatenate([rim.balls for rim in rims])
-    owners = np.repeat(np.arange(len(rims)), [len(rim.balls) for rim in rims])
+    balls = np.concatenate([boundary.balls for boundary in boundaries])
+    owners = np.repeat(np.arange(len(boundaries)), [len(boundary.balls) for boundary in boundaries])
     near: set[tuple[int, int]] = set()
     found = cKDTree(points).query_ball_point(balls[:, :3], balls[:, 3] + tolerance)
     for owner, inside in zip(owners.tolist(), found, strict=True):
         if inside:
-            own = ends.get(rims[owner], ())
+            own = ends.get(boundaries[owner], ())
             near.update((owner, vertex) for vertex in inside if vertex not in own)
     if not near:
         return {}
     which, vertices = np.array(sorted(near), dtype=np.int64).T
-    batch = Batch(survey, rims)
-    t, distance = batch.nearest(which, points[vertices], np.array([rims[k].curve.domain[0] for k in which.tolist()]))
+    batch = Batch(survey, boundaries)
+    t, distance = batch.nearest(
+        which, points[vertices], np.array([boundaries[k].curve.domain[0] for k in which.tolist()])
+    )
     reached = distance <= tolerance
     # Ends are merged already: a vertex as near to one as this is a vertex beside it.
-    tips = np.array([rims[k].ends for k in which.tolist()])
-    from_ends = np.linalg.norm(points[vertices][:, None] - tips, axis=2).min(axis=1)
+    apexes = np.array([boundaries[k].ends for k in which.tolist()])
+    from_ends = np.linalg.norm(points[vertices][:, None] - apexes, axis=2).min(axis=1)
     inner = reached & (from_ends > 2.0 * tolerance)
     cuts = {}
     for k in np.unique(which[reached]).tolist():
         at = np.sort(t[(which == k) & inner])
-        if at.size or not rims[k].anchored:
-            rims[k].anchored = True
-            cuts[rims[k]] = at
+        if at.size or not boundaries[k].anchored:
+            boundaries[k].anchored = True
+            cuts[boundaries[k]] = at
     return cuts

@@ -24,7 +24,7 @@ def _jet(table, pool, surface, curve, t):
 
 
 @kernel(signatures="(i8[::1], f8[::1], i8[::1], i8[::1], i8[::1], f8[::1], f8[:, ::1])")
-def along_rims(table, pool, surfaces, curves, which, t, out):
+def along_boundaries(table, pool, surfaces, curves, which, t, out):
     """C, C_t and S_u x S_v of curves `which` at parameters t into rows of nine."""
     for i in range(t.size):
         k = which[i]
@@ -56,7 +56,7 @@ def _nearest_sample(samples, first, stop, p):
         "f8[:, ::1])"
     ),
 )
-def nearest_on_rims(table, pool, surfaces, curves, closed, begins, samples, which, points, guess, close, out):
+def nearest_on_boundaries(table, pool, surfaces, curves, closed, begins, samples, which, points, guess, close, out):
     """Nearest points of curves `which` to points near them: rows of the parameter and the distance.
 
     Gauss and Newton's iteration, which converges quadratically for points on the curve: from the guess if it is right

@@ -94,18 +94,20 @@ def _bend(normals_a: Array, along_a: Array, normals_b: Array) -> bool | None:
     return False if angle.min() < -CORNER else None
 
 
-def matches_of(rims: Sequence[Rim], ends: dict[Rim, tuple[int, int]], signs: Array, survey: Survey) -> dict[Rim, Match]:
+def matches_of(
+    boundaries: Sequence[Rim], ends: dict[Rim, tuple[int, int]], signs: Array, survey: Survey
+) -> dict[Rim, Match]:
     """The match of every rim that has one."""
     groups: dict[tuple[int, int], list[Rim]] = defaultdict(list)
-    for rim, (start, end) in ends.items():
-        groups[min(start, end), max(start, end)].append(rim)
+    for boundary, (start, end) in ends.items():
+        groups[min(start, end), max(start, end)].append(boundary)
     candidates = [pair for group in groups.values() for pair in combinations(group, 2)]
-    rings = [rim for rim in rims if not rim.anchored]
+    rings = [boundary for boundary in boundaries if not boundary.anchored]
     if rings:
         from scipy.spatial import cKDTree
 
-        middles = np.array([rim.middle for rim in rings])
-        near = cKDTree(middles).query_ball_point(middles, [0.05 * rim.length for rim in rings])
+        middles = np.array([boundary.middle for boundary in rings])
+        near = cKDTree(middles).query_ball_point(middles, [0.05 * boundary.length for boundary in rings])
         candidates += [(rings[i], rings[j]) for i, found in enumerate(near) for j in found if i < j]
     found = _compared(candidates, signs, survey)
     found.sort(key=lambda match: match.distance)

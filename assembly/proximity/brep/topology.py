@@ -21,7 +21,7 @@ from assembly.geometry.faces.smooth_faces import smooth_faces
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.curve_parts import CORNER
 from assembly.proximity.brep.boundary_curves import Rim, Survey, turn
-from assembly.proximity.brep.boundary_cutting import all_live, cut_at_vertices, live_rims, merged
+from assembly.proximity.brep.boundary_cutting import all_live, cut_at_vertices, live_boundaries, merged
 from assembly.proximity.brep.coedge_matching import STATIONS, matches_of
 from assembly.proximity.brep.recut import with_cuts
 
@@ -147,12 +147,12 @@ def topology_of(faces: Iterable[Face], tolerance: float | None = None) -> Topolo
         tolerance = positive("tolerance", tolerance)
     chains = [_chains(face, number, tolerance) for number, face in enumerate(given)]
     survey = Survey(given, tolerance)
-    survey.measure(rim for loops in chains for loop in loops for rim in loop)
+    survey.measure(boundary for loops in chains for loop in loops for boundary in loop)
     for number in cut_at_vertices(chains, survey):
         parts: list[list[NurbsCurve]] = [[] for _ in given[number].boundary]
         for loop in chains[number]:
-            for rim in loop:
-                parts[rim.index].append(rim.curve)
+            for boundary in loop:
+                parts[boundary.index].append(boundary.curve)
         given[number] = with_cuts(given[number], parts)
         assert len(given[number].boundary) == sum(map(len, parts))
     return _joined(tuple(given), chains, survey)
@@ -178,31 +178,33 @@ def _chains(face: Face, number: int, tolerance: float) -> list[list[Rim]]:
 def _joined(faces: tuple[Face, ...], chains: list[list[list[Rim]]], survey: Survey) -> Topology:
     """The topology of rims that match one to one."""
     tolerance = survey.tolerance
-    rims = all_live(chains)
-    points, ends = merged(rims, tolerance)
-    matches = matches_of(rims, ends, np.array([face.sign for face in faces], dtype=float), survey)
-    places = {rim: k for loops in chains for k, rim in enumerate(rim for loop in loops for rim in loop)}
+    boundaries = all_live(chains)
+    points, ends = merged(boundaries, tolerance)
+    matches = matches_of(boundaries, ends, np.array([face.sign for face in faces], dtype=float), survey)
+    places = {
+        boundary: k for loops in chains for k, boundary in enumerate(boundary for loop in loops for boundary in loop)
+    }
     numbers: dict[Rim, int] = {}
     edges: list[Edge] = []
-    for rim in rims:
-        if rim in numbers:
+    for boundary in boundaries:
+        if boundary in numbers:
             continue
-        match = matches.get(rim)
+        match = matches.get(boundary)
         other = None if match is None else match.b
-        start, end = ends.get(rim, (None, None))
-        numbers[rim] = len(edges)
+        start, end = ends.get(boundary, (None, None))
+        numbers[boundary] = len(edges)
         if other is not None:
             numbers[other] = len(edges)
         edges.append(
             Edge(
-                rim.number,
-                places[rim],
+                boundary.number,
+                places[boundary],
                 None if other is None else other.number,
                 None if other is None else places[other],
                 (0.0, 0.0) if match is None else match.map_b,
                 start,
                 end,
-                rim.length,
+                boundary.length,
                 None if match is None else match.convex,
             )
         )
@@ -212,19 +214,19 @@ def _joined(faces: tuple[Face, ...], chains: list[list[list[Rim]]], survey: Surv
             if vertex is not None:
                 incident[vertex].append((k, side))
     around: list[set[int]] = [set() for _ in points]
-    for rim, pair in ends.items():
+    for boundary, pair in ends.items():
         for vertex in pair:
-            around[vertex].add(rim.number)
-    tips = [(tip, number) for number, face in enumerate(faces) for tip in _tips(face, points, tolerance)]
-    points = np.concatenate([points, *(tip[None] for tip, _ in tips)])
-    incident += [[] for _ in tips]
-    around += [{number} for _, number in tips]
+            around[vertex].add(boundary.number)
+    apexes = [(apex, number) for number, face in enumerate(faces) for apex in _apexes(face, points, tolerance)]
+    points = np.concatenate([points, *(apex[None] for apex, _ in apexes)])
+    incident += [[] for _ in apexes]
+    around += [{number} for _, number in apexes]
     points.flags.writeable = False
     vertices = tuple(
         Vertex(point, tuple(at), tuple(sorted(near))) for point, at, near in zip(points, incident, around, strict=True)
     )
-    face_edges = tuple(tuple(numbers.get(rim) for loop in loops for rim in loop) for loops in chains)
-    chi = len(vertices) - len(tips) - sum(edge.start is not None for edge in edges)
+    face_edges = tuple(tuple(numbers.get(boundary) for loop in loops for boundary in loop) for loops in chains)
+    chi = len(vertices) - len(apexes) - sum(edge.start is not None for edge in edges)
     chi += sum(_characteristic(face, loops, ends) for face, loops in zip(faces, chains, strict=True))
     return Topology(faces, tuple(edges), vertices, face_edges, tolerance, chi)
 
@@ -234,7 +236,7 @@ def _characteristic(face: Face, loops: list[list[Rim]], ends: dict[Rim, tuple[in
     count = 0
     # At poles of the surface chains end, and others go on: groups of vertices that such chains join.
     groups: list[set[int]] = []
-    for live in map(live_rims, loops):
+    for live in map(live_boundaries, loops):
         if not live:
             continue
         start, end = (-1, -1) if not live[0].anchored else (ends[live[0]][0], ends[live[-1]][1])
@@ -247,7 +249,7 @@ def _characteristic(face: Face, loops: list[list[Rim]], ends: dict[Rim, tuple[in
     return (0 if whole_torus else 2) - count - len(groups)
 
 
-def _tips(face: Face, points: Array, tolerance: float) -> list[Array]:
+def _apexes(face: Face, points: Array, tolerance: float) -> list[Array]:
     """Poles inside a face where it has no tangent plane, as the tip of a cone, but for those among given points."""
     surface = face.surface
     found = []
@@ -264,14 +266,14 @@ def _tips(face: Face, points: Array, tolerance: float) -> list[Array]:
         if face.boundary and (face.locate(*uv) < 0).any():
             continue
         uv[axis] = (low, high)[side]
-        tip = surface.evaluate(uv[0, 0], uv[1, 0])
-        if len(points) and np.linalg.norm(points - tip, axis=1).min() <= tolerance:
+        apex = surface.evaluate(uv[0, 0], uv[1, 0])
+        if len(points) and np.linalg.norm(points - apex, axis=1).min() <= tolerance:
             continue
         try:
             normals = surface.normal(*uv)
         except InputError:
-            found.append(tip)
+            found.append(apex)
             continue
         if turn(normals, normals[0]).max() > CORNER:
-            found.append(tip)
+            found.append(apex)
     return found

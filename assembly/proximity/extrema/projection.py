@@ -15,7 +15,7 @@ SLIDES = 24
 
 
 @kernel(inner=True)
-def foot_of(table, pool, g, y, s, t):
+def projection_of(table, pool, g, y, s, t):
     """The foot on surface g of a point y, by Newton's method from (s, t): parameters, signed distance, normal.
 
     Positive outside. A step is never longer than what brings the tangent plane's foot. And whether four of them did:
@@ -65,7 +65,7 @@ def slide_down(table, pool, f, g, turn, shift, start, stride, half):
     """
     u, v, s, t = start
     p, su, sv, _uu, _uv, _vv = surface_point(table, pool, f, u, v)
-    s, t, gap, n, _settled = foot_of(table, pool, g, matvec_t(turn, sub(p, shift)), s, t)
+    s, t, gap, n, _settled = projection_of(table, pool, g, matvec_t(turn, sub(p, shift)), s, t)
     slope = matvec(turn, n)
     normal = cross(su, sv)
     across = scale(1.0 / max(math.sqrt(dot(normal, normal)), 1e-300), normal)
@@ -86,7 +86,7 @@ def slide_down(table, pool, f, g, turn, shift, start, stride, half):
             table, pool, f, u + (c * first - b * second) / det, v + (a * second - b * first) / det
         )
         q, ru, rv, _uu, _uv, _vv = surface_point(table, pool, f, u_new, v_new)
-        s_new, t_new, gap_new, n, _settled = foot_of(table, pool, g, matvec_t(turn, sub(q, shift)), s, t)
+        s_new, t_new, gap_new, n, _settled = projection_of(table, pool, g, matvec_t(turn, sub(q, shift)), s, t)
         if gap_new > gap:
             length *= 0.25
             continue

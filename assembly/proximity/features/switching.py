@@ -20,7 +20,7 @@ from collections import namedtuple
 from assembly._kernel import kernel
 from assembly.geometry.faces.trim import trim_side
 from assembly.geometry.vec import cross, dot, matvec, matvec_t, neg
-from assembly.proximity.brep.apexes import LEAN, from_tip, tip_near, unit
+from assembly.proximity.brep.apexes import LEAN, apex_near, from_apex, unit
 from assembly.proximity.brep.borders import (
     edge_end,
     feature_at,
@@ -128,7 +128,7 @@ def from_vertex(table, pool, shell, code, n):
             code = faces + table[at]
             found = (t, 0.0)
     if vertex_record.edges == 0:
-        code, found = from_tip(table, pool, shell, vertex, code, n)
+        code, found = from_apex(table, pool, shell, vertex, code, n)
     return code, found, best
 
 
@@ -217,8 +217,8 @@ def track_features(table, pool, shell_f, shell_g, rotation, shift, code_f, code_
                 switches += 1
                 continue
         if status == NOT_CONVERGED:
-            tip_f = tip_near(table, pool, shell_f, code_f, x[0], x[1])
-            tip_g = tip_near(table, pool, shell_g, code_g, x[2], x[3]) if tip_f == code_f else code_g
+            tip_f = apex_near(table, pool, shell_f, code_f, x[0], x[1])
+            tip_g = apex_near(table, pool, shell_g, code_g, x[2], x[3]) if tip_f == code_f else code_g
             if tip_f == code_f and tip_g == code_g:
                 break
             code_f = tip_f

@@ -97,7 +97,7 @@ def element_distance(table, pool, trees, turn, shift, bulk, e, d):
 
 
 @kernel(inner=True)
-def facing_pairs(table, pool, watch, memory, p, posed, moving, reach, stack, candidates):
+def candidate_pairs(table, pool, watch, memory, p, posed, moving, reach, stack, candidates):
     """The patches of the two bodies of pair p that face each other within its reach, into `candidates`.
 
     Returns how many pairs there are, and the reach: it is less where there is no room for all.

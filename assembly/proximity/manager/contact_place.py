@@ -39,7 +39,7 @@ from assembly.proximity.manager.extrema import (
     extremum_at,
     given_at,
 )
-from assembly.proximity.manager.overlap import DEPTH, foot_at, surface_of, with_children
+from assembly.proximity.manager.overlap import DEPTH, projection_at, surface_of, with_children
 from assembly.proximity.manager.posed_pair import posed_pair
 from assembly.proximity.manager.state import (
     PAIR_RECORD,
@@ -114,7 +114,7 @@ def nearest_point(table, pool, tree, surface, shell, y, reach, stack):
         at = tree_record.element_pool + ELEMENT * e
         code = np.int64(element_at(pool, at).feature)
         if surface_of(table, shell, surface, code) >= 0:
-            distance, n, found = foot_at(table, pool, tree, surface, shell, e, y)
+            distance, n, found = projection_at(table, pool, tree, surface, shell, e, y)
             p = sub(y, scale(distance, n))
             if not found:
                 continue
@@ -191,9 +191,9 @@ def contact_points(table, pool, posed, given, tracked):
 
 
 @kernel(inline=True)
-def root_points(roots, k):
+def extremum_points(extrema, k):
     """The pair of points of a root."""
-    extremum = extremum_at(roots, k)
+    extremum = extremum_at(extrema, k)
     return three_of(extremum.point_f), three_of(extremum.point_g)
 
 
@@ -205,7 +205,7 @@ def apart(a, b):
 
 
 @kernel(inner=True, allocates=True)
-def spread(table, pool, posed, roots, count, begin, limits, stack):
+def spread(table, pool, posed, extrema, count, begin, limits, stack):
     """Mark the roots in the place of a contact whose points have their middle at `begin`.
 
     From root to root, the nearest first: each is tried from the nearest point that is known to be in the place. The
@@ -219,13 +219,15 @@ def spread(table, pool, posed, roots, count, begin, limits, stack):
     source = np.empty((count, 3))
     eligible = np.zeros(count, np.bool_)
     for k in range(count):
-        p, q = root_points(roots, k)
+        p, q = extremum_points(extrema, k)
         c = scale(0.5, add(p, q))
         middles[k, 0], middles[k, 1], middles[k, 2] = c
         source[k, 0], source[k, 1], source[k, 2] = begin
         nearest[k] = apart(c, begin)
-        may = extremum_at(roots, k).origin == NEW or extremum_at(roots, k).origin >= LISTED
-        eligible[k] = may and extremum_at(roots, k).place == ELSEWHERE and lowest <= extremum_at(roots, k).gap < level
+        may = extremum_at(extrema, k).origin == NEW or extremum_at(extrema, k).origin >= LISTED
+        eligible[k] = (
+            may and extremum_at(extrema, k).place == ELSEWHERE and lowest <= extremum_at(extrema, k).gap < level
+        )
     while True:
         best = -1
         for k in range(count):
@@ -238,7 +240,7 @@ def spread(table, pool, posed, roots, count, begin, limits, stack):
         end = (middles[best, 0], middles[best, 1], middles[best, 2])
         if not leads_to(table, pool, posed, start, end, level, stack):
             continue
-        extremum_at(roots, best).place = BESIDE_CONTACT
+        extremum_at(extrema, best).place = BESIDE_CONTACT
         eligible[best] = False
         for k in range(count):
             away = apart((middles[k, 0], middles[k, 1], middles[k, 2]), end)
@@ -248,13 +250,13 @@ def spread(table, pool, posed, roots, count, begin, limits, stack):
 
 
 @kernel(signatures="(i8[::1], f8[::1], i8, i8, f8[:, ::1], f8[:, ::1], f8[:, ::1], i8)")
-def mark_places(table, pool, watch, p, q, tracked, roots, count):
+def mark_places(table, pool, watch, p, q, tracked, extrema, count):
     """Mark the roots of pair p that are a given contact's pair, or in its place; how many contacts have one."""
     manager = manager_at(table, watch)
     pair = pair_at(table, manager.pair_table + PAIR_RECORD * p)
     posed = posed_pair(manager, pair, q)
     least = pair_lengths_at(pool, pair.minimum).least
-    neglect = lengths_at(pool, manager.lengths).neglect
+    merge_radius = lengths_at(pool, manager.lengths).neglect
     stack = np.empty(DEPTH, np.int64)
     known = 0
     for c in range(pair.given_count):
@@ -266,12 +268,12 @@ def mark_places(table, pool, watch, p, q, tracked, roots, count):
         known += 1
         a, b = contact_points(table, pool, posed, given, tracked)
         for k in range(count):
-            p_f, p_g = root_points(roots, k)
-            if max(apart(p_f, a), apart(p_g, b)) <= neglect:
-                extremum_at(roots, k).place = OF_CONTACT
+            p_f, p_g = extremum_points(extrema, k)
+            if max(apart(p_f, a), apart(p_g, b)) <= merge_radius:
+                extremum_at(extrema, k).place = OF_CONTACT
         gap = apart(a, b) if tracked_at(tracked, r).gap > 0.0 else 0.0
         # A contact that may stay open, and is by more than the least gap, excuses nothing that is nearer.
         lowest = least if given_record.opens == 1 and gap >= least else -math.inf
         limits = (gap + least, lowest)
-        spread(table, pool, posed, roots, count, scale(0.5, add(a, b)), limits, stack)
+        spread(table, pool, posed, extrema, count, scale(0.5, add(a, b)), limits, stack)
     return known

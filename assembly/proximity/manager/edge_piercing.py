@@ -88,7 +88,7 @@ def is_well_inside(table, pool, trim, u, v, du, dv):
 
 
 @kernel(inline=True)
-def patch_corners(table, pool, surface, patch):
+def patch_vertex_contacts(table, pool, surface, patch):
     """The first (u, v) of a patch and its widths, and its corners, counterclockwise in (u, v) from there."""
     u = patch.middle[0] - patch.half[0]
     v = patch.middle[1] - patch.half[1]
@@ -111,7 +111,7 @@ def goes_through(table, pool, tree, shell, e, a, b, margin):
     code = np.int64(patch.feature)
     face = face_at(table, shell_at(table, shell).face_table + FACE_RECORD * code)
     r = feature_at(table, shell, code)
-    (u, v, wide, high), (p, q, s, t) = patch_corners(table, pool, r, patch)
+    (u, v, wide, high), (p, q, s, t) = patch_vertex_contacts(table, pool, r, patch)
     for k in range(2):
         second, third = (q, s) if k == 0 else (s, t)
         cut = cut_at(a, sub(b, a), p, second, third, 0.0, 0.0)

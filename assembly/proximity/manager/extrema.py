@@ -54,13 +54,13 @@ EXTREMUM = record_dtype(
 extremum_at = record_view(EXTREMUM)
 CODE_F = place_of(EXTREMUM, "code_f")
 CODE_G = place_of(EXTREMUM, "code_g")
-ROOT_NORMAL = place_of(EXTREMUM, "normal")
+EXTREMUM_NORMAL = place_of(EXTREMUM, "normal")
 GAP = place_of(EXTREMUM, "gap")
 ORIGIN = place_of(EXTREMUM, "origin")
 POINT_F = place_of(EXTREMUM, "point_f")
-ROOT_FOLD = place_of(EXTREMUM, "fold")
-ROOT_BEYOND = place_of(EXTREMUM, "beyond")
-CORNER = place_of(EXTREMUM, "corner")
+EXTREMUM_FOLD = place_of(EXTREMUM, "fold")
+EXTREMUM_BEYOND = place_of(EXTREMUM, "beyond")
+VERTEX_CONTACT = place_of(EXTREMUM, "corner")
 ROOT = size_of(EXTREMUM)
 # Where it is from: of no use, new, from LISTED on the place it has, down from GIVEN_CONTACT which given contact it is.
 USELESS, NEW, LISTED, GIVEN_CONTACT = -2.0, -1.0, 0, -3.0
@@ -110,10 +110,10 @@ def square_to(a, b):
 
 
 @kernel(inner=True)
-def are_one(table, pool, posed, roots, i, k, neglect):
+def are_one(table, pool, posed, extrema, i, k, merge_radius):
     """Whether roots i and k are the same contact."""
-    square = neglect * neglect
-    one, other = extremum_at(roots, i), extremum_at(roots, k)
+    square = merge_radius * merge_radius
+    one, other = extremum_at(extrema, i), extremum_at(extrema, k)
     codes, other_codes = (one.code_f, one.code_g), (other.code_f, other.code_g)
     points = (three_of(one.point_f), three_of(one.point_g))
     other_points = (three_of(other.point_f), three_of(other.point_g))
@@ -138,7 +138,7 @@ def are_one(table, pool, posed, roots, i, k, neglect):
 
 
 @kernel(inner=True)
-def surfaces_root(table, pool, posed, start, roots, k):
+def surfaces_extremum(table, pool, posed, start, extrema, k):
     """Newton on two surfaces from `start`, the controller where it fails; fills root k.
 
     Returns NOTHING, SADDLE or MINIMUM_FOUND.
@@ -157,12 +157,12 @@ def surfaces_root(table, pool, posed, start, roots, k):
     h = found.matrix.h
     det = h[0] * h[3] - h[1] * h[2]
     norm2 = h[0] * h[0] + h[1] * h[1] + h[2] * h[2] + h[3] * h[3]
-    write(roots, k, x, 0, 0, frame.normal, frame.gap, frame.point_f, frame.point_g, fold_of(h))
+    write(extrema, k, x, 0, 0, frame.normal, frame.gap, frame.point_f, frame.point_g, fold_of(h))
     return MINIMUM_FOUND if det > -1e-9 * norm2 and h[0] + h[3] <= 0.0 else SADDLE
 
 
 @kernel(inner=True)
-def solids_root(table, pool, posed, codes, start, n, roots, k, work, corner):
+def solids_extremum(table, pool, posed, codes, start, n, extrema, k, work, vertex_contact):
     """Switching and Newton on the features of two solids, or Newton alone for a corner; fills root k."""
     i, j = posed.bodies
     q = posed.poses
@@ -174,14 +174,14 @@ def solids_root(table, pool, posed, codes, start, n, roots, k, work, corner):
         pair.parameters[l] = start[l]
     pair.feature_f = float(codes[0])
     pair.feature_g = float(codes[1])
-    pair.stays = corner
+    pair.stays = vertex_contact
     for l in range(3):
         pair.normal[l] = n[l]
     status = call_address(
         posed.track_solids,
         (table, pool, posed.shells[0], posed.shells[1], i, j, q, tracked, math.inf, records, tracked, 0),
     )
-    if status != CONVERGED and (status != SINGULAR or corner > 0.0):
+    if status != CONVERGED and (status != SINGULAR or vertex_contact > 0.0):
         # An edge along another one, or along a face, is no corner: its ends are.
         return NOTHING
     turn = rotation(q, i)
@@ -189,14 +189,14 @@ def solids_root(table, pool, posed, codes, start, n, roots, k, work, corner):
     pg = matvec_t(turn, three_of(derivatives.arm_f))
     gap = derivatives.gap
     x = pair_parameters(pair)
-    write(roots, k, x, pair.feature_f, pair.feature_g, m, gap, sub(pg, scale(gap, m)), pg, contact.fold)
-    extremum_at(roots, k).corner = corner
+    write(extrema, k, x, pair.feature_f, pair.feature_g, m, gap, sub(pg, scale(gap, m)), pg, contact.fold)
+    extremum_at(extrema, k).corner = vertex_contact
     return MINIMUM_FOUND if contact.proper == 1.0 else SADDLE
 
 
 @kernel(inline=True)
-def write(roots, k, x, code_f, code_g, n, gap, pf, pg, fold):
-    extremum = extremum_at(roots, k)
+def write(extrema, k, x, code_f, code_g, n, gap, pf, pg, fold):
+    extremum = extremum_at(extrema, k)
     for l in range(4):
         extremum.parameters[l] = x[l]
     extremum.code_f = float(code_f)
@@ -213,28 +213,28 @@ def write(roots, k, x, code_f, code_g, n, gap, pf, pg, fold):
 
 
 @kernel(inner=True)
-def add_root(table, pool, posed, codes, start, n, neglect, roots, count, work, corner):
+def add_extremum(table, pool, posed, codes, start, n, merge_radius, extrema, count, work, vertex_contact):
     """Look for a root from a start and add it, as USELESS, if it is none of the known ones; a corner where it holds on
     to something.
 
     Returns how many roots there are, and NOTHING, ALIKE, SADDLE or MINIMUM_FOUND.
     """
     if posed.surfaces[0] >= 0:
-        found = surfaces_root(table, pool, posed, start, roots, count)
+        found = surfaces_extremum(table, pool, posed, start, extrema, count)
     else:
-        found = solids_root(table, pool, posed, codes, start, n, roots, count, work, corner)
+        found = solids_extremum(table, pool, posed, codes, start, n, extrema, count, work, vertex_contact)
     if found == NOTHING:
         return count, found
     for k in range(count):
         # One of far sides, or a saddle, hides no contact beside it.
-        radius = min(neglect, SAME) if extremum_at(roots, k).origin == USELESS else neglect
-        if are_one(table, pool, posed, roots, count, k, radius):
+        radius = min(merge_radius, SAME) if extremum_at(extrema, k).origin == USELESS else merge_radius
+        if are_one(table, pool, posed, extrema, count, k, radius):
             return count, ALIKE
     return count + 1, found
 
 
 @kernel(inner=True)
-def add_given(table, pool, posed, tracked, listed, many, neglect, roots, work):
+def add_given(table, pool, posed, tracked, listed, many, merge_radius, extrema, work):
     """Add the roots at which given contacts of the two bodies are now. Returns how many.
 
     A contact whose coordinates are unknowns of a solve may be on its way to another root than Newton's method goes to
@@ -244,29 +244,29 @@ def add_given(table, pool, posed, tracked, listed, many, neglect, roots, work):
     for c in range(many):
         given = given_at(table, listed + GIVEN_RECORD * c)
         x = pair_parameters(tracked_at(tracked, given.row))
-        if math.isnan(x[0]) or count == roots.shape[0]:
+        if math.isnan(x[0]) or count == extrema.shape[0]:
             continue
         if given.swapped == 1:
             x = (x[2], x[3], x[0], x[1])
         before = count
-        count, found = add_root(table, pool, posed, (0, 0), x, (0.0, 0.0, 0.0), 0.0, roots, count, work, 0.0)
-        if posed.surfaces[0] >= 0 and (found == NOTHING or (count > before and count < roots.shape[0])):
+        count, found = add_extremum(table, pool, posed, (0, 0), x, (0.0, 0.0, 0.0), 0.0, extrema, count, work, 0.0)
+        if posed.surfaces[0] >= 0 and (found == NOTHING or (count > before and count < extrema.shape[0])):
             frame = pair_frame(table, pool, posed.surfaces[0], posed.surfaces[1], posed.turn, posed.shift, x)
             if frame.regular:
-                write(roots, count, x, 0, 0, frame.normal, frame.gap, frame.point_f, frame.point_g, 0.0)
+                write(extrema, count, x, 0, 0, frame.normal, frame.gap, frame.point_f, frame.point_g, 0.0)
             if found != NOTHING:
-                same = frame.regular and are_one(table, pool, posed, roots, before, count, neglect)
+                same = frame.regular and are_one(table, pool, posed, extrema, before, count, merge_radius)
                 count = count if same else before
             elif frame.regular and opposed(frame, posed.turn, table, pool, posed.surfaces[1], x):
                 # At a fold Newton's method may find nothing: there the contact still is.
                 count += 1
         if count > before:
-            extremum_at(roots, before).origin = GIVEN_CONTACT - c
+            extremum_at(extrema, before).origin = GIVEN_CONTACT - c
     return count
 
 
 @kernel(inline=True)
-def is_alone(roots, k):
+def is_alone(extrema, k):
     """Whether root k is far from a fold, beyond knot lines too as far as it is known."""
-    extremum = extremum_at(roots, k)
+    extremum = extremum_at(extrema, k)
     return extremum.fold > ALONE and not extremum.beyond <= ALONE

@@ -21,7 +21,7 @@ from assembly.proximity.bvh.tree import (
     tree_at,
 )
 from assembly.proximity.manager.extrema import LISTED, NEW, USELESS, extremum_at
-from assembly.proximity.manager.overlap import DEPTH, foot_at, with_children
+from assembly.proximity.manager.overlap import DEPTH, projection_at, with_children
 from assembly.proximity.manager.state import (
     HANDED_OFF,
     LOST,
@@ -61,7 +61,7 @@ def faces_about(table, pool, tree, shell, y, reach, stack, normals):
         if child >= 0:
             used = with_children(stack, used, child)
             continue
-        distance, n, some = foot_at(table, pool, tree, -1, shell, -1 - child, y)
+        distance, n, some = projection_at(table, pool, tree, -1, shell, -1 - child, y)
         if some and abs(distance) <= reach:
             normals[count, 0], normals[count, 1], normals[count, 2] = n
             count += 1
@@ -69,9 +69,9 @@ def faces_about(table, pool, tree, shell, y, reach, stack, normals):
 
 
 @kernel(inner=True)
-def is_between_flush_faces(table, pool, posed, roots, k, stack, normals):
+def is_between_flush_faces(table, pool, posed, extrema, k, stack, normals):
     """Whether the middle of root k, with a negative gap, is between two faces that all but touch there."""
-    extremum = extremum_at(roots, k)
+    extremum = extremum_at(extrema, k)
     turn, shift = posed.turn, posed.shift
     a, b = three_of(extremum.point_f), three_of(extremum.point_g)
     c = scale(0.5, add(a, b))
@@ -91,17 +91,17 @@ def is_between_flush_faces(table, pool, posed, roots, k, stack, normals):
 
 
 @kernel(inner=True, allocates=True)
-def drop_flush(table, pool, watch, memory, p, posed, roots, count, tracked):
+def drop_flush(table, pool, watch, memory, p, posed, extrema, count, tracked):
     """Make those roots of pair p useless that run between flush faces; listed ones give up their places."""
     stack = np.empty(DEPTH, np.int64)
     normals = np.empty((2, FACES_ABOUT, 3))
     places = memory_places(table, watch)[1]
     for k in range(count):
-        extremum = extremum_at(roots, k)
+        extremum = extremum_at(extrema, k)
         origin = np.int64(extremum.origin)
         if not extremum.gap < -ROUNDING or not (extremum.origin == NEW or origin >= LISTED):
             continue
-        if not is_between_flush_faces(table, pool, posed, roots, k, stack, normals):
+        if not is_between_flush_faces(table, pool, posed, extrema, k, stack, normals):
             continue
         if origin >= LISTED:
             number = place_at(memory, places + PLACE_MEMORY * (origin - LISTED)).number
@@ -111,10 +111,10 @@ def drop_flush(table, pool, watch, memory, p, posed, roots, count, tracked):
 
 
 @kernel(inner=True)
-def any_deep(roots, count):
+def any_deep(extrema, count):
     """Whether any root is deeper than rounding."""
     for k in range(count):
-        extremum = extremum_at(roots, k)
+        extremum = extremum_at(extrema, k)
         if extremum.gap < -ROUNDING and extremum.origin != USELESS:
             return True
     return False

@@ -106,10 +106,10 @@ def reach_now(table, pool, watch, memory, p, moving):
     lengths = lengths_at(pool, manager.lengths)
     reach = known.reach
     pair = pair_at(table, manager.pair_table + PAIR_RECORD * p)
-    root = tree_at(table, moving.tree).node_pool
+    extremum = tree_at(table, moving.tree).node_pool
     if not math.isnan(known.turn[0]):
-        pace = moved_from(three_of(node_at(pool, root).center), three_of(known.place), turn, shift)
-        pace += 2.0 * node_at(pool, root).radius * turned_by(memory, at, moving.quaternion)
+        pace = moved_from(three_of(node_at(pool, extremum).center), three_of(known.place), turn, shift)
+        pace += 2.0 * node_at(pool, extremum).radius * turned_by(memory, at, moving.quaternion)
         pace /= max(state.calls - known.called, 1.0)
         # After a step that was cut, as far as it was to go; but it goes no farther where contacts may be born.
         moves = MOVES if pair.spine_f < 0 else MOVES_OF_WIRES
@@ -117,7 +117,7 @@ def reach_now(table, pool, watch, memory, p, moving):
         reach = min(max(asked, lengths.first_reach), lengths.last_reach)
     known.cut_short = 0.0
     known.called = state.calls
-    center = add(matvec(turn, three_of(node_at(pool, root).center)), shift)
+    center = add(matvec(turn, three_of(node_at(pool, extremum).center)), shift)
     for k in range(4):
         known.turn[k] = moving.quaternion[k]
     for k in range(3):
@@ -155,11 +155,11 @@ def part_used(table, pool, watch, memory, p, q):
         return math.inf
     moving = mover(table, watch, p, q)
     turn, shift = moving.turn, moving.shift
-    root = tree_at(table, moving.tree).node_pool
+    extremum = tree_at(table, moving.tree).node_pool
     angle = turned_by(memory, o, moving.quaternion)
     moved = (
-        moved_from(three_of(node_at(pool, root).center), three_of(known.place), turn, shift)
-        + 2.0 * node_at(pool, root).radius * angle
+        moved_from(three_of(node_at(pool, extremum).center), three_of(known.place), turn, shift)
+        + 2.0 * node_at(pool, extremum).radius * angle
     )
     if not moved > 0.0:
         return 0.0
@@ -180,10 +180,10 @@ def part_used(table, pool, watch, memory, p, q):
 def went(table, pool, watch, p, before, after):
     """How far a point of one body of pair p went at most, seen from the other one, between two poses of a scene."""
     was, now = mover(table, watch, p, before), mover(table, watch, p, after)
-    root = tree_at(table, was.tree).node_pool
-    center = three_of(node_at(pool, root).center)
+    extremum = tree_at(table, was.tree).node_pool
+    center = three_of(node_at(pool, extremum).center)
     d = sub(add(matvec(now.turn, center), now.shift), add(matvec(was.turn, center), was.shift))
-    return math.sqrt(dot(d, d)) + 2.0 * node_at(pool, root).radius * apart(was.quaternion, now.quaternion)
+    return math.sqrt(dot(d, d)) + 2.0 * node_at(pool, extremum).radius * apart(was.quaternion, now.quaternion)
 
 
 @kernel(inner=True)

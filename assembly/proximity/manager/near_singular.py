@@ -41,7 +41,7 @@ ValleyStep = namedtuple("ValleyStep", "found there bend on_f along")
 
 
 @kernel(inner=True)
-def across_valley(table, pool, f, g, turn, shift, x):
+def across_near_singular(table, pool, f, g, turn, shift, x):
     """A step from parameters x across the valley there, if there is one."""
     none = (0.0, 0.0, 0.0)
     frame = pair_frame(table, pool, f, g, turn, shift, x)
@@ -91,7 +91,7 @@ def across_valley(table, pool, f, g, turn, shift, x):
 
 
 @kernel(inner=True)
-def into_valley(table, pool, f, g, turn, shift, x, half):
+def into_near_singular(table, pool, f, g, turn, shift, x, half):
     """The bottom of the valley that crosses a pair of patches, from their middles x: `half` are half their widths.
 
     Returns whether there is one, its parameters, whether f is the surface that is bent more across it, and its
@@ -101,7 +101,7 @@ def into_valley(table, pool, f, g, turn, shift, x, half):
     along = (0.0, 0.0, 0.0)
     on_f = False
     for _ in range(STEPS):
-        step = across_valley(table, pool, f, g, turn, shift, x)
+        step = across_near_singular(table, pool, f, g, turn, shift, x)
         found, there, bend, on_f, along = step.found, step.there, step.bend, step.on_f, step.along
         if not found or not is_beside(table, pool, (f, g), there, start, half, 1.0):
             return False, x, on_f, along

@@ -22,7 +22,7 @@ from assembly.proximity.manager.extrema import (
     USELESS,
     extremum_at,
 )
-from assembly.proximity.manager.near_singular import across_valley, into_valley
+from assembly.proximity.manager.near_singular import across_near_singular, into_near_singular
 
 # Cosine of the angle by which a valley turns from one of its points that are held to the next.
 APART = 0.5
@@ -39,14 +39,14 @@ def is_of_faces(table, posed, code_f, code_g):
 
 
 @kernel(inner=True)
-def is_loose(roots, k):
+def is_loose(extrema, k):
     """Whether a root is any one of a continuum, where it is by chance."""
-    extremum = extremum_at(roots, k)
+    extremum = extremum_at(extrema, k)
     return extremum.corner == 0.0 and abs(extremum.fold) <= CONTINUUM
 
 
 @kernel(inner=True)
-def is_next_in_valley(table, pool, posed, codes, surfaces, x, along, roots, count):
+def is_next_in_near_singular(table, pool, posed, codes, surfaces, x, along, extrema, count):
     """Whether the point at x of a valley between two faces is to be held; `along` is the valley's direction there.
 
     So it is where the valley has turned far from all of the points that are known between these faces, or where these
@@ -54,11 +54,11 @@ def is_next_in_valley(table, pool, posed, codes, surfaces, x, along, roots, coun
     """
     p = surface_point(table, pool, surfaces[0], x[0], x[1])[0]
     for k in range(count):
-        extremum = extremum_at(roots, k)
+        extremum = extremum_at(extrema, k)
         alike = extremum.code_f == codes[0] and extremum.code_g == codes[1]
-        if alike and extremum.origin != USELESS and not is_loose(roots, k):
+        if alike and extremum.origin != USELESS and not is_loose(extrema, k):
             y = pair_parameters(extremum)
-            step = across_valley(table, pool, surfaces[0], surfaces[1], posed.turn, posed.shift, y)
+            step = across_near_singular(table, pool, surfaces[0], surfaces[1], posed.turn, posed.shift, y)
             found, other = step.found, step.along
             way = sub(p, surface_point(table, pool, surfaces[0], y[0], y[1])[0])
             square = dot(way, way)
@@ -69,26 +69,28 @@ def is_next_in_valley(table, pool, posed, codes, surfaces, x, along, roots, coun
 
 
 @kernel(inner=True)
-def is_left_out(table, pool, posed, roots, k):
+def is_left_out(table, pool, posed, extrema, k):
     """Whether root k, behind all that stay, is of a continuum and next to what is held; if not, it is held."""
-    extremum = extremum_at(roots, k)
+    extremum = extremum_at(extrema, k)
     codes = (np.int64(extremum.code_f), np.int64(extremum.code_g))
-    if extremum.origin == USELESS or not is_loose(roots, k) or not is_of_faces(table, posed, codes[0], codes[1]):
+    if extremum.origin == USELESS or not is_loose(extrema, k) or not is_of_faces(table, posed, codes[0], codes[1]):
         return False
     surfaces = (feature_at(table, posed.shells[0], codes[0]), feature_at(table, posed.shells[1], codes[1]))
     x = pair_parameters(extremum)
-    step = across_valley(table, pool, surfaces[0], surfaces[1], posed.turn, posed.shift, x)
+    step = across_near_singular(table, pool, surfaces[0], surfaces[1], posed.turn, posed.shift, x)
     found, on_f, along = step.found, step.on_f, step.along
     if not found:
         return False
-    if extremum.origin == NEW and not is_next_in_valley(table, pool, posed, codes, surfaces, x, along, roots, k):
+    if extremum.origin == NEW and not is_next_in_near_singular(
+        table, pool, posed, codes, surfaces, x, along, extrema, k
+    ):
         return True
     extremum.corner = HELD_F if on_f else HELD_G
     return False
 
 
 @kernel(inner=True)
-def hold_continua(table, pool, posed, roots, count):
+def hold_continua(table, pool, posed, extrema, count):
     """Of a continuum of roots along a valley between two faces, hold those that are listed and few of the new ones.
 
     What Newton's method finds there are as many as it has starts, and may fill the room; one that is not next to what
@@ -97,9 +99,9 @@ def hold_continua(table, pool, posed, roots, count):
     stay = 0
     for k in range(count):
         for l in range(ROOT):
-            roots[stay, l] = roots[k, l]
+            extrema[stay, l] = extrema[k, l]
         stay += 1
-        if is_left_out(table, pool, posed, roots, stay - 1):
+        if is_left_out(table, pool, posed, extrema, stay - 1):
             stay -= 1
     return stay
 
@@ -120,5 +122,5 @@ def sunk(table, pool, posed, codes, held, x):
     f = feature_at(table, posed.shells[0], codes[0])
     g = feature_at(table, posed.shells[1], codes[1])
     wide = (math.inf, math.inf, math.inf, math.inf)
-    found, there, _on_f, _along = into_valley(table, pool, f, g, posed.turn, posed.shift, x, wide)
+    found, there, _on_f, _along = into_near_singular(table, pool, f, g, posed.turn, posed.shift, x, wide)
     return there if found and is_on_face(table, pool, posed, codes, 0 if held == HELD_F else 1, there) else x

@@ -57,7 +57,7 @@ def is_beside(table, pool, surfaces, x, y, half, part):
 
 
 @kernel(inner=True)
-def is_known(table, pool, posed, e, d, roots, count):
+def is_known(table, pool, posed, e, d, extrema, count):
     """The features of elements e and d, the parameters of their middles, whether a known root is all there is.
 
     And whether one is there that is near a fold, on this side of a knot line or beyond: a second root may be beside it.
@@ -69,7 +69,7 @@ def is_known(table, pool, posed, e, d, roots, count):
     half = half_widths(table, pool, posed.trees, (e, d))
     folds = False
     for k in range(count):
-        extremum = extremum_at(roots, k)
+        extremum = extremum_at(extrema, k)
         if extremum.code_f != codes[0] or extremum.code_g != codes[1]:
             continue
         if not extremum.fold > ALONE or extremum.corner >= POINT:
@@ -81,7 +81,7 @@ def is_known(table, pool, posed, e, d, roots, count):
         if posed.surfaces[0] >= 0 and math.isnan(extremum.beyond):
             # Beyond a knot line curvatures may be others.
             extremum.beyond = fold_beyond(table, pool, posed, x, half)
-        if is_alone(roots, k):
+        if is_alone(extrema, k):
             return codes, start, True, False
         folds = True
     return codes, start, False, folds

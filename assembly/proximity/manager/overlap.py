@@ -29,15 +29,15 @@ from assembly.proximity.bvh.tree import (
     overlapping,
     tree_at,
 )
-from assembly.proximity.extrema.projection import foot_of
+from assembly.proximity.extrema.projection import projection_of
 from assembly.proximity.extrema.singular import BESIDE
-from assembly.proximity.manager.edge_piercing import cut_at, patch_corners, pierces
+from assembly.proximity.manager.edge_piercing import cut_at, patch_vertex_contacts, pierces
 from assembly.proximity.manager.extrema import extremum_at
 
 # Room for the descent of a segment.
 DEPTH = 256
 # How often Newton's steps to a foot begin again where they end.
-FEET = 4
+PROJECTIONS = 4
 # A segment that passes a facet by less than this part of its sides cuts it, where being cut by two is no harm: one
 # through a common side may miss both.
 BETWEEN = 1e-9
@@ -121,7 +121,7 @@ def facets_cut(table, pool, tree, surface, shell, a, d, end, beside):
         if r < 0:
             continue
         e = tree_record.element_pool + ELEMENT * (-1 - child)
-        (u, v, wide, high), (p, q, s, t) = patch_corners(table, pool, r, element_at(pool, e))
+        (u, v, wide, high), (p, q, s, t) = patch_vertex_contacts(table, pool, r, element_at(pool, e))
         for k in range(2):
             cut = cut_at(a, d, p, q if k == 0 else s, s if k == 0 else t, end, beside)
             hit, way, x, y, along = cut.hit, cut.part, cut.q, cut.r, cut.turns
@@ -135,7 +135,7 @@ def facets_cut(table, pool, tree, surface, shell, a, d, end, beside):
 
 
 @kernel(inner=True)
-def foot_at(table, pool, tree, surface, shell, e, y):
+def projection_at(table, pool, tree, surface, shell, e, y):
     """The signed distance of a point from its foot at a body's element e, the normal there, and whether there is one.
 
     A foot that Newton's method did not reach is none: off the foot of a point outside, the tangent plane of a bulge has
@@ -147,17 +147,17 @@ def foot_at(table, pool, tree, surface, shell, e, y):
     if f < 0:
         return 0.0, y, False
     u, v = patch.middle[0], patch.middle[1]
-    s, t, distance, n, settled = foot_of(table, pool, f, y, u, v)
-    for _ in range(FEET):
+    s, t, distance, n, settled = projection_of(table, pool, f, y, u, v)
+    for _ in range(PROJECTIONS):
         if settled:
             break
-        s, t, distance, n, settled = foot_of(table, pool, f, y, s, t)
+        s, t, distance, n, settled = projection_of(table, pool, f, y, s, t)
     beside = is_within(table, pool, f, s, t, u, v, BESIDE * patch.half[0], BESIDE * patch.half[1])
     return distance, n, settled and beside and in_trim(table, pool, shell, code, s, t)
 
 
 @kernel(inner=True, allocates=True)
-def nearest_foot(table, pool, tree, surface, shell, y, reach):
+def nearest_projection(table, pool, tree, surface, shell, y, reach):
     """The signed distance of a point from its nearest foot on a body; minus the reach if none is nearer than that."""
     tree_record = tree_at(table, tree)
     stack = np.empty(DEPTH, np.int64)
@@ -178,7 +178,7 @@ def nearest_foot(table, pool, tree, surface, shell, y, reach):
         if child >= 0:
             used = with_children(stack, used, child)
             continue
-        distance, _n, some = foot_at(table, pool, tree, surface, shell, -1 - child, y)
+        distance, _n, some = projection_at(table, pool, tree, surface, shell, -1 - child, y)
         if some and abs(distance) < abs(nearest):
             nearest = distance
     return nearest
@@ -191,10 +191,10 @@ def is_inside_at(table, pool, tree, surface, shell, e, y, margin, offset):
     Of a thin wall the foot may be on the far side. Then one on the near side is nearer, or, where that is past an edge,
     a facet is between; these are up to an `offset` beside their surfaces.
     """
-    distance, n, some = foot_at(table, pool, tree, surface, shell, e, y)
+    distance, n, some = projection_at(table, pool, tree, surface, shell, e, y)
     if not (some and distance < -margin):
         return False
-    if nearest_foot(table, pool, tree, surface, shell, y, -distance) >= -margin:
+    if nearest_projection(table, pool, tree, surface, shell, y, -distance) >= -margin:
         return False
     if -distance <= 2.0 * offset:
         return True
@@ -300,12 +300,12 @@ def crosses(table, pool, posed, stack, candidates, margin, offsets):
 
 
 @kernel(inner=True)
-def is_outside(table, pool, posed, roots, k, offsets):
+def is_outside(table, pool, posed, extrema, k, offsets):
     """Whether root k, of a negative gap, is one of far sides: then a surface is between its points.
 
     Facets of f and of g are up to `offsets` beside their surfaces; gaps of no more are taken for true.
     """
-    extremum = extremum_at(roots, k)
+    extremum = extremum_at(extrema, k)
     depth = -extremum.gap
     turn, shift = posed.turn, posed.shift
     a = (extremum.point_f[0], extremum.point_f[1], extremum.point_f[2])

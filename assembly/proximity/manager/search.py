@@ -19,7 +19,7 @@ from assembly.proximity.manager.extrema import (
     NEW,
     NOTHING,
     USELESS,
-    add_root,
+    add_extremum,
     extremum_at,
     is_alone,
 )
@@ -32,14 +32,14 @@ SLIDES_A_LOOK = 6
 
 
 @kernel(inner=True)
-def look_into(table, pool, posed, e, d, neglect, roots, count, work, passed, state):
+def search_candidate(table, pool, posed, e, d, merge_radius, extrema, count, work, passed, state):
     """Look for a root of the patches e of f and d of g that is not known.
 
     Returns how many roots there are; which one is a new minimum, or -1; whether a motion may bring one forth; and the
     state: whether a root is near a fold, how many ways there are in `passed`, how many starts went down a slope.
     """
     folding, visited, slides = state
-    codes, start, inside, folds = is_known(table, pool, posed, e, d, roots, count)
+    codes, start, inside, folds = is_known(table, pool, posed, e, d, extrema, count)
     folding = folding or folds
     if inside:
         return count, -1, False, (folding, visited, slides)
@@ -55,10 +55,12 @@ def look_into(table, pool, posed, e, d, neglect, roots, count, work, passed, sta
     result = NOTHING
     if stayed or not folding:
         # Where nothing folds, it tells whether it goes to a root that is known.
-        count, result = add_root(table, pool, posed, codes, near, (0.0, 0.0, 0.0), neglect, roots, count, work, 0.0)
+        count, result = add_extremum(
+            table, pool, posed, codes, near, (0.0, 0.0, 0.0), merge_radius, extrema, count, work, 0.0
+        )
     if count > before:
-        folding = folding or not is_alone(roots, before)
-    minimum = result == MINIMUM_FOUND or (result == ALIKE and extremum_at(roots, count).fold > 0.0)
+        folding = folding or not is_alone(extrema, before)
+    minimum = result == MINIMUM_FOUND or (result == ALIKE and extremum_at(extrema, count).fold > 0.0)
     if folding and smooth and stayed and not minimum and slides < SLIDES_A_LOOK:
         # Near a fold Newton's method may go to the saddle, past the minimum beside it.
         if count > before:
@@ -68,9 +70,9 @@ def look_into(table, pool, posed, e, d, neglect, roots, count, work, passed, sta
         start, stayed = slide_down(
             table, pool, posed.surfaces[0], posed.surfaces[1], posed.turn, posed.shift, start, stride, half
         )
-        if stayed and count < roots.shape[0]:
-            count, result = add_root(
-                table, pool, posed, codes, start, (0.0, 0.0, 0.0), neglect, roots, count, work, 0.0
+        if stayed and count < extrema.shape[0]:
+            count, result = add_extremum(
+                table, pool, posed, codes, start, (0.0, 0.0, 0.0), merge_radius, extrema, count, work, 0.0
             )
     if result == ALIKE and not folding:
         # On the slopes around a root that is known.
@@ -85,7 +87,7 @@ def look_into(table, pool, posed, e, d, neglect, roots, count, work, passed, sta
 
 @kernel(inner=True)
 def search_patches(
-    table, pool, posed, moving, limits, span, offsets, neglect, facing, found, roots, count, work, passed
+    table, pool, posed, moving, limits, span, offsets, merge_radius, facing, found, extrema, count, work, passed
 ):
     """Look into `found` pairs of patches for minima that are not known: new ones where their gaps are in a span.
 
@@ -97,12 +99,12 @@ def search_patches(
     fertile = math.inf
     folding = False
     for k in range(count):
-        folding = folding or not is_alone(roots, k)
+        folding = folding or not is_alone(extrema, k)
     state = (folding, 0, 0)
     lo = (math.inf, math.inf, math.inf)
     hi = (-math.inf, -math.inf, -math.inf)
     for c in range(found):
-        if count == roots.shape[0]:
+        if count == extrema.shape[0]:
             break
         bound = distances[c]
         if bound > flank and bound > enough:
@@ -113,19 +115,29 @@ def search_patches(
             # in a crowd, what the ball around it may go.
             new, bears = -1, True
         else:
-            count, new, bears, state = look_into(
-                table, pool, posed, candidates[c, 0], candidates[c, 1], neglect, roots, count, work, passed, state
+            count, new, bears, state = search_candidate(
+                table,
+                pool,
+                posed,
+                candidates[c, 0],
+                candidates[c, 1],
+                merge_radius,
+                extrema,
+                count,
+                work,
+                passed,
+                state,
             )
             bound = max(bound, flank)
         if bears:
             fertile = min(fertile, bound)
             lo, hi = around(table, pool, moving.tree, candidates[c, moving.side], lo, hi)
         if new >= 0:
-            gap = extremum_at(roots, new).gap
+            gap = extremum_at(extrema, new).gap
             # The far sides of two bodies oppose each other, too.
             alien = gap > span[1] or gap < span[0]
-            alien = alien or (gap < 0.0 and is_outside(table, pool, posed, roots, new, offsets))
-            extremum_at(roots, new).origin = USELESS if alien else NEW
+            alien = alien or (gap < 0.0 and is_outside(table, pool, posed, extrema, new, offsets))
+            extremum_at(extrema, new).origin = USELESS if alien else NEW
     d = sub(hi, lo)
     center = scale(0.5, add(lo, hi))
     place = add(matvec(moving.turn, center), moving.shift)

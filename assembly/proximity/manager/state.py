@@ -29,8 +29,8 @@ from assembly.proximity.manager.extrema import (
     NEW,
     OF_CONTACT,
     USELESS,
+    add_extremum,
     add_given,
-    add_root,
     extremum_at,
     given_at,
 )
@@ -63,7 +63,7 @@ TRACK_SOLIDS = place_of(MANAGER_DTYPE, "track_solids")
 LENGTHS = place_of(MANAGER_DTYPE, "lengths")
 LISTS = place_of(MANAGER_DTYPE, "lists")
 LIST_TABLE = place_of(MANAGER_DTYPE, "list_table")
-CORNERS = place_of(MANAGER_DTYPE, "corners")
+VERTEX_CONTACTS = place_of(MANAGER_DTYPE, "corners")
 CLOCK = place_of(MANAGER_DTYPE, "clock")
 MARK_AT = place_of(MANAGER_DTYPE, "mark_address")
 WATCH_RECORD = size_of(MANAGER_DTYPE)
@@ -79,7 +79,7 @@ LENGTHS_DTYPE = record_dtype(
     last_reach=1,  # the largest query margin
 )
 lengths_at = record_view(LENGTHS_DTYPE)
-NEGLECT = place_of(LENGTHS_DTYPE, "neglect")
+MERGE_RADIUS = place_of(LENGTHS_DTYPE, "neglect")
 FIRST_REACH = place_of(LENGTHS_DTYPE, "first_reach")
 LAST_REACH = place_of(LENGTHS_DTYPE, "last_reach")
 LENGTH_COUNT = size_of(LENGTHS_DTYPE)
@@ -114,7 +114,7 @@ LOW = place_of(PAIR_DTYPE, "low")
 GIVEN = place_of(PAIR_DTYPE, "given")
 GIVEN_COUNT = place_of(PAIR_DTYPE, "given_count")
 SMALLER = place_of(PAIR_DTYPE, "smaller")
-SPINE_F = place_of(PAIR_DTYPE, "spine_f")
+CENTERLINE_F = place_of(PAIR_DTYPE, "spine_f")
 PAIR_RECORD = size_of(PAIR_DTYPE)
 # Lengths of a pair in the pool [over the size of the scene]. Where contacts are given the same follow IN_PLACE behind
 # with a least gap of zero, for what is in the place of a contact.
@@ -208,11 +208,11 @@ EVENT_DTYPE = record_dtype(
 event_at = record_view(EVENT_DTYPE)
 EVENT, EVENTS = size_of(EVENT_DTYPE), 64
 ADDED, REMOVED, HANDED_OFF, MERGED, REFUSED = 0, 1, 2, 3, 4
-CAME_NEAR, WENT_AWAY, LOST, SAME_ROOT, NO_PLACE = 0, 1, 2, 3, 4
+CAME_NEAR, WENT_AWAY, LOST, SAME_EXTREMUM, NO_PLACE = 0, 1, 2, 3, 4
 # Roots nearer than this part of the reach are listed; those that are, stay so up to the second.
 TAKE, KEEP = 0.4, 0.8
 # Room for roots of a look.
-ROOTS = 96
+EXTREMA = 96
 # A point of a valley that is held goes to its bottom as often as that is lower by more than this.
 SUNK = 1e-13
 # A given contact goes from a saddle to a minimum that is lower by no more than this.
@@ -286,9 +286,9 @@ def free_place(table, watch, memory, pair):
 
 
 @kernel(inner=True)
-def write_root(roots, i, tracked, r):
+def write_extremum(extrema, i, tracked, r):
     """Track root i in row r."""
-    extremum = extremum_at(roots, i)
+    extremum = extremum_at(extrema, i)
     pair = tracked_at(tracked, r)
     for k in range(4):
         pair.parameters[k] = extremum.parameters[k]
@@ -303,15 +303,15 @@ def write_root(roots, i, tracked, r):
 
 
 @kernel(inner=True)
-def is_of_far_sides(table, pool, posed, roots, k, offsets):
+def is_of_far_sides(table, pool, posed, extrema, k, offsets):
     """Whether root k, with a negative gap, is of sides that are turned away from each other."""
     if posed.centerlines[0] >= 0:
-        return extremum_at(roots, k).gap < -both_radii(table, pool, posed.centerlines)
-    return is_outside(table, pool, posed, roots, k, offsets)
+        return extremum_at(extrema, k).gap < -both_radii(table, pool, posed.centerlines)
+    return is_outside(table, pool, posed, extrema, k, offsets)
 
 
 @kernel(inner=True)
-def known_roots(table, pool, watch, memory, p, posed, offsets, tracked, roots, work):
+def known_extrema(table, pool, watch, memory, p, posed, offsets, tracked, extrema, work):
     """The roots that contacts of pair p have now: given ones, then listed ones.
 
     A listed contact that lost its root, or came to that of another one or to the far sides, gives up its place. Returns
@@ -320,11 +320,11 @@ def known_roots(table, pool, watch, memory, p, posed, offsets, tracked, roots, w
     manager = manager_at(table, watch)
     pair = pair_at(table, manager.pair_table + PAIR_RECORD * p)
     places = memory_places(table, watch)[1]
-    neglect = lengths_at(pool, manager.lengths).neglect
+    merge_radius = lengths_at(pool, manager.lengths).neglect
     # A contact that is to close a gap would contradict a clearance that asks for one, where both stood for one root.
-    radius = neglect if pair_lengths_at(pool, pair.minimum).least == 0.0 else math.inf
+    radius = merge_radius if pair_lengths_at(pool, pair.minimum).least == 0.0 else math.inf
     many = pair.given_count if posed.surfaces[0] >= 0 else 0
-    count = add_given(table, pool, posed, tracked, pair.given, many, radius, roots, work)
+    count = add_given(table, pool, posed, tracked, pair.given, many, radius, extrema, work)
     first, last = pair.low, pair.high
     any_gone = False
     # Roots first, then corners, which give way to them.
@@ -333,59 +333,61 @@ def known_roots(table, pool, watch, memory, p, posed, offsets, tracked, roots, w
         slot = place_at(memory, places + PLACE_MEMORY * k)
         r = manager.first + k
         tracked_pair = tracked_at(tracked, r)
-        corner = tracked_pair.stays if tracked_pair.stays > 0.0 else 0.0
-        if slot.pair != p or (corner > 0.0) != (step >= last - first):
+        vertex_contact = tracked_pair.stays if tracked_pair.stays > 0.0 else 0.0
+        if slot.pair != p or (vertex_contact > 0.0) != (step >= last - first):
             continue
         lost = math.isnan(tracked_pair.parameters[0])
         before = count
-        extremum = extremum_at(roots, before)
-        if not lost and count < ROOTS:
+        extremum = extremum_at(extrema, before)
+        if not lost and count < EXTREMA:
             start = pair_parameters(tracked_pair)
             codes = (np.int64(tracked_pair.feature_f), np.int64(tracked_pair.feature_g))
             n = three_of(tracked_pair.normal)
-            if corner >= HELD_F:
-                start = sunk(table, pool, posed, codes, corner, start)
-            count, found = add_root(table, pool, posed, codes, start, n, neglect, roots, count, work, corner)
+            if vertex_contact >= HELD_F:
+                start = sunk(table, pool, posed, codes, vertex_contact, start)
+            count, found = add_extremum(
+                table, pool, posed, codes, start, n, merge_radius, extrema, count, work, vertex_contact
+            )
             lost = found != ALIKE and found != MINIMUM_FOUND
-            if count > before and corner == 0.0 and extremum.gap < 0.0:
-                lost = lost or is_of_far_sides(table, pool, posed, roots, before, offsets)
+            if count > before and vertex_contact == 0.0 and extremum.gap < 0.0:
+                lost = lost or is_of_far_sides(table, pool, posed, extrema, before, offsets)
         if count > before and not lost:
             extremum.origin = LISTED + k
-            if corner >= HELD_F and extremum.gap < tracked_pair.gap - SUNK:
+            if vertex_contact >= HELD_F and extremum.gap < tracked_pair.gap - SUNK:
                 # The same contact elsewhere: who solves has to know.
-                note(table, watch, memory, HANDED_OFF, SAME_ROOT, p, slot.number, extremum.gap)
-            write_root(roots, before, tracked, r)
+                note(table, watch, memory, HANDED_OFF, SAME_EXTREMUM, p, slot.number, extremum.gap)
+            write_extremum(extrema, before, tracked, r)
         else:
             # A corner that went past its face is none of these.
-            any_gone = any_gone or (lost and corner == 0.0)
-            kind, reason = (HANDED_OFF, LOST) if lost else (MERGED, SAME_ROOT)
+            any_gone = any_gone or (lost and vertex_contact == 0.0)
+            kind, reason = (HANDED_OFF, LOST) if lost else (MERGED, SAME_EXTREMUM)
             note(table, watch, memory, kind, reason, p, slot.number, tracked_pair.gap)
             release(table, watch, memory, k, tracked)
     return count, any_gone
 
 
 @kernel(inline=True)
-def gap_beyond(roots, i, least):
+def gap_beyond(extrema, i, least):
     """By how much root i is farther than its row asks for: in the place of a contact that is nothing."""
-    extremum = extremum_at(roots, i)
+    extremum = extremum_at(extrema, i)
     return extremum.gap - (0.0 if extremum.place == BESIDE_CONTACT else least)
 
 
 @kernel(inner=True)
-def release_given(table, watch, memory, p, roots, count, tracked):
+def release_given(table, watch, memory, p, extrema, count, tracked):
     """Take their places from the roots that are a given contact's own pair, or that came into its place or left it.
 
     The latter ask for another least gap from now on, and are listed anew.
     """
     places = memory_places(table, watch)[1]
     for i in range(count):
-        extremum = extremum_at(roots, i)
+        extremum = extremum_at(extrema, i)
         origin = np.int64(extremum.origin)
         own = extremum.place == OF_CONTACT
         if origin >= LISTED:
             o = place_at(memory, places + PLACE_MEMORY * (origin - LISTED))
             if own or (extremum.place == BESIDE_CONTACT) != (o.given == 1.0):
-                kind, reason = (MERGED, SAME_ROOT) if own else (HANDED_OFF, SAME_ROOT)
+                kind, reason = (MERGED, SAME_EXTREMUM) if own else (HANDED_OFF, SAME_EXTREMUM)
                 note(table, watch, memory, kind, reason, p, o.number, extremum.gap)
                 release(table, watch, memory, origin - LISTED, tracked)
                 extremum.origin = NEW
@@ -394,7 +396,7 @@ def release_given(table, watch, memory, p, roots, count, tracked):
 
 
 @kernel(inner=True)
-def list_roots(table, pool, watch, memory, p, roots, count, tracked):
+def list_extrema(table, pool, watch, memory, p, extrema, count, tracked):
     """Give places to the near roots of pair p and take them from the far ones.
 
     Returns by how much the nearest one that is not listed is farther than it has to be, its gap, and whether a place
@@ -410,62 +412,62 @@ def list_roots(table, pool, watch, memory, p, roots, count, tracked):
     rest = math.inf
     lowest = math.inf
     for i in range(count):
-        origin = np.int64(extremum_at(roots, i).origin)
-        if origin >= LISTED and gap_beyond(roots, i, least) > KEEP * reach:
+        origin = np.int64(extremum_at(extrema, i).origin)
+        if origin >= LISTED and gap_beyond(extrema, i, least) > KEEP * reach:
             k = origin - LISTED
             number = place_at(memory, places + PLACE_MEMORY * k).number
-            note(table, watch, memory, REMOVED, WENT_AWAY, p, number, extremum_at(roots, i).gap)
+            note(table, watch, memory, REMOVED, WENT_AWAY, p, number, extremum_at(extrema, i).gap)
             release(table, watch, memory, k, tracked)
-            rest = min(rest, gap_beyond(roots, i, least))
-            lowest = min(lowest, extremum_at(roots, i).gap)
+            rest = min(rest, gap_beyond(extrema, i, least))
+            lowest = min(lowest, extremum_at(extrema, i).gap)
     # The nearest first, so that it is the far ones for which places may be wanting.
     while True:
         best = -1
         for i in range(count):
-            if extremum_at(roots, i).origin == NEW and (
-                best < 0 or gap_beyond(roots, i, least) < gap_beyond(roots, best, least)
+            if extremum_at(extrema, i).origin == NEW and (
+                best < 0 or gap_beyond(extrema, i, least) < gap_beyond(extrema, best, least)
             ):
                 best = i
         if best < 0:
             break
-        gap = gap_beyond(roots, best, least)
-        extremum_at(roots, best).origin = USELESS
+        gap = gap_beyond(extrema, best, least)
+        extremum_at(extrema, best).origin = USELESS
         k = free_place(table, watch, memory, pair) if gap <= TAKE * reach else -1
         if k < 0:
             rest = min(rest, gap)
-            lowest = min(lowest, extremum_at(roots, best).gap)
+            lowest = min(lowest, extremum_at(extrema, best).gap)
             if gap <= TAKE * reach and not wanting:
                 wanting = True
                 if at.wanting == 0.0:
-                    note(table, watch, memory, REFUSED, NO_PLACE, p, 0.0, extremum_at(roots, best).gap)
+                    note(table, watch, memory, REFUSED, NO_PLACE, p, 0.0, extremum_at(extrema, best).gap)
             continue
         o = place_at(memory, places + PLACE_MEMORY * k)
         o.pair = float(p)
         state.born += 1.0
         o.number = state.born
-        o.given = 1.0 if extremum_at(roots, best).place == BESIDE_CONTACT else 0.0
-        write_root(roots, best, tracked, manager.first + k)
+        o.given = 1.0 if extremum_at(extrema, best).place == BESIDE_CONTACT else 0.0
+        write_extremum(extrema, best, tracked, manager.first + k)
         tracked_at(tracked, manager.first + k).allowed = -gap if -state.overlap <= gap < 0.0 else 0.0
-        note(table, watch, memory, ADDED, CAME_NEAR, p, state.born, extremum_at(roots, best).gap)
+        note(table, watch, memory, ADDED, CAME_NEAR, p, state.born, extremum_at(extrema, best).gap)
     at.wanting = 1.0 if wanting else 0.0
     return rest, lowest, wanting
 
 
 @kernel(inner=True)
-def minimum_beside(roots, count, i):
+def minimum_beside(extrema, count, i):
     """The minimum nearest to root i, a saddle, that is hardly lower, or -1."""
-    root_record = extremum_at(roots, i)
+    extremum_record = extremum_at(extrema, i)
     best = -1
     least = math.inf
     for k in range(count):
-        extremum = extremum_at(roots, k)
+        extremum = extremum_at(extrema, k)
         origin = extremum.origin
-        lower = root_record.gap - extremum.gap
+        lower = extremum_record.gap - extremum.gap
         if not (origin == NEW or origin >= LISTED) or not extremum.fold > 0.0 or not 0.0 <= lower <= SHALLOW:
             continue
         square = 0.0
         for l in range(3):
-            d = root_record.point_f[l] - extremum.point_f[l]
+            d = extremum_record.point_f[l] - extremum.point_f[l]
             square += d * d
         if square < least:
             best = k
@@ -474,7 +476,7 @@ def minimum_beside(roots, count, i):
 
 
 @kernel(inner=True)
-def seat_given(table, watch, memory, p, roots, count, tracked):
+def keep_slots_of_given(table, watch, memory, p, extrema, count, tracked):
     """Given contacts of surfaces whose minimum has become a saddle go to one of those that it parted into.
 
     A contact that stayed would hold the surfaces at the saddle, and they would cross beside it.
@@ -482,11 +484,11 @@ def seat_given(table, watch, memory, p, roots, count, tracked):
     given = pair_at(table, manager_at(table, watch).pair_table + PAIR_RECORD * p).given
     places = memory_places(table, watch)[1]
     for i in range(count):
-        extremum = extremum_at(roots, i)
+        extremum = extremum_at(extrema, i)
         if extremum.origin > GIVEN_CONTACT or not extremum.fold < 0.0:
             continue
-        k = minimum_beside(roots, count, i)
-        root_record = extremum_at(roots, k)
+        k = minimum_beside(extrema, count, i)
+        extremum_record = extremum_at(extrema, k)
         if k < 0:
             continue
         c = np.int64(GIVEN_CONTACT - extremum.origin)
@@ -494,14 +496,14 @@ def seat_given(table, watch, memory, p, roots, count, tracked):
         pair = tracked_at(tracked, given_record.row)
         swap = 2 * given_record.swapped
         for l in range(4):
-            pair.parameters[l] = root_record.parameters[(l + swap) % 4]
-        pair.gap = root_record.gap
-        if root_record.origin == NEW:
-            note(table, watch, memory, HANDED_OFF, LOST, p, 0.0, root_record.gap)
+            pair.parameters[l] = extremum_record.parameters[(l + swap) % 4]
+        pair.gap = extremum_record.gap
+        if extremum_record.origin == NEW:
+            note(table, watch, memory, HANDED_OFF, LOST, p, 0.0, extremum_record.gap)
         else:
-            place = np.int64(root_record.origin) - LISTED
+            place = np.int64(extremum_record.origin) - LISTED
             number = place_at(memory, places + PLACE_MEMORY * place).number
-            note(table, watch, memory, MERGED, SAME_ROOT, p, number, root_record.gap)
+            note(table, watch, memory, MERGED, SAME_EXTREMUM, p, number, extremum_record.gap)
             release(table, watch, memory, place, tracked)
-        root_record.origin = extremum.origin
+        extremum_record.origin = extremum.origin
         extremum.origin = USELESS

@@ -23,11 +23,11 @@ from assembly._kernel import kernel
 from assembly.proximity.bvh.neighbor_list import LIST_INTS
 from assembly.proximity.bvh.tree import least_distance, node_at, tree_at
 from assembly.proximity.features.solid_contact import CONTACT_RECORD, TRACK, tracked_at
-from assembly.proximity.manager.candidates import facing_pairs, near_enough
+from assembly.proximity.manager.candidates import candidate_pairs, near_enough
 from assembly.proximity.manager.centerlines.box import BOX
 from assembly.proximity.manager.centerlines.minima import MINIMA
 from assembly.proximity.manager.centerlines.parts import near_parts, parts_beyond
-from assembly.proximity.manager.centerlines.search import BOXES, MARK, search_spines
+from assembly.proximity.manager.centerlines.search import BOXES, MARK, search_centerlines
 from assembly.proximity.manager.extrema import (
     ELSEWHERE,
     GIVEN_CONTACT,
@@ -55,20 +55,21 @@ from assembly.proximity.manager.posed_pair import posed_pair
 from assembly.proximity.manager.search import search_patches
 from assembly.proximity.manager.state import (
     ABORTED,
+    EXTREMA,
     FAR,
     NEAR,
     PAIR_MEMORY,
     PAIR_RECORD,
     PLACE_MEMORY,
-    ROOTS,
     SLICE,
     TAKE,
     TRACKING,
     any_listed,
     any_lost,
-    known_roots,
+    keep_slots_of_given,
+    known_extrema,
     lengths_at,
-    list_roots,
+    list_extrema,
     manager_at,
     memory_header_at,
     memory_places,
@@ -77,9 +78,8 @@ from assembly.proximity.manager.state import (
     pair_state_at,
     place_at,
     release_given,
-    seat_given,
 )
-from assembly.proximity.manager.vertex_contacts import add_corners
+from assembly.proximity.manager.vertex_contacts import add_vertex_contacts
 from assembly.proximity.manager.wires import both_radii
 
 # Looks: at pairs that used up their allowance, or at all that moved. The first may be careful, at urgent pairs too, and
@@ -95,7 +95,7 @@ CANDIDATES, STACK = 8192, 1024
 # Folds nearer than this part of a first reach are looked at after every move.
 FLAT = 0.2
 # Lists of parts of spines that are near are for motions up to so many first reaches.
-SPINE_RINGS = 4.0
+CENTERLINE_RINGS = 4.0
 # Arrays of an update. stack: nodes of both trees that wait, (k, 2); candidates: pairs of patches, (k, 2), and their
 # distances; passed: ways of Newton's method, (WAYS, PASSED); work: one record of derivatives, one tracked pair; pairs:
 # parts of centerlines, (k, 2); boxes: of both (`centerlines/search.py`); marks: of known roots, and minima of a box.
@@ -110,7 +110,7 @@ CROSSING = 1e-6
 
 
 @kernel(inner=True)
-def list_corners(table, pool, watch, posed, reach, least, offsets, workspace, roots, count, tracked):
+def list_vertex_contacts(table, pool, watch, posed, reach, least, offsets, workspace, extrema, count, tracked):
     """Add corners over faces to the roots of a pair. Returns how many roots there are.
 
     A listed contact whose root is at one stays there.
@@ -118,11 +118,13 @@ def list_corners(table, pool, watch, posed, reach, least, offsets, workspace, ro
     manager = manager_at(table, watch)
     lengths = lengths_at(pool, manager.lengths)
     span = (-lengths.first_reach, reach + least)
-    neglect = lengths.neglect
+    merge_radius = lengths.neglect
     stack, candidates, work = workspace.stack, workspace.candidates, workspace.work
-    count = add_corners(table, pool, posed, span, offsets, neglect, stack, candidates, roots, count, work)
+    count = add_vertex_contacts(
+        table, pool, posed, span, offsets, merge_radius, stack, candidates, extrema, count, work
+    )
     for k in range(count):
-        extremum = extremum_at(roots, k)
+        extremum = extremum_at(extrema, k)
         place = np.int64(extremum.origin)
         if place >= LISTED:
             tracked_at(tracked, manager.first + place - LISTED).stays = extremum.corner
@@ -130,18 +132,18 @@ def list_corners(table, pool, watch, posed, reach, least, offsets, workspace, ro
 
 
 @kernel(inner=True)
-def nearest_fold(roots, count, least, reach):
+def nearest_fold(extrema, count, least, reach):
     """How far away what is born at a fold may be: about as far as the nearest root beside one. Corners have none."""
     low = math.inf
     for k in range(count):
-        extremum = extremum_at(roots, k)
-        if extremum.corner == 0.0 and not is_alone(roots, k) and abs(extremum.gap - least) <= reach:
+        extremum = extremum_at(extrema, k)
+        if extremum.corner == 0.0 and not is_alone(extrema, k) and abs(extremum.gap - least) <= reach:
             low = min(low, max(extremum.gap - least, 0.0))
     return low
 
 
 @kernel(inner=True)
-def crosses_elsewhere(table, pool, watch, memory, p, posed, roots, count, least, offsets, stack, candidates, tracked):
+def crosses_elsewhere(table, pool, watch, memory, p, posed, extrema, count, least, offsets, stack, candidates, tracked):
     """Whether the bodies of pair p are in each other where no contact says so."""
     manager = manager_at(table, watch)
     pair = pair_at(table, manager.pair_table + PAIR_RECORD * p)
@@ -150,9 +152,11 @@ def crosses_elsewhere(table, pool, watch, memory, p, posed, roots, count, least,
     deep = False
     for k in range(count):
         asked = (
-            least if extremum_at(roots, k).origin > GIVEN_CONTACT and extremum_at(roots, k).place == ELSEWHERE else 0.0
+            least
+            if extremum_at(extrema, k).origin > GIVEN_CONTACT and extremum_at(extrema, k).place == ELSEWHERE
+            else 0.0
         )
-        deep = deep or (extremum_at(roots, k).gap < asked - margin and extremum_at(roots, k).origin != USELESS)
+        deep = deep or (extremum_at(extrema, k).gap < asked - margin and extremum_at(extrema, k).origin != USELESS)
     for k in range(pair.low, pair.high):
         if place_at(memory, places + PLACE_MEMORY * k).pair == p:
             deep = deep or tracked_at(tracked, manager.first + k).gap < -margin
@@ -160,7 +164,7 @@ def crosses_elsewhere(table, pool, watch, memory, p, posed, roots, count, least,
 
 
 @kernel(inner=True)
-def search_by_patches(table, pool, watch, memory, p, posed, moving, reach, offsets, tracked, workspace, roots):
+def search_by_patches(table, pool, watch, memory, p, posed, moving, reach, offsets, tracked, workspace, extrema):
     """Find the roots of pair p by patches that face each other.
 
     Returns a PairSearch, whether a listed root was lost, and whether there is anything within reach.
@@ -172,15 +176,15 @@ def search_by_patches(table, pool, watch, memory, p, posed, moving, reach, offse
     asked = pair_lengths_at(pool, minimum)
     least, flank = asked.least, asked.curved_bound
     at = memory_places(table, watch)[0] + PAIR_MEMORY * p
-    found, reach = facing_pairs(table, pool, watch, memory, p, posed, moving, reach, stack, candidates)
+    found, reach = candidate_pairs(table, pool, watch, memory, p, posed, moving, reach, stack, candidates)
     pair_state_at(memory, at).reach = reach
-    count, any_gone = known_roots(table, pool, watch, memory, p, posed, offsets, tracked, roots, workspace.work)
+    count, any_gone = known_extrema(table, pool, watch, memory, p, posed, offsets, tracked, extrema, workspace.work)
     enough = near_enough(table, pool, posed, least, reach, flank, candidates, found, distances)
     span = (-lengths.last_reach, reach + least)
-    neglect = lengths.neglect
+    merge_radius = lengths.neglect
     facing = (candidates, distances)
     search = search_patches(
-        table, pool, posed, moving, (flank, enough), span, offsets, neglect, facing, found, roots, count,
+        table, pool, posed, moving, (flank, enough), span, offsets, merge_radius, facing, found, extrema, count,
         workspace.work, workspace.passed,
     )  # fmt: skip
     free = min(search.bound, reach)
@@ -194,7 +198,7 @@ def search_by_patches(table, pool, watch, memory, p, posed, moving, reach, offse
 
 
 @kernel(inner=True)
-def search_by_spines(table, pool, watch, memory, p, posed, moving, reach, offsets, tracked, workspace, roots):
+def search_by_centerlines(table, pool, watch, memory, p, posed, moving, reach, offsets, tracked, workspace, extrema):
     """The same for two round wires, by their spines."""
     manager = manager_at(table, watch)
     stack, pairs, boxes = workspace.stack, workspace.pairs, workspace.boxes
@@ -203,7 +207,7 @@ def search_by_spines(table, pool, watch, memory, p, posed, moving, reach, offset
     asked = pair_lengths_at(pool, minimum)
     least, flank = asked.least, asked.curved_bound
     radii = both_radii(table, pool, posed.centerlines) + least
-    ring = SPINE_RINGS * lengths.first_reach
+    ring = CENTERLINE_RINGS * lengths.first_reach
     at_list = manager.list_table + LIST_INTS * (p % manager.lists)
     waiting = near_parts(table, pool, at_list, p, posed, moving, radii + reach, ring, stack, pairs, boxes)
     while waiting < 0 and reach > LEAST_ALLOWANCE:
@@ -211,7 +215,7 @@ def search_by_spines(table, pool, watch, memory, p, posed, moving, reach, offset
         reach *= 0.5
         waiting = near_parts(table, pool, at_list, p, posed, moving, radii + reach, ring, stack, pairs, boxes)
     pair_state_at(memory, memory_places(table, watch)[0] + PAIR_MEMORY * p).reach = reach
-    count, any_gone = known_roots(table, pool, watch, memory, p, posed, offsets, tracked, roots, workspace.work)
+    count, any_gone = known_extrema(table, pool, watch, memory, p, posed, offsets, tracked, extrema, workspace.work)
     if waiting < 0:
         # There is no room for what is as near as it should not be.
         memory_header_at(memory, 0).crowded = 1.0
@@ -221,15 +225,15 @@ def search_by_spines(table, pool, watch, memory, p, posed, moving, reach, offset
         return PairSearch(count, beyond, math.inf, no_ball(), math.inf), any_gone, False
     # No tangent turns by more than a motion over this.
     rho = min(2.0 * (radii + reach), 0.99 * node_at(pool, tree_at(table, moving.tree).node_pool).radius)
-    search = search_spines(
+    search = search_centerlines(
         table, pool, posed, moving, rho, (least, TAKE * reach, reach, flank), lengths.neglect, boxes, waiting,
-        workspace.marks, roots, count, workspace.work,
+        workspace.marks, extrema, count, workspace.work,
     )  # fmt: skip
     return search, any_gone, True
 
 
 @kernel(inner=True)
-def look_at_pair(table, pool, watch, memory, p, q, tracked, workspace, roots, asks):
+def update_pair(table, pool, watch, memory, p, q, tracked, workspace, extrema, asks):
     """Find and list the roots of pair p; `asks` says whether it tells if the bodies cross elsewhere."""
     state = memory_header_at(memory, 0)
     manager = manager_at(table, watch)
@@ -245,24 +249,26 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, workspace, roots, as
     reach = reach_now(table, pool, watch, memory, p, moving)
     wires = posed.centerlines[0] >= 0
     if wires:
-        search, any_gone, found = search_by_spines(
-            table, pool, watch, memory, p, posed, moving, reach, offsets, tracked, workspace, roots
+        search, any_gone, found = search_by_centerlines(
+            table, pool, watch, memory, p, posed, moving, reach, offsets, tracked, workspace, extrema
         )
     else:
         search, any_gone, found = search_by_patches(
-            table, pool, watch, memory, p, posed, moving, reach, offsets, tracked, workspace, roots
+            table, pool, watch, memory, p, posed, moving, reach, offsets, tracked, workspace, extrema
         )
     count, fertile, sure = search.count, search.ball_bound, search.accepted_bound
     if posed.surfaces[0] >= 0:
-        seat_given(table, watch, memory, p, roots, count, tracked)
+        keep_slots_of_given(table, watch, memory, p, extrema, count, tracked)
     elif manager.corners == 1:
-        count = list_corners(table, pool, watch, posed, known.reach, least, offsets, workspace, roots, count, tracked)
-    if posed.surfaces[0] < 0 and any_deep(roots, count):
-        drop_flush(table, pool, watch, memory, p, posed, roots, count, tracked)
+        count = list_vertex_contacts(
+            table, pool, watch, posed, known.reach, least, offsets, workspace, extrema, count, tracked
+        )
+    if posed.surfaces[0] < 0 and any_deep(extrema, count):
+        drop_flush(table, pool, watch, memory, p, posed, extrema, count, tracked)
     if manager.mark_address != 0 and least > 0.0 and pair.given_count > 0:
-        call_address(manager.mark_address, (table, pool, watch, p, q, tracked, roots, count))
-        release_given(table, watch, memory, p, roots, count, tracked)
-    rest, lowest, wanting = list_roots(table, pool, watch, memory, p, roots, count, tracked)
+        call_address(manager.mark_address, (table, pool, watch, p, q, tracked, extrema, count))
+        release_given(table, watch, memory, p, extrema, count, tracked)
+    rest, lowest, wanting = list_extrema(table, pool, watch, memory, p, extrema, count, tracked)
     known.crossed = math.nan
     if wires and asks != NEVER:
         # All that is as near as this is known, and most of it is listed.
@@ -275,7 +281,7 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, workspace, roots, as
             memory,
             p,
             posed,
-            roots,
+            extrema,
             count,
             least,
             offsets,
@@ -290,7 +296,7 @@ def look_at_pair(table, pool, watch, memory, p, q, tracked, workspace, roots, as
     if wires:
         sure = max(sure, STILL * known.allowance)
     elif fertile < math.inf:
-        low = nearest_fold(roots, count, least, known.reach)
+        low = nearest_fold(extrema, count, least, known.reach)
         sure = 0.0 if low <= FLAT * lengths_at(pool, manager.lengths).first_reach else math.inf
         fertile = fertile if sure == 0.0 else min(fertile, low)
     allow_ball(memory, at, search.ball, fertile, sure)
@@ -334,15 +340,15 @@ def is_due(table, watch, memory, p, tracked, how, most):
 
 
 @kernel(inner=True, allocates=True)
-def look_at_due(table, pool, watch, memory, q, tracked, how, first, most):
+def update_due(table, pool, watch, memory, q, tracked, how, first, most):
     """Look at the pairs that are due, of which `first` is the first one."""
     state = memory_header_at(memory, 0)
     manager = manager_at(table, watch)
     stack = np.empty((STACK, 2), np.int64)
-    roots = np.empty((ROOTS, ROOT))
+    extrema = np.empty((EXTREMA, ROOT))
     pairs = np.empty((BOXES, 2), np.int64)
     boxes = np.empty((BOXES, BOX))
-    marks = (np.empty((ROOTS, MARK)), np.empty((MINIMA, 2)))
+    marks = (np.empty((EXTREMA, MARK)), np.empty((MINIMA, 2)))
     work = (np.empty((1, CONTACT_RECORD)), np.empty((1, TRACK)))
     with_patches = False
     candidates = stack
@@ -376,11 +382,11 @@ def look_at_due(table, pool, watch, memory, q, tracked, how, first, most):
             boxes=boxes,
             marks=marks,
         )
-        look_at_pair(table, pool, watch, memory, p, q, tracked, workspace, roots, asks)
+        update_pair(table, pool, watch, memory, p, q, tracked, workspace, extrema, asks)
 
 
 @kernel(signatures="(i8[::1], f8[::1], i8, f8[::1], f8[:, ::1], f8[:, ::1], i8)")
-def look(table, pool, watch, memory, q, tracked, how):
+def update(table, pool, watch, memory, q, tracked, how):
     """Look at the pairs of bodies that need it, or at all that moved, and list what is near.
 
     Returns how many events that made. `tracked` has a row for every place (`proximity/features/solid_contact.py`), at
@@ -396,6 +402,6 @@ def look(table, pool, watch, memory, q, tracked, how):
         most = used_most(table, watch, memory)
     for p in range(manager_at(table, watch).pairs):
         if is_due(table, watch, memory, p, tracked, how, most):
-            look_at_due(table, pool, watch, memory, q, tracked, how, p, most)
+            update_due(table, pool, watch, memory, q, tracked, how, p, most)
             break
     return np.int64(state.event_count - before)

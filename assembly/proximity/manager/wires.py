@@ -90,7 +90,7 @@ def turned(x):
 
 
 @kernel(inline=True)
-def spine_point(pool, o, s):
+def centerline_point(pool, o, s):
     """Point, unit tangent and curvature vector of the part at o, a length s from its middle."""
     part = centerline_part_at(pool, o)
     p, t = three_of(part.point), three_of(part.tangent)
@@ -118,27 +118,27 @@ def in_span(pool, breaks, k, x):
 
 
 @kernel(inline=True)
-def both_radii(table, pool, spines):
+def both_radii(table, pool, centerlines):
     """The radii of two wires, together."""
     return (
-        wire_at(pool, centerline_at(table, spines[0]).numbers).radius
-        + wire_at(pool, centerline_at(table, spines[1]).numbers).radius
+        wire_at(pool, centerline_at(table, centerlines[0]).numbers).radius
+        + wire_at(pool, centerline_at(table, centerlines[1]).numbers).radius
     )
 
 
 @kernel(inner=True)
-def wire_parameters(table, pool, spine, surface, part, s, way):
+def wire_parameters(table, pool, centerline, surface, part, s, way):
     """Parameters (u, v) of the wire's surface in a unit direction from a point of its spine, s from a part's middle.
 
     At a free end the direction may lead on: there is a half ball.
     """
-    line = centerline_at(table, spine)
+    line = centerline_at(table, centerline)
     o = line.part_pool + PART * part
     part_record = centerline_part_at(pool, o)
     k = np.int64(part_record.owner)
     piece = centerline_piece_at(pool, line.piece_pool + PIECE * k)
     bend, length = piece.bend, piece.length
-    _point, t, curvature = spine_point(pool, o, s)
+    _point, t, curvature = centerline_point(pool, o, s)
     n = scale(1.0 / bend, curvature) if bend > 0.0 else three_of(part_record.normal)
     turn = piece.turn
     begin = blend(math.cos(turn), n, math.sin(turn), cross(t, n))
@@ -171,9 +171,9 @@ def wire_parameters(table, pool, spine, surface, part, s, way):
 
 
 @kernel(inner=True)
-def spine_place(table, pool, spine, surface, u, v):
+def centerline_place(table, pool, centerline, surface, u, v):
     """The part of a wire's spine, and how far from its middle, where parameters of the surface are."""
-    line = centerline_at(table, spine)
+    line = centerline_at(table, centerline)
     along = line.along
     wire = surface_at(table, surface)
     breaks = wire.breaks_v if along == 1 else wire.breaks_u
@@ -200,9 +200,9 @@ def spine_place(table, pool, spine, surface, u, v):
 
 
 @kernel(signatures="(i8[::1], f8[::1], i8, i8, f8, f8[::1])")
-def point_of(table, pool, spine, part, s, out):
+def point_of(table, pool, centerline, part, s, out):
     """`spine_point` for Python: point, tangent and curvature into out (9,)."""
-    p, t, c = spine_point(pool, centerline_at(table, spine).part_pool + PART * part, s)
+    p, t, c = centerline_point(pool, centerline_at(table, centerline).part_pool + PART * part, s)
     for i in range(3):
         out[i] = p[i]
         out[3 + i] = t[i]
@@ -210,12 +210,12 @@ def point_of(table, pool, spine, part, s, out):
 
 
 @kernel(signatures="(i8[::1], f8[::1], i8, i8, i8, f8, f8, f8, f8)")
-def parameters_of(table, pool, spine, surface, part, s, x, y, z):
+def parameters_of(table, pool, centerline, surface, part, s, x, y, z):
     """`wire_parameters` for Python."""
-    return wire_parameters(table, pool, spine, surface, part, s, (x, y, z))
+    return wire_parameters(table, pool, centerline, surface, part, s, (x, y, z))
 
 
 @kernel(signatures="(i8[::1], f8[::1], i8, i8, f8, f8)")
-def place_of(table, pool, spine, surface, u, v):
+def place_of(table, pool, centerline, surface, u, v):
     """`spine_place` for Python."""
-    return spine_place(table, pool, spine, surface, u, v)
+    return centerline_place(table, pool, centerline, surface, u, v)

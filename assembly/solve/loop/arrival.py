@@ -36,20 +36,20 @@ def reach_of(table, pool, q):
 
 
 @kernel(inner=True)
-def rounding_at(table, pool, settings, here):
+def rounding_at(table, pool, settings, current):
     """The violation that is none: what is asked for, or what rounding of coordinates and of whole turns violates."""
-    reach = max(reach_of(table, pool, here.q), turned(table, pool, here.tracked))
+    reach = max(reach_of(table, pool, current.q), turned(table, pool, current.tracked))
     return max(settings_at(settings, 0).feasibility, min(ROUNDING * reach, MOST_ROUNDING))
 
 
 @kernel(inner=True)
-def is_rounding(program, here, lagrangian, n, rows, y, moved, dual):
+def is_rounding(program, current, lagrangian, n, rows, y, moved, dual):
     """Whether a step moved poses by no more than doubles tell apart, and rounding explains the slope that is left.
 
     Poses' rounding by the objective's curvature, and that of forces.
     """
     table, pool, shape = program.table, program.pool, program.structure
-    reach = max(1.0, reach_of(table, pool, here.q))
+    reach = max(1.0, reach_of(table, pool, current.q))
     most = ROUNDING * (reach * greatest_on_diagonal(lagrangian, n, shape.sparsity) + strongest(y, rows))
     return moved <= STEPS_OF_ROUNDING * ROUNDING * reach and dual <= most
 
@@ -64,7 +64,7 @@ def is_near_saddle(table, settings, results, violation, dual):
 
 
 @kernel(inner=True)
-def has_arrived(program, settings, results, here, violation, last_violation, feasible, dual):
+def has_arrived(program, settings, results, current, violation, last_violation, feasible, dual):
     """Whether rows hold and the Lagrangian is stationary, or all but so at a saddle that is to be left.
 
     Of a start that was far out rows held to its rounding. They are to hold to that of where bodies are now, unless
@@ -77,4 +77,4 @@ def has_arrived(program, settings, results, here, violation, last_violation, fea
     if not (violation <= feasible and dual <= limits.stationarity):
         return False
     gains = violation > limits.feasibility and not violation > GAIN * last_violation
-    return not gains or violation <= rounding_at(table, pool, settings, here)
+    return not gains or violation <= rounding_at(table, pool, settings, current)

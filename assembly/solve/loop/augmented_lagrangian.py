@@ -45,10 +45,10 @@ from assembly.proximity.manager.update import (
 )
 from assembly.solve.loop.arrival import GAIN, has_arrived, is_rounding, reach_of, rounding_at
 from assembly.solve.loop.begin import let_touch, overlap_allowed, read_state, rearrange, set_out
-from assembly.solve.loop.clearances import allowed_share, look_again, numbers_of, place_guards
+from assembly.solve.loop.clearances import allowed_share, numbers_of, place_clearance_rows, update_again
 from assembly.solve.loop.contacts import free_folds, is_of_surfaces
 from assembly.solve.loop.deadline import HALF, begin_tick, is_cut, is_spent, may_end, set_deadline
-from assembly.solve.loop.direction import CLOSE, aim, cut_step, leave_saddle, propose, short_share
+from assembly.solve.loop.direction import CLOSE, cut_step, find_direction, leave_saddle, propose, short_share
 from assembly.solve.loop.finish import End, finish, return_to
 from assembly.solve.loop.inertia import note_factor
 from assembly.solve.loop.line_search import SHORTEST, goal, search
@@ -86,7 +86,7 @@ from assembly.solve.loop.standstill import (
     stays_off,
 )
 from assembly.solve.loop.violation import off_rows
-from assembly.solve.loop.workspace import Program, carve_all, results_of, room_needed
+from assembly.solve.loop.workspace import Program, carve_all, results_of, workspace_needed
 
 # Every so many steps the largest violation must have halved, or the loop sees whether the rows can hold; so many times.
 PATIENCE = 25
@@ -117,7 +117,7 @@ def solve_program(table, pool, settings, state, history, tips):
 
     `tips` is None where no term of the objective is a dexterity.
     """
-    doubles, integers = room_needed(table)
+    doubles, integers = workspace_needed(table)
     return run(table, pool, settings, state, history, tips, np.empty(doubles), np.empty(integers, np.int64))
 
 
@@ -138,21 +138,21 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
     n = 6 * header.moving
     # The last pose that held is none yet.
     workspace = carve_all(table, memory, doubles, integers)
-    shape, loose, room, system = workspace.structure, workspace.lifted, workspace.tapes, workspace.system
+    shape, lifted, room, system = workspace.structure, workspace.lifted, workspace.tapes, workspace.system
     by_row, numbers, gram, way = workspace.by_row, workspace.numbers, workspace.gram, workspace.way
     progress = restoration_at(way, 0)
-    here, trial, held = workspace.here, workspace.trial, workspace.held
+    current, trial, held = workspace.here, workspace.trial, workspace.held
     y, better_y, active, forces, foreseen = by_row.y, by_row.better_y, by_row.active, by_row.forces, by_row.foreseen
     weights = (active, forces, foreseen)
-    read_state(table, pool, state, here, trial, y, better_y)
+    read_state(table, pool, state, current, trial, y, better_y)
     one_sided, order = shape.one_sided, shape.sparsity
-    free = loose.free
+    free = lifted.free
     # What stays as it is for the whole solve.
-    program = Program(table, pool, shape, loose, room)
+    program = Program(table, pool, shape, lifted, room)
     gradient, lines, lagrangian = system.gradient, system.directions, system.hessian
 
-    feasible = rounding_at(table, pool, settings, here)
-    farthest = FAR * (1.0 + reach_of(table, pool, here.q)) if limits.strays == 1.0 else math.inf
+    feasible = rounding_at(table, pool, settings, current)
+    farthest = FAR * (1.0 + reach_of(table, pool, current.q)) if limits.strays == 1.0 else math.inf
     tick = limits.tick == 1.0
     # A tick goes on with the last one, if that one's time was spent.
     begin, done, looks = begin_tick(table, settings, results, memory)
@@ -176,7 +176,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
     restorations = 0
     kicks = 0
     cuts = 0
-    room_left = math.inf
+    workspace_left = math.inf
     # How long steps may be after one that led bodies deep into each other, when that was, how long the last one was.
     leash = math.inf
     back_at = -1
@@ -192,9 +192,9 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
     settles = not tick and (watched or any_pose)
     lingers = 0
     holds = False
-    status, lost, folded = set_out(program, settings, state, here, by_row, n)
+    status, lost, folded = set_out(program, settings, state, current, by_row, n)
     if status == CONTACT_LOST:
-        value = objective(table, pool, here.q, 0, room, order, gradient, lagrangian)
+        value = objective(table, pool, current.q, 0, room, order, gradient, lagrangian)
     count = 0
     freed = 0
     below = FREE_BELOW
@@ -212,14 +212,14 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
     while True:
         may_begin = watched and not tick and holds and begun < BEGINNINGS and iteration + LEFT <= limit
         if status == STALLED and may_begin:
-            begin_again(table, pool, held, loose, here, y, better_y)
+            begin_again(table, pool, held, lifted, current, y, better_y)
             measured = False
             begun += 1
             iteration += 1
             status = ended = RUNNING
             rows = m
             mu, radius, leash, shift, last_dual = limits.penalty, limits.radius, math.inf, 0.0, math.inf
-            restoring, restorations, cuts, room_left = False, 0, 0, math.inf
+            restoring, restorations, cuts, workspace_left = False, 0, 0, math.inf
             check_at, check_violation = iteration + PATIENCE, math.inf
             lost, below, changed = np.int64(-1), FREE_BELOW, True
         if status != RUNNING:
@@ -229,28 +229,28 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         late = is_cut(table, memory)
         holds_now = False
         if watched and not changed:
-            holds_now = off_rows(table, loose, one_sided, here, tick) <= (feasible if tick else TOUCHING)
+            holds_now = off_rows(table, lifted, one_sided, current, tick) <= (feasible if tick else TOUCHING)
             late = not holds_now and may_end(table, settings, memory, clock, iteration, 1.0)
         if watched and not changed and not late:
             how = (CAREFUL if holds_now else AS_NEEDED) | (SPARING if tick else IN_TURNS | DOUBTFUL)
             how |= MEASURED if measured else AS_NEEDED
-            changed = look_again(table, pool, memory, here, how, free, loose.guess)
+            changed = update_again(table, pool, memory, current, how, free, lifted.guess)
             late = is_cut(table, memory)
         if changed:
-            place_guards(table, memory, here, y, better_y, free, False)
-        weigh_rows(rows, one_sided, here.residual, y, mu, forces, active)
+            place_clearance_rows(table, memory, current, y, better_y, free, False)
+        weigh_rows(rows, one_sided, current.residual, y, mu, forces, active)
         if folded:
             # Nothing is known of its row yet.
             active[lost] = 1.0 / mu
         if pairs > 0:
             count = free_folds(
-                table, pool, here.records, here.tracked, active, free, loose.lengths, below, lost, free_trims
+                table, pool, current.records, current.tracked, active, free, lifted.lengths, below, lost, free_trims
             )
         if m + 4 * count != rows or changed:
             changed = False
-            rows, n, system, lost = rearrange(program, count, rows, here, y, better_y, active)
+            rows, n, system, lost = rearrange(program, count, rows, current, y, better_y, active)
             if iteration == 0 and lost < 0:
-                let_touch(table, here, overlap_allowed(settings))
+                let_touch(table, current, overlap_allowed(settings))
             gradient, lines, lagrangian = system.gradient, system.directions, system.hessian
             kept = False
             # What was hard for other rows need not be for these.
@@ -268,9 +268,9 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             result.culprit = float(lost)
             status = CONTACT_LOST if folded else STALLED
         lost = np.int64(-1)
-        residual = here.residual
-        violation = off_rows(table, loose, one_sided, here, tick)
-        value = goal(table, pool, shape, rows, loose, room, tips, here, 1, gradient, lagrangian)
+        residual = current.residual
+        violation = off_rows(table, lifted, one_sided, current, tick)
+        value = goal(table, pool, shape, rows, lifted, room, tips, current, 1, gradient, lagrangian)
         # Rows of vectors depend on one another: their multipliers drift where nothing keeps them short.
         vectors = header.vector_trims == 1
         shortened = iteration > 0 and (alpha < 1.0 or vectors)
@@ -279,7 +279,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         touches = first or (watched and not tick and violation <= TOUCHING)
         good = max(0.0 if first else 0.1 * last_dual, limits.stationarity if touches else 0.0)
         dual = choose_multipliers(
-            shape, rows, here, shortened, vectors, touches, good, active, gradient, lines.descent, gram, y, better_y
+            shape, rows, current, shortened, vectors, touches, good, active, gradient, lines.descent, gram, y, better_y
         )
         log(history, iteration, (value, violation, dual, mu, shift, alpha, radius))
         asked, stops = pause(table, pool, settings, results, asked, iteration, value, violation)
@@ -303,21 +303,21 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         # What whole steps gain nothing of, several in a row, may be rounding.
         stands = alpha * cut == 1.0 and dual > max(GAIN * last_dual, limits.stationarity) and violation <= feasible
         stood = stood + 1 if stands else 0
-        rounded = stood >= STANDS and is_rounding(program, here, lagrangian, n, rows, y, longest, dual)
+        rounded = stood >= STANDS and is_rounding(program, current, lagrangian, n, rows, y, longest, dual)
         unbalanced = 0.0 if rounded else dual
-        arrived = has_arrived(program, settings, results, here, violation, last_violation, feasible, unbalanced)
+        arrived = has_arrived(program, settings, results, current, violation, last_violation, feasible, unbalanced)
         # Where every last look finds other contacts, the limit ends it.
         if arrived and not retreats and not (looks_last and iteration > limit):
             # A contact that ends right here is lost and found again, however often it is looked for.
             if looks_last and iteration != looked_at:
-                changed = look_again(table, pool, memory, here, EVERYTHING, free, loose.guess)
+                changed = update_again(table, pool, memory, current, EVERYTHING, free, lifted.guess)
                 if changed:
                     looked_at = iteration = iteration + 1
                     continue
             # Deeper than looks reach no row tells of a crossing.
             status = STALLED if looks_last and any_crossed(table, header.watch, memory) else SOLVED
             if status == SOLVED:
-                dual = least_multipliers(shape, rows, here, active, gradient, lines.descent, gram, dual, y, better_y)
+                dual = least_multipliers(shape, rows, current, active, gradient, lines.descent, gram, dual, y, better_y)
             break
         # What holds, of a tick or where nothing else is asked for; with clearances, what does not cross.
         clear = watched and not tick and not sunk and is_clear(table, residual)
@@ -325,10 +325,10 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         if clear or (violation <= feasible and (tick or lasts)):
             holds = True
             leash *= LONGER if iteration != back_at else 1.0
-            keep(here, y, rows, held)
+            keep(current, y, rows, held)
             if watched:
                 numbers_of(table, numbers)
-        if iteration == STRAYING and limits.strays == 1.0 and not reach_of(table, pool, here.q) <= farthest:
+        if iteration == STRAYING and limits.strays == 1.0 and not reach_of(table, pool, current.q) <= farthest:
             status = ITERATION_LIMIT
             break
         if iteration >= limit and (not tick or violation <= feasible or iteration >= longest_tick):
@@ -356,7 +356,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             if leash < SHORTEST:
                 status = STALLED
                 continue
-            return_to(table, pool, held, numbers, loose, rows, here, y, better_y, tick)
+            return_to(table, pool, held, numbers, lifted, rows, current, y, better_y, tick)
             measured = False
             # Rows of tangency have other pairs now.
             rows = m
@@ -365,9 +365,11 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             continue
         if ended != RUNNING or (tick and iteration >= limit):
             # Its time is over: the shortest way back onto the rows.
-            measured = step_back(program, here, trial, rows, weights, mu, violation, 0.1 * feasible, system, tick, way)
+            measured = step_back(
+                program, current, trial, rows, weights, mu, violation, 0.1 * feasible, system, tick, way
+            )
             if measured:
-                here, trial = trial, here
+                current, trial = trial, current
                 for r in range(rows):
                     better_y[r] = y[r]
             elif progress.share < LEAST_SHARE:
@@ -413,9 +415,9 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         reach = min(radius, leash)
         if restoring:
             reach = min(reach, bound_nearby(way, violation, restored))
-        shift, used, longest, turn = aim(
-            program, here, rows, y, mu, shift, min(reach, room_left), cuts, dual, violation, restoring, is_fresh,
-            weights, system,
+        shift, used, longest, turn = find_direction(
+            program, current, rows, y, mu, shift, min(reach, workspace_left), cuts, dual, violation, restoring,
+            is_fresh, weights, system,
         )  # fmt: skip
         if used < 0.0:
             status = STALLED
@@ -427,7 +429,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         cut, may_go = short_share(reach, longest, turn), True
         if watched:
             most_of_it = cut
-            cut, may_go = allowed_share(table, pool, memory, here, trial, lines.step, most_of_it)
+            cut, may_go = allowed_share(table, pool, memory, current, trial, lines.step, most_of_it)
             if tick and not may_go and asked_at != iteration:
                 # A tick looks where a step would go farther than is known to be free: at pairs that would use much.
                 if may_end(table, settings, memory, clock, iteration, HALF):
@@ -435,25 +437,25 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
                     violation = violation if iteration > 0 else math.inf
                     break
                 asked_at = iteration
-                changed = look_again(table, pool, memory, here, AS_NEEDED | MEASURED, free, loose.guess)
+                changed = update_again(table, pool, memory, current, AS_NEEDED | MEASURED, free, lifted.guess)
                 if changed or is_cut(table, memory):
                     continue
-                cut, may_go = allowed_share(table, pool, memory, here, trial, lines.step, most_of_it)
-        slope, steepest = cut_step(shape, here, rows, y, mu, cut, foreseen, lines)
+                cut, may_go = allowed_share(table, pool, memory, current, trial, lines.step, most_of_it)
+        slope, steepest = cut_step(shape, current, rows, y, mu, cut, foreseen, lines)
         if restoring:
             ends = steepest <= 1e-9 * violation or longest < 1e-12
             ends = ends or stays_off(way, feasible, steepest, violation, restored)
             slows = iteration >= check_at and violation > 0.99 * check_violation
             if (ends or slows) and watched and iteration < limit:
                 # A contact may have come to where a given one stands, of which no clearance asks anything.
-                changed = look_again(table, pool, memory, here, EVERYTHING, free, loose.guess)
+                changed = update_again(table, pool, memory, current, EVERYTHING, free, lifted.guess)
                 if changed:
                     iteration += 1
                     continue
             if ends:
-                if kicks < KICKS and leave_saddle(program, here, trial, kicks, system):
+                if kicks < KICKS and leave_saddle(program, current, trial, kicks, system):
                     kicks += 1
-                    here, trial = trial, here
+                    current, trial = trial, current
                     iteration += 1
                     continue
                 if violation > TOUCHING or watched or not any_pose or is_stuck(way):
@@ -471,11 +473,11 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         restored = violation if restoring else math.inf
         longest *= cut
         cuts = cuts + 1 if watched and cut < 0.5 and violation <= TOUCHING else 0
-        room_left = 2.0 * longest if cuts > 0 else math.inf
+        workspace_left = 2.0 * longest if cuts > 0 else math.inf
         base = 0.0 if restoring else value
         leave = (not tick, may_go)
         accepted, alpha, lost = search(
-            program, tips, here, trial, rows, y, base, value, restoring, leave, mu, slope, longest, weights, system
+            program, tips, current, trial, rows, y, base, value, restoring, leave, mu, slope, longest, weights, system
         )
         measured = accepted
         if not accepted:
@@ -485,7 +487,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
                 for k in range(pairs):
                     if (
                         free[k] < 0
-                        and abs(contact_record_at(here.records, k).fold) < below
+                        and abs(contact_record_at(current.records, k).fold) < below
                         and is_of_surfaces(table, k)
                     ):
                         lost = np.int64(k)
@@ -506,12 +508,12 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
                 continue
             status = STALLED
             continue
-        propose(shape, here, rows, y, mu, active, lines.straight, alpha, better_y)
-        here, trial = trial, here
+        propose(shape, current, rows, y, mu, active, lines.straight, alpha, better_y)
+        current, trial = trial, current
         if alpha == 1.0:
             kept = cut == 1.0 and used == shift and mu == floor and not restoring
             if cut == 1.0 and used == shift:
-                slow = mu == floor and violation_of(here.residual, one_sided, rows) > max(0.5 * violation, feasible)
+                slow = mu == floor and violation_of(current.residual, one_sided, rows) > max(0.5 * violation, feasible)
                 floor = next_floor(way, floor, slow and not tick)
                 mu = max(0.1 * mu, floor)
             radius = min(2.0 * radius, 1e6)
@@ -526,7 +528,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         result.carried = float(1 + done + iteration)
     at_end = End(status, value, violation, dual, feasible, rows, holds)
     status, value, violation, dual = finish(
-        program, settings, state, tips, here, trial, by_row, at_end, held, numbers, system, gram
+        program, settings, state, tips, current, trial, by_row, at_end, held, numbers, system, gram
     )
     result.status = float(status)
     result.count = float(min(iteration, limit) if ended != RUNNING else iteration)

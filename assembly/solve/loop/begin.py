@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
-from assembly.constraints.program.contact import is_guard
+from assembly.constraints.program.contact import is_clearance_row
 from assembly.constraints.program.evaluate import evaluate
 from assembly.constraints.program.objective_terms import recenter
 from assembly.constraints.program.records import (
@@ -17,9 +17,9 @@ from assembly.constraints.program.records import (
 from assembly.proximity.features.solid_contact import TRACK, contact_record_at, tracked_at
 from assembly.proximity.manager.state import memory_header_at
 from assembly.proximity.manager.update import AS_NEEDED, SPARING
-from assembly.solve.loop.clearances import forget_guards, look_around, place_guards
+from assembly.solve.loop.clearances import forget_clearance_rows, place_clearance_rows, update_around
 from assembly.solve.loop.contacts import free_folds, is_of_surfaces, start_contacts
-from assembly.solve.loop.initial_guess import gather, scattered
+from assembly.solve.loop.initial_guess import assemble, scattered
 from assembly.solve.loop.residuals import arrange
 from assembly.solve.loop.settings import (
     ASSEMBLES,
@@ -29,12 +29,12 @@ from assembly.solve.loop.settings import (
     results_at,
     settings_at,
 )
-from assembly.solve.loop.warm_start import recall
+from assembly.solve.loop.warm_start import warm_start
 from assembly.solve.loop.workspace import results_of, unknowns
 
 
 @kernel(inline=True)
-def read_state(table, pool, state, here, trial, y, better_y):
+def read_state(table, pool, state, current, trial, y, better_y):
     """Poses, tracked values and multipliers of a state, scaled."""
     units = pool_header_at(pool, 0)
     header = header_at(table, 0)
@@ -47,32 +47,32 @@ def read_state(table, pool, state, here, trial, y, better_y):
             value = state[7 * b + k]
             if k < 3:
                 value = (value - units.reference[k]) / size
-            here.q[b, k] = value
+            current.q[b, k] = value
             trial.q[b, k] = value
-    recenter(table, pool, here.q)
+    recenter(table, pool, current.q)
     for k in range(tracks):
         for i in range(TRACK):
-            here.tracked[k, i] = state[o_tracked + TRACK * k + i]
+            current.tracked[k, i] = state[o_tracked + TRACK * k + i]
     for k in range(header.contacts):
         # Before anything is evaluated no pair is near a fold.
-        contact_record_at(here.records, k).fold = 1.0
+        contact_record_at(current.records, k).fold = 1.0
     for r in range(header.rows):
-        here.residual[r] = math.inf
+        current.residual[r] = math.inf
         y[r] = state[o_y + r]
         better_y[r] = y[r]
 
 
 @kernel(inner=True)
-def let_touch(table, here, touching):
+def let_touch(table, current, touching):
     """Let contacts of bodies that are in each other by no more than `touching` stay so: their rows hold."""
     for k in range(header_at(table, 0).contacts):
-        pair = tracked_at(here.tracked, k)
-        if is_guard(table, k) or not here.residual[k] < 0.0:
+        pair = tracked_at(current.tracked, k)
+        if is_clearance_row(table, k) or not current.residual[k] < 0.0:
             continue
-        allowed = pair.allowed - here.residual[k]
+        allowed = pair.allowed - current.residual[k]
         if allowed <= touching:
             pair.allowed = allowed
-            here.residual[k] = 0.0
+            current.residual[k] = 0.0
 
 
 @kernel(inline=True)
@@ -87,7 +87,7 @@ def overlap_allowed(settings):
 
 
 @kernel(inline=True)
-def find_contacts(program, settings, state, here, by_row, n):
+def find_contacts(program, settings, state, current, by_row, n):
     """Find the contacts of the start and evaluate its rows, unless the last tick left them in its state.
 
     Bodies of a contact or a clearance that are in each other by no more than touching there may stay so.
@@ -95,64 +95,76 @@ def find_contacts(program, settings, state, here, by_row, n):
     evaluated yet where a contact has no pair to begin with, or is at a fold.
     """
     limits = settings_at(settings, 0)
-    table, pool, shape, loose, room = program.table, program.pool, program.structure, program.lifted, program.tapes
+    table, pool, shape, lifted, workspace = (
+        program.table,
+        program.pool,
+        program.structure,
+        program.lifted,
+        program.tapes,
+    )
     header = header_at(table, 0)
-    free, lengths, memory = loose.free, loose.lengths, loose.memory
+    free, lengths, memory = lifted.free, lifted.lengths, lifted.memory
     memory_header = memory_header_at(memory, 0)
     y, better_y, active = by_row.y, by_row.better_y, by_row.active
     recalled, tick = int(limits.recall), limits.tick == 1.0
     watched = header.watch >= 0
     came = False
     if watched:
-        place_guards(table, memory, here, y, better_y, free, True)
-    lost = start_contacts(table, pool, here.q, here.tracked, free, lengths)
+        place_clearance_rows(table, memory, current, y, better_y, free, True)
+    lost = start_contacts(table, pool, current.q, current.tracked, free, lengths)
     if watched and lost < 0:
         memory_header.overlap = limits.touching
-        came = look_around(table, pool, memory, here, SPARING if tick else AS_NEEDED)
+        came = update_around(table, pool, memory, current, SPARING if tick else AS_NEEDED)
         memory_header.overlap = 0.0
-        place_guards(table, memory, here, y, better_y, free, False)
+        place_clearance_rows(table, memory, current, y, better_y, free, False)
     count = free_folds(
-        table, pool, here.records, here.tracked, active, free, lengths, -1.0, -1, limits.free_trims == 1.0
+        table, pool, current.records, current.tracked, active, free, lengths, -1.0, -1, limits.free_trims == 1.0
     )
     if lost >= 0 or count > 0:
         return lost, False
     if watched:
         arrange(table, free, shape, header.rows, n)
-    if recalled == 0 or came or not recall(table, state, recalled, here):
-        lost = evaluate(table, pool, here.tracked, math.inf, loose, room, here)
+    if recalled == 0 or came or not warm_start(table, state, recalled, current):
+        lost = evaluate(table, pool, current.tracked, math.inf, lifted, workspace, current)
         if lost < 0:
-            let_touch(table, here, overlap_allowed(settings))
+            let_touch(table, current, overlap_allowed(settings))
     return lost, True
 
 
 @kernel(inner=True)
-def put_together(program, here, by_row):
+def put_together(program, current, by_row):
     """Gather scattered bodies, and begin again from there; returns the contact that has no pair, or -1."""
-    table, pool, shape, loose, room = program.table, program.pool, program.structure, program.lifted, program.tapes
+    table, pool, shape, lifted, workspace = (
+        program.table,
+        program.pool,
+        program.structure,
+        program.lifted,
+        program.tapes,
+    )
     header = header_at(table, 0)
-    free, lengths, memory = loose.free, loose.lengths, loose.memory
+    free, lengths, memory = lifted.free, lifted.lengths, lifted.memory
     y, better_y = by_row.y, by_row.better_y
     watched = header.watch >= 0
-    gather(table, pool, shape.bases, header.slots, here)
+    assemble(table, pool, shape.bases, header.slots, current)
     for k in range(header.contacts):
-        here.tracked[k, 0] = math.nan
+        current.tracked[k, 0] = math.nan
     if watched:
-        forget_guards(table, memory)
-        place_guards(table, memory, here, y, better_y, free, False)
-    start_contacts(table, pool, here.q, here.tracked, free, lengths)
+        forget_clearance_rows(table, memory)
+        place_clearance_rows(table, memory, current, y, better_y, free, False)
+    start_contacts(table, pool, current.q, current.tracked, free, lengths)
     if watched:
-        look_around(table, pool, memory, here, AS_NEEDED)
-        place_guards(table, memory, here, y, better_y, free, False)
+        update_around(table, pool, memory, current, AS_NEEDED)
+        place_clearance_rows(table, memory, current, y, better_y, free, False)
     if header.implicit == 1:
-        recenter(table, pool, here.q)
+        recenter(table, pool, current.q)
     for r in range(header.rows):
         y[r] = 0.0
         better_y[r] = 0.0
-    return evaluate(table, pool, here.tracked, math.inf, loose, room, here)
+    return evaluate(table, pool, current.tracked, math.inf, lifted, workspace, current)
 
 
 @kernel(inline=True, allocates=True)
-def set_out(program, settings, state, here, by_row, n):
+def set_out(program, settings, state, current, by_row, n):
     """Find contacts, evaluate rows, gather what is scattered where the settings ask for it.
 
     Returns CONTACT_LOST, GATHERED or RUNNING, the contact that is lost or -1, and whether that one is at a fold, to be
@@ -166,13 +178,13 @@ def set_out(program, settings, state, here, by_row, n):
     result.held = 0.0
     result.curved = 0.0
     tick = limits.tick == 1.0
-    lost, evaluated = find_contacts(program, settings, state, here, by_row, n)
+    lost, evaluated = find_contacts(program, settings, state, current, by_row, n)
     # A tick begins where the last one ended: there a pair that Newton's method loses is at a fold.
     folded = lost >= 0 and evaluated and tick and is_of_surfaces(table, lost)
     status = CONTACT_LOST if lost >= 0 and not folded else RUNNING
-    result.scatter = 1.0 if status == RUNNING and scattered(table, here.residual, shape.one_sided) else 0.0
+    result.scatter = 1.0 if status == RUNNING and scattered(table, current.residual, shape.one_sided) else 0.0
     if limits.gather > 0.0 and result.scatter == 1.0:
-        lost = put_together(program, here, by_row)
+        lost = put_together(program, current, by_row)
         folded = False
         status = GATHERED if limits.gather == ASSEMBLES else RUNNING
         status = CONTACT_LOST if lost >= 0 else status
@@ -182,12 +194,18 @@ def set_out(program, settings, state, here, by_row, n):
 
 
 @kernel(inner=True, allocates=True)
-def rearrange(program, count, before, here, y, better_y, active):
+def rearrange(program, count, before, current, y, better_y, active):
     """Rows and unknowns for other contacts or `count` free pairs, where there were `before` rows.
 
     Returns how many rows and unknowns there are, room for these, and which contact is lost at this point, or -1.
     """
-    table, pool, shape, loose, room = program.table, program.pool, program.structure, program.lifted, program.tapes
+    table, pool, shape, lifted, workspace = (
+        program.table,
+        program.pool,
+        program.structure,
+        program.lifted,
+        program.tapes,
+    )
     header = header_at(table, 0)
     for r in range(before, y.size):
         # New rows of tangency say nothing yet: least squares leave them out.
@@ -196,6 +214,6 @@ def rearrange(program, count, before, here, y, better_y, active):
         active[r] = 0.0
     rows = header.rows + 4 * count
     n = 6 * header.moving + 4 * count
-    arrange(table, loose.free, shape, rows, n)
+    arrange(table, lifted.free, shape, rows, n)
     system = unknowns(n, shape.sparsity)
-    return rows, n, system, evaluate(table, pool, here.tracked, math.inf, loose, room, here)
+    return rows, n, system, evaluate(table, pool, current.tracked, math.inf, lifted, workspace, current)

@@ -39,7 +39,7 @@ SLIGHTLY = 1e-5
 
 
 @kernel(inner=True)
-def clear_guards(table):
+def clear_clearance_rows(table):
     """No row has a contact: so a packed scene is left, whose solutions have contacts of their own."""
     header = header_at(table, 0)
     for k in range(header.first_guard, header.first_guard + header.guards):
@@ -51,7 +51,7 @@ def clear_guards(table):
 
 
 @kernel(inner=True)
-def forget_guards(table, memory):
+def forget_clearance_rows(table, memory):
     """Begin again: nothing has been looked at, and no contact has a place."""
     header = header_at(table, 0)
     watch = header.watch
@@ -63,7 +63,7 @@ def forget_guards(table, memory):
 
 
 @kernel(inner=True)
-def place_guards(table, memory, here, y, better_y, free, begins):
+def place_clearance_rows(table, memory, current, y, better_y, free, begins):
     """Make every row the contact that its place has; multipliers of one that is new are zero.
 
     Where a solve begins, rows know no contacts yet, and multipliers are those of the places.
@@ -74,7 +74,7 @@ def place_guards(table, memory, here, y, better_y, free, begins):
     for k in range(header.guards):
         slot = place_at(memory, places + PLACE_MEMORY * k)
         r = header.first_guard + k
-        contact_record = contact_record_at(here.records, r)
+        contact_record = contact_record_at(current.records, r)
         row = header.row_table + ROW * r
         contact = contact_row_at(table, row)
         fields = row_at(table, row)
@@ -90,7 +90,7 @@ def place_guards(table, memory, here, y, better_y, free, begins):
         # Nothing is known of it yet.
         contact_record.fold = 1.0
         contact_record.slack = 0.0
-        here.residual[r] = 1.0
+        current.residual[r] = 1.0
         if p < 0:
             fields.body_f = -1
             fields.body_g = -1
@@ -107,7 +107,7 @@ def place_guards(table, memory, here, y, better_y, free, begins):
 
 
 @kernel(inner=True)
-def look_around(table, pool, memory, point, how):
+def update_around(table, pool, memory, point, how):
     """The watch's look at a point; whether rows changed.
 
     A long one asks between two slices whether it is to go on. Where what it is for is thrown away, it ends as one that
@@ -131,7 +131,7 @@ def look_around(table, pool, memory, point, how):
 
 
 @kernel(inner=True)
-def look_again(table, pool, memory, point, how, free, scratch):
+def update_again(table, pool, memory, point, how, free, scratch):
     """The watch's look at a point that is evaluated; whether rows changed.
 
     A look puts contacts on their extrema. Those whose coordinates are unknowns are on their way there: their rows have
@@ -145,16 +145,16 @@ def look_again(table, pool, memory, point, how, free, scratch):
         if free[r] >= 0:
             for i in range(TRACK):
                 scratch[r, i] = tracked[r, i]
-    changed = look_around(table, pool, memory, point, how)
+    changed = update_around(table, pool, memory, point, how)
     places = memory_places(table, header.watch)[1]
-    neglect = lengths_at(pool, manager_at(table, header.watch).lengths).neglect
+    merge_radius = lengths_at(pool, manager_at(table, header.watch).lengths).neglect
     for r in range(first, first + header.guards):
         place = places + PLACE_MEMORY * (r - first)
         number = np.int64(place_at(memory, place).number) if place_at(memory, place).pair >= 0.0 else 0
         if free[r] >= 0 and number == contact_row_at(table, header.row_table + ROW * r).guard_number:
             row = contact_row_at(table, header.row_table + ROW * r)
             f, g = row.surface_f, row.surface_g
-            if call_address(header.stayed_address, (table, pool, f, g, tracked, scratch, r, neglect)) == 1:
+            if call_address(header.stayed_address, (table, pool, f, g, tracked, scratch, r, merge_radius)) == 1:
                 for i in range(TRACK):
                     tracked[r, i] = scratch[r, i]
             else:
@@ -197,13 +197,13 @@ def measure(table, pool, memory, first, end, q):
 
 
 @kernel(inner=True)
-def allowed_share(table, pool, memory, here, trial, step, share):
+def allowed_share(table, pool, memory, current, trial, step, share):
     """How much of a step the watch allows, at most `share`, and whether it is all of that.
 
     The poses at the end of the share go into the trial point. Of what it would use of allowances there it is then known
     of which pairs more is known by another look.
     """
-    move(table, here.q, step, share, trial.q)
+    move(table, current.q, step, share, trial.q)
     watch = header_at(table, 0).watch
     manager = manager_at(table, watch)
     if measure(table, pool, memory, 0, manager.pairs, trial.q) <= 1.0:
@@ -217,7 +217,7 @@ def allowed_share(table, pool, memory, here, trial, step, share):
         o.cut_short = end * o.allowance
         begin = end
         if end > USED:
-            measure(table, pool, memory, p, p + 1, here.q)
+            measure(table, pool, memory, p, p + 1, current.q)
             begin = o.part
             o.part = end
         if end > max(begin, 1.0):

@@ -6,7 +6,7 @@ import math
 
 from assembly._address import call_address
 from assembly._kernel import kernel
-from assembly.constraints.program.contact import is_guard, search_row, start_row, surface_of
+from assembly.constraints.program.contact import is_clearance_row, search_row, start_row, surface_of
 from assembly.constraints.program.records import (
     ROW,
     SIGNED,
@@ -67,7 +67,7 @@ def start_contacts(table, pool, q, contacts, free, lengths):
         pair = tracked_at(contacts, k)
         row = header.row_table + ROW * k
         # What a clearance has lost its watch looks for.
-        if not math.isnan(contacts[k, 0]) or row_at(table, row).body_f < 0 or is_guard(table, k):
+        if not math.isnan(contacts[k, 0]) or row_at(table, row).body_f < 0 or is_clearance_row(table, k):
             continue
         if contact_row_at(table, row).shell_f >= 0:
             pair.idle = 0.0

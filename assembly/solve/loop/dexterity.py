@@ -44,7 +44,7 @@ from assembly.constraints.program.row_terms import add_row_terms
 from assembly.geometry.vec import add, cross, matvec, scale
 from assembly.kinematics.motion import rotation
 from assembly.solve.linear_algebra.singular_values import measure_jacobian
-from assembly.solve.loop.predict import carry
+from assembly.solve.loop.predict import predict_pairs
 from assembly.solve.loop.rates import rate_system, settle
 from assembly.solve.loop.residuals import move, slot, times
 
@@ -261,7 +261,7 @@ def tip_map(table, pool, term, bases, rows, n, point, order):
 
 
 @kernel(inner=True)
-def bend(table, pool, record, shape, loose, room, point, forces, weights, inputs, rates, hessian, gradient):
+def bend(table, pool, record, shape, lifted, workspace, point, forces, weights, inputs, rates, hessian, gradient):
     """gradient -= H v, H the second derivative of forces . rows + inputs . (values of the inputs).
 
     `weights` are no weights of rows: zeros.
@@ -270,7 +270,7 @@ def bend(table, pool, record, shape, loose, room, point, forces, weights, inputs
     for r in range(n):
         for c in range(r, n):
             hessian[r, c] = 0.0
-    add_row_terms(table, pool, loose, room, shape, point, forces, weights, hessian)
+    add_row_terms(table, pool, lifted, workspace, shape, point, forces, weights, hessian)
     for j in range(inputs.size):
         asked = body_coordinate_at(table, record + INPUT_LIST + INPUT * j)
         add_coordinate_hessian(
@@ -291,7 +291,7 @@ def bend(table, pool, record, shape, loose, room, point, forces, weights, inputs
 
 
 @kernel(inner=True, allocates=True)
-def dexterity(table, pool, term, shape, rows, loose, room, point, order, gradient):
+def dexterity(table, pool, term, shape, rows, lifted, workspace, point, order, gradient):
     """Value of the term at a point whose rows are evaluated; from order 1 on its gradient is added."""
     term_record = term_at(table, term)
     bases = shape.bases
@@ -340,18 +340,18 @@ def dexterity(table, pool, term, shape, rows, loose, room, point, order, gradien
                 turn[j] += w * y[r, j]
             for l in range(used.size):
                 forces[used[l]] += w * loads[r, l]
-        bend(table, pool, record, shape, loose, room, point, forces, none, turn, v[i], hessian, gradient)
+        bend(table, pool, record, shape, lifted, workspace, point, forces, none, turn, v[i], hessian, gradient)
         if largest(changes[i]) > KEPT:
             for l in range(used.size):
                 forces[used[l]] = changes[i, l]
-            bend(table, pool, record, shape, loose, room, point, forces, none, z[i], pull, hessian, gradient)
+            bend(table, pool, record, shape, lifted, workspace, point, forces, none, z[i], pull, hessian, gradient)
         if s >= 0:
             add_tip_bend(pool, o, task, arm, slopes, i, v[i], s, gradient)
     return weight * value
 
 
 @kernel(inner=True, allocates=True)
-def add_dexterities(table, pool, shape, rows, loose, room, here, order, gradient, hessian):
+def add_dexterities(table, pool, shape, rows, lifted, workspace, current, order, gradient, hessian):
     """Values of all terms of this kind; from order 1 on gradients, and Hessians by differences of these."""
     header = header_at(table, 0)
     value = 0.0
@@ -361,17 +361,17 @@ def add_dexterities(table, pool, shape, rows, loose, room, here, order, gradient
         if term_at(table, term).kind != DEXTERITY:
             continue
         slope = np.zeros(n)
-        value += dexterity(table, pool, term, shape, rows, loose, room, here, order, slope)
+        value += dexterity(table, pool, term, shape, rows, lifted, workspace, current, order, slope)
         if order == 0 or not math.isfinite(value):
             continue
         for i in range(n):
             gradient[i] += slope[i]
         beside = Iterate(
-            here.q.copy(),
-            here.tracked.copy(),
-            np.empty(here.records.shape),
-            np.empty(here.residual.size),
-            np.empty(here.jacobian.shape),
+            current.q.copy(),
+            current.tracked.copy(),
+            np.empty(current.records.shape),
+            np.empty(current.residual.size),
+            np.empty(current.jacobian.shape),
         )
         step = np.zeros(n)
         other = np.empty(n)
@@ -379,12 +379,12 @@ def add_dexterities(table, pool, shape, rows, loose, room, here, order, gradient
             for i in range(n):
                 other[i] = 0.0
             step[j] = STEP
-            move(table, here.q, step, 1.0, beside.q)
-            carry(table, pool, shape.bases, loose, here, beside, step, 1.0)
+            move(table, current.q, step, 1.0, beside.q)
+            predict_pairs(table, pool, shape.bases, lifted, current, beside, step, 1.0)
             step[j] = 0.0
-            if evaluate(table, pool, loose.guess, math.inf, loose, room, beside) >= 0:
+            if evaluate(table, pool, lifted.guess, math.inf, lifted, workspace, beside) >= 0:
                 continue
-            if math.isfinite(dexterity(table, pool, term, shape, rows, loose, room, beside, 1, other)):
+            if math.isfinite(dexterity(table, pool, term, shape, rows, lifted, workspace, beside, 1, other)):
                 for i in range(n):
                     bend = 0.5 * (other[i] - slope[i]) / STEP
                     hessian[min(i, j), max(i, j)] += 2.0 * bend if i == j else bend

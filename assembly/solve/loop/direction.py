@@ -10,8 +10,8 @@ from assembly.constraints.program.records import header_at
 from assembly.constraints.program.row_terms import add_row_terms
 from assembly.solve.linear_algebra.factorize import factorize_shifted
 from assembly.solve.loop.line_search import damped_step
-from assembly.solve.loop.multipliers import curve_rows, foresee, leave_out, weigh_rows
-from assembly.solve.loop.predict import carry
+from assembly.solve.loop.multipliers import curve_rows, leave_out, predict_active_set, weigh_rows
+from assembly.solve.loop.predict import predict_pairs
 from assembly.solve.loop.residuals import add_transposed, move, times
 
 # The least shift of the Hessian; of violations alone, so much of the largest one, down to rounding. That is where rows
@@ -30,21 +30,29 @@ SADDLE, KICK = 1e-5, 1e-3
 
 
 @kernel(inline=True)
-def aim(program, here, rows, y, mu, shift, radius, cuts, dual, violation, restoring, is_fresh, weights, system):
+def find_direction(
+    program, current, rows, y, mu, shift, radius, cuts, dual, violation, restoring, is_fresh, weights, system
+):
     """The step of the augmented Lagrangian at a point, into the system's lines; by the last factor unless `is_fresh`.
 
     `weights` gets which rows count, what they push with, and which do because the step would break them. Returns the
     shift of the matrix and that of the factor the step is by, negative where there is none; the step's largest
     component and turn.
     """
-    table, pool, shape, loose, room = program.table, program.pool, program.structure, program.lifted, program.tapes
+    table, pool, shape, lifted, workspace = (
+        program.table,
+        program.pool,
+        program.structure,
+        program.lifted,
+        program.tapes,
+    )
     header = header_at(table, 0)
     active, forces, foreseen = weights
     gradient, lines, lagrangian, matrix = system.gradient, system.directions, system.hessian, system.factor
     bases, one_sided, order = shape.bases, shape.one_sided, shape.sparsity
     descent, step, straight = lines.descent, lines.step, lines.straight
     n = descent.size
-    residual, jacobian = here.residual, here.jacobian
+    residual, jacobian = current.residual, current.jacobian
     weigh_rows(rows, one_sided, residual, y, mu, forces, active)
     for i in range(n):
         descent[i] = -gradient[i]
@@ -53,7 +61,7 @@ def aim(program, here, rows, y, mu, shift, radius, cuts, dual, violation, restor
         foreseen[r] = 0.0
     if is_fresh:
         curve_rows(rows, residual, y, active, restoring, forces)
-        add_row_terms(table, pool, loose, room, shape, here, forces, active, lagrangian)
+        add_row_terms(table, pool, lifted, workspace, shape, current, forces, active, lagrangian)
         # What the inertia needs falls with the distance to the solution. Where rows alone count and depend on each
         # other there, the squares of their slopes do, too; contacts of a clearance come and go instead.
         least, off = LEAST_SHIFT, dual
@@ -69,7 +77,7 @@ def aim(program, here, rows, y, mu, shift, radius, cuts, dual, violation, restor
     for attempt in range(FORESEEN + 1):
         if used < 0.0 or restoring:
             break
-        changed = foresee(
+        changed = predict_active_set(
             table, shape, rows, residual, jacobian, y, mu, step, is_fresh, active, foreseen, descent, lagrangian
         )
         if changed == 0:
@@ -79,7 +87,7 @@ def aim(program, here, rows, y, mu, shift, radius, cuts, dual, violation, restor
         if not is_fresh:
             is_fresh = True
             curve_rows(rows, residual, y, active, restoring, forces)
-            add_row_terms(table, pool, loose, room, shape, here, forces, active, lagrangian)
+            add_row_terms(table, pool, lifted, workspace, shape, current, forces, active, lagrangian)
         shift = factorize_shifted(lagrangian, n, order, max(shift, LEAST_SHIFT), matrix)
         used = shift
         if shift >= 0.0:
@@ -97,7 +105,7 @@ def short_share(radius, longest, turn):
 
 
 @kernel(inline=True)
-def cut_step(shape, here, rows, y, mu, cut, foreseen, lines):
+def cut_step(shape, current, rows, y, mu, cut, foreseen, lines):
     """Shorten the step to a share. Returns the merit's slope along it, and the largest component of the descent."""
     descent, step, straight = lines.descent, lines.step, lines.straight
     slope = 0.0
@@ -110,35 +118,41 @@ def cut_step(shape, here, rows, y, mu, cut, foreseen, lines):
     for r in range(rows):
         if foreseen[r] == 1.0:
             # What the row adds to the descent is not in the merit before it binds.
-            slope -= (y[r] + here.residual[r] / mu) * times(shape.bases, here.jacobian, r, step)
+            slope -= (y[r] + current.residual[r] / mu) * times(shape.bases, current.jacobian, r, step)
     return slope, steepest
 
 
 @kernel(inline=True)
-def propose(shape, here, rows, y, mu, active, straight, alpha, better_y):
+def propose(shape, current, rows, y, mu, active, straight, alpha, better_y):
     """The multipliers of first order after a share alpha of the straight step."""
     bases, one_sided = shape.bases, shape.one_sided
     for r in range(rows):
         better_y[r] = 0.0
         if active[r] > 0.0:
-            better_y[r] = y[r] + alpha * (times(bases, here.jacobian, r, straight) + here.residual[r]) / mu
+            better_y[r] = y[r] + alpha * (times(bases, current.jacobian, r, straight) + current.residual[r]) / mu
             if one_sided[r] == 1:
                 better_y[r] = min(better_y[r], 0.0)
 
 
 @kernel(inner=True)
-def leave_saddle(program, here, trial, number, system):
+def leave_saddle(program, current, trial, number, system):
     """A small move off a saddle of the violations, into the trial point; whether it is one.
 
     Of axes that are parallel and are to stand at right angles, say. `number` is how many moves there have been.
     """
-    table, pool, shape, loose, room = program.table, program.pool, program.structure, program.lifted, program.tapes
+    table, pool, shape, lifted, workspace = (
+        program.table,
+        program.pool,
+        program.structure,
+        program.lifted,
+        program.tapes,
+    )
     step, lagrangian, matrix = system.directions.step, system.hessian, system.factor
     n = step.size
     if not factorize_shifted(lagrangian, n, shape.sparsity, LEAST_SHIFT, matrix) > SADDLE:
         return False
     for i in range(n):
         step[i] = KICK * math.sin(number + 1 + i) if i < 6 * header_at(table, 0).moving else 0.0
-    move(table, here.q, step, 1.0, trial.q)
-    carry(table, pool, shape.bases, loose, here, trial, step, 1.0)
-    return evaluate(table, pool, loose.guess, math.inf, loose, room, trial) < 0
+    move(table, current.q, step, 1.0, trial.q)
+    predict_pairs(table, pool, shape.bases, lifted, current, trial, step, 1.0)
+    return evaluate(table, pool, lifted.guess, math.inf, lifted, workspace, trial) < 0

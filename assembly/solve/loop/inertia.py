@@ -74,19 +74,25 @@ def told_convex(results, rows, one_sided, residual, y, scratch):
 
 
 @kernel(inner=True)
-def is_convex(program, tips, here, rows, y, active, system, mu, shift):
+def is_convex(program, tips, current, rows, y, active, system, mu, shift):
     """Whether the matrix of the rows that push, shifted by so much, has a factor at this point."""
-    table, pool, shape, loose, room = program.table, program.pool, program.structure, program.lifted, program.tapes
+    table, pool, shape, lifted, workspace = (
+        program.table,
+        program.pool,
+        program.structure,
+        program.lifted,
+        program.tapes,
+    )
     gradient, lagrangian, matrix = system.gradient, system.hessian, system.factor
-    goal(table, pool, shape, rows, loose, room, tips, here, 1, gradient, lagrangian)
+    goal(table, pool, shape, rows, lifted, workspace, tips, current, 1, gradient, lagrangian)
     for r in range(rows):
         active[r] = 0.0 if shape.one_sided[r] == 1 and y[r] >= -IDLE else 1.0 / mu
-    add_row_terms(table, pool, loose, room, shape, here, y, active, lagrangian)
+    add_row_terms(table, pool, lifted, workspace, shape, current, y, active, lagrangian)
     return factorize_shifted(lagrangian, gradient.size, shape.sparsity, shift, matrix) == shift
 
 
 @kernel(inline=True)
-def test_end(program, settings, results, status, tips, here, rows, y, active, forces, system):
+def test_end(program, settings, results, status, tips, current, rows, y, active, forces, system):
     """The status of a solve that is SOLVED: UNSURE where no factorization tells that no curvature is negative.
 
     Of a tick that is asked for it the result says whether its end is a minimum. A first solve that ends where it began
@@ -102,9 +108,9 @@ def test_end(program, settings, results, status, tips, here, rows, y, active, fo
     if not tick:
         if result.curved == DOWNWARD or (result.curved == 0.0 and limits.penalty > mu):
             return UNSURE
-        if told_convex(results, rows, shape.one_sided, here.residual, y, forces):
+        if told_convex(results, rows, shape.one_sided, current.residual, y, forces):
             return status
     shift = 0.0 if tick else LEAST_SHIFT
-    convex = is_convex(program, tips, here, rows, y, active, system, mu, shift)
+    convex = is_convex(program, tips, current, rows, y, active, system, mu, shift)
     result.curved = 1.0 if convex else -1.0
     return status if tick or convex else UNSURE

@@ -129,10 +129,10 @@ def is_half_around(table, residual, first, count):
 
 
 @kernel(inner=True)
-def normal_equations(table, bases, first, count, joint, s, point, room):
+def normal_equations(table, bases, first, count, joint, s, point, workspace):
     """J^T J and J^T c of rows that do not hold, in the twist that stands at s."""
     residual, jacobian = point.residual, point.jacobian
-    matrix, row, slope = room.matrix, room.row, room.slope
+    matrix, row, slope = workspace.matrix, workspace.row, workspace.slope
     for i in range(6):
         slope[i] = 0.0
         for j in range(i, 6):
@@ -150,19 +150,25 @@ def normal_equations(table, bases, first, count, joint, s, point, room):
 
 
 @kernel(inner=True)
-def fit_body(table, pool, bases, body, first, count, joint, s, point, room):
+def fit_body(table, pool, bases, body, first, count, joint, s, point, workspace):
     """Move a body until rows listed in the table, of a joint or of all (-1), are as small as they get.
 
     Returns half the sum of squares of those that do not hold.
     """
     q = point.q
-    matrix, damped, last, slope, step = room.matrix, room.damped, room.last, room.slope, room.step
+    matrix, damped, last, slope, step = (
+        workspace.matrix,
+        workspace.damped,
+        workspace.last,
+        workspace.slope,
+        workspace.step,
+    )
     damping = DAMPING
     cost = body_rows(table, pool, first, count, joint, point)
     for _step in range(STEPS):
         if cost <= ENOUGH or damping > STUCK:
             break
-        normal_equations(table, bases, first, count, joint, s, point, room)
+        normal_equations(table, bases, first, count, joint, s, point, workspace)
         before = pose_of(q, body)
         while damping <= STUCK:
             for i in range(6):
@@ -199,11 +205,11 @@ def put_pose(q, body, pose):
 
 
 @kernel(inner=True, allocates=True)
-def gather(table, pool, bases, slots, point):
+def assemble(table, pool, bases, slots, point):
     """Move the bodies of the point one by one."""
     header = header_at(table, 0)
     q, tracked, residual = point.q, point.tracked, point.residual
-    room = FitRoom(np.empty((6, 6)), np.empty((6, 6)), np.full(6, 5), np.empty(6), np.empty(6), np.empty(6))
+    workspace = FitRoom(np.empty((6, 6)), np.empty((6, 6)), np.full(6, 5), np.empty(6), np.empty(6), np.empty(6))
     o = header.gather_table + 1
     for _entry in range(table[header.gather_table]):
         body = table[o]
@@ -212,7 +218,7 @@ def gather(table, pool, bases, slots, point):
         o = first + count
         s = 6 * table[slots + body]
         start = pose_of(q, body)
-        cost = fit_body(table, pool, bases, body, first, count, -1, s, point, room)
+        cost = fit_body(table, pool, bases, body, first, count, -1, s, point, workspace)
         if cost <= ENOUGH or not is_half_around(table, residual, first, count):
             continue
         best = pose_of(q, body)
@@ -226,9 +232,9 @@ def gather(table, pool, bases, slots, point):
             tried = joint
             put_pose(q, body, start)
             follow_drives(table, pool, first, count, tracked)
-            fit_body(table, pool, bases, body, first, count, joint, s, point, room)
+            fit_body(table, pool, bases, body, first, count, joint, s, point, workspace)
             follow_drives(table, pool, first, count, tracked)
-            there = fit_body(table, pool, bases, body, first, count, -1, s, point, room)
+            there = fit_body(table, pool, bases, body, first, count, -1, s, point, workspace)
             if there < LOWER * cost:
                 cost = there
                 best = pose_of(q, body)

@@ -7,7 +7,7 @@ shortened.
 from __future__ import annotations
 
 from assembly._kernel import kernel
-from assembly.constraints.program.contact import MAY_GO, hold_all, is_guard, may_go
+from assembly.constraints.program.contact import MAY_GO, hold_all, is_clearance_row, may_go
 from assembly.constraints.program.evaluate import evaluate
 from assembly.constraints.program.objective_terms import objective
 from assembly.constraints.program.records import header_at
@@ -16,7 +16,7 @@ from assembly.proximity.features.solid_contact import tracked_at
 from assembly.solve.linear_algebra.factorize import factorize_shifted, forward_step, solve_step
 from assembly.solve.loop.clearances import ends_unseen, is_too_far
 from assembly.solve.loop.dexterity import add_dexterities
-from assembly.solve.loop.predict import carry
+from assembly.solve.loop.predict import predict_pairs
 from assembly.solve.loop.residuals import add_transposed, merit, move
 
 # A step shorter than this decides nothing.
@@ -65,19 +65,19 @@ def damped_step(table, lagrangian, n, order, shift, radius, damps, matrix, desce
 
 
 @kernel(inner=True)
-def goal(table, pool, shape, rows, loose, room, tips, point, order, gradient, hessian):
+def goal(table, pool, shape, rows, lifted, workspace, tips, point, order, gradient, hessian):
     """The objective at a point whose rows are evaluated; from order 1 on its gradient and the Hessian's upper half.
 
     `tips` is None where no term is a dexterity: then what these need is not even compiled.
     """
-    value = objective(table, pool, point.q, order, room, shape.sparsity, gradient, hessian)
+    value = objective(table, pool, point.q, order, workspace, shape.sparsity, gradient, hessian)
     if tips is not None:
-        value += add_dexterities(table, pool, shape, rows, loose, room, point, order, gradient, hessian)
+        value += add_dexterities(table, pool, shape, rows, lifted, workspace, point, order, gradient, hessian)
     return value
 
 
 @kernel(inline=True)
-def search(program, tips, here, trial, rows, y, base, value, restoring, leave, mu, slope, longest, weights, system):
+def search(program, tips, current, trial, rows, y, base, value, restoring, leave, mu, slope, longest, weights, system):
     """Try alpha times the step, alpha from 1 down, until the augmented Lagrangian falls enough.
 
     The trial point is left in `trial`. Returns whether one was accepted, alpha, and the contact lost by the last trial
@@ -85,7 +85,13 @@ def search(program, tips, here, trial, rows, y, base, value, restoring, leave, m
     says whether a contact that ends where solids are in each other may be given up, and whether bodies may go all the
     way for certain.
     """
-    table, pool, shape, loose, room = program.table, program.pool, program.structure, program.lifted, program.tapes
+    table, pool, shape, lifted, workspace = (
+        program.table,
+        program.pool,
+        program.structure,
+        program.lifted,
+        program.tapes,
+    )
     header = header_at(table, 0)
     active, forces, _foreseen = weights
     lets_go, may_go_all = leave
@@ -99,10 +105,10 @@ def search(program, tips, here, trial, rows, y, base, value, restoring, leave, m
     )
     bases, one_sided, order = shape.bases, shape.one_sided, shape.sparsity
     n = descent.size
-    residual = here.residual
-    here_merit = merit(residual, one_sided, rows, y, mu) + base
+    residual = current.residual
+    current_merit = merit(residual, one_sided, rows, y, mu) + base
     # Of the violations alone no objective rounds anything off.
-    noise = 1e-14 * (abs(here_merit) + (0.0 if restoring else abs(value)) + 1e-300)
+    noise = 1e-14 * (abs(current_merit) + (0.0 if restoring else abs(value)) + 1e-300)
     # Rounding of the poses, of order one, is felt through the objective's slope and the rows' forces.
     for i in range(n):
         noise += 4e-16 * abs(gradient[i])
@@ -112,16 +118,16 @@ def search(program, tips, here, trial, rows, y, base, value, restoring, leave, m
     bends = 0
     lost = -1
     while alpha * longest > 1e-9 * SHORTEST or alpha == 1.0:
-        move(table, here.q, step, alpha, trial.q)
-        carry(table, pool, bases, loose, here, trial, step, alpha)
+        move(table, current.q, step, alpha, trial.q)
+        predict_pairs(table, pool, bases, lifted, current, trial, step, alpha)
         known = may_go_all and alpha == 1.0 and bends == 0
-        if header.watch >= 0 and not known and is_too_far(table, pool, loose.memory, trial):
+        if header.watch >= 0 and not known and is_too_far(table, pool, lifted.memory, trial):
             # Bent, it would go farther than is known to be free.
             bends = 2
             alpha *= 0.5
             continue
-        lost = evaluate(table, pool, loose.guess, BEND, loose, room, trial)
-        if header.watch >= 0 and not lets_go and lost < 0 and ends_unseen(table, pool, loose.memory, here, trial):
+        lost = evaluate(table, pool, lifted.guess, BEND, lifted, workspace, trial)
+        if header.watch >= 0 and not lets_go and lost < 0 and ends_unseen(table, pool, lifted.memory, current, trial):
             # A tick has no last look, which would tell of what it led through.
             bends = 2
             alpha *= 0.5
@@ -129,8 +135,8 @@ def search(program, tips, here, trial, rows, y, base, value, restoring, leave, m
         if lost < 0:
             there = merit(trial.residual, one_sided, rows, y, mu)
             if not restoring:
-                there += goal(table, pool, shape, rows, loose, room, tips, trial, 0, gradient, lagrangian)
-            if there <= here_merit + 1e-4 * alpha * slope + noise:
+                there += goal(table, pool, shape, rows, lifted, workspace, tips, trial, 0, gradient, lagrangian)
+            if there <= current_merit + 1e-4 * alpha * slope + noise:
                 return True, alpha, lost
             if bends < 2:
                 bends += 1
@@ -138,7 +144,7 @@ def search(program, tips, here, trial, rows, y, base, value, restoring, leave, m
                     descent[i] = 0.0
                 for r in range(rows):
                     forces[r] = -(trial.residual[r] - (1.0 - alpha) * residual[r]) * active[r]
-                add_transposed(bases, here.jacobian, rows, forces, descent)
+                add_transposed(bases, current.jacobian, rows, forces, descent)
                 solve_step(matrix, n, order, descent)
                 for i in range(n):
                     step[i] += descent[i] / alpha
@@ -149,12 +155,12 @@ def search(program, tips, here, trial, rows, y, base, value, restoring, leave, m
                     step[i] = straight[i]
         # A bent step may be longer than it was.
         short = lets_go and bends % 3 == 0 and alpha <= HALVED and alpha * longest < LETS_GO
-        if lost >= 0 and short and may_go(table, lost, residual) and tracked_at(here.tracked, lost).stays >= 0.0:
-            tracked_at(here.tracked, lost).stays = MAY_GO - tracked_at(here.tracked, lost).stays
+        if lost >= 0 and short and may_go(table, lost, residual) and tracked_at(current.tracked, lost).stays >= 0.0:
+            tracked_at(current.tracked, lost).stays = MAY_GO - tracked_at(current.tracked, lost).stays
             continue
         alpha *= 0.5
         # A pair near a fold is freed; a clearance's is given up where its gap does not close.
-        if lost >= 0 and alpha * longest < 0.01 and not is_guard(table, lost):
+        if lost >= 0 and alpha * longest < 0.01 and not is_clearance_row(table, lost):
             break
-    hold_all(table, here.tracked)
+    hold_all(table, current.tracked)
     return False, alpha, lost

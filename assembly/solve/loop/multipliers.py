@@ -52,7 +52,9 @@ def let_count(shape, r, counts, residual, jacobian, y, mu, in_matrix, active, fo
 
 
 @kernel(inner=True)
-def foresee(table, shape, rows, residual, jacobian, y, mu, step, in_matrix, active, foreseen, descent, lagrangian):
+def predict_active_set(
+    table, shape, rows, residual, jacobian, y, mu, step, in_matrix, active, foreseen, descent, lagrangian
+):
     """Let one-sided rows count that are idle here and would push at the end of the step; those that would not, no more.
 
     Their sign is that of y + (c + J step) / mu. Returns how many rows changed.
@@ -252,7 +254,7 @@ def pushing_multipliers(shape, rows, residual, jacobian, active, exchanges, roun
 
 @kernel(inline=True)
 def choose_multipliers(
-    shape, rows, here, shortened, vectors, holds, good, active, gradient, scratch, gram, y, better_y
+    shape, rows, current, shortened, vectors, holds, good, active, gradient, scratch, gram, y, better_y
 ):
     """The better of y, of what the last step proposed, and of least squares, into y.
 
@@ -260,8 +262,8 @@ def choose_multipliers(
     rows push then. There, and with rows of `vectors`, they are refined. Returns the dual residual.
     """
     bases, one_sided = shape.bases, shape.one_sided
-    residual = here.residual
-    jacobian = here.jacobian
+    residual = current.residual
+    jacobian = current.jacobian
     dual = dual_residual(bases, jacobian, rows, one_sided, residual, gradient, better_y, scratch)
     # Where they are as good as they should be, the old ones need no look.
     other = math.inf
@@ -306,7 +308,7 @@ def strongest(values, count):
 
 
 @kernel(inner=True)
-def least_multipliers(shape, rows, here, active, gradient, scratch, gram, dual, y, better_y):
+def least_multipliers(shape, rows, current, active, gradient, scratch, gram, dual, y, better_y):
     """The shortest multipliers that balance the objective, if they do so as well as y; into y. The dual residual.
 
     They are for y much stronger than the objective's slope: of rows that depend on each other.
@@ -314,8 +316,8 @@ def least_multipliers(shape, rows, here, active, gradient, scratch, gram, dual, 
     if not strongest(y, rows) > EXCESS * strongest(gradient, gradient.size):
         return dual
     bases, one_sided = shape.bases, shape.one_sided
-    residual = here.residual
-    jacobian = here.jacobian
+    residual = current.residual
+    jacobian = current.jacobian
     pushing_multipliers(shape, rows, residual, jacobian, active, 0, 1, gradient, scratch, gram, better_y)
     other = dual_residual(bases, jacobian, rows, one_sided, residual, gradient, better_y, scratch)
     if other > max(10.0 * dual, 1e-11):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly.constraints.program.contact import copy_tracked, is_guard, predict_pair, surface_of
+from assembly.constraints.program.contact import copy_tracked, is_clearance_row, predict_pair, surface_of
 from assembly.constraints.program.records import (
     FREE_COLUMN,
     ROW,
@@ -34,12 +34,12 @@ def longest_way(d, at, alpha, far):
 
 
 @kernel(inner=True)
-def stays_open(table, pool, bases, k, here, trial, d, alpha):
+def stays_open(table, pool, bases, k, current, trial, d, alpha):
     """Whether row k, of a clearance, is open all along alpha d for certain; if so, what is known of it goes on.
 
     No gap changes by more than points of the two bodies go, those of each seen from where they were.
     """
-    left = contact_record_at(here.records, k).slack
+    left = contact_record_at(current.records, k).slack
     if not left > 0.0 or bases[k, 2] >= 0:
         return False
     minimum = contact_row_at(table, header_at(table, 0).row_table + ROW * k).minimum
@@ -48,15 +48,15 @@ def stays_open(table, pool, bases, k, here, trial, d, alpha):
     if not left > 0.0:
         return False
     for i in range(CONTACT_RECORD):
-        trial.records[k, i] = here.records[k, i]
+        trial.records[k, i] = current.records[k, i]
     for i in range(FREE_COLUMN):
-        trial.jacobian[k, i] = here.jacobian[k, i]
+        trial.jacobian[k, i] = current.jacobian[k, i]
     contact_record_at(trial.records, k).slack = left
     return True
 
 
 @kernel(inner=True)
-def carry(table, pool, bases, loose, here, trial, d, alpha):
+def predict_pairs(table, pool, bases, lifted, current, trial, d, alpha):
     """Contact coordinates along alpha d: by the contact velocity, or, for a free pair, by its own unknowns.
 
     Gaps follow to first order, angles start from where they are: a step turns no body by more than a radian. The guess
@@ -64,9 +64,9 @@ def carry(table, pool, bases, loose, here, trial, d, alpha):
     on to the trial point as they are.
     """
     header = header_at(table, 0)
-    tracked, records, jacobian = here.tracked, here.records, here.jacobian
-    lengths = loose.lengths
-    out = loose.guess
+    tracked, records, jacobian = current.tracked, current.records, current.jacobian
+    lengths = lifted.lengths
+    out = lifted.guess
     for k in range(header.tracked):
         copy_tracked(tracked, k, out)
     for k in range(header.contacts):
@@ -93,7 +93,7 @@ def carry(table, pool, bases, loose, here, trial, d, alpha):
                 for i in range(4):
                     out[k, i] += derivatives_at(records, k).rates[i, j] * s
             predict_pair(table, pool, row, k, tracked, out)
-        if is_guard(table, k) and stays_open(table, pool, bases, k, here, trial, d, alpha):
+        if is_clearance_row(table, k) and stays_open(table, pool, bases, k, current, trial, d, alpha):
             tracked_at(out, k).idle = 1.0
             tracked_at(out, k).gap = max(
                 tracked_at(out, k).gap,

@@ -63,33 +63,33 @@ def is_clear(table, residual):
 
 
 @kernel(inner=True)
-def keep(here, y, rows, held):
+def keep(current, y, rows, held):
     """Copy poses, tracked values and multipliers of a point."""
     for b in range(held.q.shape[0]):
         for k in range(7):
-            held.q[b, k] = here.q[b, k]
+            held.q[b, k] = current.q[b, k]
     for r in range(held.tracked.shape[0]):
         for k in range(TRACK):
-            held.tracked[r, k] = here.tracked[r, k]
+            held.tracked[r, k] = current.tracked[r, k]
     for r in range(rows):
         held.y[r] = y[r]
 
 
 @kernel(inner=True)
-def bring_back(held, rows, here, y):
+def bring_back(held, rows, current, y):
     """The point that `keep` copied."""
     for b in range(held.q.shape[0]):
         for k in range(7):
-            here.q[b, k] = held.q[b, k]
+            current.q[b, k] = held.q[b, k]
     for r in range(held.tracked.shape[0]):
         for k in range(TRACK):
-            here.tracked[r, k] = held.tracked[r, k]
+            current.tracked[r, k] = held.tracked[r, k]
     for r in range(rows):
         y[r] = held.y[r]
 
 
 @kernel(inner=True)
-def judge(table, pool, state, loose, room, shape, rows, here, trial, bound, lax):
+def judge(table, pool, state, lifted, workspace, shape, rows, current, trial, bound, lax):
     """The pose as it is returned, rounded to the user's coordinates, evaluated afresh into `trial`.
 
     Residuals and pairs found are copied to `here`. Returns whether every row holds within the bound, and the largest
@@ -97,25 +97,25 @@ def judge(table, pool, state, loose, room, shape, rows, here, trial, bound, lax)
     """
     q = trial.q
     scaled_poses(table, pool, state, q)
-    lost = evaluate(table, pool, here.tracked, BEND, loose, room, trial)
+    lost = evaluate(table, pool, current.tracked, BEND, lifted, workspace, trial)
     if lost >= 0:
         return False, math.inf
     for r in range(rows):
-        here.residual[r] = trial.residual[r]
+        current.residual[r] = trial.residual[r]
     for k in range(header_at(table, 0).contacts):
         for i in range(TRACK):
-            here.tracked[k, i] = trial.tracked[k, i]
-    violation = off_rows(table, loose, shape.one_sided, trial, lax)
-    holds = free_pairs_hold(table, pool, q, here.tracked, loose.free, 1e-9)
+            current.tracked[k, i] = trial.tracked[k, i]
+    violation = off_rows(table, lifted, shape.one_sided, trial, lax)
+    holds = free_pairs_hold(table, pool, q, current.tracked, lifted.free, 1e-9)
     return holds and violation <= bound, violation
 
 
 @kernel(inner=True)
-def write_rows(table, here, y, loose, lax, size, state):
+def write_rows(table, current, y, lifted, lax, size, state):
     """Tracked values, multipliers and residuals into the state; returns at how many contacts surfaces cross."""
     header = header_at(table, 0)
-    tracked, records, residual, jacobian = here.tracked, here.records, here.residual, here.jacobian
-    free = loose.free
+    tracked, records, residual, jacobian = current.tracked, current.records, current.residual, current.jacobian
+    free = lifted.free
     m = header.rows
     o = 7 * header.bodies
     for k in range(header.tracked):
@@ -129,7 +129,7 @@ def write_rows(table, here, y, loose, lax, size, state):
         if r < header.contacts:
             if free[r] >= 0:
                 # What a free pair lacks to be extremal is a violation of its contact, too.
-                off = off_tangency(residual, jacobian, r, m + 4 * free[r], lax, loose.variables)
+                off = off_tangency(residual, jacobian, r, m + 4 * free[r], lax, lifted.variables)
                 if off > abs(worst):
                     worst = -off
             elif contact_record_at(records, r).proper == 0.0 and abs(worst) <= TOUCHING:

@@ -11,7 +11,7 @@ from assembly.constraints.program.records import header_at
 from assembly.proximity.extrema.face_face import BEND
 from assembly.solve.loop.clearances import is_too_far
 from assembly.solve.loop.multipliers import toward_rows
-from assembly.solve.loop.predict import carry
+from assembly.solve.loop.predict import predict_pairs
 from assembly.solve.loop.residuals import move
 from assembly.solve.loop.violation import off_rows
 
@@ -35,13 +35,19 @@ WAY = size_of(RESTORATION)
 
 
 @kernel(inline=True)
-def way_back(program, here, trial, rows, weights, mu, softness, share, enough, system, tick):
+def way_back(program, current, trial, rows, weights, mu, softness, share, enough, system, tick):
     """A share of the least step that leaves little of the gaps, into the trial point.
 
     `weights` is room for which rows count, and for forces. Returns the softness that the step took, and how far off the
     rows it leads: infinitely where bodies may not go so far, or a pair is lost.
     """
-    table, pool, shape, loose, room = program.table, program.pool, program.structure, program.lifted, program.tapes
+    table, pool, shape, lifted, workspace = (
+        program.table,
+        program.pool,
+        program.structure,
+        program.lifted,
+        program.tapes,
+    )
     header = header_at(table, 0)
     active, forces, _foreseen = weights
     step, lagrangian, matrix = system.directions.step, system.hessian, system.factor
@@ -51,8 +57,8 @@ def way_back(program, here, trial, rows, weights, mu, softness, share, enough, s
         shape,
         header.rows,
         rows,
-        here.residual,
-        here.jacobian,
+        current.residual,
+        current.jacobian,
         mu,
         active,
         softness,
@@ -63,13 +69,13 @@ def way_back(program, here, trial, rows, weights, mu, softness, share, enough, s
         forces,
         step,
     )
-    move(table, here.q, step, share, trial.q)
-    carry(table, pool, bases, loose, here, trial, step, share)
-    if header.watch >= 0 and is_too_far(table, pool, loose.memory, trial):
+    move(table, current.q, step, share, trial.q)
+    predict_pairs(table, pool, bases, lifted, current, trial, step, share)
+    if header.watch >= 0 and is_too_far(table, pool, lifted.memory, trial):
         return softness, math.inf
-    if evaluate(table, pool, loose.guess, BEND, loose, room, trial) >= 0:
+    if evaluate(table, pool, lifted.guess, BEND, lifted, workspace, trial) >= 0:
         return softness, math.inf
-    return softness, off_rows(table, loose, one_sided, trial, tick)
+    return softness, off_rows(table, lifted, one_sided, trial, tick)
 
 
 @kernel(inner=True)
@@ -86,14 +92,14 @@ def begin_way(way):
 
 
 @kernel(inline=True)
-def step_back(program, here, trial, rows, weights, mu, violation, enough, system, tick, way):
+def step_back(program, current, trial, rows, weights, mu, violation, enough, system, tick, way):
     """A step on the way back, into the trial point; whether it is to be taken. If not, the next one is shorter."""
     progress = restoration_at(way, 0)
     if violation < progress.lowest:
         progress.lowest = violation
         progress.led_off = 0.0
     progress.softness, there = way_back(
-        program, here, trial, rows, weights, mu, progress.softness, progress.share, enough, system, tick
+        program, current, trial, rows, weights, mu, progress.softness, progress.share, enough, system, tick
     )
     nearer = there < progress.lowest
     if not nearer and not (tick and there < ASTRAY * progress.lowest and progress.led_off == 0.0):

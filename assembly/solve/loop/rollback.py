@@ -18,7 +18,7 @@ from assembly.constraints.program.records import (
     header_at,
 )
 from assembly.proximity.manager.update import AS_NEEDED, any_crossed
-from assembly.solve.loop.clearances import forget_guards, look_around, place_guards
+from assembly.solve.loop.clearances import forget_clearance_rows, place_clearance_rows, update_around
 from assembly.solve.loop.report import bring_back
 
 # Deeper than this part of how far bodies may go in one step, which is half the least radius of theirs.
@@ -48,14 +48,14 @@ def has_sunk(table, pool, memory, residual):
 
 
 @kernel(inner=True)
-def begin_again(table, pool, held, loose, here, y, better_y):
+def begin_again(table, pool, held, lifted, current, y, better_y):
     """Back to the pose that is held. Its contacts are found anew; no row has pushed yet."""
     header = header_at(table, 0)
-    memory, free = loose.memory, loose.free
-    bring_back(held, header.rows, here, y)
-    forget_guards(table, memory)
-    look_around(table, pool, memory, here, AS_NEEDED)
-    place_guards(table, memory, here, y, better_y, free, False)
+    memory, free = lifted.memory, lifted.free
+    bring_back(held, header.rows, current, y)
+    forget_clearance_rows(table, memory)
+    update_around(table, pool, memory, current, AS_NEEDED)
+    place_clearance_rows(table, memory, current, y, better_y, free, False)
     for r in range(header.rows):
         y[r] = 0.0
         better_y[r] = 0.0

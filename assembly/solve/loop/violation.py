@@ -59,14 +59,14 @@ def off_tangency(residual, jacobian, r, e, lax, work):
 
 
 @kernel(inner=True)
-def off_rows(table, loose, one_sided, point, lax):
+def off_rows(table, lifted, one_sided, point, lax):
     """The largest violation of rows and of the tangency of free pairs, which is counted as by `off_tangency`."""
     header = header_at(table, 0)
-    free = loose.free
+    free = lifted.free
     worst = violation_of(point.residual, one_sided, header.rows)
     for k in range(header.contacts):
         if free[k] >= 0:
-            off = off_tangency(point.residual, point.jacobian, k, header.rows + 4 * free[k], lax, loose.variables)
+            off = off_tangency(point.residual, point.jacobian, k, header.rows + 4 * free[k], lax, lifted.variables)
             if not off <= worst:
                 worst = off
     return worst

@@ -30,7 +30,7 @@ RECALLED = size_of(RECALLED_CONTACT)
 
 
 @kernel(inline=True)
-def recall_size(bodies, pairs):
+def warm_start_size(bodies, pairs):
     """Doubles of what is left."""
     return 1 + 7 * bodies + RECALLED * pairs
 
@@ -43,7 +43,7 @@ def is_simple(table):
 
 
 @kernel(inline=True)
-def recall(table, state, at, point):
+def warm_start(table, state, at, point):
     """Take over the rows that were left at these poses, with these contacts. Whether there were."""
     header = header_at(table, 0)
     if state[at] != 1.0 or not is_simple(table):

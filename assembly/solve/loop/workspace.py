@@ -47,7 +47,7 @@ def results_of(table, state):
 
 
 @kernel(inline=True)
-def room_needed(table):
+def workspace_needed(table):
     """How many doubles and integers a solve works in: what is carved below, and by `shape_of`."""
     header = header_at(table, 0)
     pairs, bodies, tracks, tapes = header.contacts, header.bodies, header.tracked, header.tape_room
@@ -94,10 +94,10 @@ def carve_points(table, most, doubles, at):
     for k in range(BY_ROW):
         for r in range(most):
             by_row[k, r] = 0.0
-    here = Iterate(poses[0], tracked[0], records[0], by_row[0], jacobians[0])
+    current = Iterate(poses[0], tracked[0], records[0], by_row[0], jacobians[0])
     trial = Iterate(poses[1], tracked[1], records[1], by_row[1], jacobians[1])
     vectors = RowVectors(by_row[2], by_row[3], by_row[4], by_row[5], by_row[6])
-    return (here, trial, Held(poses[2], tracked[3], by_row[BY_ROW])), vectors, tracked[2], at
+    return (current, trial, Held(poses[2], tracked[3], by_row[BY_ROW])), vectors, tracked[2], at
 
 
 @kernel(inline=True, allocates=True)
@@ -153,17 +153,17 @@ def carve_all(table, memory, doubles, integers):
     header = header_at(table, 0)
     pairs = header.contacts
     most, n = header.rows + 4 * pairs, 6 * header.moving
-    (here, trial, held), by_row, guess, at = carve_points(table, most, doubles, 0)
+    (current, trial, held), by_row, guess, at = carve_points(table, most, doubles, 0)
     shape = shape_of(table, most, n + 4 * pairs, record_of_blocks(table), integers, doubles)
-    loose, at = carve_pairs(table, guess, memory, doubles, at, integers)
+    lifted, at = carve_pairs(table, guess, memory, doubles, at, integers)
     numbers = carve(integers, pairs, (header.guards,))
-    arrange(table, loose.free, shape, header.rows, n)
+    arrange(table, lifted.free, shape, header.rows, n)
     tapes, at = carve_tapes(table, doubles, at)
     gram = carve(doubles, at, (most + 1, most))
     at += (most + 1) * most
     way = carve(doubles, at, (WAY,))
     system = carve_unknowns(n, shape.sparsity, doubles, at + WAY)
-    return Workspace(here, trial, held, by_row, shape, loose, numbers, tapes, gram, way, system)
+    return Workspace(current, trial, held, by_row, shape, lifted, numbers, tapes, gram, way, system)
 
 
 @kernel(inline=True, allocates=True)

@@ -23,7 +23,7 @@ from assembly.solve.dense.row_table import new_point, point_at
 from assembly.solve.linear_algebra.factorize import factorize_shifted, solve_step
 from assembly.solve.loop.line_search import goal
 from assembly.solve.loop.multipliers import toward_rows
-from assembly.solve.loop.predict import carry
+from assembly.solve.loop.predict import predict_pairs
 from assembly.solve.loop.report import write_pose
 from assembly.solve.loop.residuals import add_row, arrange, move, record_of_blocks, shape_of, size_of_shape
 from assembly.solve.loop.violation import off_rows
@@ -130,7 +130,7 @@ def walk_within(table, pool, state, step, share, kept, residual, tips, integers,
     before = math.inf
     for _ in range(STEPS):
         move(table, here.q, way, share, trial.q)
-        carry(table, pool, shape.bases, loose, here, trial, way, share)
+        predict_pairs(table, pool, shape.bases, loose, here, trial, way, share)
         if evaluate(table, pool, loose.guess, BEND, loose, room, trial) >= 0:
             return math.inf
         here, trial = trial, here

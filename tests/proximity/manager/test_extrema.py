@@ -27,7 +27,7 @@ def root_of(f, q_f, g, q_g, start):
     turn, shift = relative_pose(q, 0, rotation(q, 0), 1, rotation(q, 1))
     table, pool = np.asarray(table), np.asarray(pool)
     out = np.full((1, roots.ROOT), np.nan)
-    found = roots.surfaces_root(table, pool, posed(turn, shift, (0, SURFACE_RECORD)), tuple(start), out, 0)
+    found = roots.surfaces_extremum(table, pool, posed(turn, shift, (0, SURFACE_RECORD)), tuple(start), out, 0)
     return found, out[0], rotation(q, 0)
 
 
@@ -52,7 +52,7 @@ def test_where_newton_fails_the_controller_finds_the_minimum(first, second):
         # The same descent, from the same start.
         np.testing.assert_allclose(root[: roots.CODE_F], lowest.parameters, rtol=0, atol=1e-9)
         assert root[roots.GAP] == pytest.approx(lowest.gap, abs=1e-12)
-        normal = matvec(turn, tuple(root[roots.ROOT_NORMAL : roots.GAP]))
+        normal = matvec(turn, tuple(root[roots.EXTREMUM_NORMAL : roots.GAP]))
         np.testing.assert_allclose(normal, lowest.normal, rtol=0, atol=1e-12)
         # Nothing beside it is nearer: the points of both surfaces a little off.
         ends = [as_face("side", side).surface for side in (f, g)]

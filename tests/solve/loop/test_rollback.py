@@ -8,9 +8,9 @@ from scipy.spatial.transform import Rotation
 
 import assembly as asm
 from assembly.constraints.program.records import (
-    FIRST_GUARD,
-    GUARD_NUMBER,
-    GUARDS,
+    CLEARANCE_ROW_NUMBER,
+    CLEARANCE_ROWS,
+    FIRST_CLEARANCE_ROW,
     MINIMUM,
     ROW,
     ROW_TABLE,
@@ -54,8 +54,8 @@ def test_what_has_sunk():
     packed = scene.packed()
     table, pool = packed.table.copy(), packed.pool.copy()
     memory = packed.new_state()[packed.memory_at :]
-    residual = np.zeros(table[GUARDS] + table[FIRST_GUARD])
-    r = table[FIRST_GUARD]
+    residual = np.zeros(table[CLEARANCE_ROWS] + table[FIRST_CLEARANCE_ROW])
+    r = table[FIRST_CLEARANCE_ROW]
     row = table[ROW_TABLE] + ROW * r
     # Rows know no contact before a solve begins.
     table[row + MINIMUM] = table[table[table[WATCH] + PAIR_TABLE] + PAIR_MINIMUM]
@@ -70,10 +70,10 @@ def test_what_has_sunk():
         (1.01, 1, solid, False),
     ):
         residual[r] = -depth * DEEP * flank
-        table[row + GUARD_NUMBER], table[row + SHELL_F] = number, shell
+        table[row + CLEARANCE_ROW_NUMBER], table[row + SHELL_F] = number, shell
         assert has_sunk(table, pool, memory, residual) == sunk
     # What is nearer than it is to be is not in the other body.
-    table[row + SHELL_F], table[row + GUARD_NUMBER] = surfaces, 1
+    table[row + SHELL_F], table[row + CLEARANCE_ROW_NUMBER] = surfaces, 1
     pool[table[row + MINIMUM]] = 2.0 * flank
     residual[r] = -1.5 * flank
     assert not has_sunk(table, pool, memory, residual)

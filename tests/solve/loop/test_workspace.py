@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly.solve.loop.workspace import carve_all, room_needed
+from assembly.solve.loop.workspace import carve_all, workspace_needed
 from benchmarks.running import example
 from tests.laws.trim_scenes import trim_scene
 
@@ -56,7 +56,7 @@ def dexterity():
 @pytest.mark.parametrize("scene", [contacts, joints, expressions, many, trims, dexterity])
 def test_nothing_stands_in_one_place(scene):
     table = scene().packed().table
-    sizes = room_needed(table)
+    sizes = workspace_needed(table)
     doubles, integers = np.zeros(sizes[0]), np.zeros(sizes[1], dtype=np.int64)
     space = carve_all(table, np.empty(0), doubles, integers)
     lifted, shape, system = space.lifted, space.structure, space.system

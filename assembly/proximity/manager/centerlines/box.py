@@ -22,7 +22,7 @@ from assembly._record import record_dtype, record_view, size_of
 from assembly.geometry.vec import add, blend, dot, matvec, matvec_t, sub
 from assembly.proximity.manager.wires import (
     centerline_part_at,
-    spine_point,
+    centerline_point,
 )
 
 # A box: a part of either centerline, and the lengths from its middle where the box begins and ends.
@@ -65,8 +65,8 @@ def segment_distance(d, f, g, h, k):
 @kernel(inline=True)
 def apart(pool, o, p, turn, shift, s, t):
     """The Difference at lengths s and t along the parts at o and p."""
-    pf, f, bend_f = spine_point(pool, o, s)
-    q, g, bend_g = spine_point(pool, p, t)
+    pf, f, bend_f = centerline_point(pool, o, s)
+    q, g, bend_g = centerline_point(pool, p, t)
     return Difference(
         d=sub(add(matvec(turn, q), shift), pf),
         tangent_f=f,

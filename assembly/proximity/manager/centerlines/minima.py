@@ -19,7 +19,7 @@ from assembly.geometry.vec import dot
 from assembly.proximity.manager.centerlines.box import FreeEnds, Lengths, apart
 
 # Steps of Newton's method, of feet, and until an interval cannot be halved any more.
-STEPS, FEET, HALVINGS = 30, 12, 60
+STEPS, PROJECTIONS, HALVINGS = 30, 12, 60
 # Slopes of the distance below this count as zero at the borders of a box: the next box has the same point. Those of F
 # below the second are rounding.
 LEVEL, STILL = 1e-10, 1e-16
@@ -111,7 +111,7 @@ def slopes_of(pool, o, p, turn, shift, side, x, y):
 
 
 @kernel(inner=True)
-def foot_at(pool, o, p, turn, shift, side, held, x, y):
+def projection_at(pool, o, p, turn, shift, side, held, x, y):
     """The foot of x on the other spine, from y, or y itself if it is `held`: phi', phi'', the foot, whether it is one.
 
     There is none where F is not convex along the other spine.
@@ -120,7 +120,7 @@ def foot_at(pool, o, p, turn, shift, side, held, x, y):
     if held:
         return at.x, at.xx, y, True
     step = math.inf
-    for _ in range(FEET):
+    for _ in range(PROJECTIONS):
         if not at.yy > 0.0:
             return at.x, at.xx, y, False
         step = -at.y / at.yy
@@ -191,7 +191,7 @@ def rise_of(pool, o, p, turn, shift, side, held, left, right, y):
     """Where phi' rises through zero between two places, the foot there and whether it is one."""
     x = 0.5 * (left + right)
     for _ in range(HALVINGS):
-        slope, bend, y, _found = foot_at(pool, o, p, turn, shift, side, held, x, y)
+        slope, bend, y, _found = projection_at(pool, o, p, turn, shift, side, held, x, y)
         if abs(slope) <= 1e-15 * bend:
             break
         if slope <= 0.0:
@@ -201,7 +201,7 @@ def rise_of(pool, o, p, turn, shift, side, held, left, right, y):
         x = within(left, right, x - slope / bend if bend > 0.0 else left)
         if right - left <= 1e-15:
             break
-    _slope, _bend, y, found = foot_at(pool, o, p, turn, shift, side, held, x, y)
+    _slope, _bend, y, found = projection_at(pool, o, p, turn, shift, side, held, x, y)
     return x, y, found
 
 
@@ -212,8 +212,8 @@ def piece_minima(pool, o, p, turn, shift, side, held, left, right, y, ends, plac
     `ends`: whether the followed spine has a free end at either place. Returns how many `places` there are, the larger
     slope at both ends, and whether there are feet.
     """
-    a, bend_a, y_a, found_a = foot_at(pool, o, p, turn, shift, side, held, left, y)
-    b, bend_b, y_b, found_b = foot_at(pool, o, p, turn, shift, side, held, right, y)
+    a, bend_a, y_a, found_a = projection_at(pool, o, p, turn, shift, side, held, left, y)
+    b, bend_b, y_b, found_b = projection_at(pool, o, p, turn, shift, side, held, right, y)
     certain = found_a and found_b
     width = right - left
     low, high = turns_of(width, a, b, bend_a, bend_b)
@@ -226,12 +226,12 @@ def piece_minima(pool, o, p, turn, shift, side, held, left, right, y, ends, plac
         new, rises = right, b
         if part < 1.0:
             new = left + part * width
-            rises = foot_at(pool, o, p, turn, shift, side, held, new, y)[0]
+            rises = projection_at(pool, o, p, turn, shift, side, held, new, y)[0]
         if new > x and slope <= 0.0 <= rises:
-            there, foot, found = rise_of(pool, o, p, turn, shift, side, held, x, new, y)
+            there, projection, found = rise_of(pool, o, p, turn, shift, side, held, x, new, y)
             certain = certain and found
             if found:
-                places[count, side], places[count, 1 - side] = there, foot
+                places[count, side], places[count, 1 - side] = there, projection
                 count += 1
         x, slope = new, rises
     if ends[1] and b < 0.0 and found_b:
@@ -241,7 +241,7 @@ def piece_minima(pool, o, p, turn, shift, side, held, left, right, y, ends, plac
 
 
 @kernel(inner=True)
-def valley_minima(pool, o, p, turn, shift, box, open_ends, places):
+def near_singular_minima(pool, o, p, turn, shift, box, open_ends, places):
     """Minima of phi over a thin box: s and t of each into `places`, (MINIMA, 2).
 
     That spine is followed across which F is curved the most. Where feet come to a free end phi' has a kink. Between

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from assembly.geometry.shapes.centerline import Spine
 from assembly.proximity.manager import wires as layout
 
-__all__ = ["pack_spine"]
+__all__ = ["pack_centerline"]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
@@ -20,7 +20,7 @@ _TURN, _LINE, _MOST = 0.3, 2.0, 64
 _JUMP = 1e-9
 
 
-def pack_spine(spine: Spine, scale: float, table_at: int = 0, pool_at: int = 0) -> tuple[Table, Array, int]:
+def pack_centerline(centerline: Spine, scale: float, table_at: int = 0, pool_at: int = 0) -> tuple[Table, Array, int]:
     """The records of a spine.
 
     Parameters
@@ -38,30 +38,30 @@ def pack_spine(spine: Spine, scale: float, table_at: int = 0, pool_at: int = 0) 
     offset : int
         Of the spine's record in the table.
     """
-    numbers = np.array([spine.radius / scale, scale * spine.curvature.max(), spine.sense])
-    counts = _counts(spine)
+    numbers = np.array([centerline.radius / scale, scale * centerline.curvature.max(), centerline.sense])
+    counts = _counts(centerline)
     owner = np.repeat(np.arange(len(counts)), counts)
     first = np.cumsum(counts) - counts
-    half = 0.5 * (spine.length / counts)[owner]
+    half = 0.5 * (centerline.length / counts)[owner]
     place = half * (1.0 + 2.0 * (np.arange(len(owner)) - first[owner]))
-    pieces = np.stack([scale * spine.curvature, spine.length / scale, spine.turn, first, counts], axis=1)
+    pieces = np.stack([scale * centerline.curvature, centerline.length / scale, centerline.turn, first, counts], axis=1)
     points, tangents, normals = (np.concatenate(rows) for rows in zip(*(
-        spine.frames(k, place[owner == k]) for k in range(len(counts))
+        centerline.frames(k, place[owner == k]) for k in range(len(counts))
     ), strict=True))  # fmt: skip
     parts = np.concatenate([
         points / scale, tangents, normals,
-        np.stack([scale * spine.curvature[owner], half / scale, owner, place / scale], axis=1),
-        *_beyond(spine, owner, scale),
+        np.stack([scale * centerline.curvature[owner], half / scale, owner, place / scale], axis=1),
+        *_beyond(centerline, owner, scale),
     ], axis=1)  # fmt: skip
     ends = np.array([
-        spine.frames(int(k), middle + np.array([-reach, 0.0, reach]))[0]
+        centerline.frames(int(k), middle + np.array([-reach, 0.0, reach]))[0]
         for k, middle, reach in zip(owner, place, half, strict=True)
     ])  # fmt: skip
     children, balls = _tree(ends, scale)
     table = np.zeros(layout.SPINE, dtype=np.int64)
     record = layout.centerline_at(table, 0)
     record.pieces, record.parts = len(counts), len(owner)
-    record.closed, record.along = spine.closed, spine.along
+    record.closed, record.along = centerline.closed, centerline.along
     doubles = (numbers, pieces, parts, balls)
     at = pool_at + np.cumsum([0, *(block.size for block in doubles)])
     record.numbers, record.piece_pool, record.part_pool, record.node_pool = at[:4]
@@ -69,27 +69,27 @@ def pack_spine(spine: Spine, scale: float, table_at: int = 0, pool_at: int = 0) 
     return np.append(table, children), np.concatenate([block.ravel() for block in doubles]), table_at
 
 
-def _beyond(spine: Spine, owner: NDArray[np.int64], scale: float) -> tuple[Array, Array]:
+def _beyond(centerline: Spine, owner: NDArray[np.int64], scale: float) -> tuple[Array, Array]:
     """Whether the curvature jumps where parts start and end, (m, 2), and the vectors beyond, (m, 6)."""
-    count = len(spine.length)
-    starts = spine.curvature[:, None] * spine.normal
-    ends = np.array([spine.frames(k, spine.length[k : k + 1])[2][0] for k in range(count)])
-    ends *= spine.curvature[:, None]
+    count = len(centerline.length)
+    starts = centerline.curvature[:, None] * centerline.normal
+    ends = np.array([centerline.frames(k, centerline.length[k : k + 1])[2][0] for k in range(count)])
+    ends *= centerline.curvature[:, None]
     before, after = np.roll(ends, 1, axis=0), np.roll(starts, -1, axis=0)
     jumps = np.stack([np.linalg.norm(before - starts, axis=1), np.linalg.norm(after - ends, axis=1)], axis=1)
-    kinks = jumps > _JUMP * spine.curvature.max()
-    if not spine.closed:
+    kinks = jumps > _JUMP * centerline.curvature.max()
+    if not centerline.closed:
         kinks[0, 0] = kinks[-1, 1] = False
     change = owner[1:] != owner[:-1]
     border = np.stack([np.append(True, change), np.append(change, True)], axis=1)
     return (border & kinks[owner]).astype(float), scale * np.concatenate([before, after], axis=1)[owner]
 
 
-def _counts(spine: Spine) -> NDArray[np.int64]:
+def _counts(centerline: Spine) -> NDArray[np.int64]:
     """Into how many parts pieces are cut."""
-    finest = _TURN / max(float(spine.curvature.max()), 1e-300)
-    lines = np.minimum(spine.length / (_LINE * finest), _MOST)
-    counts = np.where(spine.curvature > 0.0, spine.curvature * spine.length / _TURN, lines)
+    finest = _TURN / max(float(centerline.curvature.max()), 1e-300)
+    lines = np.minimum(centerline.length / (_LINE * finest), _MOST)
+    counts = np.where(centerline.curvature > 0.0, centerline.curvature * centerline.length / _TURN, lines)
     return np.maximum(np.ceil(counts), 1).astype(np.int64)
 
 

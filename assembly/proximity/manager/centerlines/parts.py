@@ -50,22 +50,22 @@ def parts_apart(pool, o, p, turn, shift):
 
 
 @kernel(inline=True)
-def whole_box(table, pool, spines, i, j, boxes, b):
+def whole_box(table, pool, centerlines, i, j, boxes, b):
     """Box b: the whole parts i of f and j of g, from and to their ends."""
     box = centerline_box_at(boxes, b)
-    half_f = centerline_part_at(pool, centerline_at(table, spines[0]).part_pool + PART * i).half
-    half_g = centerline_part_at(pool, centerline_at(table, spines[1]).part_pool + PART * j).half
+    half_f = centerline_part_at(pool, centerline_at(table, centerlines[0]).part_pool + PART * i).half
+    half_g = centerline_part_at(pool, centerline_at(table, centerlines[1]).part_pool + PART * j).half
     box.part_f, box.from_f, box.to_f = float(i), -half_f, half_f
     box.part_g, box.from_g, box.to_g = float(j), -half_g, half_g
 
 
 @kernel(inner=True)
-def descend(table, pool, spines, turn, shift, reach, stack, out):
+def descend(table, pool, centerlines, turn, shift, reach, stack, out):
     """Parts (k, 2) of two spines that may be within a reach of each other.
 
     Returns how many, or -1 where there is no room; and how far all others are beyond.
     """
-    f, g = spines
+    f, g = centerlines
     line = centerline_at(table, f)
     centerline = centerline_at(table, g)
     nodes_f = line.node_pool
@@ -123,11 +123,11 @@ def near_parts(table, pool, at, p, posed, moving, reach, ring, stack, out, boxes
     From the list at `at`, as `patch_list.listed_pairs` has patches.
     """
     turn, shift = posed.turn, posed.shift
-    spines = posed.centerlines
-    f, g = spines
+    centerlines = posed.centerlines
+    f, g = centerlines
     fits = reaches(table, at, moved_since(table, pool, at, p, moving), reach)
     if fits == 0 and can_be_listed(table, pool, moving, ring + reach):
-        count, _beyond = descend(table, pool, spines, turn, shift, reach + ring, stack, out)
+        count, _beyond = descend(table, pool, centerlines, turn, shift, reach + ring, stack, out)
         fits = 1 if write_list(table, pool, at, p, moving, reach, ring, out, count) else -1
     if fits == 1:
         many = neighbor_list_at(table, at).count
@@ -136,7 +136,7 @@ def near_parts(table, pool, at, p, posed, moving, reach, ring, stack, out, boxes
             out[k, 0] = entry.f
             out[k, 1] = entry.g
     else:
-        many, _beyond = descend(table, pool, spines, turn, shift, reach, stack, out)
+        many, _beyond = descend(table, pool, centerlines, turn, shift, reach, stack, out)
     count = 0
     for k in range(many):
         i, j = out[k, 0], out[k, 1]
@@ -153,6 +153,6 @@ def near_parts(table, pool, at, p, posed, moving, reach, ring, stack, out, boxes
             continue
         if count == boxes.shape[0]:
             return -1
-        whole_box(table, pool, spines, i, j, boxes, count)
+        whole_box(table, pool, centerlines, i, j, boxes, count)
         count += 1
     return count if many >= 0 else -1

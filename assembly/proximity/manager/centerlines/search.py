@@ -30,13 +30,13 @@ from assembly.proximity.manager.centerlines.box import (
     box_of,
     centerline_box_at,
 )
-from assembly.proximity.manager.centerlines.minima import convex_minimum, valley_minima
+from assembly.proximity.manager.centerlines.minima import convex_minimum, near_singular_minima
 from assembly.proximity.manager.extrema import (
     NEW,
     NOTHING,
     SAME,
     USELESS,
-    add_root,
+    add_extremum,
     are_one,
     extremum_at,
     write,
@@ -47,8 +47,8 @@ from assembly.proximity.manager.wires import (
     both_radii,
     centerline_at,
     centerline_part_at,
-    spine_place,
-    spine_point,
+    centerline_place,
+    centerline_point,
     wire_at,
     wire_parameters,
 )
@@ -68,7 +68,7 @@ MUCH = 0.6
 # Of a level valley points are contacts that are farther from each other than so many radii.
 SPARSE = 0.5
 # Slopes of the distance below this say that a known contact is a minimum's.
-AT_ROOT = 1e-9
+AT_EXTREMUM = 1e-9
 # Newton's method on the surfaces ends at the minimum it began at, if the gap is the same but for this.
 ASTRAY = 1e-9
 # Spines that are nearer than this cross, and have no direction to each other.
@@ -95,14 +95,14 @@ def open_ends(table, pool, f, g, box):
 
 
 @kernel(inner=True)
-def mark_known(table, pool, posed, roots, count, marks):
+def mark_known(table, pool, posed, extrema, count, marks):
     """Where on the spines known roots are that are at a minimum: part and length of either; NaN for others."""
     surfaces = posed.surfaces
     f, g = posed.centerlines
     for k in range(count):
-        x = pair_parameters(extremum_at(roots, k))
-        i, s = spine_place(table, pool, f, surfaces[0], x[0], x[1])
-        j, t = spine_place(table, pool, g, surfaces[1], x[2], x[3])
+        x = pair_parameters(extremum_at(extrema, k))
+        i, s = centerline_place(table, pool, f, surfaces[0], x[0], x[1])
+        j, t = centerline_place(table, pool, g, surfaces[1], x[2], x[3])
         mark = known_place_at(marks, k)
         mark.part_f, mark.at_f = float(i), s
         mark.part_g, mark.at_g = float(j), t
@@ -110,9 +110,9 @@ def mark_known(table, pool, posed, roots, count, marks):
         p = centerline_at(table, g).part_pool + PART * j
         there = apart(pool, o, p, posed.turn, posed.shift, s, t)
         d = there.d
-        if extremum_at(roots, k).origin == USELESS or not abs(dot(d, there.tangent_f)) + abs(
+        if extremum_at(extrema, k).origin == USELESS or not abs(dot(d, there.tangent_f)) + abs(
             dot(d, there.tangent_g)
-        ) <= AT_ROOT * math.sqrt(dot(d, d)):
+        ) <= AT_EXTREMUM * math.sqrt(dot(d, d)):
             # Of far sides, at a half ball, or on its way to a root: what is there is looked for.
             mark.part_f = math.nan
 
@@ -146,9 +146,9 @@ def across_both(f, g):
 
 
 @kernel(inner=True)
-def add_minimum(table, pool, posed, i, j, s, t, neglect, roots, count, work):
+def add_minimum(table, pool, posed, i, j, s, t, merge_radius, extrema, count, work):
     """Add the contact at lengths s and t along parts i and j, if it is none of the known ones. Returns how many."""
-    if count == roots.shape[0]:
+    if count == extrema.shape[0]:
         return count
     f, g = posed.centerlines
     o = centerline_at(table, f).part_pool + PART * i
@@ -162,17 +162,19 @@ def add_minimum(table, pool, posed, i, j, s, t, neglect, roots, count, work):
     start = (u_f, v_f, u_g, v_g)
     gap = length - both_radii(table, pool, posed.centerlines)
     before = count
-    extremum = extremum_at(roots, before)
-    count, found = add_root(table, pool, posed, (0, 0), start, (0.0, 0.0, 0.0), neglect, roots, count, work, 0.0)
+    extremum = extremum_at(extrema, before)
+    count, found = add_extremum(
+        table, pool, posed, (0, 0), start, (0.0, 0.0, 0.0), merge_radius, extrema, count, work, 0.0
+    )
     if found == NOTHING or not abs(extremum.gap - gap) <= ASTRAY:
         # At a fold Newton's method may find nothing, or go elsewhere: the minimum is known without it.
         frame = pair_frame(table, pool, posed.surfaces[0], posed.surfaces[1], posed.turn, posed.shift, start)
         if not frame.regular:
             return before
-        write(roots, before, start, 0, 0, frame.normal, frame.gap, frame.point_f, frame.point_g, 0.0)
+        write(extrema, before, start, 0, 0, frame.normal, frame.gap, frame.point_f, frame.point_g, 0.0)
         for k in range(before):
-            radius = min(neglect, SAME) if extremum_at(roots, k).origin == USELESS else neglect
-            if are_one(table, pool, posed, roots, before, k, radius):
+            radius = min(merge_radius, SAME) if extremum_at(extrema, k).origin == USELESS else merge_radius
+            if are_one(table, pool, posed, extrema, before, k, radius):
                 return before
         count = before + 1
     if count > before:
@@ -185,7 +187,7 @@ def around_box(pool, o, box, side, lo, hi):
     """A box (lo, hi) made larger so that the part of one spine in a box of both is in it."""
     begin, end = (box.from_f, box.to_f) if side == 0 else (box.from_g, box.to_g)
     half = 0.5 * (end - begin)
-    middle = spine_point(pool, o, begin + half)[0]
+    middle = centerline_point(pool, o, begin + half)[0]
     return (
         (min(lo[0], middle[0] - half), min(lo[1], middle[1] - half), min(lo[2], middle[2] - half)),
         (max(hi[0], middle[0] + half), max(hi[1], middle[1] + half), max(hi[2], middle[2] + half)),
@@ -205,7 +207,7 @@ def halves(boxes, b):
 
 
 @kernel(inner=True)
-def add_minima(table, pool, posed, box, ends, what, neglect, places, roots, count, work):
+def add_minima(table, pool, posed, box, ends, what, merge_radius, places, extrema, count, work):
     """Add the minima that a box has. Returns how many roots there are, and whether these are all for certain."""
     f, g = posed.centerlines
     i = np.int64(box.part_f)
@@ -219,19 +221,25 @@ def add_minima(table, pool, posed, box, ends, what, neglect, places, roots, coun
         s, t = 0.5 * (box.from_f + box.to_f), 0.5 * (box.from_g + box.to_g)
         found, s, t, settled = convex_minimum(pool, o, p, posed.turn, posed.shift, part, ends, s, t)
         if found:
-            count = add_minimum(table, pool, posed, i, j, s, t, neglect, roots, count, work)
+            count = add_minimum(table, pool, posed, i, j, s, t, merge_radius, extrema, count, work)
     if not settled:
-        many, level, certain = valley_minima(pool, o, p, posed.turn, posed.shift, part, ends, places)
+        many, level, certain = near_singular_minima(pool, o, p, posed.turn, posed.shift, part, ends, places)
         if level:
             # All along it is as good: points here and there stand for it.
-            neglect = max(neglect, SPARSE / max(centerline_part_at(pool, o).bend, centerline_part_at(pool, p).bend))
+            merge_radius = max(
+                merge_radius, SPARSE / max(centerline_part_at(pool, o).bend, centerline_part_at(pool, p).bend)
+            )
         for m in range(many):
-            count = add_minimum(table, pool, posed, i, j, places[m, 0], places[m, 1], neglect, roots, count, work)
+            count = add_minimum(
+                table, pool, posed, i, j, places[m, 0], places[m, 1], merge_radius, extrema, count, work
+            )
     return count, certain
 
 
 @kernel(inner=True)
-def search_spines(table, pool, posed, moving, rho, lengths, neglect, boxes, waiting, rooms, roots, count, work):
+def search_centerlines(
+    table, pool, posed, moving, rho, lengths, merge_radius, boxes, waiting, rooms, extrema, count, work
+):
     """Look for all contacts of two wires with gaps up to `near`; known ones are the first `count` roots.
 
     The `lengths` are the least gap asked for, how near is near, the reach, and the flank: how far bodies may go at a
@@ -249,7 +257,7 @@ def search_spines(table, pool, posed, moving, rho, lengths, neglect, boxes, wait
     sharpest = max(wire_at(pool, line.numbers).sharpest, wire_at(pool, centerline.numbers).sharpest)
     known = count
     marks, places = rooms
-    mark_known(table, pool, posed, roots, known, marks)
+    mark_known(table, pool, posed, extrema, known, marks)
     free = reach
     fertile = math.inf
     sure = math.inf
@@ -281,8 +289,8 @@ def search_spines(table, pool, posed, moving, rho, lengths, neglect, boxes, wait
             waiting += 1
             continue
         if low <= near and not hollow and not (what == CONVEX and is_marked(boxes, b, marks, known)):
-            count, certain = add_minima(table, pool, posed, box, ends, what, neglect, places, roots, count, work)
-            if halve or count == roots.shape[0] or not certain:
+            count, certain = add_minima(table, pool, posed, box, ends, what, merge_radius, places, extrema, count, work)
+            if halve or count == extrema.shape[0] or not certain:
                 # There may be one that is not known.
                 allowed = low
         waiting = b
