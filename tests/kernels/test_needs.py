@@ -14,7 +14,7 @@ TURNS = {"coordinates_at"}
 CONTACTS = {"contact_rows"}
 SURFACES = {"start_surfaces", "coordinate_lengths", "free_row", "free_terms", "is_extremal"}
 SOLIDS = {"track_solids", "search_solids", "find_nearest"}
-CLEARANCES = {"look", "has_stayed", "measure_parts", "went_beyond"}
+CLEARANCES = {"update", "has_stayed", "measure_parts", "went_beyond"}
 BLOCKS, TAPES, TRIMS = {"factorize_blocks", "solve_blocks"}, {"run_scene_tape"}, {"trim_rows", "trim_terms"}
 # All that solves call; shapes ask for others, before.
 CALLED = BLOCKS | TAPES | TRIMS | {"find_deepest", "mark_places"}

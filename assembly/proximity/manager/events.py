@@ -33,7 +33,7 @@ class EventReason(Enum):
     CAME_NEAR = "its gap came below the pair's reach"
     WENT_AWAY = "its gap grew beyond the pair's reach"
     LOST = "its extremum ended, or left its patch: the global stage looks for what is there now"
-    SAME_EXTREMUM = "it came to the points of another contact, near along the surfaces as well"
+    SAME_ROOT = "it came to the points of another contact, near along the surfaces as well"
     NO_PLACE = "all places were taken"
 
 
