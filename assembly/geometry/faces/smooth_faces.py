@@ -90,4 +90,5 @@ def _part(surface: NurbsSurface, u: Interval, v: Interval) -> NurbsSurface:
 
 
 def _made(face: Face, surface: NurbsSurface, *loops: object) -> Face:
+    # Loops are an outer one and a list of holes, or none: mypy cannot know which of the arguments each is.
     return Face(surface, *loops, name=face.name, reversed=face.reversed, color=face.color)  # type: ignore[arg-type]
