@@ -8,6 +8,9 @@ import numpy as np
 import pytest
 
 import assembly as asm
+from assembly.constraints.program.contact import OTHER_SIDE, track_contact
+from assembly.constraints.program.records import ROW_TABLE
+from assembly.proximity.features.solid_contact import CONTACT_RECORD, TRACK, tracked_at
 from assembly.solve.attempts.starts import scattered
 from assembly.solve.diagnosis.contradiction import is_certain
 from tests.solve.linkages import linkage, random_turn
@@ -335,3 +338,23 @@ def test_a_contact_keeps_to_its_side_of_a_ball():
 def test_a_solve_out_of_steps_is_not_tried_elsewhere():
     solution = crank_slider((0.0, None)).solve(max_iterations=3)
     assert solution.status is asm.Status.ITERATION_LIMIT and not solution.restarted
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0, 0.0])
+def test_a_pair_on_the_other_side_of_a_ball_is_another_pair(side):
+    """Newton's method, begun at the top of a ball on a plane, stays there: that is no pair of one at its bottom."""
+    plane, ball = asm.Body("plane", asm.shapes.plane(4, 4), fixed=True), asm.Body("ball", asm.shapes.sphere(1.0))
+    scene = asm.Assembly([plane, ball])
+    scene.constrain(asm.Contact(plane, ball))
+    packed = scene.packed()
+    q = np.array([plane.q, [0.1, 0.2, 1.5, *np.sqrt([0.5, 0.5, 0.0, 0.0])]])
+    q[:, :3] = (q[:, :3] - packed.reference) / packed.scale
+    start, records = np.zeros((1, TRACK)), np.zeros((1, CONTACT_RECORD))
+    middle = np.mean(plane.faces[0].face.surface.domain, axis=1)
+    # The ball is turned so that its top, at (pi/2, pi/2), is no pole.
+    start[0, :4] = (*middle, 1.5, 1.6)
+    tracked_at(start, 0).facing = side
+    row = int(packed.table[ROW_TABLE])
+    status, _x, facing, _gap = track_contact(packed.table, packed.pool, row, q, start, np.inf, records, 0)
+    assert (status == OTHER_SIDE) == (side == 1.0)
+    assert facing == (1.0 if side == 1.0 else -1.0)
