@@ -10,6 +10,7 @@ A record does not keep its block: as with `_carve.py`, the block has to outlive 
 
 from __future__ import annotations
 
+from collections import namedtuple
 from collections.abc import Callable
 from typing import Any
 
@@ -20,7 +21,11 @@ from numba.extending import intrinsic, overload
 from numba.np import numpy_support
 from numba.np.arrayobj import make_array
 
-__all__ = ["place_of", "record_dtype", "record_view", "rows_of", "size_of"]
+__all__ = ["Store", "place_of", "record_dtype", "record_view", "rows_of", "size_of"]
+
+# What kernels read of a scene: `table`, the flat array of its integers (records of surfaces, faces, trees and rows, and
+# places in the pool), and `pool`, the flat array of its doubles.
+Store = namedtuple("Store", "table pool")
 
 
 def record_dtype(item: str, /, **fields: int | tuple[int, ...]) -> np.dtype[Any]:

@@ -10,9 +10,10 @@ import math
 
 from assembly._kernel import kernel
 from assembly._lanes import lane, load_lanes
+from assembly._record import Store
 from assembly.geometry.splines.evaluate import surface_lanes, surface_point
 from assembly.geometry.vec import add
-from assembly.kinematics.motion import relative_pose, rotation
+from assembly.kinematics.motion import RelativePose, relative_pose, rotation
 from assembly.proximity.bvh.tree import pairs_within
 from assembly.proximity.extrema.face_face import pair_frame, solve_pair
 from assembly.proximity.extrema.pair_matrix import pair_matrix
@@ -24,7 +25,7 @@ def lanes_along(table, pool, u, v):
     """Point and all second derivatives along a path, as four-lane values."""
     total = 0.0 * load_lanes(pool, 0)
     for i in range(u.size):
-        a, au, av, auu, auv, avv = surface_lanes(table, pool, 0, u[i], v[i])
+        a, au, av, auu, auv, avv = surface_lanes(Store(table, pool), 0, u[i], v[i])
         total = total + a + au + av + auu + auv + avv
     return lane(total, 0) + lane(total, 1) + lane(total, 2)
 
@@ -52,7 +53,15 @@ def solve_pairs(table, pool, records, q, starts, sizes, close, times, parameters
         for _ in range(times):
             turn, shift = relative_pose(q[i], 0, rotation(q[i], 0), 1, rotation(q[i], 1))
             status, x, count, frame, _curvature = solve_pair(
-                table, pool, records[i, 0], records[i, 1], turn, shift, start, sizes[i], math.inf, close, False
+                Store(table, pool),
+                records[i, 0],
+                records[i, 1],
+                RelativePose(turn, shift),
+                start,
+                sizes[i],
+                math.inf,
+                close,
+                False,
             )
             total += count
             statuses[i] = status
@@ -87,7 +96,7 @@ def contact_jacobians(table, pool, records, q, parameters, size, times, record, 
         for _ in range(times):
             turn = rotation(q[i], 0)
             relative, shift = relative_pose(q[i], 0, turn, 1, rotation(q[i], 1))
-            frame = pair_frame(table, pool, records[i, 0], records[i, 1], relative, shift, x)
+            frame = pair_frame(Store(table, pool), records[i, 0], records[i, 1], RelativePose(relative, shift), x)
             curvature = pair_matrix(frame[7], frame[8], frame[10], 1e-9 / size)
             store_record(turn, shift, frame, curvature, record, 0)
             for k in range(4):
@@ -120,7 +129,9 @@ def facing_bodies(table, pool, trees, q, reach, stack, out):
         turn_j = rotation(q, j)
         for i in range(j):
             turn, shift = relative_pose(q, i, rotation(q, i), j, turn_j)
-            count = pairs_within(table, pool, trees[i], trees[j], turn, shift, reach, stack, out[total:])
+            count = pairs_within(
+                Store(table, pool), trees[i], trees[j], RelativePose(turn, shift), reach, stack, out[total:]
+            )
             if count < 0 or count > out.shape[0] - total:
                 return -1
             total += count

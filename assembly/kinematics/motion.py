@@ -7,9 +7,14 @@ world. A twist is linear, then angular velocity, world axes, at the body's origi
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 from assembly._kernel import kernel
 from assembly.geometry.vec import matmul_t, matvec_t, quaternion_matrix, quaternion_product
+
+# The pose of a shape in the axes that a kernel works in, mostly those of another body: a rotation matrix by rows and
+# the place of the shape's origin.
+RelativePose = namedtuple("RelativePose", "rotation shift")
 
 
 @kernel(inline=True)
@@ -30,7 +35,7 @@ def relative_pose(q, i, rotation_i, j, rotation_j):
     The positions are subtracted before anything else, so a common offset cancels.
     """
     shift = matvec_t(rotation_i, (q[j, 0] - q[i, 0], q[j, 1] - q[i, 1], q[j, 2] - q[i, 2]))
-    return matmul_t(rotation_i, rotation_j), shift
+    return RelativePose(rotation=matmul_t(rotation_i, rotation_j), shift=shift)
 
 
 @kernel(inline=True)

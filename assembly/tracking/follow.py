@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
+from assembly._record import Store
 from assembly.constraints.program.contact import predict_pair, surface_of, track_contact, track_row
 from assembly.constraints.program.records import (
     ROW,
@@ -49,10 +50,10 @@ UNIT = 1e-2
 
 
 @kernel(inner=True)
-def place_bodies(table, pool, q, poses):
+def place_bodies(store, q, poses):
     """Poses in the user's coordinates to scaled ones. Whether all are finite and the quaternions nearly unit."""
-    units = pool_header_at(pool, 0)
-    for b in range(header_at(table, 0).bodies):
+    units = pool_header_at(store.pool, 0)
+    for b in range(header_at(store.table, 0).bodies):
         square = 0.0
         for k in range(7):
             if not math.isfinite(q[b, k]):
@@ -89,9 +90,9 @@ def write_twists(table, before, poses, twists):
 
 
 @kernel(inner=True)
-def predict(table, pool, row, r, tracked, records, twists, guess):
+def predict(store, row, r, tracked, records, twists, guess):
     """Coordinates of contact r along its bodies' twists."""
-    fields = row_at(table, row)
+    fields = row_at(store.table, row)
     derivatives = derivatives_at(records, r)
     f = fields.body_f
     g = fields.body_g
@@ -103,15 +104,15 @@ def predict(table, pool, row, r, tracked, records, twists, guess):
             s += derivatives.zed[j, i] * twists[f, i] + derivatives.zed[j, 6 + i] * twists[g, i]
         for i in range(4):
             guess[r, i] += derivatives.rates[i, j] * s
-    predict_pair(table, pool, row, r, tracked, guess)
+    predict_pair(store, row, r, tracked, guess)
 
 
 @kernel(inline=True)
-def part_of_domain(table, pool, surface, u, v, s, t):
+def part_of_domain(store, surface, u, v, s, t):
     """The larger difference of two pairs of parameters, in parts of the domain, the shorter way around."""
-    patch = surface_at(table, surface)
-    du = abs(u - s) / (pool[patch.breaks_u + patch.spans_u] - pool[patch.breaks_u])
-    dv = abs(v - t) / (pool[patch.breaks_v + patch.spans_v] - pool[patch.breaks_v])
+    patch = surface_at(store.table, surface)
+    du = abs(u - s) / (store.pool[patch.breaks_u + patch.spans_u] - store.pool[patch.breaks_u])
+    dv = abs(v - t) / (store.pool[patch.breaks_v + patch.spans_v] - store.pool[patch.breaks_v])
     if patch.closed_u == 1:
         du = min(du, abs(1.0 - du))
     if patch.closed_v == 1:
@@ -120,29 +121,29 @@ def part_of_domain(table, pool, surface, u, v, s, t):
 
 
 @kernel(inner=True)
-def is_astray(table, pool, row, r, before, guess, after):
+def is_astray(store, row, r, before, guess, after):
     """Whether a contact of two surfaces was corrected by so much that it may have come to another root."""
     for side in range(2):
         i = 2 * side
-        surface = surface_of(table, row, side)
-        moved = part_of_domain(table, pool, surface, before[r, i], before[r, i + 1], guess[r, i], guess[r, i + 1])
-        off = part_of_domain(table, pool, surface, guess[r, i], guess[r, i + 1], after[r, i], after[r, i + 1])
+        surface = surface_of(store.table, row, side)
+        moved = part_of_domain(store, surface, before[r, i], before[r, i + 1], guess[r, i], guess[r, i + 1])
+        off = part_of_domain(store, surface, guess[r, i], guess[r, i + 1], after[r, i], after[r, i + 1])
         if off > ASTRAY * moved + SLACK:
             return True
     return False
 
 
 @kernel(inner=True)
-def correct(table, pool, row, r, q, guess, tracked, records):
+def correct(store, row, r, q, guess, tracked, records):
     """Newton's method from guess[r], into tracked[r] and record r. Whether there is a minimum of the distance."""
     pair = tracked_at(tracked, r)
     for i in range(TRACK):
         tracked[r, i] = guess[r, i]
-    if contact_row_at(table, row).shell_f >= 0:
-        status = track_row(table, pool, row, q, guess, BEND, records, tracked, r)
+    if contact_row_at(store.table, row).shell_f >= 0:
+        status = track_row(store, row, q, guess, BEND, records, tracked, r)
         found = status == CONVERGED or status == SINGULAR
     else:
-        status, x, facing, _distance = track_contact(table, pool, row, q, guess, BEND, records, r)
+        status, x, facing, _distance = track_contact(store, row, q, guess, BEND, records, r)
         found = status == CONVERGED or status == SINGULAR
         tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3] = x
         pair.facing = facing
@@ -163,12 +164,12 @@ def look_at_all_of(table, memory, k):
 
 
 @kernel(inner=True)
-def doubt_twins(table, pool, memory, k, records):
+def doubt_twins(store, memory, k, records):
     """Look at a pair of bodies where contact k came within the spheres of neglect of another one."""
-    header = header_at(table, 0)
+    header = header_at(store.table, 0)
     first = header.first_guard
-    places = memory_places(table, header.watch)[1]
-    near = lengths_at(pool, manager_at(table, header.watch).lengths).neglect
+    places = memory_places(store.table, header.watch)[1]
+    near = lengths_at(store.pool, manager_at(store.table, header.watch).lengths).neglect
     for l in range(k):
         if place_at(memory, places + PLACE_MEMORY * l).pair != place_at(memory, places + PLACE_MEMORY * k).pair:
             continue
@@ -177,7 +178,7 @@ def doubt_twins(table, pool, memory, k, records):
             d = derivatives_at(records, first + k).arm_f[i] - derivatives_at(records, first + l).arm_f[i]
             square += d * d
         if square <= near * near:
-            look_at_all_of(table, memory, k)
+            look_at_all_of(store.table, memory, k)
 
 
 @kernel(
@@ -192,13 +193,14 @@ def follow(table, pool, q, poses, tracked, records, room, free, memory):
     twists), a guess, and two rows of numbers. Returns the number of events, or -1, and nothing has changed, for poses
     that are not finite or whose quaternions are far from unit.
     """
+    store = Store(table, pool)
     header = header_at(table, 0)
     state = memory_header_at(memory, 0)
     standing, twists, guess, before, rows = room
     # Nothing evaluates rows here: what would be their residuals and multipliers is room alone.
     listed = Iterate(poses, tracked, records, rows[0], rows)
     events = state.event_count
-    if not place_bodies(table, pool, q, standing):
+    if not place_bodies(store, q, standing):
         return -1
     write_twists(table, poses, standing, twists)
     for b in range(header.bodies):
@@ -212,15 +214,15 @@ def follow(table, pool, q, poses, tracked, records, room, free, memory):
             continue
         for i in range(TRACK):
             before[r, i] = tracked[r, i]
-        predict(table, pool, row, r, tracked, records, twists, guess)
-        if not correct(table, pool, row, r, poses, guess, tracked, records):
+        predict(store, row, r, tracked, records, twists, guess)
+        if not correct(store, row, r, poses, guess, tracked, records):
             continue
         if abs(contact_record_at(records, r).fold) < NEAR_FOLD:
             look_at_all_of(table, memory, k)
-        elif contact_row_at(table, row).shell_f < 0 and is_astray(table, pool, row, r, before, guess, tracked):
+        elif contact_row_at(table, row).shell_f < 0 and is_astray(store, row, r, before, guess, tracked):
             look_at_all_of(table, memory, k)
-        doubt_twins(table, pool, memory, k, records)
-    update_around(table, pool, memory, listed, IN_TURNS)
+        doubt_twins(store, memory, k, records)
+    update_around(store, memory, listed, IN_TURNS)
     for k in range(header.guards):
         before[first + k, 0] = float(contact_row_at(table, header.row_table + ROW * (first + k)).guard_number)
     place_clearance_rows(table, memory, listed, rows[0], rows[1], free, False)
@@ -230,5 +232,5 @@ def follow(table, pool, q, poses, tracked, records, room, free, memory):
         if row_at(table, row).body_f >= 0 and float(contact_row_at(table, row).guard_number) != before[r, 0]:
             for i in range(TRACK):
                 guess[r, i] = tracked[r, i]
-            correct(table, pool, row, r, poses, guess, tracked, records)
+            correct(store, row, r, poses, guess, tracked, records)
     return int(state.event_count - events)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from assembly._record import Store
 from assembly.constraints.program import evaluate as program
 from assembly.constraints.program import records as layout
 from assembly.constraints.program import row_terms
@@ -55,10 +56,10 @@ class LoopPoint:
             state[packed.contacts_at : packed.angles_at] = np.nan
             packed.start_angles(np.array(q, dtype=float), state, False)
             tracked = state[packed.contacts_at : packed.multipliers_at].reshape(-1, TRACK)
-            start = (table, self.pool, scaled, tracked, free, self.loose.lengths)
+            start = (Store(table, self.pool), scaled, tracked, free, self.loose.lengths)
             # Solids that cross are looked for where a scene asks for it.
             assert start_contacts(*start) < 0 or (packed.seek_penetration() and start_contacts(*start) < 0)
-        lost = program.evaluate(table, self.pool, np.array(tracked), np.inf, self.loose, self.room, self.point)
+        lost = program.evaluate(Store(table, self.pool), np.array(tracked), np.inf, self.loose, self.room, self.point)
         assert lost < 0
 
     @property
@@ -101,8 +102,7 @@ class LoopPoint:
         """Value, gradient (n,) and Hessian (n, n) of the objective."""
         gradient, hessian = np.zeros(self.n), self.room_for_hessian()
         value = goal(
-            self.table,
-            self.pool,
+            Store(self.table, self.pool),
             self.shape,
             self.rows,
             self.loose,
@@ -119,8 +119,7 @@ class LoopPoint:
         """Second derivative of y . rows + J^T diag(weights) J, (n, n)."""
         hessian = self.room_for_hessian()
         row_terms.add_row_terms(
-            self.table,
-            self.pool,
+            Store(self.table, self.pool),
             self.loose,
             self.room,
             self.shape,

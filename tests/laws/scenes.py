@@ -9,6 +9,7 @@ import numpy as np
 from assembly.geometry import shapes
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.surface import NurbsSurface
+from assembly.kinematics.motion import RelativePose
 from assembly.proximity.manager.posed_pair import PosedPair
 from tests.laws.witness import Pairs, Stack, rotated
 
@@ -168,4 +169,6 @@ def random_group(seed, kind_f, kind_g, count):
 
 def posed(turn, shift, surfaces=(-1, -1), shells=(-1, -1), trees=(-1, -1)):
     """A posed pair of bodies, of which kernels read no more than the pose and the shapes."""
-    return PosedPair(turn, shift, surfaces, shells, trees, (-1, -1), bodies=(0, 1), poses=None, track_solids=0)
+    return PosedPair(
+        RelativePose(turn, shift), surfaces, shells, trees, (-1, -1), bodies=(0, 1), poses=None, track_solids=0
+    )

@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import assembly as asm
+from assembly._record import Store
 from assembly.constraints.program.records import MOVING, WATCH, Iterate
 from assembly.proximity.brep.borders import feature_kind
 from assembly.proximity.brep.records import EDGE, FACE
@@ -60,7 +61,7 @@ class Looked:
 
     def parts(self, q):
         """Which parts of their allowances pairs have used."""
-        return np.array([part_used(self.table, self.pool, self.watch, self.memory, p, q) for p in self.pairs])
+        return np.array([part_used(Store(self.table, self.pool), self.watch, self.memory, p, q) for p in self.pairs])
 
     def moved(self, q, step, share):
         out = q.copy()
@@ -70,7 +71,7 @@ class Looked:
     def allowed(self, q, step, share):
         trial = q.copy()
         return allowed_share(
-            self.table, self.pool, self.memory, Iterate(q, *[None] * 4), Iterate(trial, *[None] * 4), step, share
+            Store(self.table, self.pool), self.memory, Iterate(q, *[None] * 4), Iterate(trial, *[None] * 4), step, share
         )
 
     def column(self, k):
@@ -159,7 +160,7 @@ def test_a_point_that_stays_on_an_edge_is_no_root():
             roots[0, EXTREMUM_FOLD], roots[0, EXTREMUM_BEYOND] = 1.0, np.nan
             for corner, known in ((NOTHING, True), (FEATURES, True), (POINT, False)):
                 roots[0, VERTEX_CONTACT] = corner
-                assert is_known(table, pool, looked_into, e[0], d[0], roots, 1)[2] == known
+                assert is_known(Store(table, pool), looked_into, e[0], d[0], roots, 1)[2] == known
             seen += 1
     assert seen > 4
 
@@ -192,7 +193,7 @@ def test_no_point_goes_farther_than_is_told():
             for k in range(2):
                 turn = Rotation.from_rotvec(size * rng.normal(size=3))
                 after[k, 3:] = rng.choice([-1.0, 1.0]) * turn.as_quat(scalar_first=True)
-            bound = went(table, pool, at, 0, before, after)
+            bound = went(Store(table, pool), at, 0, before, after)
             moved = seen(after, side, 1 - side, points) - seen(before, side, 1 - side, points)
             most = np.linalg.norm(moved, axis=1).max()
             # Rounding of places some sizes from the origin.
@@ -202,4 +203,4 @@ def test_no_point_goes_farther_than_is_told():
     # Both together go nowhere, seen from each other.
     q = scene.q.copy()
     q[:, :3] += 1.0
-    assert went(table, pool, at, 0, scene.q.copy(), q) <= 1e-14
+    assert went(Store(table, pool), at, 0, scene.q.copy(), q) <= 1e-14

@@ -11,11 +11,13 @@ import numpy as np
 import pytest
 
 from assembly._kernel import kernel
+from assembly._record import Store
 from assembly.geometry import shapes
 from assembly.geometry.faces.face import Face
 from assembly.geometry.shapes import solids
 from assembly.geometry.splines.evaluate import surface_point
 from assembly.geometry.splines.surface import NurbsSurface
+from assembly.kinematics.motion import RelativePose
 from assembly.proximity.brep.packing import pack_shell
 from assembly.proximity.brep.records import EDGE, EDGE_CURVE, EDGE_RECORD, EDGE_TABLE, EDGES, FACE, FACE_RECORD
 from assembly.proximity.brep.topology import topology_of
@@ -52,19 +54,19 @@ SURFACES = {
 @kernel
 def edge_points(table, pool, edge, t, out):
     for k in range(t.size):
-        p = edge_jet(table, pool, edge, t[k])[0]
+        p = edge_jet(Store(table, pool), edge, t[k])[0]
         out[k, 0], out[k, 1], out[k, 2] = p
 
 
 @kernel
 def fill(table, pool, turn, shift, nodes, info, i, work):
-    give_model(table, pool, turn, shift, nodes, info, i, work)
+    give_model(Store(table, pool), RelativePose(turn, shift), nodes, info, i, work)
 
 
 def open_all(table, pool, shell, turn, shift, nodes, info, work):
-    used = plant(table, pool, shell, turn, shift, nodes, info)
+    used = plant(Store(table, pool), shell, RelativePose(turn, shift), nodes, info)
     for i in range(1, used):
-        used = grow(table, pool, shell, turn, shift, nodes, info, i, used)
+        used = grow(Store(table, pool), shell, RelativePose(turn, shift), nodes, info, i, used)
     return used
 
 
@@ -206,7 +208,7 @@ def test_models_of_edges_hold(name, cases):
 def tree(faces, turn, shift):
     """All nodes of a solid's tree down to its cells, with the arrays that made them."""
     table, pool, shell = pack_shell(topology_of(faces), 1.0)
-    count = room(table, pool, shell)
+    count = room(Store(table, pool), shell)
     nodes, info, work = np.zeros((count, box.NODE)), np.zeros((count, INFO), np.int64), np.empty((4, 16, 16))
     used = open_all(table, pool, shell, turn, shift, nodes, info, work)
     return nodes[:used], info[:used], (table, pool, turn, shift, work)

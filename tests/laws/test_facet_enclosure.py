@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from assembly._record import Store
 from assembly.geometry import shapes
 from assembly.geometry.faces.face import Face
 from assembly.geometry.shapes import solids
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.surface import NurbsSurface
+from assembly.kinematics.motion import RelativePose
 from assembly.proximity import FeatureStatus, PairStatus, closest_features, extremal_pair
 from assembly.proximity.bvh.facet_check import edge_point, other_parameter
 from assembly.proximity.bvh.facet_tree import FacetTree
@@ -323,12 +325,12 @@ def test_plain_python_finds_the_same():
     for _ in range(4):
         (_, _, f, n), (_, _, g, m) = (sample(tree, rng) for tree in descent.trees)
         turn, shift = placed(rng, f, n, g, m, rng.uniform(-0.1, 0.1))
-        pose = tuple(turn.ravel().tolist()), tuple(shift.tolist())
-        arrays = descent.table, descent.pool, descent.f, descent.g
+        pose = RelativePose(tuple(turn.ravel().tolist()), tuple(shift.tolist()))
+        arrays = Store(descent.table, descent.pool), descent.f, descent.g
         # An inner kernel is plain Python when it is called from Python.
-        count = pairs_within(*arrays, *pose, 0.2, descent.stack, room)
+        count = pairs_within(*arrays, pose, 0.2, descent.stack, room)
         assert {tuple(row) for row in room[:count].tolist()} == descent.found(turn, shift, 0.2)
-        lower = least_distance(*arrays, *pose, 5.0, descent.stack)
+        lower = least_distance(*arrays, pose, 5.0, descent.stack)
         assert descent.lower(turn, shift, 5.0) == pytest.approx(lower, rel=1e-12, abs=1e-12)
 
 

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from assembly._record import Store
 from assembly.geometry.vec import quaternion_matrix
+from assembly.kinematics.motion import RelativePose
 from assembly.proximity.bvh.tree import magnitudes
 from assembly.proximity.manager.candidates import element_distance
 from tests.laws.test_facet_enclosure import BODIES, Descent, placed, sample
@@ -44,7 +46,7 @@ def test_patches_are_no_nearer_than_they_are_said_to_be(names, cases):
                 continue
             q = q @ turn.T + shift
             trees, at = (descent.f, descent.g), tuple(shift.tolist())
-            distance = element_distance(descent.table, descent.pool, trees, there, at, bulk, i, j)
+            distance = element_distance(Store(descent.table, descent.pool), trees, RelativePose(there, at), bulk, i, j)
             nearest = np.linalg.norm(p[:, None] - q, axis=2).min()
             if np.isfinite(distance):
                 # Points of nets are no nearer than the patches are; rounding of lengths of order one.

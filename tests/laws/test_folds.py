@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 import assembly as asm
+from assembly._record import Store
 from assembly.constraints.program.records import FREE_COLUMN, ROWS, WATCH, Iterate
 from assembly.geometry.splines.evaluate import SURFACE_RECORD
-from assembly.kinematics.motion import relative_pose, rotation
+from assembly.kinematics.motion import RelativePose, relative_pose, rotation
 from assembly.proximity.extrema.face_face import SINGULAR, solve_pair
 from assembly.proximity.extrema.lifted_pair import VARIABLES, VECTORS, free_rows
 from assembly.proximity.extrema.pairs import _key, _packed, as_face, extremal_pair
@@ -52,7 +53,7 @@ def test_what_a_gap_gains_by_tangency():
     for size in (1e-3, 1e-4):
         for _ in range(20):
             x = tuple(pair.parameters + size * rng.normal(size=4))
-            free_rows(table, pool, 0, SURFACE_RECORD, 0, 1, q, x, (1.0,) * 4, work, residual, jacobian, 0, 1)
+            free_rows(Store(table, pool), 0, SURFACE_RECORD, 0, 1, q, x, (1.0,) * 4, work, residual, jacobian, 0, 1)
             gained = untouched(residual, jacobian, 0, 1, square)
             # The next order is smaller by the step, times third derivatives of some tens.
             assert gained == pytest.approx(2.0 * abs(pair.gap - residual[0]), rel=60.0 * size, abs=1e-15)
@@ -67,7 +68,7 @@ def root_at(table, pool, q, start):
     turn, shift = relative_pose(q, 0, rotation(q, 0), 1, rotation(q, 1))
     pair = posed(turn, shift, surfaces=(0, SURFACE_RECORD))
     out = np.full((1, roots.ROOT), np.nan)
-    assert roots.surfaces_extremum(table, pool, pair, tuple(start), out, 0) != roots.NOTHING
+    assert roots.surfaces_extremum(Store(table, pool), pair, tuple(start), out, 0) != roots.NOTHING
     assert np.isnan(out[0, roots.EXTREMUM_BEYOND])
     return pair, out[0]
 
@@ -92,7 +93,7 @@ def test_a_fold_beyond_a_knot_line_is_that_of_the_pair_there(side):
         q = np.array([[0.0, 0.0, 0.0, *IDENTITY], [*(ring[1] + 0.1 * outward + along_line), *IDENTITY]])
         near_pair, root = root_at(table, pool, q, extremal_pair(clip, q[0], ball, q[1]).parameters)
         near = (0.05, -1.0, -1.0, -1.0)  # no other knot lines
-        folds.append((root[roots.EXTREMUM_FOLD], fold_beyond(table, pool, near_pair, tuple(root[:4]), near)))
+        folds.append((root[roots.EXTREMUM_FOLD], fold_beyond(Store(table, pool), near_pair, tuple(root[:4]), near)))
     (here, beyond), (there, behind) = folds
     assert abs(here - there) > 0.05
     # The two places are 2e-6 apart, where curvatures change by some hundreds a unit.
@@ -115,7 +116,9 @@ def test_a_valley_of_fourth_order_is_a_pair_after_few_steps():
     identity = rotation(np.array([[0.0, 0.0, 0.0, *IDENTITY]]), 0)
     for start in (0.3, 0.02):
         x = (start, 0.1, start, 0.1)
-        found = solve_pair(table, pool, 0, SURFACE_RECORD, identity, (0.0, 0.0, 0.01), x, 1.0, np.inf, 0.0, False)
+        found = solve_pair(
+            Store(table, pool), 0, SURFACE_RECORD, RelativePose(identity, (0.0, 0.0, 0.01)), x, 1.0, np.inf, 0.0, False
+        )
         assert found.status == SINGULAR
         # x^4 where the slope 4 x^3 is 1e-9.
         assert found.frame.gap == pytest.approx(0.01, abs=2e-13)
@@ -176,8 +179,7 @@ def test_a_given_contact_stands_only_for_the_root_it_is_at(off, swapped):
     listed = len(table)
     found = np.full((4, roots.ROOT), np.nan)
     count = roots.add_given(
-        np.append(table, [0, swapped, 0, -1, -1, -1, -1]),
-        pool,
+        Store(np.append(table, [0, swapped, 0, -1, -1, -1, -1]), pool),
         near_pair,
         tracked,
         listed,
@@ -232,7 +234,7 @@ def test_a_free_contact_of_a_clearance_goes_to_its_extremum_if_it_is_off_it(off)
     rows = int(table[ROWS])
     tracked, free = np.full((packed.tracked, TRACK), np.nan), np.full(rows, -1)
     point = Iterate(q, tracked, np.zeros((rows, CONTACT_RECORD)), np.zeros(rows), None)
-    assert update_around(table, packed.pool, memory, point, watch.EVERYTHING)
+    assert update_around(Store(table, packed.pool), memory, point, watch.EVERYTHING)
     place_clearance_rows(table, memory, point, np.zeros(rows), np.zeros(rows), free, True)
     row = int(np.flatnonzero(~np.isnan(tracked[:, 0]))[0])
     extremum = tracked[row].copy()
@@ -241,7 +243,7 @@ def test_a_free_contact_of_a_clearance_goes_to_its_extremum_if_it_is_off_it(off)
     q[1, 0] += 1e-15
     tracked[row, :4] += off
     moved = tracked[row].copy()
-    changed = update_again(table, packed.pool, memory, point, watch.EVERYTHING, free, np.empty_like(tracked))
+    changed = update_again(Store(table, packed.pool), memory, point, watch.EVERYTHING, free, np.empty_like(tracked))
     assert changed == (off > 1e-6)
     assert np.array_equal(tracked[row], moved) if off < 1e-6 else np.abs(tracked[row, :4] - extremum[:4]).max() < 1e-9
 

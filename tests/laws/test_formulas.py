@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from assembly._record import Store
 from assembly.geometry import shapes
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.evaluate import POLES
@@ -354,7 +355,7 @@ def test_the_frame_at_a_pole(surface, curvatures, reverse):
             place = np.empty(2)
             place[across] = low + delta if edge in (1, 4) else high - delta
             place[1 - across] = start + 0.3 * (end - start)
-            frame = pole_frame(record, pool, 0, edge, *place)
+            frame = pole_frame(Store(record, pool), 0, edge, *place)
             tangents = np.array([frame.tangent_x, frame.tangent_y])
             # The frame turns with the normal, up to second order.
             assert frame.regular and np.abs(tangents @ frame.normal).max() < 50.0 * delta**2

@@ -11,6 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import assembly as asm
+from assembly._record import Store
 from assembly.geometry import interval
 from assembly.geometry.expression import formula, tape
 from assembly.geometry.expression.instructions import compact, packed
@@ -253,7 +254,7 @@ def test_many_arcs_as_one_by_one(count):
     t0, t1 = np.sort(np.random.default_rng(count).uniform(0.0, 6.0, (2, count)), axis=0)
     table, pool = curve.packed()
     room = np.zeros(int(table[formula.ROOM]))
-    one = [formula.arc_bound(table, pool, *ends, room) for ends in zip(t0, t1, strict=True)]
+    one = [formula.arc_bound(Store(table, pool), *ends, room) for ends in zip(t0, t1, strict=True)]
     assert curve.arc_lengths(t0, t1) == pytest.approx(one, rel=1e-10)
 
 

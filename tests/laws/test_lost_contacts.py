@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from assembly._record import Store
 from assembly.constraints.program.contact import HARDLY, MAY_GO, hold_all, lost_clearance_row, may_go
 from assembly.constraints.program.records import (
     CLEARANCE_ROWS,
@@ -42,7 +43,7 @@ def guards(gap, solids=True):
 @pytest.mark.parametrize("gap", [1.0, 1e-12, -1e-12, -5e-10, -2e-9, -0.5])
 def test_a_contact_that_ends_stays_behind_where_it_is_open_or_solids_touch(gap, solids):
     table, pool, start, point = guards(gap, solids)
-    stays_behind = lost_clearance_row(table, pool, 1, start, point, False, False)
+    stays_behind = lost_clearance_row(Store(table, pool), 1, start, point, False, False)
     assert stays_behind == (gap > (-1e-9 if solids else 0.0))
     _q, tracked, records, residual, jacobian = point
     if not stays_behind:
@@ -54,7 +55,7 @@ def test_a_contact_that_ends_stays_behind_where_it_is_open_or_solids_touch(gap, 
     assert np.isnan(tracked[1, 0]) and (jacobian[1, :FREE_COLUMN] == 0.0).all() and np.isfinite(records[1]).any()
     assert np.isnan(residual[0])
     # It may be evaluated again, however often.
-    assert lost_clearance_row(table, pool, 1, tracked, point, False, False) and residual[1] == pytest.approx(
+    assert lost_clearance_row(Store(table, pool), 1, tracked, point, False, False) and residual[1] == pytest.approx(
         gap, abs=1e-16
     )
 
@@ -62,7 +63,7 @@ def test_a_contact_that_ends_stays_behind_where_it_is_open_or_solids_touch(gap, 
 def test_a_contact_that_is_not_open_stays_behind_where_it_goes_or_is_past_its_face():
     for past, goes, told in ((False, True, -0.5), (True, False, 0.0)):
         table, pool, start, point = guards(-0.5)
-        assert lost_clearance_row(table, pool, 1, start, point, past, goes)
+        assert lost_clearance_row(Store(table, pool), 1, start, point, past, goes)
         assert point.residual[1] == told and np.isnan(point.tracked[1, 0])
 
 
@@ -88,5 +89,5 @@ def test_a_start_leaves_to_the_watch_what_a_clearance_has_lost():
         table, pool, start, _point = guards(0.0, solids)
         table[CONTACTS] = 2
         start[:, 0] = np.nan
-        assert start_contacts(table, pool, None, start, np.full(2, -1), None) == -1
+        assert start_contacts(Store(table, pool), None, start, np.full(2, -1), None) == -1
         assert np.isnan(start[:, 0]).all()

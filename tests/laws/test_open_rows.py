@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import assembly as asm
+from assembly._record import Store
 from assembly.constraints.program import records as layout
 from assembly.constraints.program.evaluate import evaluate
 from assembly.proximity.extrema.lifted_pair import VARIABLES, VECTORS
@@ -67,15 +68,15 @@ class Near:
     def exactly(self, point):
         """Every row by its pair."""
         start = point.tracked.copy()
-        return evaluate(self.table, self.pool, start, np.inf, self.loose, self.room, point) < 0
+        return evaluate(Store(self.table, self.pool), start, np.inf, self.loose, self.room, point) < 0
 
     def step(self, d):
         """The point that a step leads to, as the loop evaluates it, and which rows it took as open."""
         trial = self.point(self.here.q)
         move(self.table, self.here.q, d, 1.0, trial.q)
-        predict_pairs(self.table, self.pool, self.shape.bases, self.loose, self.here, trial, d, 1.0)
+        predict_pairs(Store(self.table, self.pool), self.shape.bases, self.loose, self.here, trial, d, 1.0)
         idle = self.loose.guess[:, IDLE] == 1.0
-        found = evaluate(self.table, self.pool, self.loose.guess, np.inf, self.loose, self.room, trial) < 0
+        found = evaluate(Store(self.table, self.pool), self.loose.guess, np.inf, self.loose, self.room, trial) < 0
         return trial, idle, found
 
 

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from assembly._record import Store
 from assembly.geometry.vec import quaternion_matrix
+from assembly.kinematics.motion import RelativePose
 from assembly.proximity.bvh.neighbor_list import COUNT, LIST_INTS, OWNER, listed_pairs
 from assembly.proximity.bvh.tree import CENTER, NODE_POOL, RADIUS, pairs_within
 from assembly.proximity.manager.motion_bounds import Mover
@@ -53,14 +55,16 @@ def test_a_list_has_what_is_in_reach_at_poses_near_its_own(names, side):
             e = tuple(Rotation.from_matrix(seen[0]).as_quat(scalar_first=True).tolist())
             moving = Mover(side, trees[side], e, quaternion_matrix(*e), tuple(seen[1].tolist()))
             turn, shift = seen if side == 1 else inverse(*seen)
-            there = tuple(turn.ravel().tolist()), tuple(shift.tolist())
+            there = RelativePose(tuple(turn.ravel().tolist()), tuple(shift.tolist()))
             before = table[at:].copy()
-            count = listed_pairs(table, pool, at, 0, trees, *there, moving, REACH, 1.01 * RING, descent.stack, room)
+            count = listed_pairs(
+                Store(table, pool), at, 0, trees, there, moving, REACH, 1.01 * RING, descent.stack, room
+            )
             if count < 0:
                 assert table[at + COUNT] == -1
                 break
             listed = {tuple(row) for row in room[:count].tolist()}
-            count = pairs_within(table, pool, *trees, *there, REACH, descent.stack, room)
+            count = pairs_within(Store(table, pool), *trees, there, REACH, descent.stack, room)
             assert {tuple(row) for row in room[:count].tolist()} <= listed
             sifted += len(listed)
             kept += int(k > 0 and (before == table[at:]).all())

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import assembly as asm
+from assembly._record import Store
 from assembly.constraints.program.objective_terms import objective
 from assembly.constraints.program.records import Sparsity
 from assembly.geometry.splines.evaluate import SURFACE_RECORD
@@ -46,13 +47,13 @@ class FreePair:
         q, x = self.at(step)
         residual, jacobian = np.empty(5), np.empty((5, VARIABLES))
         places = (0, SURFACE_RECORD, 0, 1, q, tuple(x), tuple(self.lengths), self.work)
-        free_rows(self.table, self.pool, *places, residual, jacobian, 0, 1)
+        free_rows(Store(self.table, self.pool), *places, residual, jacobian, 0, 1)
         return residual, jacobian
 
     def hessian(self, y):
         out = np.empty((VARIABLES, VARIABLES))
         places = (0, SURFACE_RECORD, 0, 1, self.q, tuple(self.x), tuple(self.lengths), tuple(y), self.work)
-        free_hessian(self.table, self.pool, *places, out)
+        free_hessian(Store(self.table, self.pool), *places, out)
         return out
 
 
@@ -122,7 +123,7 @@ def objective_at(scene, q):
     room = (np.empty(0), np.empty(0), np.empty(0))
     places = np.stack([np.full(6, 5), np.arange(6), np.full(6, 5)])
     whole = Sparsity(places, np.zeros((1, 2), np.int64), np.empty((1, 6)), np.zeros(0, np.int64))
-    value = objective(packed.table, packed.pool, q, 1, room, whole, gradient, hessian)
+    value = objective(Store(packed.table, packed.pool), q, 1, room, whole, gradient, hessian)
     # The kernel writes the upper triangle.
     return value, gradient, np.triu(hessian) + np.triu(hessian, 1).T
 

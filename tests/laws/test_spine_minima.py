@@ -22,7 +22,7 @@ CLOSED = (False, False, False, False)
 
 def slopes(two, pose, s, t):
     """F_s, F_t, F_ss, F_tt, of numbers or of arrays of them."""
-    d, f, c, g, e = apart(two.pool, two.o, two.p, *pose, s, t)
+    d, f, c, g, e = apart(two.pool, two.o, two.p, pose, s, t)
     return -dot(d, f), dot(d, g), 1.0 - dot(d, c), 1.0 + dot(d, e)
 
 
@@ -114,7 +114,7 @@ def compare(two, box, open_ends):
         return None
     places = np.empty((MINIMA, 2))
     count, _level, certain = near_singular_minima(
-        two.pool, two.o, two.p, *two.pose(), Lengths(*box), FreeEnds(*open_ends), places
+        two.pool, two.o, two.p, two.pose(), Lengths(*box), FreeEnds(*open_ends), places
     )
     assert certain
     found = places[:count]
@@ -135,7 +135,7 @@ def test_minima_of_thin_boxes_are_those_of_samples(cases):
         box = (s - h, s + h, t - k, t + k)
         # Slopes near zero somewhere in the box: else nearly all have no minimum.
         at = rng.uniform(box[0], box[1]), rng.uniform(box[2], box[3])
-        d, f, _, g, _ = (np.array(row) for row in apart(two.pool, two.o, two.p, *two.pose(), *at))
+        d, f, _, g, _ = (np.array(row) for row in apart(two.pool, two.o, two.p, two.pose(), *at))
         normal = np.cross(f, g)
         if np.linalg.norm(normal) < 1e-6:
             continue
@@ -159,7 +159,7 @@ def test_minima_beside_a_turn_of_the_slope_are_found(cases):
         if side == 1 or curved < 0.2:
             continue
         # Where phi'' vanishes beside the box's middle phi' turns: F_ss F_tt = F_st^2 by the distance of the spines.
-        d, f, c, g, e = (np.array(row) for row in apart(two.pool, two.o, two.p, *two.pose(), s, t))
+        d, f, c, g, e = (np.array(row) for row in apart(two.pool, two.o, two.p, two.pose(), s, t))
         normal = np.cross(f, g)
         cc, ee = c @ normal, e @ normal
         # (1 - x c.n) (1 + x e.n) = (f.g)^2 for d = x n.

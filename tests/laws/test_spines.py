@@ -9,10 +9,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import assembly as asm
+from assembly._record import Store
 from assembly.geometry.faces.face import Face
 from assembly.geometry.shapes.centerline import spine_of
 from assembly.geometry.shapes.path import Path
 from assembly.geometry.vec import dot
+from assembly.kinematics.motion import RelativePose
 from assembly.proximity.manager import state as watch_memory
 from assembly.proximity.manager.centerlines.box import BARREN, CONVEX, EMPTY, FreeEnds, Lengths, apart, box_of
 from assembly.proximity.manager.centerlines.packing import pack_centerline
@@ -162,15 +164,15 @@ class Two:
         return mine, [other[0] + self.shift, *other[1:]]
 
     def pose(self):
-        return tuple(self.turn.as_matrix().ravel().tolist()), tuple(self.shift.tolist())
+        return RelativePose(tuple(self.turn.as_matrix().ravel().tolist()), tuple(self.shift.tolist()))
 
     def told(self, ends=(False, False, False, False)):
-        return box_of(self.pool, self.o, self.p, *self.pose(), Lengths(*self.box), FreeEnds(*ends), np.inf, self.rho)
+        return box_of(self.pool, self.o, self.p, self.pose(), Lengths(*self.box), FreeEnds(*ends), np.inf, self.rho)
 
     def at(self, s, t):
         """Distances, slopes F_s, F_t and second derivatives F_ss, F_st, F_tt at arrays of places."""
         # Plain Python of a kernel, which takes arrays for numbers.
-        d, f, c, g, e = apart(self.pool, self.o, self.p, *self.pose(), s, t)
+        d, f, c, g, e = apart(self.pool, self.o, self.p, self.pose(), s, t)
         rows = np.sqrt(dot(d, d)), -dot(d, f), dot(d, g), 1.0 - dot(d, c), -dot(f, g), 1.0 + dot(d, e)
         return np.array(np.broadcast_arrays(*rows))
 
@@ -403,7 +405,7 @@ def test_contacts_that_are_born_where_the_curvature_jumps_are_within_what_looks_
                 continue
             if (np.abs(minima.points[:, 0, 0] + 0.4) < 0.4).any():
                 # It is in the rod already: the look did not allow as much, or not without another one.
-                part = part_used(packed.table, packed.pool, watch._at, watch.memory, 0, scaled)
+                part = part_used(Store(packed.table, packed.pool), watch._at, watch.memory, 0, scaled)
                 doubt = watch.memory[watch_memory.MEMORY_HEADER + watch_memory.DOUBT]
                 assert max(part, doubt) >= 1.0
                 born += 1

@@ -7,8 +7,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import assembly as asm
+from assembly._record import Store
 from assembly.constraints.program.records import WATCH
 from assembly.geometry.splines.evaluate import BREAKS_U, BREAKS_V, SPANS_U, SPANS_V, surface_point
+from assembly.kinematics.motion import RelativePose
 from assembly.proximity.brep.borders import feature_at
 from assembly.proximity.brep.records import FACES
 from assembly.proximity.features.holding import HELD_F, HELD_G
@@ -87,7 +89,9 @@ def test_the_bottom_is_the_lowest_point_across_a_ring(tilt):
         s = surface.evaluate(*start[2:])
         start_angle = np.arctan2(s[1], s[0]) % (2.0 * np.pi)
         matrix = tuple(turn.ravel())
-        found, x, on_f, along = into_near_singular(table, pool, top, ring, matrix, tuple(shift), start, WIDE)
+        found, x, on_f, along = into_near_singular(
+            Store(table, pool), top, ring, RelativePose(matrix, tuple(shift)), start, WIDE
+        )
         assert found and not on_f
         p = surface.evaluate(x[2], x[3])
         u = np.arctan2(p[1], p[0])
@@ -111,7 +115,10 @@ def test_a_patch_is_not_left():
     start = (0.0, 0.0, 0.3 * u1, v0 + 0.75 * (v1 - v0) + off)
     for part, inside in ((0.5, False), (2.0, True)):
         half = (np.inf, np.inf, np.inf, part * off)
-        assert into_near_singular(table, pool, top, ring, tuple(turn.ravel()), shift, start, half)[0] == inside
+        assert (
+            into_near_singular(Store(table, pool), top, ring, RelativePose(tuple(turn.ravel()), shift), start, half)[0]
+            == inside
+        )
 
 
 @pytest.mark.parametrize(
@@ -126,7 +133,9 @@ def test_no_valley_where_nothing_or_everything_is_level(shape, cases):
         turn, shift = tilted(rng, 0.1, scale)
         for other in others:
             x = lowest_start(table, pool, other, turn, shift)
-            assert not across_near_singular(table, pool, top, other, tuple(turn.ravel()), tuple(shift), x).found
+            assert not across_near_singular(
+                Store(table, pool), top, other, RelativePose(tuple(turn.ravel()), tuple(shift)), x
+            ).found
 
 
 def ring_on_a_slab(slab=None):
@@ -153,7 +162,7 @@ def test_a_point_that_is_held_goes_back_to_the_bottom():
         turn, shift = tilted(rng, tilt, scale)
         pair = posed(tuple(turn.ravel()), tuple(shift), shells=tuple(shells))
         start = (0.0, 0.0, rng.uniform(0.0, u1), v0 + (0.75 + rng.uniform(-0.03, 0.03)) * (v1 - v0))
-        x = sunk(table, pool, pair, (top, 0), HELD_G, start)
+        x = sunk(Store(table, pool), pair, (top, 0), HELD_G, start)
         p = surface.evaluate(x[2], x[3])
         low, _ = lowest_across(turn, shift, np.arctan2(p[1], p[0]), scale)
         assert (turn @ p / scale + shift)[2] == pytest.approx(low, abs=ARRIVED**2 + 1e-15 + MINOR * tilt**4)
@@ -165,8 +174,8 @@ def test_a_point_that_is_held_stays_where_its_bottom_is_over_a_hole():
     pair = posed(tuple(np.eye(3).ravel()), (0.0, 0.0, 0.35 / scale), shells=tuple(shells))
     start = (MAJOR, 0.0, 0.0, v0 + 0.77 * (v1 - v0))
     # Of the slab nothing is below it; of the ring there is.
-    assert sunk(table, pool, pair, (top, 0), HELD_F, start) == start
-    assert sunk(table, pool, pair, (top, 0), HELD_G, start)[3] == pytest.approx(v0 + 0.75 * (v1 - v0), abs=1e-9)
+    assert sunk(Store(table, pool), pair, (top, 0), HELD_F, start) == start
+    assert sunk(Store(table, pool), pair, (top, 0), HELD_G, start)[3] == pytest.approx(v0 + 0.75 * (v1 - v0), abs=1e-9)
 
 
 def test_few_of_a_continuum_are_held():
@@ -181,12 +190,17 @@ def test_few_of_a_continuum_are_held():
     for root, (eighth, origin, fold) in zip(found, states, strict=True):
         start = (0.0, 0.0, eighth / 8.0 * u1, v0 + 0.75 * (v1 - v0))
         _found, root[:4], _on_f, _along = into_near_singular(
-            table, pool, feature_at(table, shells[0], top), feature_at(table, shells[1], 0), turn, shift, start, WIDE
+            Store(table, pool),
+            feature_at(table, shells[0], top),
+            feature_at(table, shells[1], 0),
+            RelativePose(turn, shift),
+            start,
+            WIDE,
         )
         root[CODE_F], root[CODE_G], root[ORIGIN], root[EXTREMUM_FOLD] = top, 0, origin, fold
     before = found[[0, 2, 3, 4, 5], :4].copy()
     # What is a step from one that is held, or from the isolated one, is left out.
-    assert hold_continua(table, pool, looked_into, found, len(states)) == 5
+    assert hold_continua(Store(table, pool), looked_into, found, len(states)) == 5
     np.testing.assert_array_equal(found[:5, :4], before)
     assert found[:5, VERTEX_CONTACT].tolist() == [HELD_G, HELD_G, 0.0, HELD_G, 0.0]
     assert found[:5, ORIGIN].tolist() == [NEW, LISTED, USELESS, NEW, NEW]
@@ -198,7 +212,7 @@ def test_what_lies_beside_a_point_is_in_another_valley():
     turn, shift = tuple(np.eye(3).ravel()), (0.0, 0.0, 0.35 / scale)
     surfaces = feature_at(table, shells[0], top), feature_at(table, shells[1], 0)
     start = (0.0, 0.0, 0.1 * u1, v0 + 0.75 * (v1 - v0))
-    _found, x, _on_f, along = into_near_singular(table, pool, *surfaces, turn, shift, start, WIDE)
+    _found, x, _on_f, along = into_near_singular(Store(table, pool), *surfaces, RelativePose(turn, shift), start, WIDE)
     roots = np.zeros((1, ROOT))
     roots[0, :4], roots[0, CODE_F], roots[0, ORIGIN], roots[0, VERTEX_CONTACT] = x, top, NEW, HELD_G
     pair = posed(turn, shift, shells=tuple(shells))
@@ -212,4 +226,6 @@ def test_what_lies_beside_a_point_is_in_another_valley():
         (0.3 * turned, tuple(turned), True),
     ):
         there = (x[0] + way[0], x[1] + way[1], x[2], x[3])
-        assert is_next_in_near_singular(table, pool, pair, (top, 0), surfaces, there, direction, roots, 1) == other
+        assert (
+            is_next_in_near_singular(Store(table, pool), pair, (top, 0), surfaces, there, direction, roots, 1) == other
+        )

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import assembly as asm
+from assembly._record import Store
 from assembly.constraints.program import evaluate as program
 from assembly.constraints.program import records as layout
 from assembly.constraints.program import row_terms
@@ -161,7 +162,7 @@ class FreePoint:
         arrange(self.table, self.loose.free, self.shape, self.rows, self.n)
         self.room = base.room
         start = case.tracked(x)
-        assert program.evaluate(self.table, self.pool, start, np.inf, self.loose, self.room, self.point) < 0
+        assert program.evaluate(Store(self.table, self.pool), start, np.inf, self.loose, self.room, self.point) < 0
 
     @property
     def residual(self):
@@ -175,6 +176,6 @@ class FreePoint:
         """Second derivative of y . rows + J^T diag(weights) J, (n, n)."""
         hessian = np.zeros((self.n, self.n))
         row_terms.add_row_terms(
-            self.table, self.pool, self.loose, self.room, self.shape, self.point, y, weights, hessian
+            Store(self.table, self.pool), self.loose, self.room, self.shape, self.point, y, weights, hessian
         )
         return np.triu(hessian) + np.triu(hessian, 1).T

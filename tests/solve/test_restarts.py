@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import assembly as asm
+from assembly._record import Store
 from assembly.constraints.program.contact import OTHER_SIDE, track_contact
 from assembly.constraints.program.records import ROW_TABLE
 from assembly.proximity.features.solid_contact import CONTACT_RECORD, TRACK, tracked_at
@@ -355,6 +356,6 @@ def test_a_pair_on_the_other_side_of_a_ball_is_another_pair(side):
     start[0, :4] = (*middle, 1.5, 1.6)
     tracked_at(start, 0).facing = side
     row = int(packed.table[ROW_TABLE])
-    status, _x, facing, _gap = track_contact(packed.table, packed.pool, row, q, start, np.inf, records, 0)
+    status, _x, facing, _gap = track_contact(Store(packed.table, packed.pool), row, q, start, np.inf, records, 0)
     assert (status == OTHER_SIDE) == (side == 1.0)
     assert facing == (1.0 if side == 1.0 else -1.0)

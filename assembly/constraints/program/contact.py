@@ -11,6 +11,7 @@ import math
 
 from assembly._address import call_address
 from assembly._kernel import kernel
+from assembly._record import Store
 from assembly.constraints.program.records import (
     FREE_COLUMN,
     ROW,
@@ -52,56 +53,56 @@ def surface_of(table, row, side):
 
 
 @kernel(inline=True)
-def facing_of(table, pool, g, relative, frame, x):
+def facing_of(store, g, relative, frame, x):
     """1 where the outward normals of the surfaces of a pair oppose each other, -1 where they agree.
 
     Seen along the normal n of f, with S the surface g, n.(S_u x S_v) = det T, and the frame has T^-1; at a pole it has
     none.
     """
     t = frame.rates_g
-    along = float(surface_at(table, g).sign) * (t[0] * t[3] - t[1] * t[2])
+    along = float(surface_at(store.table, g).sign) * (t[0] * t[3] - t[1] * t[2])
     if along == 0.0:
-        along = dot(frame.normal, matvec(relative, own_frame(table, pool, g, x[2], x[3]).normal))
+        along = dot(frame.normal, matvec(relative, own_frame(store, g, x[2], x[3]).normal))
     return -1.0 if along > 0.0 else 1.0
 
 
 @kernel(inline=True)
-def predict_point(table, pool, surface, u, v, du, dv):
+def predict_point(store, surface, u, v, du, dv):
     """Parameters after rates (du, dv), inside the domain.
 
     Where a pole is nearer than they lead, that is along the tangent plane: a point that passes a pole goes around it,
     in coordinates, in no time, and rates of these lead elsewhere.
     """
-    if surface_at(table, surface).poles != 0:
-        _p, su, sv, _suu, _suv, _svv = surface_point(table, pool, surface, u, v)
+    if surface_at(store.table, surface).poles != 0:
+        _p, su, sv, _suu, _suv, _svv = surface_point(store.table, store.pool, surface, u, v)
         step = blend(du, su, dv, sv)
-        edge, part = nearest_pole(table, pool, surface, u, v)
-        low, high, _closed = limits(table, pool, surface, 0 if edge <= 2 else 1)
+        edge, part = nearest_pole(store, surface, u, v)
+        low, high, _closed = limits(store, surface, 0 if edge <= 2 else 1)
         spoke = scale(part * (high - low), su if edge <= 2 else sv)
         if dot(step, step) > dot(spoke, spoke):
-            return polar_step(table, pool, surface, edge, u, v, step)
-    u, v, _clamped = into_domain(table, pool, surface, u + du, v + dv)
+            return polar_step(store, surface, edge, u, v, step)
+    u, v, _clamped = into_domain(store, surface, u + du, v + dv)
     return u, v
 
 
 @kernel(inner=True)
-def predict_pair(table, pool, row, r, tracked, guess):
+def predict_pair(store, row, r, tracked, guess):
     """Make of guess[r], coordinates that run on from tracked[r] by their rates, where the pair is expected.
 
     A prediction may run over the end of a patch; Newton starts inside. What becomes of edges is up to switching.
     """
-    if contact_row_at(table, row).shell_f >= 0:
+    if contact_row_at(store.table, row).shell_f >= 0:
         return
     for side in range(2):
         i = 2 * side
         u, v = tracked[r, i], tracked[r, i + 1]
         guess[r, i], guess[r, i + 1] = predict_point(
-            table, pool, surface_of(table, row, side), u, v, guess[r, i] - u, guess[r, i + 1] - v
+            store, surface_of(store.table, row, side), u, v, guess[r, i] - u, guess[r, i + 1] - v
         )
 
 
 @kernel(inner=True)
-def track_contact(table, pool, row, q, start, patience, records, k):
+def track_contact(store, row, q, start, patience, records, k):
     """Newton on the pair of one row from start[k]; fills its record.
 
     A pair that is followed keeps what its outward normals are to each other: no way leads from opposed ones to equal
@@ -109,25 +110,25 @@ def track_contact(table, pool, row, q, start, patience, records, k):
     Returns status, parameters, how they face each other (`FACING`), the points' signed distance.
     """
     pair = tracked_at(start, k)
-    fields = row_at(table, row)
-    contact = contact_row_at(table, row)
+    fields = row_at(store.table, row)
+    contact = contact_row_at(store.table, row)
     contact_record = contact_record_at(records, k)
     i = fields.body_f
     j = fields.body_g
     turn = rotation(q, i)
-    relative, shift = relative_pose(q, i, turn, j, rotation(q, j))
+    pose = relative_pose(q, i, turn, j, rotation(q, j))
     f, g = contact.surface_f, contact.surface_g
     x = (start[k, 0], start[k, 1], start[k, 2], start[k, 3])
-    found = solve_pair(table, pool, f, g, relative, shift, x, 1.0, patience, CLOSE, False)
+    found = solve_pair(store, f, g, pose, x, 1.0, patience, CLOSE, False)
     status, frame, x = found.status, found.frame, found.parameters
     apart = sub(frame.point_g, frame.point_f)
     distance = math.sqrt(dot(apart, apart))
     facing = pair.facing
     if status == CONVERGED or status == SINGULAR:
-        facing = facing_of(table, pool, g, relative, frame, x)
+        facing = facing_of(store, g, pose.rotation, frame, x)
         if facing * pair.facing < 0.0:
             return OTHER_SIDE, x, pair.facing, distance
-        store_record(turn, shift, frame, found.matrix, records, k)
+        store_record(turn, pose.shift, frame, found.matrix, records, k)
         # Relative curvature -H (I + beta A)^-1: indefinite means the surfaces cross beside the point.
         h = found.matrix.h
         det = h[0] * h[3] - h[1] * h[2]
@@ -139,60 +140,63 @@ def track_contact(table, pool, row, q, start, patience, records, k):
 
 
 @kernel(inner=True)
-def start_row(table, pool, row, q, tracked, r):
+def start_row(store, row, q, tracked, r):
     """The pair of the surfaces of a row wherever it is, into tracked[r]. A status."""
-    contact = contact_row_at(table, row)
-    fields = row_at(table, row)
+    contact = contact_row_at(store.table, row)
+    fields = row_at(store.table, row)
     f, g = contact.surface_f, contact.surface_g
     return call_address(
-        header_at(table, 0).start_address, (table, pool, f, g, fields.body_f, fields.body_g, q, tracked, r)
+        header_at(store.table, 0).start_address,
+        (store.table, store.pool, f, g, fields.body_f, fields.body_g, q, tracked, r),
     )
 
 
 @kernel(inner=True)
-def restart_contact(table, pool, row, q, tracked, records, k):
+def restart_contact(store, row, q, tracked, records, k):
     """As `track_contact`, from a global start, without the distance; tracked[k] is written meanwhile."""
     was = (tracked[k, 0], tracked[k, 1], tracked[k, 2], tracked[k, 3])
-    status = start_row(table, pool, row, q, tracked, k)
+    status = start_row(store, row, q, tracked, k)
     x = (tracked[k, 0], tracked[k, 1], tracked[k, 2], tracked[k, 3])
     facing = tracked_at(tracked, k).facing
     if status == CONVERGED or status == SINGULAR:
-        status, x, facing, _distance = track_contact(table, pool, row, q, tracked, math.inf, records, k)
+        status, x, facing, _distance = track_contact(store, row, q, tracked, math.inf, records, k)
     tracked[k, 0], tracked[k, 1], tracked[k, 2], tracked[k, 3] = was
     return status, was if status == OTHER_SIDE else x, facing
 
 
 @kernel(inner=True)
-def search_row(table, pool, row, q, tracked, r, crossing):
+def search_row(store, row, q, tracked, r, crossing):
     """The closest features of the solids of a row wherever they are, into tracked[r]. Whether there are any.
 
     Solids that are in each other have some if `crossing`, which takes a thousand times as long.
     """
-    header = header_at(table, 0)
-    contact = contact_row_at(table, row)
-    fields = row_at(table, row)
+    header = header_at(store.table, 0)
+    contact = contact_row_at(store.table, row)
+    fields = row_at(store.table, row)
     shell_f = contact.shell_f
     shell_g = contact.shell_g
     i = fields.body_f
     j = fields.body_g
     nearest = header.nearest_address
     deepest = header.deepest_address if crossing else 0
-    found = call_address(header.search_address, (table, pool, shell_f, shell_g, i, j, q, nearest, deepest, tracked, r))
+    found = call_address(
+        header.search_address, (store.table, store.pool, shell_f, shell_g, i, j, q, nearest, deepest, tracked, r)
+    )
     return found == 1
 
 
 @kernel(inner=True)
-def track_row(table, pool, row, q, start, patience, records, tracked, r):
+def track_row(store, row, q, start, patience, records, tracked, r):
     """The features of the solids of a row from start[r] on, into tracked[r] and record r. A status."""
-    contact = contact_row_at(table, row)
-    fields = row_at(table, row)
+    contact = contact_row_at(store.table, row)
+    fields = row_at(store.table, row)
     shell_f = contact.shell_f
     shell_g = contact.shell_g
     i = fields.body_f
     j = fields.body_g
     return call_address(
-        header_at(table, 0).track_address,
-        (table, pool, shell_f, shell_g, i, j, q, start, patience, records, tracked, r),
+        header_at(store.table, 0).track_address,
+        (store.table, store.pool, shell_f, shell_g, i, j, q, start, patience, records, tracked, r),
     )
 
 
@@ -204,9 +208,12 @@ def is_clearance_row(table, r):
 
 
 @kernel(inline=True)
-def least_gap(table, pool, r, tracked):
+def least_gap(store, r, tracked):
     """The least gap of row r, less by what the bodies were in each other where the solve began and still touched."""
-    return pool[contact_row_at(table, header_at(table, 0).row_table + ROW * r).minimum] - tracked_at(tracked, r).allowed
+    return (
+        store.pool[contact_row_at(store.table, header_at(store.table, 0).row_table + ROW * r).minimum]
+        - tracked_at(tracked, r).allowed
+    )
 
 
 @kernel(inline=True)
@@ -250,20 +257,20 @@ def idle_row(r, gap, point):
 
 
 @kernel(inner=True)
-def lost_clearance_row(table, pool, r, start, point, past, goes):
+def lost_clearance_row(store, r, start, point, past, goes):
     """Row r of a clearance whose pair was lost: idle, if its gap would be open, or it is a corner `past` its face.
 
     Solids need only touch. Or if it `goes`, though it is not open: one that ends where bodies are in each other would
     hold every step. One that is lost already stays as it is. What the neighborhood holds now is for the next look to
     find.
     """
-    row = header_at(table, 0).row_table + ROW * r
-    least = least_gap(table, pool, r, start)
+    row = header_at(store.table, 0).row_table + ROW * r
+    least = least_gap(store, r, start)
     gap = tracked_at(start, r).gap - least
     if past:
         gap = max(gap, 0.0)
     elif (
-        not gap > (-TOUCHING if contact_row_at(table, row).shell_f >= 0 else 0.0)
+        not gap > (-TOUCHING if contact_row_at(store.table, row).shell_f >= 0 else 0.0)
         and not goes
         and not math.isnan(start[r, 0])
     ):
@@ -280,11 +287,11 @@ def lost_clearance_row(table, pool, r, start, point, past, goes):
 
 
 @kernel(inline=True)
-def write_gap_row(table, pool, r, point):
+def write_gap_row(store, r, point):
     """Row r, of contact r, from its record: the gap less the least one, and its gradient over the twists."""
     tracked, records, residual, jacobian = point.tracked, point.records, point.residual, point.jacobian
     derivatives = derivatives_at(records, r)
-    residual[r] = derivatives.gap - least_gap(table, pool, r, tracked)
+    residual[r] = derivatives.gap - least_gap(store, r, tracked)
     gradient_row(records, r, jacobian, r)
     # A pair that follows the bodies has no unknowns of its own.
     for i in range(4):
@@ -293,7 +300,7 @@ def write_gap_row(table, pool, r, point):
 
 
 @kernel(inner=True)
-def solids_row(table, pool, r, start, patience, point):
+def solids_row(store, r, start, patience, point):
     """Row r, of a contact of solids. Returns whether its pair was found.
 
     Where the pair that is tracked is lost, or an edge is farthest there, the closest one there is takes over, if the
@@ -302,36 +309,36 @@ def solids_row(table, pool, r, start, patience, point):
     """
     pair = tracked_at(start, r)
     q, tracked, records = point.q, point.tracked, point.records
-    row = header_at(table, 0).row_table + ROW * r
+    row = header_at(store.table, 0).row_table + ROW * r
     goes = pair.stays <= MAY_GO
     if goes:
         pair.stays = MAY_GO - pair.stays
         tracked_at(tracked, r).stays = pair.stays
-    status = track_row(table, pool, row, q, start, patience, records, tracked, r)
+    status = track_row(store, row, q, start, patience, records, tracked, r)
     found = (status == CONVERGED or status == SINGULAR) and (
-        contact_record_at(records, r).proper != 0.0 or is_clearance_row(table, r)
+        contact_record_at(records, r).proper != 0.0 or is_clearance_row(store.table, r)
     )
     if not found:
-        if is_clearance_row(table, r):
+        if is_clearance_row(store.table, r):
             past = pair.stays > 0.0 and status == LEFT_PATCH
-            return lost_clearance_row(table, pool, r, start, point, past, goes)
+            return lost_clearance_row(store, r, start, point, past, goes)
         # Near touching a search takes long, and steps are short.
         far = abs(pair.gap) > HARDLY
-        if not (far or row_at(table, row).one_sided == 1 or patience == math.inf):
+        if not (far or row_at(store.table, row).one_sided == 1 or patience == math.inf):
             return False
         # Where an edge is farthest, solids may be deep in each other: a step that leads there is too long.
         lost = status != CONVERGED and status != SINGULAR
-        if not search_row(table, pool, row, q, tracked, r, lost or patience == math.inf):
+        if not search_row(store, row, q, tracked, r, lost or patience == math.inf):
             return False
-        status = track_row(table, pool, row, q, tracked, math.inf, records, tracked, r)
+        status = track_row(store, row, q, tracked, math.inf, records, tracked, r)
         if status != CONVERGED and status != SINGULAR:
             return False
-    write_gap_row(table, pool, r, point)
+    write_gap_row(store, r, point)
     return True
 
 
 @kernel(inner=True)
-def row_of_pair(table, pool, r, start, patience, point):
+def row_of_pair(store, r, start, patience, point):
     """Row r, of contact r, by its pair. Returns whether it was found.
 
     A contact is carried from `start` to its extremal pair, by steps that turn no normal by more than `patience`. A
@@ -341,19 +348,19 @@ def row_of_pair(table, pool, r, start, patience, point):
     q, tracked, records = point.q, point.tracked, point.records
     derivatives = derivatives_at(records, r)
     contact = contact_record_at(records, r)
-    row = header_at(table, 0).row_table + ROW * r
-    if contact_row_at(table, row).shell_f >= 0:
-        return solids_row(table, pool, r, start, patience, point)
-    status, x, facing, distance = track_contact(table, pool, row, q, start, patience, records, r)
+    row = header_at(store.table, 0).row_table + ROW * r
+    if contact_row_at(store.table, row).shell_f >= 0:
+        return solids_row(store, r, start, patience, point)
+    status, x, facing, distance = track_contact(store, row, q, start, patience, records, r)
     if status != CONVERGED and status != SINGULAR:
         anywhere = status == OTHER_SIDE and patience == math.inf
-        if row_at(table, row).one_sided == 0 and not anywhere:
+        if row_at(store.table, row).one_sided == 0 and not anywhere:
             return False
-        if is_clearance_row(table, r):
-            return lost_clearance_row(table, pool, r, start, point, False, False)
+        if is_clearance_row(store.table, r):
+            return lost_clearance_row(store, r, start, point, False, False)
         # A one-sided contact is of the nearest pair, whichever that is now.
         held = status == LEFT_PATCH and distance > 0.0
-        status, x, facing = restart_contact(table, pool, row, q, tracked, records, r)
+        status, x, facing = restart_contact(store, row, q, tracked, records, r)
         if status != CONVERGED and status != SINGULAR:
             if not held:
                 return False
@@ -364,14 +371,14 @@ def row_of_pair(table, pool, r, start, patience, point):
             contact.fold = 1.0
         elif not (derivatives.gap > 0.0 or anywhere):
             return False
-    write_gap_row(table, pool, r, point)
+    write_gap_row(store, r, point)
     tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3] = x
     tracked_at(tracked, r).facing = facing
     return True
 
 
 @kernel(inline=True)
-def contact_row(table, pool, r, start, patience, point):
+def contact_row(store, r, start, patience, point):
     """Row r, of contact r, from `start` on. Returns whether its pair was found, or need not be.
 
     A row of a clearance that stays open is as `solve/loop/predict.py` left it.
@@ -379,25 +386,25 @@ def contact_row(table, pool, r, start, patience, point):
     pair = tracked_at(start, r)
     tracked, records, residual = point.tracked, point.records, point.residual
     contact_record = contact_record_at(records, r)
-    row = header_at(table, 0).row_table + ROW * r
-    contact = contact_row_at(table, row)
+    row = header_at(store.table, 0).row_table + ROW * r
+    contact = contact_row_at(store.table, row)
     copy_tracked(start, r, tracked)
-    if row_at(table, row).body_f < 0:
+    if row_at(store.table, row).body_f < 0:
         idle_row(r, 1.0, point)
         return True
     if pair.idle == 1.0:
         tracked_at(tracked, r).idle = 0.0
-        residual[r] = pair.gap - least_gap(table, pool, r, start)
+        residual[r] = pair.gap - least_gap(store, r, start)
         return True
-    if not row_of_pair(table, pool, r, start, patience, point):
+    if not row_of_pair(store, r, start, patience, point):
         return False
     tracks = not math.isnan(tracked[r, 0])
     # Features of solids switch as they move: their rows are followed.
-    open_far = is_clearance_row(table, r) and contact.shell_f < 0 and residual[r] > FAR
+    open_far = is_clearance_row(store.table, r) and contact.shell_f < 0 and residual[r] > FAR
     contact_record.slack = 0.0
     if tracks and open_far:
         # How far they may go is behind the least gap.
-        contact_record.slack = min(UNSEEN * residual[r], ASTRAY * pool[contact.minimum + 1])
+        contact_record.slack = min(UNSEEN * residual[r], ASTRAY * store.pool[contact.minimum + 1])
     return True
 
 
@@ -408,6 +415,6 @@ def contact_rows(table, pool, start, patience, free, q, tracked, records, residu
     """All rows of contacts but those of free pairs, and their gradients. Returns one whose pair was lost, or -1."""
     point = Iterate(q, tracked, records, residual, jacobian)
     for r in range(header_at(table, 0).contacts):
-        if free[r] < 0 and not contact_row(table, pool, r, start, patience, point):
+        if free[r] < 0 and not contact_row(Store(table, pool), r, start, patience, point):
             return r
     return -1

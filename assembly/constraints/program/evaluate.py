@@ -42,24 +42,24 @@ def coordinate_row(pool, kind, component, k, angle, factor, start, tracked, reco
 
 
 @kernel(inner=True)
-def joint_row(table, pool, r, start, tracked, records, residual, jacobian):
+def joint_row(store, r, start, tracked, records, residual, jacobian):
     """Row r, of a joint."""
-    header = header_at(table, 0)
+    header = header_at(store.table, 0)
     row = header.row_table + ROW * r
-    joint = joint_row_at(table, row)
+    joint = joint_row_at(store.table, row)
     o = joint.parameters
     pairs = header.contacts
     second = joint.second
-    value = -pool[o + 2]
+    value = -store.pool[o + 2]
     for part in range(1 if second < 0 else 2):
-        asked = coordinate_at(table, row + COORDINATE if part == 0 else second)
+        asked = coordinate_at(store.table, row + COORDINATE if part == 0 else second)
         value += coordinate_row(
-            pool,
+            store.pool,
             asked.kind,
             asked.component,
             pairs + asked.joint,
             asked.angle,
-            pool[o + part],
+            store.pool[o + part],
             start,
             tracked,
             records,
@@ -71,38 +71,52 @@ def joint_row(table, pool, r, start, tracked, records, residual, jacobian):
 
 
 @kernel(inner=True)
-def evaluate(table, pool, start, patience, lifted, workspace, point):
+def evaluate(store, start, patience, lifted, workspace, point):
     """Evaluate all rows at the point's poses. Returns the contact whose pair was lost, or -1.
 
     `start` are the tracked values to begin from. Of `point`, an `Iterate`, all but the poses is written. `loose` are
     `LiftedPairs`.
     """
-    header = header_at(table, 0)
+    header = header_at(store.table, 0)
     q, tracked, records, residual, jacobian = point.q, point.tracked, point.records, point.residual, point.jacobian
     pairs = header.contacts
     free = lifted.free
     for r in range(pairs):
         if free[r] >= 0:
-            one = (table, pool, r, start, free, lifted.lengths, lifted.vectors, q, tracked, records, residual, jacobian)
+            one = (
+                store.table,
+                store.pool,
+                r,
+                start,
+                free,
+                lifted.lengths,
+                lifted.vectors,
+                q,
+                tracked,
+                records,
+                residual,
+                jacobian,
+            )
             call_address(header.free_row_address, one)
     if pairs > 0:
-        others = (table, pool, start, patience, free, q, tracked, records, residual, jacobian)
+        others = (store.table, store.pool, start, patience, free, q, tracked, records, residual, jacobian)
         lost = call_address(header.contact_rows_address, others)
         if lost >= 0:
             return lost
     if header.trims > 0:
         call_address(
-            header.trim_rows_address, (table, pool, free, lifted.lengths, q, tracked, records, residual, jacobian)
+            header.trim_rows_address,
+            (store.table, store.pool, free, lifted.lengths, q, tracked, records, residual, jacobian),
         )
     for k in range(pairs, header.tracked):
         # Of an angle that no row has, only an input of a dexterity, this is all that is known.
         copy_tracked(start, k, tracked)
     for k in range(header.joints):
-        joint = joint_at(table, header.joint_table + JOINT_RECORD * k)
-        place_frames(pool, joint.frames, q, joint.body_f, joint.body_g, records, pairs + k)
+        joint = joint_at(store.table, header.joint_table + JOINT_RECORD * k)
+        place_frames(store.pool, joint.frames, q, joint.body_f, joint.body_g, records, pairs + k)
     for r in range(pairs, header.rows):
-        if row_at(table, header.row_table + ROW * r).kind == JOINT_ROW:
-            joint_row(table, pool, r, start, tracked, records, residual, jacobian)
+        if row_at(store.table, header.row_table + ROW * r).kind == JOINT_ROW:
+            joint_row(store, r, start, tracked, records, residual, jacobian)
     for t in range(header.tapes):
-        tape_rows(table, pool, header.tape_table + TAPE_RECORD * t, q, workspace, residual, jacobian)
+        tape_rows(store, header.tape_table + TAPE_RECORD * t, q, workspace, residual, jacobian)
     return -1

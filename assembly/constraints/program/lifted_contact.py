@@ -6,6 +6,7 @@ Both kernels are called by their addresses.
 from __future__ import annotations
 
 from assembly._kernel import kernel
+from assembly._record import Store
 from assembly.constraints.program.contact import copy_tracked, least_gap
 from assembly.constraints.program.records import (
     ROW,
@@ -25,14 +26,14 @@ from assembly.proximity.features.solid_contact import contact_record_at, tracked
 )
 def free_row(table, pool, r, start, free, lengths, vectors, q, tracked, records, residual, jacobian):
     """Row r, of a contact at the coordinates in start[r]; its four rows of tangency follow the rows of the program."""
+    store = Store(table, pool)
     header = header_at(table, 0)
     row = header.row_table + ROW * r
     contact = contact_row_at(table, row)
     fields = row_at(table, row)
     copy_tracked(start, r, tracked)
     free_rows(
-        table,
-        pool,
+        store,
         contact.surface_f,
         contact.surface_g,
         fields.body_f,
@@ -47,7 +48,7 @@ def free_row(table, pool, r, start, free, lengths, vectors, q, tracked, records,
         header.rows + 4 * free[r],
     )
     tracked_at(tracked, r).gap = residual[r]
-    residual[r] -= least_gap(table, pool, r, tracked)
+    residual[r] -= least_gap(store, r, tracked)
     contact_record_at(records, r).slack = 0.0
     return 0
 
@@ -69,8 +70,7 @@ def free_terms(table, pool, r, free, lengths, vectors, block, q, tracked, jacobi
     e = header.rows + 4 * free[r]
     u = 6 * header.moving + 4 * free[r]
     free_hessian(
-        table,
-        pool,
+        Store(table, pool),
         contact.surface_f,
         contact.surface_g,
         fields.body_f,

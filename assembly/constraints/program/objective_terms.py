@@ -112,35 +112,35 @@ def posture(pool, o, q, body, s, order, gradient, hessian):
 
 
 @kernel(inner=True)
-def tape_term(table, pool, term, q, order, workspace, entries, gradient, hessian):
+def tape_term(store, term, q, order, workspace, entries, gradient, hessian):
     """Weight times the one value of a tape."""
-    header = header_at(table, 0)
-    term_record = term_at(table, term)
+    header = header_at(store.table, 0)
+    term_record = term_at(store.table, term)
     inputs, outputs, work = workspace
-    weight = pool[term_record.parameters]
-    size = pool_header_at(pool, 0).scale
+    weight = store.pool[term_record.parameters]
+    size = pool_header_at(store.pool, 0).scale
     # A term's tape has the record of a row's tape, one value.
     tape = term_record.tape
-    expression = tape_at(table, tape)
-    end = place_tape(table, pool, tape, q, inputs)
-    call_address(header.run_tape_address, (table, pool, expression.first_order, inputs, work, outputs))
+    expression = tape_at(store.table, tape)
+    end = place_tape(store, tape, q, inputs)
+    call_address(header.run_tape_address, (store.table, store.pool, expression.first_order, inputs, work, outputs))
     value = weight * outputs[0]
     count = expression.bodies
     bodies = expression.body_list
     if order == 0 or not math.isfinite(value):
         return value if math.isfinite(value) else math.inf
     for b in range(count):
-        s = 6 * table[header.slots + table[bodies + b]]
+        s = 6 * store.table[header.slots + store.table[bodies + b]]
         if s >= 0:
             for i in range(3):
                 gradient[s + i] += weight * size * outputs[1 + 6 * b + i]
                 gradient[s + 3 + i] += weight * outputs[4 + 6 * b + i]
     inputs[end] = weight
-    call_address(header.run_tape_address, (table, pool, expression.second_order, inputs, work, outputs))
+    call_address(header.run_tape_address, (store.table, store.pool, expression.second_order, inputs, work, outputs))
     for b in range(count):
-        at = 6 * table[header.slots + table[bodies + b]]
+        at = 6 * store.table[header.slots + store.table[bodies + b]]
         for c in range(count):
-            other = 6 * table[header.slots + table[bodies + c]]
+            other = 6 * store.table[header.slots + store.table[bodies + c]]
             if at < 0 or other < at:
                 continue
             row, column = spot(entries, at, other)
@@ -165,13 +165,13 @@ def term_by_blocks(pool, o, kind, q, body, s, entries, gradient, hessian):
 
 
 @kernel(inner=True)
-def recenter(table, pool, q):
+def recenter(store, q):
     """Postures that have no reference of their own from where their bodies are now."""
-    header = header_at(table, 0)
+    header = header_at(store.table, 0)
     for t in range(header.terms):
-        term = term_at(table, header.term_table + TERM * t)
+        term = term_at(store.table, header.term_table + TERM * t)
         if term.kind == POSTURE and term.follows == 1:
-            reference = posture_at(pool, term.parameters)
+            reference = posture_at(store.pool, term.parameters)
             for k in range(3):
                 reference.position[k] = q[term.body, k]
             for k in range(4):
@@ -179,12 +179,12 @@ def recenter(table, pool, q):
 
 
 @kernel(inner=True)
-def objective(table, pool, q, order, workspace, entries, gradient, hessian):
+def objective(store, q, order, workspace, entries, gradient, hessian):
     """Value of the objective. From order 1 on the gradient and the upper triangle of the Hessian are overwritten.
 
     `entries` says where the Hessian has any (`constraints/program/envelope.py`).
     """
-    header = header_at(table, 0)
+    header = header_at(store.table, 0)
     if order > 0:
         for i in range(gradient.size):
             gradient[i] = 0.0
@@ -193,18 +193,18 @@ def objective(table, pool, q, order, workspace, entries, gradient, hessian):
     value = 0.0
     for t in range(header.terms):
         term = header.term_table + TERM * t
-        term_record = term_at(table, term)
+        term_record = term_at(store.table, term)
         kind = term_record.kind
         body = term_record.body
         if blocked and (kind == POINT_DISTANCE or kind == POSTURE):
-            s = 6 * table[header.slots + body]
-            value += term_by_blocks(pool, term_record.parameters, kind, q, body, s, entries, gradient, hessian)
+            s = 6 * store.table[header.slots + body]
+            value += term_by_blocks(store.pool, term_record.parameters, kind, q, body, s, entries, gradient, hessian)
         elif kind == POINT_DISTANCE:
-            s = 6 * table[header.slots + body]
-            value += point_distance(pool, term_record.parameters, q, body, s, order, gradient, hessian)
+            s = 6 * store.table[header.slots + body]
+            value += point_distance(store.pool, term_record.parameters, q, body, s, order, gradient, hessian)
         elif kind == POSTURE:
-            s = 6 * table[header.slots + body]
-            value += posture(pool, term_record.parameters, q, body, s, order, gradient, hessian)
+            s = 6 * store.table[header.slots + body]
+            value += posture(store.pool, term_record.parameters, q, body, s, order, gradient, hessian)
         elif kind == TAPE_TERM:
-            value += tape_term(table, pool, term, q, order, workspace, entries, gradient, hessian)
+            value += tape_term(store, term, q, order, workspace, entries, gradient, hessian)
     return value

@@ -94,12 +94,12 @@ def add_coordinate_blocks(kind, component, records, k, y, order, hessian, f, g):
 
 
 @kernel(inner=True)
-def add_row_terms(table, pool, lifted, workspace, shape, point, y, weights, hessian):
+def add_row_terms(store, lifted, workspace, shape, point, y, weights, hessian):
     """Upper triangle of hessian += second derivative of y . rows + J^T diag(weights) J.
 
     The rows of tangency of a free pair go with its row.
     """
-    header = header_at(table, 0)
+    header = header_at(store.table, 0)
     q, tracked, records, jacobian = point.q, point.tracked, point.records, point.jacobian
     bases, order = shape.bases, shape.sparsity
     blocked = is_blocked(order)
@@ -109,7 +109,7 @@ def add_row_terms(table, pool, lifted, workspace, shape, point, y, weights, hess
         if free[r] >= 0:
             call_address(
                 header.free_terms_address,
-                (table, pool, r, free, lengths, vectors, block, q, tracked, jacobian, y, weights, hessian),
+                (store.table, store.pool, r, free, lengths, vectors, block, q, tracked, jacobian, y, weights, hessian),
             )
         elif blocked and (y[r] != 0.0 or weights[r] != 0.0):
             f, g = clear_patch(order, bases[r, 0], bases[r, 1])
@@ -123,7 +123,7 @@ def add_row_terms(table, pool, lifted, workspace, shape, point, y, weights, hess
         if y[r] != 0.0:
             call_address(
                 header.trim_terms_address,
-                (table, pool, r, free, lengths, bases, tracked, records, jacobian, y[r], hessian),
+                (store.table, store.pool, r, free, lengths, bases, tracked, records, jacobian, y[r], hessian),
             )
     for r in range(pairs + header.trims, header.rows):
         if weights[r] != 0.0 and blocked:
@@ -131,25 +131,25 @@ def add_row_terms(table, pool, lifted, workspace, shape, point, y, weights, hess
         elif weights[r] != 0.0:
             add_gram(bases, jacobian, r, weights[r], hessian)
         row = header.row_table + ROW * r
-        joint = joint_row_at(table, row)
-        if y[r] == 0.0 or row_at(table, row).kind != JOINT_ROW:
+        joint = joint_row_at(store.table, row)
+        if y[r] == 0.0 or row_at(store.table, row).kind != JOINT_ROW:
             continue
         second = joint.second
         for part in range(1 if second < 0 else 2):
-            asked = coordinate_at(table, row + COORDINATE if part == 0 else second)
+            asked = coordinate_at(store.table, row + COORDINATE if part == 0 else second)
             f = bases[r, 0 if part == 0 else 3]
             g = bases[r, 1 if part == 0 else 4]
             k = pairs + asked.joint
-            factor = y[r] * pool[joint.parameters + part]
+            factor = y[r] * store.pool[joint.parameters + part]
             if blocked:
                 add_coordinate_blocks(asked.kind, asked.component, records, k, factor, order, hessian, f, g)
             else:
                 add_coordinate_hessian(asked.kind, asked.component, records, k, factor, hessian, f, g)
     for t in range(header.tapes):
         tape = header.tape_table + TAPE_RECORD * t
-        expression = tape_at(table, tape)
+        expression = tape_at(store.table, tape)
         idle = True
         for v in range(expression.values):
             idle = idle and y[expression.first_row + v] == 0.0
         if not idle:
-            add_tape_hessian(table, pool, tape, q, workspace, order, y, hessian)
+            add_tape_hessian(store, tape, q, workspace, order, y, hessian)

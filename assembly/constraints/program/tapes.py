@@ -10,6 +10,7 @@ import math
 
 from assembly._address import call_address
 from assembly._kernel import kernel
+from assembly._record import Store
 from assembly.constraints.program.hessian_blocks import spot
 from assembly.constraints.program.records import (
     EXTRA_COLUMN,
@@ -25,18 +26,18 @@ from assembly.geometry.expression.tape import run_tape
 @kernel(signatures="(i8[::1], f8[::1], i8, f8[::1], f8[::1], f8[::1])")
 def run_scene_tape(table, pool, o, x, work, y):
     """`run_tape`, for who calls it by its address."""
-    run_tape(table, pool, o, x, work, y)
+    run_tape(Store(table, pool), o, x, work, y)
     return 0
 
 
 @kernel(inner=True)
-def place_tape(table, pool, tape, q, workspace):
+def place_tape(store, tape, q, workspace):
     """The poses of a tape's bodies, in the user's units, to the front of its room. Returns where its inputs end."""
-    units = pool_header_at(pool, 0)
-    expression = tape_at(table, tape)
+    units = pool_header_at(store.pool, 0)
+    expression = tape_at(store.table, tape)
     size = units.scale
     for b in range(expression.bodies):
-        body = table[expression.body_list + b]
+        body = store.table[expression.body_list + b]
         for i in range(3):
             workspace[7 * b + i] = q[body, i] * size + units.reference[i]
         for i in range(3, 7):
@@ -45,20 +46,20 @@ def place_tape(table, pool, tape, q, workspace):
 
 
 @kernel(inner=True)
-def tape_rows(table, pool, tape, q, workspace, residual, jacobian):
+def tape_rows(store, tape, q, workspace, residual, jacobian):
     """All rows of a tape; a value or a slope that is not finite is an infinite violation, of one side too."""
-    header = header_at(table, 0)
-    expression = tape_at(table, tape)
+    header = header_at(store.table, 0)
+    expression = tape_at(store.table, tape)
     inputs, outputs, work = workspace
-    place_tape(table, pool, tape, q, inputs)
-    call_address(header.run_tape_address, (table, pool, expression.first_order, inputs, work, outputs))
+    place_tape(store, tape, q, inputs)
+    call_address(header.run_tape_address, (store.table, store.pool, expression.first_order, inputs, work, outputs))
     m = expression.values
     count = expression.bodies
-    each = 1.0 / pool[expression.unit]
-    size = pool_header_at(pool, 0).scale
+    each = 1.0 / store.pool[expression.unit]
+    size = pool_header_at(store.pool, 0).scale
     for v in range(m):
         r = expression.first_row + v
-        nowhere = -math.inf if row_at(table, header.row_table + ROW * r).one_sided == 1 else math.inf
+        nowhere = -math.inf if row_at(store.table, header.row_table + ROW * r).one_sided == 1 else math.inf
         residual[r] = outputs[v] * each if math.isfinite(outputs[v]) else nowhere
         for b in range(count):
             at = m + 6 * (count * v + b)
@@ -71,23 +72,23 @@ def tape_rows(table, pool, tape, q, workspace, residual, jacobian):
 
 
 @kernel(inner=True)
-def add_tape_hessian(table, pool, tape, q, workspace, order, y, hessian):
+def add_tape_hessian(store, tape, q, workspace, order, y, hessian):
     """Upper triangle of hessian += second derivative of y . rows, for the rows of a tape."""
-    header = header_at(table, 0)
-    expression = tape_at(table, tape)
+    header = header_at(store.table, 0)
+    expression = tape_at(store.table, tape)
     inputs, outputs, work = workspace
     m = expression.values
     count = expression.bodies
-    each = 1.0 / pool[expression.unit]
-    size = pool_header_at(pool, 0).scale
-    end = place_tape(table, pool, tape, q, inputs)
+    each = 1.0 / store.pool[expression.unit]
+    size = pool_header_at(store.pool, 0).scale
+    end = place_tape(store, tape, q, inputs)
     for v in range(m):
         inputs[end + v] = y[expression.first_row + v] * each
-    call_address(header.run_tape_address, (table, pool, expression.second_order, inputs, work, outputs))
+    call_address(header.run_tape_address, (store.table, store.pool, expression.second_order, inputs, work, outputs))
     for b in range(count):
-        at = 6 * table[header.slots + table[expression.body_list + b]]
+        at = 6 * store.table[header.slots + store.table[expression.body_list + b]]
         for c in range(count):
-            other = 6 * table[header.slots + table[expression.body_list + c]]
+            other = 6 * store.table[header.slots + store.table[expression.body_list + c]]
             if at < 0 or other < at:
                 continue
             row, column = spot(order, at, other)

@@ -25,6 +25,7 @@ from collections import namedtuple
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly._record import Store
 from assembly.constraints.program.contact import surface_of
 from assembly.constraints.program.records import (
     BETWEEN,
@@ -86,14 +87,14 @@ def add_rate(records, k, i, factor, jacobian, r):
 
 
 @kernel(inner=True)
-def signed_row(table, pool, r, lifted, point):
+def signed_row(store, r, lifted, point):
     """Row r, of a trim in the signed form."""
     tracked, records, residual, jacobian = point.tracked, point.records, point.residual, point.jacobian
-    row = trim_row_at(table, header_at(table, 0).row_table + ROW * r)
+    row = trim_row_at(store.table, header_at(store.table, 0).row_table + ROW * r)
     k = row.contact
     o = 2 * row.side
-    factor = pool[row.factor]
-    s, n, _bend = trim_distance(table, pool, row.loop, tracked[k, o], tracked[k, o + 1])
+    factor = store.pool[row.factor]
+    s, n, _bend = trim_distance(store, row.loop, tracked[k, o], tracked[k, o + 1])
     residual[r] = factor * s
     clear(jacobian, r)
     add_coordinate(lifted, records, k, o, factor * n[0], jacobian, r)
@@ -101,34 +102,30 @@ def signed_row(table, pool, r, lifted, point):
 
 
 @kernel(inner=True)
-def loop_extremum(table, pool, row, x, o, turn, relative, shift, records, scratch):
+def loop_extremum(store, row, x, o, turn, pose, records, scratch):
     """The loop's point that is extremal against the other surface: found near the contact x, its record in `scratch`.
 
     Returns the curve, its parameter, whether it moves (it does not at a corner), and the signed distance of x.
     """
-    trim = trim_row_at(table, row)
+    trim = trim_row_at(store.table, row)
     loop = trim.loop
-    s, number, t, _cu, _cv, _nu, _nv = trim_nearest(table, pool, loop, 0, trim_at(table, loop).curves, x[o], x[o + 1])
+    s, number, t, _cu, _cv, _nu, _nv = trim_nearest(store, loop, 0, trim_at(store.table, loop).curves, x[o], x[o + 1])
     edge = trim.edges + EDGE_RECORD * number
-    other = other_surface(table, row)
+    other = other_surface(store.table, row)
     none = (0.0, 0.0, 0.0)
     if o == 0:
         start = (t, 0.0, x[2], x[3])
-        status, y, frame = solve_features(
-            table, pool, EDGE, edge, FACE, other, relative, shift, start, none, 1.0, math.inf
-        )
+        status, y, frame = solve_features(store, EDGE, edge, FACE, other, pose, start, none, 1.0, math.inf)
         found = y[0]
     else:
         start = (x[0], x[1], t, 0.0)
-        status, y, frame = solve_features(
-            table, pool, FACE, other, EDGE, edge, relative, shift, start, none, 1.0, math.inf
-        )
+        status, y, frame = solve_features(store, FACE, other, EDGE, edge, pose, start, none, 1.0, math.inf)
         found = y[2]
     moves = status == CONVERGED or status == SINGULAR
     if moves:
         t = found
-        feature_record(turn, shift, frame, records, scratch)
-    return edge_at(table, edge).curve, t, moves, s
+        feature_record(turn, pose.shift, frame, records, scratch)
+    return edge_at(store.table, edge).curve, t, moves, s
 
 
 @kernel(inline=True)
@@ -175,13 +172,13 @@ def offset_tangents(pu, pv, puu, puv, pvv, n, beta):
 
 
 @kernel(inner=True)
-def vector_rows(table, pool, first, lifted, point):
+def vector_rows(store, first, lifted, point):
     """The rows of a trim from `first` on, in one of the paper's forms."""
-    header = header_at(table, 0)
+    header = header_at(store.table, 0)
     q, tracked, records, residual, jacobian = point.q, point.tracked, point.records, point.residual, point.jacobian
     row = header.row_table + ROW * first
-    trim = trim_row_at(table, row)
-    fields = row_at(table, row)
+    trim = trim_row_at(store.table, row)
+    fields = row_at(store.table, row)
     k = trim.contact
     derivatives = derivatives_at(records, k)
     side = trim.side
@@ -192,19 +189,21 @@ def vector_rows(table, pool, first, lifted, point):
     x = (tracked[k, 0], tracked[k, 1], tracked[k, 2], tracked[k, 3])
     turn_f = rotation(q, i)
     turn_g = rotation(q, j)
-    relative, shift = relative_pose(q, i, turn_f, j, turn_g)
+    pose = relative_pose(q, i, turn_f, j, turn_g)
     scratch = header.contacts + header.joints
-    curve, t, moves, s = loop_extremum(table, pool, row, x, o, turn_f, relative, shift, records, scratch)
-    factor = pool[trim.factor]
+    curve, t, moves, s = loop_extremum(store, row, x, o, turn_f, pose, records, scratch)
+    factor = store.pool[trim.factor]
     kept = 1.0 if factor >= 0.0 else -1.0
     factor = abs(factor)
     turn = turn_f if side == 0 else turn_g
-    surface = own_surface(table, row)
-    at, rate, _bend = curve_point(table, pool, curve, t)
-    on_edge = on_surface(table, pool, surface, curve, t)
+    surface = own_surface(store.table, row)
+    at, rate, _bend = curve_point(store.table, store.pool, curve, t)
+    on_edge = on_surface(store, surface, curve, t)
     c, along = on_edge.point, on_edge.tangent
-    p, pu, pv, puu, puv, pvv = surface_point(table, pool, surface, x[o], x[o + 1])
-    there, du, dv, _uu, _uv, _vv = surface_point(table, pool, other_surface(table, row), x[2 - o], x[3 - o])
+    p, pu, pv, puu, puv, pvv = surface_point(store.table, store.pool, surface, x[o], x[o + 1])
+    there, du, dv, _uu, _uv, _vv = surface_point(
+        store.table, store.pool, other_surface(store.table, row), x[2 - o], x[3 - o]
+    )
     away = turn_g if side == 0 else turn_f
     origin = position(q, j if side == 0 else i)
     point_w = add(matvec(away, there), origin)
@@ -251,11 +250,11 @@ def vector_rows(table, pool, first, lifted, point):
         if moves:
             add_rate(records, scratch, o, -slope, jacobian, r)
     if trim.is_length == 1:
-        signed_length(table, pool, first, trim.count, 1.0 if kept * s >= 0.0 else -1.0, lifted, point)
+        signed_length(store, first, trim.count, 1.0 if kept * s >= 0.0 else -1.0, lifted, point)
 
 
 @kernel(inner=True)
-def signed_length(table, pool, first, count, side, lifted, point):
+def signed_length(store, first, count, side, lifted, point):
     """One row of a vector's rows: its length, positive on the right side of the loop. The others become zero.
 
     The length is smooth through zero, but its gradient is 0 / 0 there: as all columns of the rows are then along one
@@ -297,22 +296,22 @@ def signed_length(table, pool, first, count, side, lifted, point):
     for l in range(1, count):
         residual[first + l] = 0.0
     residual[first] = side * length
-    if column > 0.0 and growth(table, pool, first, best, lifted, point) < 0.0:
+    if column > 0.0 and growth(store, first, best, lifted, point) < 0.0:
         for j in range(FREE_COLUMN + 4):
             jacobian[first, j] = -jacobian[first, j]
 
 
 @kernel(inner=True)
-def growth(table, pool, r, j, lifted, point):
+def growth(store, r, j, lifted, point):
     """The derivative along column j of the signed distance, positive on the right side of the loop."""
     tracked = point.tracked
     records = point.records
-    row = trim_row_at(table, header_at(table, 0).row_table + ROW * r)
+    row = trim_row_at(store.table, header_at(store.table, 0).row_table + ROW * r)
     k = row.contact
     derivatives = derivatives_at(records, k)
     o = 2 * row.side
-    factor = pool[row.factor]
-    _s, n, _bend = trim_distance(table, pool, row.loop, tracked[k, o], tracked[k, o + 1])
+    factor = store.pool[row.factor]
+    _s, n, _bend = trim_distance(store, row.loop, tracked[k, o], tracked[k, o + 1])
     value = 0.0
     for i in range(2):
         if lifted.free[k] >= 0:
@@ -326,6 +325,7 @@ def growth(table, pool, r, j, lifted, point):
 @kernel(signatures="(i8[::1], f8[::1], i8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1])")
 def trim_rows(table, pool, free, lengths, q, tracked, records, residual, jacobian):
     """All rows of trims, and their gradients."""
+    store = Store(table, pool)
     header = header_at(table, 0)
     lifted = LiftedCoordinates(free, lengths)
     point = Iterate(q, tracked, records, residual, jacobian)
@@ -333,9 +333,9 @@ def trim_rows(table, pool, free, lengths, q, tracked, records, residual, jacobia
     while r < header.contacts + header.trims:
         row = trim_row_at(table, header.row_table + ROW * r)
         if row.form == SIGNED:
-            signed_row(table, pool, r, lifted, point)
+            signed_row(store, r, lifted, point)
         else:
-            vector_rows(table, pool, r, lifted, point)
+            vector_rows(store, r, lifted, point)
         r += row.count
     return 0
 
@@ -373,7 +373,7 @@ def trim_terms(table, pool, r, free, lengths, bases, tracked, records, jacobian,
     k = row.contact
     o = 2 * row.side
     lifted = LiftedCoordinates(free, lengths)
-    _s, n, bend = trim_distance(table, pool, row.loop, tracked[k, o], tracked[k, o + 1])
+    _s, n, bend = trim_distance(Store(table, pool), row.loop, tracked[k, o], tracked[k, o + 1])
     places = np.empty((1, bases.shape[1]), np.int64)
     for b in range(bases.shape[1]):
         places[0, b] = bases[r, b]

@@ -23,7 +23,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly._record import place_of, record_dtype, record_view, size_of
+from assembly._record import Store, place_of, record_dtype, record_view, size_of
 from assembly.geometry.expression import formula
 from assembly.geometry.expression.formula import (
     arc_bound,
@@ -101,11 +101,11 @@ def copy_values(source, at, target, to):
 def point_values(kind, table, pool, span, t, room, out, o):
     """Intervals of C, C', C'' at t to out[o:], nine pairs."""
     if kind == FORMULA:
-        point_bounds(table, pool, t, room)
+        point_bounds(Store(table, pool), t, room)
         copy_values(room, formula.RESULTS, out, o)
     else:
         at = bezier_ranges.BEZIER_AT
-        bezier_point_bounds(table, pool, span, t, room, at)
+        bezier_point_bounds(Store(table, pool), span, t, room, at)
         copy_values(room, at, out, o)
 
 
@@ -136,12 +136,12 @@ def fill_piece(kind, table, pool, room, x, o):
     width = math.inf
     arc = math.inf
     if kind == FORMULA:
-        range_bounds(table, pool, t0, t1, room)
+        range_bounds(Store(table, pool), t0, t1, room)
         set_ranges(piece, room, formula.RESULTS)
         if formula_at(table, 0).arc_tape != 0:
-            arc = arc_bound(table, pool, t0, t1, room)
+            arc = arc_bound(Store(table, pool), t0, t1, room)
     else:
-        bezier_range_bounds(table, pool, span, t0, t1, room)
+        bezier_range_bounds(Store(table, pool), span, t0, t1, room)
         set_ranges(piece, room, 0)
         width = work.width
     refine(x, o + BOX, up(max(middle - t0, t1 - middle)), o + MID)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
+from assembly._record import Store
 from assembly.distance.enclosures.enclosure import FORMULA, HULL
 from assembly.distance.enclosures.gjk import INSIDE, POINT, gjk, inside_weights, on_b, simplex_at
 from assembly.geometry.expression.formula import formula_point, formula_room_at
@@ -19,7 +20,7 @@ _ROUNDS = 24
 def local_point(kind, table, pool, span, t, room):
     """C, C', C'' at t."""
     if kind == FORMULA:
-        formula_point(table, pool, t, room)
+        formula_point(Store(table, pool), t, room)
         c = formula_room_at(room, 0).results
         return (c[0], c[1], c[2]), (c[3], c[4], c[5]), (c[6], c[7], c[8])
     found = weighted_point_at(room, BEZIER_AT)

@@ -28,7 +28,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly._record import place_of, record_dtype, record_view
+from assembly._record import Store, place_of, record_dtype, record_view
 from assembly.distance.patches.nodes import (
     DEEPEST,
     NODE_INTS,
@@ -143,10 +143,10 @@ def describe_formula(curve, short, nodes, o, x):
     h = 2.0 * half
     ranges = ranges_at(x, 0)
     results = formula_room_at(room, 0).results
-    range_bounds(table, pool, t0, t1, room)
+    range_bounds(Store(table, pool), t0, t1, room)
     for k in range(24):
         ranges.over[k] = results[k]
-    point_bounds(table, pool, 0.5 * (t0 + t1), room)
+    point_bounds(Store(table, pool), 0.5 * (t0 + t1), room)
     for k in range(18):
         ranges.middle[k] = results[k]
     refine(x, 0, half, _MIDDLE)
@@ -226,7 +226,7 @@ def formula_derivatives(curve, nodes, o, x, w):
     t1 = node.high_u
     h = 2.0 * half_width(t0, t1)
     t = formula_parameter(nodes, o, x)
-    point_bounds(table, pool, t, room)
+    point_bounds(Store(table, pool), t, room)
     at = RESULTS
     size = 0.0
     for k in range(3):

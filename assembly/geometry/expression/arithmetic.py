@@ -36,15 +36,15 @@ LANES = 64
 
 
 @kernel(inner=True, allocates=True)
-def lane_constants(table, pool, o):
+def lane_constants(store, o):
     """Work of a tape, a row a result, with its constants in their places."""
-    tape = tape_at(table, o)
+    tape = tape_at(store.table, o)
     count = tape.count
     work = np.empty((count, LANES))
     for k in range(count):
         p = o + HEAD + INSTRUCTION * k
-        if table[p] == CONST:
-            work[k, :] = pool[tape.constants + table[p + 2]]
+        if store.table[p] == CONST:
+            work[k, :] = store.pool[tape.constants + store.table[p + 2]]
     return work
 
 

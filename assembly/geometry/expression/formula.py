@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly._record import place_of, record_dtype, record_view, size_of
+from assembly._record import Store, place_of, record_dtype, record_view, size_of
 from assembly.geometry.expression.arithmetic import LANES, lane_constants, run_lanes
 from assembly.geometry.expression.tape import run_tape
 from assembly.geometry.expression.tape_bounds import JUMP, KINK, SMOOTH, run_bounds
@@ -73,13 +73,13 @@ formula_range_at = record_view(FORMULA_RANGE)
 
 
 @kernel(inner=True)
-def formula_point(table, pool, t, room):
+def formula_point(store, t, room):
     """C, C', C'' at t to the results of the room, nine doubles."""
     room[0] = t
-    run_tape(table, pool, formula_at(table, 0).point_tape, room, room[WORK_AT:], room[RESULTS:])
+    run_tape(store, formula_at(store.table, 0).point_tape, room, room[WORK_AT:], room[RESULTS:])
     results = formula_room_at(room, 0).results
     for k in range(3):
-        results[k] -= formula_head_at(pool, 0).center[k]
+        results[k] -= formula_head_at(store.pool, 0).center[k]
 
 
 @kernel(inline=True)
@@ -94,14 +94,14 @@ def forget(table, room, first, last):
 
 
 @kernel(inline=True)
-def settle(table, pool, room, told, orders):
+def settle(store, room, told, orders):
     """What a run tells forgets of its derivatives, below `orders`; C with its error, about the center."""
-    head = formula_head_at(pool, 0)
-    formula = formula_at(table, 0)
+    head = formula_head_at(store.pool, 0)
+    formula = formula_at(store.table, 0)
     if told >= KINK:
-        forget(table, room, 2, orders)
+        forget(store.table, room, 2, orders)
     if told >= JUMP and formula.continuous == 0:
-        forget(table, room, 1, 2)
+        forget(store.table, room, 1, 2)
     error = head.error
     results = formula_room_at(room, 0).results
     for k in range(formula.dimension):
@@ -115,24 +115,24 @@ def settle(table, pool, room, told, orders):
 
 
 @kernel(inner=True, exact=True)
-def point_bounds(table, pool, t, room):
+def point_bounds(store, t, room):
     """Intervals of C, C', C'' at t to the results of the room, nine pairs."""
     room[0] = t
     room[1] = t
-    told = run_bounds(table, pool, formula_at(table, 0).point_tape, room, room[WORK_AT:], room[RESULTS:])
-    settle(table, pool, room, told, 3)
+    told = run_bounds(store, formula_at(store.table, 0).point_tape, room, room[WORK_AT:], room[RESULTS:])
+    settle(store, room, told, 3)
 
 
 @kernel(inner=True, exact=True)
-def range_bounds(table, pool, lo, hi, room):
+def range_bounds(store, lo, hi, room):
     """Intervals of C, C', C'', C''' over [lo, hi] to the results of the room, twelve pairs."""
-    formula = formula_at(table, 0)
+    formula = formula_at(store.table, 0)
     room[0] = lo
     room[1] = hi
-    told = run_bounds(table, pool, formula.range_tape, room, room[WORK_AT:], room[RESULTS:])
+    told = run_bounds(store, formula.range_tape, room, room[WORK_AT:], room[RESULTS:])
     if formula.has_range == 0:
-        forget(table, room, 0, 1)
-    settle(table, pool, room, told, 4)
+        forget(store.table, room, 0, 1)
+    settle(store, room, told, 4)
     return told
 
 
@@ -160,22 +160,22 @@ def refine(values, o, half, m):
 
 
 @kernel(inner=True, exact=True)
-def arc_bound(table, pool, lo, hi, room):
+def arc_bound(store, lo, hi, room):
     """Upper bound of the length of arc over [lo, hi] by the user's expression; infinite where it has no length."""
-    formula = formula_at(table, 0)
+    formula = formula_at(store.table, 0)
     results = formula_room_at(room, 0).results
     if formula.arc_tape == 0:
         return math.inf
     if formula.arc_plain != 0:
         room[0] = lo
         room[1] = hi
-        run_tape(table, pool, formula.arc_tape, room, room[WORK_AT:], room[RESULTS:])
+        run_tape(store, formula.arc_tape, room, room[WORK_AT:], room[RESULTS:])
         return results[0] if results[0] >= 0.0 else math.inf
     room[0] = lo
     room[1] = lo
     room[2] = hi
     room[3] = hi
-    run_bounds(table, pool, formula.arc_tape, room, room[WORK_AT:], room[RESULTS:])
+    run_bounds(store, formula.arc_tape, room, room[WORK_AT:], room[RESULTS:])
     return results[1] if results[1] >= 0.0 else math.inf
 
 
@@ -185,7 +185,7 @@ def formula_points(table, pool, t, out, room):
     results = formula_room_at(room, 0).results
     bad = -1
     for i in range(t.size):
-        formula_point(table, pool, t[i], room)
+        formula_point(Store(table, pool), t[i], room)
         for k in range(_VALUES):
             out[i, k] = results[k]
         if bad < 0 and not math.isfinite(out[i, 0] + out[i, 1] + out[i, 2]):
@@ -200,30 +200,32 @@ def formula_ranges(table, pool, lo, hi, out, room):
     Twelve pairs over the interval, nine pairs at its middle, and the user's bound of the length of arc. Returns what
     the runs tell, the worst of it.
     """
+    store = Store(table, pool)
     results = formula_room_at(room, 0).results
     told = SMOOTH
     for i in range(lo.size):
         row = formula_range_at(out, i)
-        told = max(told, range_bounds(table, pool, lo[i], hi[i], room))
+        told = max(told, range_bounds(store, lo[i], hi[i], room))
         for k in range(2 * _ORDERS):
             row.over[k] = results[k]
         middle = 0.5 * (lo[i] + hi[i])
-        point_bounds(table, pool, middle, room)
+        point_bounds(store, middle, room)
         for k in range(2 * _VALUES):
             row.middle[k] = results[k]
         refine(out[i], 0, up(max(middle - lo[i], hi[i] - middle)), 2 * _ORDERS)
-        row.arc = arc_bound(table, pool, lo[i], hi[i], room)
+        row.arc = arc_bound(store, lo[i], hi[i], room)
     return told
 
 
 @kernel(signatures="(i8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1])")
 def arc_bounds(table, pool, lo, hi, out, room):
     """`arc_bound` of every interval [lo[i], hi[i]]; many at a time where plain doubles do."""
+    store = Store(table, pool)
     formula = formula_at(table, 0)
     if formula.arc_tape != 0 and formula.arc_plain != 0:
-        work = lane_constants(table, pool, formula.arc_tape)
+        work = lane_constants(store, formula.arc_tape)
         for i in range(0, lo.size, LANES):
             run_lanes(table, formula.arc_tape, lo, hi, i, work, out)
         return
     for i in range(lo.size):
-        out[i] = arc_bound(table, pool, lo[i], hi[i], room)
+        out[i] = arc_bound(store, lo[i], hi[i], room)

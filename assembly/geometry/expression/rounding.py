@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from assembly._record import Store
 from assembly.geometry.expression.instructions import Tape, compact, instructions, packed
 from assembly.geometry.expression.tape import ADD, CONST, COUNT, DIV, HEAD, INPUT, INSTRUCTION, MUL, OUTPUT, SUB, WORK
 from assembly.geometry.expression.tape_bounds import run_bounds
@@ -53,7 +54,7 @@ def rounding_error(ends: ca.SX, expression: ca.SX, domain: tuple[float, float]) 
             known = [(work[2 * i], work[2 * i + 1], errors[i]) for i in places]
         step[HEAD:] = tape.table[HEAD + INSTRUCTION * k : HEAD + INSTRUCTION * (k + 1)]
         with np.errstate(all="ignore"):
-            run_bounds(step, tape.constants, 0, x, work, y)
+            run_bounds(Store(step, tape.constants), 0, x, work, y)
         lo, hi = float(work[2 * out]), float(work[2 * out + 1])
         errors[out] = _error_of(name, known, max(abs(lo), abs(hi)))
     return inf

@@ -99,13 +99,13 @@ def erfinv(x):
 
 
 @kernel(inner=True, exact=True)
-def run_tape(table, pool, o, x, work, y):
+def run_tape(store, o, x, work, y):
     """Run the tape that begins at table[o]: y of x. All of y that the tape knows is written."""
-    tape = tape_at(table, o)
+    tape = tape_at(store.table, o)
     constants = np.uint64(tape.constants)
     begin = o + HEAD
     for k in range(begin, begin + INSTRUCTION * tape.count, INSTRUCTION):
-        instruction = instruction_at(table, k)
+        instruction = instruction_at(store.table, k)
         code = instruction.code
         # Unsigned, because Numba tests a signed index for being counted from the end: a fifth of the time.
         out = np.uint64(instruction.out)
@@ -122,7 +122,7 @@ def run_tape(table, pool, o, x, work, y):
         elif code == OUTPUT:
             y[out] = work[a]
         elif code == CONST:
-            work[out] = pool[constants + a]
+            work[out] = store.pool[constants + a]
         elif code == NEG:
             work[out] = -work[a]
         elif code == SQ:

@@ -15,6 +15,7 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly._record import Store
 from assembly.geometry.expression.tape import (
     ACOS,
     ACOSH,
@@ -299,16 +300,16 @@ def chosen(code, a, b, lo, hi, told):
 
 
 @kernel(inner=True, exact=True)
-def run_bounds(table, pool, o, x, work, y):
+def run_bounds(store, o, x, work, y):
     """Run the tape that begins at table[o] on intervals: pairs (lo, hi) in x, work and y. Returns what it tells."""
-    tape = tape_at(table, o)
+    tape = tape_at(store.table, o)
     constants = np.uint64(tape.constants)
     begin = o + HEAD
     told = SMOOTH
     # Whether some value so far may be none.
     undefined = False
     for k in range(begin, begin + INSTRUCTION * tape.count, INSTRUCTION):
-        instruction = instruction_at(table, k)
+        instruction = instruction_at(store.table, k)
         code = instruction.code
         out = np.uint64(2) * np.uint64(instruction.out)
         i = np.uint64(instruction.a)
@@ -318,8 +319,8 @@ def run_bounds(table, pool, o, x, work, y):
             work[out + np.uint64(1)] = x[np.uint64(2) * i + np.uint64(1)]
             continue
         if code == CONST:
-            work[out] = pool[constants + i]
-            work[out + np.uint64(1)] = pool[constants + i]
+            work[out] = store.pool[constants + i]
+            work[out + np.uint64(1)] = store.pool[constants + i]
             continue
         i = np.uint64(2) * i
         a = (work[i], work[i + np.uint64(1)])
@@ -376,4 +377,4 @@ def run_bounds(table, pool, o, x, work, y):
 @kernel(signatures="(i8[::1], f8[::1], i8, f8[::1], f8[::1], f8[::1])")
 def bound_outputs(table, pool, o, x, work, y):
     """`run_bounds` for Python."""
-    return run_bounds(table, pool, o, x, work, y)
+    return run_bounds(Store(table, pool), o, x, work, y)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly._record import Store
 from assembly.geometry.faces.trim_pieces import (
     PIECE_DOUBLES,
     PIECE_INTS,
@@ -63,51 +64,51 @@ def _segments(ax, ay, bx, by, cx, cy, dx, dy):
 
 
 @kernel(inner=True)
-def _place(table, pool, ints, doubles, piece, t, move_u, move_v):
+def _place(store, ints, doubles, piece, t, move_u, move_v):
     """The point of a piece at a parameter; its ends are as the table has them."""
-    o = piece_links_at(table, ints + PIECE_INTS * piece)
-    i = piece_bounds_at(pool, doubles + PIECE_DOUBLES * piece)
+    o = piece_links_at(store.table, ints + PIECE_INTS * piece)
+    i = piece_bounds_at(store.pool, doubles + PIECE_DOUBLES * piece)
     if t <= i.t0:
         return i.start[0] + move_u, i.start[1] + move_v
     if t >= i.t1:
         return i.end[0] + move_u, i.end[1] + move_v
-    x, y, _dx, _dy = piece_line(pool, o.coefficients, o.degree, t - i.middle)
+    x, y, _dx, _dy = piece_line(store.pool, o.coefficients, o.degree, t - i.middle)
     return x + i.shift_u + move_u, y + i.shift_v + move_v
 
 
 @kernel(inner=True)
-def _follows(table, pool, ints, doubles, a, b, tolerance):
+def _follows(store, ints, doubles, a, b, tolerance):
     """Whether b comes after a, at once or after a stretch of next to nothing."""
     length = 0.0
-    k = piece_links_at(table, ints + PIECE_INTS * a).after
+    k = piece_links_at(store.table, ints + PIECE_INTS * a).after
     while k >= 0:
         if k == b:
             return True
-        i = piece_bounds_at(pool, doubles + PIECE_DOUBLES * k)
+        i = piece_bounds_at(store.pool, doubles + PIECE_DOUBLES * k)
         length += abs(i.end[0] - i.start[0]) + abs(i.end[1] - i.start[1])
         if length > 4.0 * tolerance or k == a:
             return False
-        k = piece_links_at(table, ints + PIECE_INTS * k).after
+        k = piece_links_at(store.table, ints + PIECE_INTS * k).after
     return False
 
 
 @kernel(inner=True)
-def _meet(table, pool, ints, doubles, a, b, move_u, move_v, tolerance, size, stack, budget):
+def _meet(store, ints, doubles, a, b, move_u, move_v, tolerance, size, stack, budget):
     """Whether two pieces meet beside a common corner, where, and what is left of the budget."""
-    ia = piece_bounds_at(pool, doubles + PIECE_DOUBLES * a)
-    ib = piece_bounds_at(pool, doubles + PIECE_DOUBLES * b)
+    ia = piece_bounds_at(store.pool, doubles + PIECE_DOUBLES * a)
+    ib = piece_bounds_at(store.pool, doubles + PIECE_DOUBLES * b)
     corners = 0
     corner_u = 0.0
     corner_v = 0.0
     other_u = 0.0
     other_v = 0.0
     near = 8.0 * tolerance
-    if _follows(table, pool, ints, doubles, a, b, tolerance):
+    if _follows(store, ints, doubles, a, b, tolerance):
         corner_u = ia.end[0]
         corner_v = ia.end[1]
         if abs(corner_u - ib.start[0] - move_u) + abs(corner_v - ib.start[1] - move_v) <= near:
             corners = 1
-    if _follows(table, pool, ints, doubles, b, a, tolerance):
+    if _follows(store, ints, doubles, b, a, tolerance):
         other_u = ia.start[0]
         other_v = ia.start[1]
         if abs(other_u - ib.end[0] - move_u) + abs(other_v - ib.end[1] - move_v) <= near:
@@ -131,10 +132,10 @@ def _meet(table, pool, ints, doubles, a, b, move_u, move_v, tolerance, size, sta
         a1 = stack[top, 1]
         b0 = stack[top, 2]
         b1 = stack[top, 3]
-        px, py = _place(table, pool, ints, doubles, a, a0, 0.0, 0.0)
-        qx, qy = _place(table, pool, ints, doubles, a, a1, 0.0, 0.0)
-        rx, ry = _place(table, pool, ints, doubles, b, b0, move_u, move_v)
-        sx, sy = _place(table, pool, ints, doubles, b, b1, move_u, move_v)
+        px, py = _place(store, ints, doubles, a, a0, 0.0, 0.0)
+        qx, qy = _place(store, ints, doubles, a, a1, 0.0, 0.0)
+        rx, ry = _place(store, ints, doubles, b, b0, move_u, move_v)
+        sx, sy = _place(store, ints, doubles, b, b1, move_u, move_v)
         gap_u = max(min(px, qx) - max(rx, sx), min(rx, sx) - max(px, qx), 0.0)
         gap_v = max(min(py, qy) - max(ry, sy), min(ry, sy) - max(py, qy), 0.0)
         apart = np.sqrt(gap_u * gap_u + gap_v * gap_v)
@@ -212,7 +213,17 @@ def first_crossing(table, pool, ints, doubles, pieces, moves, order, tolerance, 
             if (move_u != 0.0 or move_v != 0.0) and (shift_u != 0.0 or shift_v != 0.0):
                 continue
             found, u, v, budget = _meet(
-                table, pool, ints, doubles, a, b, shift_u - move_u, shift_v - move_v, tolerance, size, stack, budget
+                Store(table, pool),
+                ints,
+                doubles,
+                a,
+                b,
+                shift_u - move_u,
+                shift_v - move_v,
+                tolerance,
+                size,
+                stack,
+                budget,
             )
             if found:
                 where[0] = u + move_u

@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly._record import Store
 from assembly.geometry.faces.trim_pieces import piece_line
 from assembly.geometry.splines.evaluate import (
     into_domain,
@@ -21,12 +22,12 @@ from assembly.geometry.vec import cross, dot
 
 
 @kernel(inner=True)
-def _column(table, pool, u, v, levels, nodes, weights):
+def _column(store, u, v, levels, nodes, weights):
     """Integrals over a column from v to the top of |Su x Sv| and of S.(Su x Sv) / 3."""
-    patch = surface_at(table, 0)
+    patch = surface_at(store.table, 0)
     area = 0.0
     volume = 0.0
-    x, _fits = into_domain(pool, patch.breaks_u, patch.spans_u, patch.closed_u, u)
+    x, _fits = into_domain(store.pool, patch.breaks_u, patch.spans_u, patch.closed_u, u)
     for k in range(levels.size - 1):
         low = max(v, levels[k])
         half = 0.5 * (levels[k + 1] - low)
@@ -34,8 +35,8 @@ def _column(table, pool, u, v, levels, nodes, weights):
             continue
         for n in range(nodes.size):
             y = low + half * (1.0 + nodes[n])
-            y, _fits = into_domain(pool, patch.breaks_v, patch.spans_v, patch.closed_v, y)
-            s, su, sv, _suu, _suv, _svv = surface_point(table, pool, 0, x, y)
+            y, _fits = into_domain(store.pool, patch.breaks_v, patch.spans_v, patch.closed_v, y)
+            s, su, sv, _suu, _suv, _svv = surface_point(store.table, store.pool, 0, x, y)
             normal = cross(su, sv)
             area += half * weights[n] * np.sqrt(dot(normal, normal))
             volume += half * weights[n] * dot(s, normal) / 3.0
@@ -57,7 +58,7 @@ def along_pieces(table, pool, rows, coefficients, degrees, levels, nodes, weight
         for n in range(nodes.size):
             t = t0 + half * (1.0 + nodes[n])
             u, v, du, _dv = piece_line(pool, coefficients[k], degrees[k], t - rows[k, 2])
-            a, b = _column(table, pool, u + rows[k, 3], v + rows[k, 4], levels, nodes, weights)
+            a, b = _column(Store(table, pool), u + rows[k, 3], v + rows[k, 4], levels, nodes, weights)
             area += half * weights[n] * du * a
             volume += half * weights[n] * du * b
         out[k, 0] = area
@@ -73,7 +74,7 @@ def along_bottom(table, pool, stretches, levels, nodes, weights, out):
         area = 0.0
         volume = 0.0
         for n in range(nodes.size):
-            a, b = _column(table, pool, u0 + half * (1.0 + nodes[n]), levels[0], levels, nodes, weights)
+            a, b = _column(Store(table, pool), u0 + half * (1.0 + nodes[n]), levels[0], levels, nodes, weights)
             area += half * weights[n] * a
             volume += half * weights[n] * b
         out[k, 0] = area

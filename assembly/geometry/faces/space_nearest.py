@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly._record import Store
 from assembly.geometry.faces.trim_pieces import (
     LET_GO,
     PIECE_DOUBLES,
@@ -31,33 +32,33 @@ _ROUNDING = 4e-15
 
 
 @kernel(inner=True)
-def _on_surface(table, pool, surface, u, v):
+def _on_surface(store, surface, u, v):
     """The point and derivatives at parameters of any sheet; beyond an open end, those of the end."""
-    patch = surface_at(table, surface)
-    x, _fits = into_domain(pool, patch.breaks_u, patch.spans_u, patch.closed_u, u)
-    y, _fits = into_domain(pool, patch.breaks_v, patch.spans_v, patch.closed_v, v)
-    return surface_point(table, pool, surface, x, y)
+    patch = surface_at(store.table, surface)
+    x, _fits = into_domain(store.pool, patch.breaks_u, patch.spans_u, patch.closed_u, u)
+    y, _fits = into_domain(store.pool, patch.breaks_v, patch.spans_v, patch.closed_v, v)
+    return surface_point(store.table, store.pool, surface, x, y)
 
 
 @kernel(inner=True)
-def _on_curve(table, pool, surface, o, i, t):
+def _on_curve(store, surface, o, i, t):
     """A point of S(c(t)) with its first two derivatives."""
-    piece = piece_bounds_at(pool, i)
-    links = piece_links_at(table, o)
-    u, v, du, dv, ddu, ddv = piece_bend(pool, links.coefficients, links.degree, t - piece.middle)
-    s, su, sv, suu, suv, svv = _on_surface(table, pool, surface, u + piece.shift_u, v + piece.shift_v)
+    piece = piece_bounds_at(store.pool, i)
+    links = piece_links_at(store.table, o)
+    u, v, du, dv, ddu, ddv = piece_bend(store.pool, links.coefficients, links.degree, t - piece.middle)
+    s, su, sv, suu, suv, svv = _on_surface(store, surface, u + piece.shift_u, v + piece.shift_v)
     bend = add(blend(du * du, suu, 2.0 * du * dv, suv), blend(dv * dv, svv, 1.0, blend(ddu, su, ddv, sv)))
     return s, blend(du, su, dv, sv), bend
 
 
 @kernel(inner=True)
-def _newton(table, pool, surface, o, i, a, b, t, q):
+def _newton(store, surface, o, i, a, b, t, q):
     """The nearest point of an interval on which the distance is convex; half its square and its parameter."""
     low = a
     high = b
     f = 0.0
     for _ in range(60):
-        p, d, h = _on_curve(table, pool, surface, o, i, t)
+        p, d, h = _on_curve(store, surface, o, i, t)
         e = sub(p, q)
         f = 0.5 * dot(e, e)
         g = dot(e, d)
@@ -86,9 +87,9 @@ def _newton(table, pool, surface, o, i, a, b, t, q):
 
 
 @kernel(inner=True)
-def _search(table, pool, surface, o, i, q, m1, m2, m3, best):
+def _search(store, surface, o, i, q, m1, m2, m3, best):
     """As `trim.nearest_on_piece`, in space."""
-    piece = piece_bounds_at(pool, i)
+    piece = piece_bounds_at(store.pool, i)
     t0 = piece.t0
     t1 = piece.t1
     found = t0 - 1.0
@@ -98,7 +99,7 @@ def _search(table, pool, surface, o, i, q, m1, m2, m3, best):
     for _ in range(_BUDGET):
         half = 0.5 * h
         m = t0 + (index + 0.5) * h
-        p, d, dd = _on_curve(table, pool, surface, o, i, m)
+        p, d, dd = _on_curve(store, surface, o, i, m)
         e = sub(p, q)
         f = 0.5 * dot(e, e)
         if f < best:
@@ -119,7 +120,7 @@ def _search(table, pool, surface, o, i, q, m1, m2, m3, best):
         if low < best:
             if curvature > third * half:
                 begin = t0 + index * h
-                f, t = _newton(table, pool, surface, o, i, begin, min(begin + h, t1), m, q)
+                f, t = _newton(store, surface, o, i, begin, min(begin + h, t1), m, q)
                 if f < best:
                     best = f
                     found = t
@@ -144,10 +145,11 @@ def nearest_in_space(table, pool, surface, trim, bounds, u, v, out):
 
     `bounds` are g1, g2, g3 of the surface.
     """
+    store = Store(table, pool)
     trim_record = trim_at(table, trim)
     count = trim_record.pieces
     for n in range(u.size):
-        q, _su, _sv, _suu, _suv, _svv = _on_surface(table, pool, surface, u[n], v[n])
+        q, _su, _sv, _suu, _suv, _svv = _on_surface(store, surface, u[n], v[n])
         best = np.inf
         out[n, 1] = -1.0
         out[n, 2] = 0.0
@@ -155,7 +157,7 @@ def nearest_in_space(table, pool, surface, trim, bounds, u, v, out):
             o = trim_record.piece_table + PIECE_INTS * (k >> 1)
             i = trim_record.piece_pool + PIECE_DOUBLES * (k >> 1)
             t = piece_bounds_at(pool, i).t0 if k % 2 == 0 else piece_bounds_at(pool, i).t1
-            p, _d, _h = _on_curve(table, pool, surface, o, i, t)
+            p, _d, _h = _on_curve(store, surface, o, i, t)
             e = sub(p, q)
             if 0.5 * dot(e, e) < best:
                 best = 0.5 * dot(e, e)
@@ -169,7 +171,7 @@ def nearest_in_space(table, pool, surface, trim, bounds, u, v, out):
             m1 = bounds[0] * c1
             m2 = bounds[1] * c1 * c1 + bounds[0] * c2
             m3 = bounds[2] * c1**3 + 3.0 * bounds[1] * c1 * c2 + bounds[0] * piece_bounds_at(pool, i).bound_3
-            best, t = _search(table, pool, surface, o, i, q, m1, m2, m3, best)
+            best, t = _search(store, surface, o, i, q, m1, m2, m3, best)
             if t >= piece_bounds_at(pool, i).t0:
                 out[n, 1] = piece_links_at(table, o).curve
                 out[n, 2] = t

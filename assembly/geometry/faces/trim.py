@@ -14,6 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly._record import Store
 from assembly.geometry.faces.trim_pieces import (
     PIECE_DOUBLES,
     PIECE_INTS,
@@ -47,19 +48,19 @@ def _steps(pool, first, count, start, u):
 
 
 @kernel(inner=True)
-def _below(table, pool, o, i, u, v, tolerance):
+def _below(store, o, i, u, v, tolerance):
     """What a piece adds to w at a point, and whether the point is on it."""
-    piece = piece_bounds_at(pool, i)
-    links = piece_links_at(table, o)
-    if v > pool[i + 3] + tolerance:
-        return links.sign_u if pool[i] <= u < pool[i + 1] else 0, False
-    if v < pool[i + 2] - tolerance:
+    piece = piece_bounds_at(store.pool, i)
+    links = piece_links_at(store.table, o)
+    if v > store.pool[i + 3] + tolerance:
+        return links.sign_u if store.pool[i] <= u < store.pool[i + 1] else 0, False
+    if v < store.pool[i + 2] - tolerance:
         return 0, False
     shift_u = piece.shift_u
     shift_v = piece.shift_v
     sign_u = links.sign_u
     sign_v = links.sign_v
-    within = pool[i] <= u < pool[i + 1]
+    within = store.pool[i] <= u < store.pool[i + 1]
     major = links.major
     x = u
     # The ends first: beyond them the curve is not the piece's.
@@ -72,17 +73,17 @@ def _below(table, pool, o, i, u, v, tolerance):
         start = piece.start[0]
         end = piece.end[0]
         shift = shift_u
-        inside = pool[i] <= u <= pool[i + 1]
+        inside = store.pool[i] <= u <= store.pool[i + 1]
     else:
         x = v
         start = piece.start[1]
         end = piece.end[1]
         shift = shift_v
-        inside = pool[i + 2] <= v <= pool[i + 3]
+        inside = store.pool[i + 2] <= v <= store.pool[i + 3]
     if not inside:
-        return sign_u if within and v > pool[i + 3] else 0, False
+        return sign_u if within and v > store.pool[i + 3] else 0, False
     at, cu, cv, du, dv = piece_at(
-        pool,
+        store.pool,
         links.coefficients,
         links.degree,
         piece.middle,
@@ -105,10 +106,10 @@ def _below(table, pool, o, i, u, v, tolerance):
 
 
 @kernel(inner=True)
-def winding(table, pool, trim, u, v):
+def winding(store, trim, u, v):
     """w at a point, and whether the point is on the boundary."""
-    trim_record = trim_at(table, trim)
-    frame = trim_frame_at(pool, trim_record.frame)
+    trim_record = trim_at(store.table, trim)
+    frame = trim_frame_at(store.pool, trim_record.frame)
     tolerance = frame.on
     x = into_cell(u, frame.low_u, frame.high_u, frame.period_u)
     y = into_cell(v, frame.low_v, frame.high_v, frame.period_v)
@@ -117,20 +118,20 @@ def winding(table, pool, trim, u, v):
     extent = frame.high_u - frame.low_u
     if frame.period_u == 0.0 and 0.0 <= x - frame.high_u <= 1e-14 * extent:
         z = frame.high_u - 1e-15 * extent
-    w = _steps(pool, trim_record.step_pool, trim_record.steps, frame.bottom, x)
+    w = _steps(store.pool, trim_record.step_pool, trim_record.steps, frame.bottom, x)
     o = trim_record.piece_table
     i = trim_record.piece_pool
     for _ in range(trim_record.pieces):
-        if pool[i] - tolerance <= x <= pool[i + 1] + tolerance:
-            part, on = _below(table, pool, o, i, x, y, tolerance)
+        if store.pool[i] - tolerance <= x <= store.pool[i + 1] + tolerance:
+            part, on = _below(store, o, i, x, y, tolerance)
             if on:
                 return w, True
             w += part
         o += PIECE_INTS
         i += PIECE_DOUBLES
     for _ in range(trim_record.pieces, trim_record.all_pieces):
-        sign = piece_links_at(table, o).sign_u
-        if pool[i] <= z < pool[i + 1] and (y > pool[i + 2] or (y == pool[i + 2] and sign > 0)):
+        sign = piece_links_at(store.table, o).sign_u
+        if store.pool[i] <= z < store.pool[i + 1] and (y > store.pool[i + 2] or (y == store.pool[i + 2] and sign > 0)):
             w += sign
         o += PIECE_INTS
         i += PIECE_DOUBLES
@@ -138,12 +139,12 @@ def winding(table, pool, trim, u, v):
 
 
 @kernel(inner=True)
-def trim_side(table, pool, trim, u, v):
+def trim_side(store, trim, u, v):
     """1 inside, 0 on the boundary (within 1e-12 of its size), -1 outside."""
-    w, on = winding(table, pool, trim, u, v)
+    w, on = winding(store, trim, u, v)
     if on:
         return 0
-    frame = trim_frame_at(pool, trim_at(table, trim).frame)
+    frame = trim_frame_at(store.pool, trim_at(store.table, trim).frame)
     slack = 1e-14 * (frame.high_u - frame.low_u)
     if frame.period_u == 0.0 and not frame.low_u - slack <= u <= frame.high_u + slack:
         return -1
@@ -157,11 +158,11 @@ def trim_side(table, pool, trim, u, v):
 def locate_points(table, pool, trim, u, v, side):
     """`trim_side` at flat points."""
     for k in range(u.size):
-        side[k] = trim_side(table, pool, trim, u[k], v[k])
+        side[k] = trim_side(Store(table, pool), trim, u[k], v[k])
 
 
 @kernel(signatures="(i8[::1], f8[::1], i8, f8[::1], f8[::1], f8[::1])")
 def windings(table, pool, trim, u, v, out):
     """w at flat points, before the table knows what w at the bottom is."""
     for k in range(u.size):
-        out[k], _on = winding(table, pool, trim, u[k], v[k])
+        out[k], _on = winding(Store(table, pool), trim, u[k], v[k])

@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly._record import Store
 from assembly.geometry.faces.trim import into_cell, winding
 from assembly.geometry.faces.trim_pieces import (
     END,
@@ -42,16 +43,16 @@ def _gap(x, low, high):
 
 
 @kernel(inner=True)
-def _end_direction(table, pool, o, i, at_end):
+def _end_direction(store, o, i, at_end):
     """Unit direction of a piece at one of its ends, from the chord where its speed vanishes there."""
-    piece = piece_bounds_at(pool, i)
-    links = piece_links_at(table, o)
+    piece = piece_bounds_at(store.pool, i)
+    links = piece_links_at(store.table, o)
     t = piece.t1 if at_end else piece.t0
-    x, y, dx, dy = piece_line(pool, links.coefficients, links.degree, t - piece.middle)
+    x, y, dx, dy = piece_line(store.pool, links.coefficients, links.degree, t - piece.middle)
     length = np.sqrt(dx * dx + dy * dy)
     if length <= _SLOW * piece.bound_1:
         near = t + 1e-4 * (piece.t0 - piece.t1) * (1.0 if at_end else -1.0)
-        a, b, dx, dy = piece_line(pool, links.coefficients, links.degree, near - piece.middle)
+        a, b, dx, dy = piece_line(store.pool, links.coefficients, links.degree, near - piece.middle)
         dx = x - a if at_end else a - x
         dy = y - b if at_end else b - y
         length = np.sqrt(dx * dx + dy * dy)
@@ -79,19 +80,19 @@ def _nearest_end(pool, doubles, begin, stop, x, y, best):
 
 
 @kernel(inner=True)
-def _nearest_inside(table, pool, ints, doubles, begin, stop, x, y, best):
+def _nearest_inside(store, ints, doubles, begin, stop, x, y, best):
     """The same for all points of pieces, those aside whose box is too far."""
     piece = begin
     t = 0.0
     for k in range(begin, stop):
-        o = piece_links_at(table, ints + PIECE_INTS * k)
+        o = piece_links_at(store.table, ints + PIECE_INTS * k)
         i = doubles + PIECE_DOUBLES * k
-        piece_bounds = piece_bounds_at(pool, i)
-        gap_u = _gap(x, pool[i], pool[i + 1])
-        gap_v = _gap(y, pool[i + 2], pool[i + 3])
+        piece_bounds = piece_bounds_at(store.pool, i)
+        gap_u = _gap(x, store.pool[i], store.pool[i + 1])
+        gap_v = _gap(y, store.pool[i + 2], store.pool[i + 3])
         if 0.5 * (gap_u * gap_u + gap_v * gap_v) < best:
             best, at = nearest_on_piece(
-                pool,
+                store.pool,
                 o.coefficients,
                 o.degree,
                 piece_bounds.middle,
@@ -111,19 +112,19 @@ def _nearest_inside(table, pool, ints, doubles, begin, stop, x, y, best):
 
 
 @kernel(inner=True)
-def trim_nearest(table, pool, trim, first, count, u, v):
+def trim_nearest(store, trim, first, count, u, v):
     """Signed distance to boundary curves, index and parameter of the foot, the foot, and its normal to material.
 
     The distance is positive on the material side of the curves `first` to `first + count - 1`.
     """
-    trim_record = trim_at(table, trim)
-    frame = trim_frame_at(pool, trim_record.frame)
+    trim_record = trim_at(store.table, trim)
+    frame = trim_frame_at(store.pool, trim_record.frame)
     period_u = frame.period_u
     period_v = frame.period_v
     qx = into_cell(u, frame.low_u, frame.high_u, period_u)
     qy = into_cell(v, frame.low_v, frame.high_v, period_v)
-    begin = table[trim_record.curve_pieces + first]
-    stop = table[trim_record.curve_pieces + first + count]
+    begin = store.table[trim_record.curve_pieces + first]
+    stop = store.table[trim_record.curve_pieces + first + count]
     ints = trim_record.piece_table
     doubles = trim_record.piece_pool
     copies_u = 1 if period_u != 0.0 else 0
@@ -132,7 +133,7 @@ def trim_nearest(table, pool, trim, first, count, u, v):
         return np.inf, -1, 0.0, u, v, 0.0, 0.0
     best = np.inf
     piece = begin
-    t = piece_bounds_at(pool, doubles + PIECE_DOUBLES * begin).t0
+    t = piece_bounds_at(store.pool, doubles + PIECE_DOUBLES * begin).t0
     move_u = 0.0
     move_v = 0.0
     # Ends of pieces first: near ones spare the search of most others. Then the pieces; copies one period away last.
@@ -148,19 +149,19 @@ def trim_nearest(table, pool, trim, first, count, u, v):
                 if 0.5 * (cell_u * cell_u + cell_v * cell_v) >= best:
                     continue
                 if search == 0:
-                    f, k, at = _nearest_end(pool, doubles, begin, stop, x, y, best)
+                    f, k, at = _nearest_end(store.pool, doubles, begin, stop, x, y, best)
                 else:
-                    f, k, at = _nearest_inside(table, pool, ints, doubles, begin, stop, x, y, best)
+                    f, k, at = _nearest_inside(store, ints, doubles, begin, stop, x, y, best)
                 if f < best:
                     best = f
                     piece = k
                     t = at
                     move_u = move_a
                     move_v = move_b
-    o = piece_links_at(table, ints + PIECE_INTS * piece)
-    i = piece_bounds_at(pool, doubles + PIECE_DOUBLES * piece)
+    o = piece_links_at(store.table, ints + PIECE_INTS * piece)
+    i = piece_bounds_at(store.pool, doubles + PIECE_DOUBLES * piece)
     t = polished(
-        pool,
+        store.pool,
         o.coefficients,
         o.degree,
         i.middle,
@@ -170,19 +171,19 @@ def trim_nearest(table, pool, trim, first, count, u, v):
         qx - move_u - i.shift_u,
         qy - move_v - i.shift_v,
     )
-    return _foot(table, pool, trim, begin, stop, piece, t, u, v, qx - move_u, qy - move_v)
+    return _foot(store, trim, begin, stop, piece, t, u, v, qx - move_u, qy - move_v)
 
 
 @kernel(inner=True)
-def _foot(table, pool, trim, begin, stop, piece, t, u, v, qx, qy):
+def _foot(store, trim, begin, stop, piece, t, u, v, qx, qy):
     """What `trim_nearest` returns, from the piece and the parameter of the foot; (qx, qy) is (u, v) in the cell."""
-    trim_record = trim_at(table, trim)
+    trim_record = trim_at(store.table, trim)
     o = trim_record.piece_table + PIECE_INTS * piece
-    links = piece_links_at(table, o)
+    links = piece_links_at(store.table, o)
     i = trim_record.piece_pool + PIECE_DOUBLES * piece
-    piece_bounds = piece_bounds_at(pool, i)
-    size = trim_frame_at(pool, trim_record.frame).extent
-    x, y, dx, dy = piece_line(pool, links.coefficients, links.degree, t - piece_bounds.middle)
+    piece_bounds = piece_bounds_at(store.pool, i)
+    size = trim_frame_at(store.pool, trim_record.frame).extent
+    x, y, dx, dy = piece_line(store.pool, links.coefficients, links.degree, t - piece_bounds.middle)
     ox = qx - x - piece_bounds.shift_u
     oy = qy - y - piece_bounds.shift_v
     distance = np.sqrt(ox * ox + oy * oy)
@@ -196,8 +197,8 @@ def _foot(table, pool, trim, begin, stop, piece, t, u, v, qx, qy):
         # The way to the foot is not across the curve: is it an end, that rounding or a vanishing speed has left?
         first = t - piece_bounds.t0 < piece_bounds.t1 - t if unsure else beyond < 0.0
         end = START if first else END
-        ax = pool[i + end] - piece_bounds.shift_u - x
-        ay = pool[i + end + 1] - piece_bounds.shift_v - y
+        ax = store.pool[i + end] - piece_bounds.shift_u - x
+        ay = store.pool[i + end + 1] - piece_bounds.shift_v - y
         if ax * ax + ay * ay <= (_AT_END * size) ** 2:
             at_start = first
             at_end = not first
@@ -207,7 +208,7 @@ def _foot(table, pool, trim, begin, stop, piece, t, u, v, qx, qy):
             distance = np.sqrt(ox * ox + oy * oy)
     other = -1
     if at_start or at_end:
-        dx, dy = _end_direction(table, pool, o, i, at_end)
+        dx, dy = _end_direction(store, o, i, at_end)
         other = links.after if at_end else links.before
     else:
         length = np.sqrt(dx * dx + dy * dy)
@@ -218,8 +219,7 @@ def _foot(table, pool, trim, begin, stop, piece, t, u, v, qx, qy):
     smooth = not (at_start or at_end)
     if begin <= other < stop:
         ax, ay = _end_direction(
-            table,
-            pool,
+            store,
             trim_record.piece_table + PIECE_INTS * other,
             trim_record.piece_pool + PIECE_DOUBLES * other,
             not at_end,
@@ -232,7 +232,7 @@ def _foot(table, pool, trim, begin, stop, piece, t, u, v, qx, qy):
         elif same_way or abs(turn) > 1e-9:
             sign = -1.0 if turn > 0.0 else 1.0
         else:
-            w, _on = winding(table, pool, trim, u, v)
+            w, _on = winding(store, trim, u, v)
             sign = 1.0 if w == 1.0 else -1.0
         dx += ax
         dy += ay
@@ -254,7 +254,7 @@ def _foot(table, pool, trim, begin, stop, piece, t, u, v, qx, qy):
 def nearest_points(table, pool, trim, first, count, u, v, out):
     """`trim_nearest` at flat points, a row of seven each."""
     for k in range(u.size):
-        s, curve, t, cu, cv, nu, nv = trim_nearest(table, pool, trim, first, count, u[k], v[k])
+        s, curve, t, cu, cv, nu, nv = trim_nearest(Store(table, pool), trim, first, count, u[k], v[k])
         out[k, 0] = s
         out[k, 1] = curve
         out[k, 2] = t

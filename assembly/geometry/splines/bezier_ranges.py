@@ -119,9 +119,9 @@ def piece_points(table, span, order):
 
 
 @kernel(inline=True)
-def error_of(table, pool, order):
+def error_of(store, order):
     """How far values and Bezier points of a derivative may be off."""
-    return units(table) * largest_at(pool, ranged_curve_at(table, 0).largest).orders[order]
+    return units(store.table) * largest_at(store.pool, ranged_curve_at(store.table, 0).largest).orders[order]
 
 
 @kernel(inline=True)
@@ -131,10 +131,10 @@ def units(table):
 
 
 @kernel(inner=True, exact=True)
-def project(table, pool, free, count, room, at):
+def project(store, free, count, room, at):
     """Pairs of C and of w from homogeneous points at room[free:], to room[at:], eight numbers."""
-    part = units(table)
-    off = 4.0 * part * largest_at(pool, ranged_curve_at(table, 0).largest).position
+    part = units(store.table)
+    off = 4.0 * part * largest_at(store.pool, ranged_curve_at(store.table, 0).largest).position
     for k in range(4):
         lo = math.inf
         hi = -math.inf
@@ -180,19 +180,19 @@ def quotients(room, at, orders):
 
 
 @kernel(inner=True, exact=True)
-def bezier_point_bounds(table, pool, span, s, room, at):
+def bezier_point_bounds(store, span, s, room, at):
     """Intervals of C, C', C'' (by s) at s of a piece to room[at:], nine pairs; room behind them is used."""
-    curve = ranged_curve_at(table, 0)
+    curve = ranged_curve_at(store.table, 0)
     free = at + 32
     for order in range(3):
-        o, n = piece_points(table, span, order)
-        error = error_of(table, pool, order)
+        o, n = piece_points(store.table, span, order)
+        error = error_of(store, order)
         for k in range(4):
             room[free + k] = 0.0
         if n >= 0:
-            value(pool, o, n, s, room, free)
+            value(store.pool, o, n, s, room, free)
         if order == 0 and curve.rational != 0:
-            project(table, pool, free, 1, room, at)
+            project(store, free, 1, room, at)
             continue
         for k in range(4):
             lo, hi = room[free + k] - error, room[free + k] + error
@@ -206,29 +206,29 @@ def bezier_point_bounds(table, pool, span, s, room, at):
 
 
 @kernel(inner=True, exact=True)
-def bezier_range_bounds(table, pool, span, s0, s1, room):
+def bezier_range_bounds(store, span, s0, s1, room):
     """Intervals of C, C', C'', C''' (by s) over [s0, s1] of a piece to room, twelve pairs, and the width of an arc.
 
     The width of a polynomial piece is (s1 - s0) int |C' - chi / (s1 - s0)|^2 ds by the closed form of its Bezier
     points, a quadratic form in differences and so free of cancellation; of a rational piece it is infinite here.
     """
     work = range_room_at(room, 0)
-    polynomial = ranged_curve_at(table, 0).rational == 0
+    polynomial = ranged_curve_at(store.table, 0).rational == 0
     work.width = math.inf
     free = BEZIER_AT
     if not polynomial:
         s0 *= 1.0 - 4.0 * UNIT
         s1 = min(s1 * (1.0 + 4.0 * UNIT), 1.0)
     for order in range(4):
-        o, n = piece_points(table, span, order)
-        error = error_of(table, pool, order)
+        o, n = piece_points(store.table, span, order)
+        error = error_of(store, order)
         if n < 0:
             for k in range(8):
                 room[8 * order + k] = 0.0
             continue
-        restrict(pool, o, n, s0, s1, room, free)
+        restrict(store.pool, o, n, s0, s1, room, free)
         if order == 0 and not polynomial:
-            project(table, pool, free, n + 1, room, RANGES)
+            project(store, free, n + 1, room, RANGES)
             continue
         for k in range(4):
             lo = room[free + k]
@@ -240,7 +240,7 @@ def bezier_range_bounds(table, pool, span, s0, s1, room):
             place = RANGES + 8 * order + 2 * k
             room[place], room[place + 1] = widened(lo - error, hi + error, UNIT)
         if polynomial and order == 1:
-            work.width = gram_width(table, pool, n, s1 - s0, room, free, error)
+            work.width = gram_width(store, n, s1 - s0, room, free, error)
     if polynomial:
         for order in range(1, 4):
             for k in range(6):
@@ -250,9 +250,9 @@ def bezier_range_bounds(table, pool, span, s0, s1, room):
 
 
 @kernel(inner=True, exact=True)
-def gram_width(table, pool, n, step, room, at, error):
+def gram_width(store, n, step, room, at, error):
     """(step)^2 times the variance of C' from its Bezier points at room[at:], of degree n; rounded up."""
-    curve = ranged_curve_at(table, 0)
+    curve = ranged_curve_at(store.table, 0)
     total = 0.0
     off = 0.0
     for k in range(3):
@@ -268,10 +268,10 @@ def gram_width(table, pool, n, step, room, at, error):
             p = at + 4 * i
             q = at + 4 * j
             scalar = room[p] * room[q] + room[p + 1] * room[q + 1] + room[p + 2] * room[q + 2]
-            total += pool[g + (n + 1) * i + j] * scalar
-            off += pool[g + (n + 1) * i + j] * abs(scalar)
+            total += store.pool[g + (n + 1) * i + j] * scalar
+            off += store.pool[g + (n + 1) * i + j] * abs(scalar)
     # Points are off by `error` each, and a mean by as much: in the norm of the variance, which is at most the largest
     # of them. Sums of (n + 1)^2 positive and negative terms are off by that many units of their absolute sum.
     root = math.sqrt(max(total, 0.0) + UNIT * (n + 2.0) * (n + 2.0) * off) * (1.0 + 8.0 * UNIT)
-    root += 2.0 * math.sqrt(3.0) * (error + UNIT * (n + 2.0) * largest_at(pool, curve.largest).orders[1])
+    root += 2.0 * math.sqrt(3.0) * (error + UNIT * (n + 2.0) * largest_at(store.pool, curve.largest).orders[1])
     return up(up(step * root) * up(step * root))

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly._record import Store
 from assembly.geometry.splines.evaluate import (
     curve_lanes,
     spline_curve_at,
@@ -113,7 +114,7 @@ def swept_area(pool, records, u, v, nodes, weights):
             half = 0.5 * (pool[breaks + span + 1] - pool[breaks + span])
             middle = 0.5 * (pool[breaks + span + 1] + pool[breaks + span])
             for k in range(nodes.size):
-                a, b, _c = curve_lanes(table, pool, r, middle + half * nodes[k])
+                a, b, _c = curve_lanes(Store(table, pool), r, middle + half * nodes[k])
                 x, y, _z = xyz(a)
                 dx, dy, _dz = xyz(b)
                 total += 0.5 * half * weights[k] * ((x - u) * dy - (y - v) * dx)

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from assembly._kernel import kernel
 from assembly._lanes import lane, load_lanes, store_xyz
-from assembly._record import place_of, record_dtype, record_view, size_of
+from assembly._record import Store, place_of, record_dtype, record_view, size_of
 
 # A surface in the table.
 SURFACE = record_dtype(
@@ -171,22 +171,22 @@ def _quotient(a, au, av, auu, auv, avv):
 
 
 @kernel(inline=True)
-def surface_lanes(table, pool, r, u, v):
+def surface_lanes(store, r, u, v):
     """S, Su, Sv, Suu, Suv, Svv of the surface whose record starts at r, as four-lane values."""
-    patch = surface_at(table, r)
-    iu = find_span(pool, patch.breaks_u, patch.spans_u, u)
-    iv = find_span(pool, patch.breaks_v, patch.spans_v, v)
+    patch = surface_at(store.table, r)
+    iu = find_span(store.pool, patch.breaks_u, patch.spans_u, u)
+    iv = find_span(store.pool, patch.breaks_v, patch.spans_v, v)
     ou = patch.breaks_u + iu
     ov = patch.breaks_v + iv
-    s = u - 0.5 * (pool[ou] + pool[ou + 1])
-    t = v - 0.5 * (pool[ov] + pool[ov + 1])
+    s = u - 0.5 * (store.pool[ou] + store.pool[ou + 1])
+    t = v - 0.5 * (store.pool[ov] + store.pool[ov + 1])
     p = patch.degree_u
     q = patch.degree_v
     o = patch.coefficients + 4 * (p + 1) * (q + 1) * (iu * patch.spans_v + iv)
     if p == 3 and q == 3:
-        a, au, av, auu, auv, avv = _bicubic(pool, o, s, t)
+        a, au, av, auu, auv, avv = _bicubic(store.pool, o, s, t)
     else:
-        a, au, av, auu, auv, avv = _any_degree(pool, o, p, q, s, t)
+        a, au, av, auu, auv, avv = _any_degree(store.pool, o, p, q, s, t)
     return _quotient(a, au, av, auu, auv, avv)
 
 
@@ -198,7 +198,7 @@ def xyz(a):
 @kernel(signatures="(i8[::1], f8[::1], i8, f8, f8)")
 def surface_point(table, pool, r, u, v):
     """S, Su, Sv, Suu, Suv, Svv as 3-tuples."""
-    a, au, av, auu, auv, avv = surface_lanes(table, pool, r, u, v)
+    a, au, av, auu, auv, avv = surface_lanes(Store(table, pool), r, u, v)
     return xyz(a), xyz(au), xyz(av), xyz(auu), xyz(auv), xyz(avv)
 
 
@@ -237,7 +237,7 @@ def evaluate_surface(table, pool, u, v, order, out):
         y, fits = into_domain(pool, patch.breaks_v, patch.spans_v, patch.closed_v, v[i])
         if not fits:
             return 2 * i + 1
-        a, au, av, auu, auv, avv = surface_lanes(table, pool, 0, x, y)
+        a, au, av, auu, auv, avv = surface_lanes(Store(table, pool), 0, x, y)
         o = 3 * i
         store_xyz(a, out, o)
         if order >= 1:
@@ -251,14 +251,14 @@ def evaluate_surface(table, pool, u, v, order, out):
 
 
 @kernel(inline=True)
-def curve_lanes(table, pool, r, t):
+def curve_lanes(store, r, t):
     """C, Ct, Ctt of the curve whose record starts at r, as four-lane values."""
-    arc = spline_curve_at(table, r)
-    span = find_span(pool, arc.breaks, arc.spans, t)
+    arc = spline_curve_at(store.table, r)
+    span = find_span(store.pool, arc.breaks, arc.spans, t)
     at = arc.breaks + span
-    s = t - 0.5 * (pool[at] + pool[at + 1])
+    s = t - 0.5 * (store.pool[at] + store.pool[at + 1])
     degree = arc.degree
-    a, d, h = _row(pool, arc.coefficients + 4 * (degree + 1) * span, degree, s)
+    a, d, h = _row(store.pool, arc.coefficients + 4 * (degree + 1) * span, degree, s)
     i = 1.0 / lane(a, 3)
     p = i * a
     pt = i * (d - lane(d, 3) * p)
@@ -268,7 +268,7 @@ def curve_lanes(table, pool, r, t):
 @kernel(signatures="(i8[::1], f8[::1], i8, f8)")
 def curve_point(table, pool, r, t):
     """C, Ct, Ctt as 3-tuples (z is zero for plane curves)."""
-    a, d, h = curve_lanes(table, pool, r, t)
+    a, d, h = curve_lanes(Store(table, pool), r, t)
     return xyz(a), xyz(d), xyz(h)
 
 
@@ -282,7 +282,7 @@ def evaluate_curve(table, pool, t, order, out):
         x, fits = into_domain(pool, arc.breaks, arc.spans, arc.closed, t[i])
         if not fits:
             return i
-        a, d, h = curve_lanes(table, pool, 0, x)
+        a, d, h = curve_lanes(Store(table, pool), 0, x)
         o = 3 * i
         store_xyz(a, out, o)
         if order >= 1:

@@ -41,22 +41,22 @@ SurfaceFrame = namedtuple(
 
 
 @kernel(inline=True)
-def limits(table, pool, r, across):
+def limits(store, r, across):
     """Low and high end of u (across = 0) or v (1), and whether it is closed."""
-    patch = surface_at(table, r)
+    patch = surface_at(store.table, r)
     if across == 0:
         o = patch.breaks_u
-        return pool[o], pool[o + patch.spans_u], patch.closed_u
+        return store.pool[o], store.pool[o + patch.spans_u], patch.closed_u
     o = patch.breaks_v
-    return pool[o], pool[o + patch.spans_v], patch.closed_v
+    return store.pool[o], store.pool[o + patch.spans_v], patch.closed_v
 
 
 @kernel(inner=True)
-def nearest_pole(table, pool, r, u, v):
+def nearest_pole(store, r, u, v):
     """The pole edge nearest to (u, v): its bit, and the distance as a part of the domain."""
-    ulo, uhi, _ = limits(table, pool, r, 0)
-    vlo, vhi, _ = limits(table, pool, r, 1)
-    poles = surface_at(table, r).poles
+    ulo, uhi, _ = limits(store, r, 0)
+    vlo, vhi, _ = limits(store, r, 1)
+    poles = surface_at(store.table, r).poles
     edge = 0
     least = 2.0
     for k in range(4):
@@ -74,17 +74,17 @@ def nearest_pole(table, pool, r, u, v):
 
 
 @kernel(inner=True)
-def spoke(table, pool, r, edge, along):
+def spoke(store, r, edge, along):
     """At the pole of `edge`: the point, E, dE/d(along), S_vv (v into the pole) for the other parameter `along`."""
     if edge <= 2:
-        lo, hi, _ = limits(table, pool, r, 0)
+        lo, hi, _ = limits(store, r, 0)
         at = lo if edge == 1 else hi
-        p, su, _sv, suu, suv, _svv = surface_point(table, pool, r, at, along)
+        p, su, _sv, suu, suv, _svv = surface_point(store.table, store.pool, r, at, along)
         s = 1.0 if edge == 1 else -1.0
         return p, scale(s, su), scale(s, suv), suu
-    lo, hi, _ = limits(table, pool, r, 1)
+    lo, hi, _ = limits(store, r, 1)
     at = lo if edge == 4 else hi
-    p, _su, sv, _suu, suv, svv = surface_point(table, pool, r, along, at)
+    p, _su, sv, _suu, suv, svv = surface_point(store.table, store.pool, r, along, at)
     s = 1.0 if edge == 4 else -1.0
     return p, scale(s, sv), scale(s, suv), svv
 
@@ -100,16 +100,16 @@ def spoke_normal(table, r, edge, e, turn):
 
 
 @kernel(inner=True)
-def pole_frame(table, pool, r, edge, u, v):
+def pole_frame(store, r, edge, u, v):
     """The `SurfaceFrame` near a pole, whose coordinates have no rates."""
     across = 0 if edge <= 2 else 1
-    lo, hi, _ = limits(table, pool, r, across)
-    other_lo, other_hi, _ = limits(table, pool, r, 1 - across)
+    lo, hi, _ = limits(store, r, across)
+    other_lo, other_hi, _ = limits(store, r, 1 - across)
     along = v if edge <= 2 else u
     depth = u if edge <= 2 else v
     delta = depth - lo if edge == 1 or edge == 4 else hi - depth
-    p, e, turn, bent = spoke(table, pool, r, edge, along)
-    n = spoke_normal(table, r, edge, e, turn)
+    p, e, turn, bent = spoke(store, r, edge, along)
+    n = spoke_normal(store.table, r, edge, e, turn)
     length = math.sqrt(dot(n, n))
     ee = dot(e, e)
     zero = (0.0, 0.0, 0.0)
@@ -127,8 +127,8 @@ def pole_frame(table, pool, r, edge, u, v):
     r2 = 0.0
     smooth = True
     for k in range(3):
-        _p, ek, tk, bk = spoke(table, pool, r, edge, other_lo + (other_hi - other_lo) * k / 3.0)
-        nk = spoke_normal(table, r, edge, ek, tk)
+        _p, ek, tk, bk = spoke(store, r, edge, other_lo + (other_hi - other_lo) * k / 3.0)
+        nk = spoke_normal(store.table, r, edge, ek, tk)
         lk = math.sqrt(dot(nk, nk))
         # At an apex the normals differ from spoke to spoke.
         smooth = smooth and dot(nk, n) > (1.0 - 1e-6) * lk
@@ -169,16 +169,16 @@ def pole_frame(table, pool, r, edge, u, v):
 
 
 @kernel(inner=True)
-def polar_step(table, pool, r, edge, u, v, step):
+def polar_step(store, r, edge, u, v, step):
     """Parameters after a tangential step (body axes) from (u, v) near the pole of `edge`, over it if it leads there."""
     across = 0 if edge <= 2 else 1
-    lo, hi, _ = limits(table, pool, r, across)
-    other_lo, other_hi, closed = limits(table, pool, r, 1 - across)
+    lo, hi, _ = limits(store, r, across)
+    other_lo, other_hi, closed = limits(store, r, 1 - across)
     along = v if edge <= 2 else u
     depth = u if edge <= 2 else v
     delta = depth - lo if edge == 1 or edge == 4 else hi - depth
-    _p, e, turn, _bent = spoke(table, pool, r, edge, along)
-    n = spoke_normal(table, r, edge, e, turn)
+    _p, e, turn, _bent = spoke(store, r, edge, along)
+    n = spoke_normal(store.table, r, edge, e, turn)
     flat = sub(step, scale(dot(step, n) / dot(n, n), n))
     w = add(scale(delta, e), flat)
     reach = math.sqrt(dot(w, w))
@@ -189,13 +189,13 @@ def polar_step(table, pool, r, edge, u, v, step):
     angle = along
     for k in range(16):
         candidate = other_lo + (other_hi - other_lo) * (k + 0.5) / 16.0
-        _p, ek, _tk, _bk = spoke(table, pool, r, edge, candidate)
+        _p, ek, _tk, _bk = spoke(store, r, edge, candidate)
         cosine = dot(ek, w) / (math.sqrt(dot(ek, ek)) * reach)
         if cosine > best:
             best = cosine
             angle = candidate
     for _ in range(6):
-        _p, ek, tk, _bk = spoke(table, pool, r, edge, angle)
+        _p, ek, tk, _bk = spoke(store, r, edge, angle)
         slope = dot(cross(tk, w), n)
         if slope == 0.0:
             break
@@ -205,7 +205,7 @@ def polar_step(table, pool, r, edge, u, v, step):
             if closed == 1:
                 angle -= (other_hi - other_lo) * math.floor((angle - other_lo) / (other_hi - other_lo))
             angle = min(max(angle, other_lo), other_hi)
-    _p, ek, _tk, _bk = spoke(table, pool, r, edge, angle)
+    _p, ek, _tk, _bk = spoke(store, r, edge, angle)
     delta = min(reach / math.sqrt(dot(ek, ek)), hi - lo)
     depth = lo + delta if edge == 1 or edge == 4 else hi - delta
     return (depth, angle) if edge <= 2 else (angle, depth)

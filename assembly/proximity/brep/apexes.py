@@ -35,44 +35,44 @@ def unit(a):
 
 
 @kernel(inline=True)
-def pole_point(table, pool, surface, pole):
+def pole_point(store, surface, pole):
     """The point of a pole."""
-    low, high, _closed = limits(table, pool, surface, 1 if pole <= 2 else 0)
-    return spoke(table, pool, surface, pole, 0.5 * (low + high))[0]
+    low, high, _closed = limits(store, surface, 1 if pole <= 2 else 0)
+    return spoke(store, surface, pole, 0.5 * (low + high))[0]
 
 
 @kernel(inner=True)
-def is_at(table, pool, vertex, p):
+def is_at(store, vertex, p):
     """Whether p is the point of a vertex."""
-    o = vertex_at(table, vertex).point
-    d = sub(p, (pool[o], pool[o + 1], pool[o + 2]))
+    o = vertex_at(store.table, vertex).point
+    d = sub(p, (store.pool[o], store.pool[o + 1], store.pool[o + 2]))
     return dot(d, d) <= APEX * APEX * (1.0 + dot(p, p))
 
 
 @kernel(inner=True)
-def from_apex(table, pool, shell, vertex, code, n):
+def from_apex(store, shell, vertex, code, n):
     """The face that takes over from the tip of a cone: code and (u, v) on the spoke along which the normal leans most.
 
     Where it leans along none, the tip itself, `code`.
     """
-    vertex_record = vertex_at(table, vertex)
+    vertex_record = vertex_at(store.table, vertex)
     best = LEAN
     found = (0.0, 0.0)
     for k in range(vertex_record.faces):
-        face = table[vertex_record.face_list + k]
-        surface = face_at(table, shell_at(table, shell).face_table + FACE_RECORD * face).surface
+        face = store.table[vertex_record.face_list + k]
+        surface = face_at(store.table, shell_at(store.table, shell).face_table + FACE_RECORD * face).surface
         for bit in range(4):
             pole = 1 << bit
-            if surface_at(table, surface).poles & pole == 0 or not is_at(
-                table, pool, vertex, pole_point(table, pool, surface, pole)
+            if surface_at(store.table, surface).poles & pole == 0 or not is_at(
+                store, vertex, pole_point(store, surface, pole)
             ):
                 continue
-            low, high, _closed = limits(table, pool, surface, 1 if pole <= 2 else 0)
-            first, last, _closed = limits(table, pool, surface, 0 if pole <= 2 else 1)
+            low, high, _closed = limits(store, surface, 1 if pole <= 2 else 0)
+            first, last, _closed = limits(store, surface, 0 if pole <= 2 else 1)
             depth = first + BESIDE * (last - first) if pole == 1 or pole == 4 else last - BESIDE * (last - first)
             for i in range(SPOKES):
                 along = low + (high - low) * (i + 0.5) / SPOKES
-                lean = dot(n, unit(spoke(table, pool, surface, pole, along)[1]))
+                lean = dot(n, unit(spoke(store, surface, pole, along)[1]))
                 if lean > best:
                     best = lean
                     code = face
@@ -81,20 +81,20 @@ def from_apex(table, pool, shell, vertex, code, n):
 
 
 @kernel(inner=True)
-def apex_near(table, pool, shell, code, u, v):
+def apex_near(store, shell, code, u, v):
     """The tip of a cone next to a point of a face where Newton's method gave up; else the face itself."""
-    solid = shell_at(table, shell)
+    solid = shell_at(store.table, shell)
     if code >= solid.faces:
         return code
-    surface = face_at(table, solid.face_table + FACE_RECORD * code).surface
-    if surface_at(table, surface).poles == 0:
+    surface = face_at(store.table, solid.face_table + FACE_RECORD * code).surface
+    if surface_at(store.table, surface).poles == 0:
         return code
-    pole, distance = nearest_pole(table, pool, surface, u, v)
+    pole, distance = nearest_pole(store, surface, u, v)
     if distance > NEAR_APEX:
         return code
-    p = pole_point(table, pool, surface, pole)
+    p = pole_point(store, surface, pole)
     for k in range(solid.vertices):
         vertex = solid.vertex_table + VERTEX_RECORD * k
-        if vertex_at(table, vertex).edges == 0 and is_at(table, pool, vertex, p):
+        if vertex_at(store.table, vertex).edges == 0 and is_at(store, vertex, p):
             return solid.faces + solid.edges + k
     return code

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
+from assembly._record import Store
 from assembly.geometry.splines.domain import into_domain
 from assembly.geometry.splines.evaluate import curve_lanes, surface_point, xyz
 from assembly.geometry.vec import blend, cross, dot, sub
@@ -13,13 +14,13 @@ _NEWTON_STEPS = 12
 
 
 @kernel(inner=True)
-def _jet(table, pool, surface, curve, t):
+def _jet(store, surface, curve, t):
     """C, C_t and S_u x S_v."""
-    c, d, _h = curve_lanes(table, pool, curve, t)
+    c, d, _h = curve_lanes(store, curve, t)
     at = xyz(c)
     rate = xyz(d)
-    u, v, _clamped = into_domain(table, pool, surface, at[0], at[1])
-    s, su, sv, _suu, _suv, _svv = surface_point(table, pool, surface, u, v)
+    u, v, _clamped = into_domain(store, surface, at[0], at[1])
+    s, su, sv, _suu, _suv, _svv = surface_point(store.table, store.pool, surface, u, v)
     return s, blend(rate[0], su, rate[1], sv), cross(su, sv)
 
 
@@ -28,7 +29,7 @@ def along_boundaries(table, pool, surfaces, curves, which, t, out):
     """C, C_t and S_u x S_v of curves `which` at parameters t into rows of nine."""
     for i in range(t.size):
         k = which[i]
-        jet = _jet(table, pool, surfaces[k], curves[k], t[i])
+        jet = _jet(Store(table, pool), surfaces[k], curves[k], t[i])
         for j in range(3):
             for m in range(3):
                 out[i, 3 * j + m] = jet[j][m]
@@ -62,6 +63,7 @@ def nearest_on_boundaries(table, pool, surfaces, curves, closed, begins, samples
     Gauss and Newton's iteration, which converges quadratically for points on the curve: from the guess if it is right
     to `close`, else from the nearest of the curve's samples. Distances are measured a step before the parameter.
     """
+    store = Store(table, pool)
     for i in range(which.size):
         k = which[i]
         p = (points[i, 0], points[i, 1], points[i, 2])
@@ -70,7 +72,7 @@ def nearest_on_boundaries(table, pool, surfaces, curves, closed, begins, samples
         low = samples[first, 0]
         high = samples[stop - 1, 0]
         t = guess[i]
-        c, rate, _normal = _jet(table, pool, surfaces[k], curves[k], t)
+        c, rate, _normal = _jet(store, surfaces[k], curves[k], t)
         gap = sub(p, c)
         best = t
         least = math.sqrt(dot(gap, gap))
@@ -78,7 +80,7 @@ def nearest_on_boundaries(table, pool, surfaces, curves, closed, begins, samples
             t = samples[_nearest_sample(samples, first, stop, p), 0]
             least = math.inf
             for _ in range(_NEWTON_STEPS):
-                c, rate, _normal = _jet(table, pool, surfaces[k], curves[k], t)
+                c, rate, _normal = _jet(store, surfaces[k], curves[k], t)
                 gap = sub(p, c)
                 distance = math.sqrt(dot(gap, gap))
                 speed = max(dot(rate, rate), 1e-300)

@@ -47,16 +47,16 @@ GRAIN, FAR = 2.0**-48, 1000.0
 
 
 @kernel(inner=True)
-def moved_since(table, pool, at, p, moving):
+def moved_since(store, at, p, moving):
     """How far the body that moves is at most from where it was when the list at `at` was made; infinite for another's.
 
     `moving` is the body whose motion is measured (`manager/motion_bounds.Mover`).
     """
-    neighbors = neighbor_list_at(table, at)
+    neighbors = neighbor_list_at(store.table, at)
     if neighbors.owner != p:
         return math.inf
-    root = tree_at(table, moving.tree).node_pool
-    middle = add(matvec(moving.turn, three_of(node_at(pool, root).center)), moving.shift)
+    root = tree_at(store.table, moving.tree).node_pool
+    middle = add(matvec(moving.turn, three_of(node_at(store.pool, root).center)), moving.shift)
     e = moving.quaternion
     square = 0.0
     other = 0.0
@@ -65,7 +65,7 @@ def moved_since(table, pool, at, p, moving):
         square += (e[k] - was) * (e[k] - was)
         other += (e[k] + was) * (e[k] + was)
     way = sub(middle, (GRAIN * neighbors.place[0], GRAIN * neighbors.place[1], GRAIN * neighbors.place[2]))
-    return math.sqrt(dot(way, way)) + 2.0 * node_at(pool, root).radius * math.sqrt(min(square, other))
+    return math.sqrt(dot(way, way)) + 2.0 * node_at(store.pool, root).radius * math.sqrt(min(square, other))
 
 
 @kernel(inner=True)
@@ -80,18 +80,18 @@ def reaches(table, at, moved, reach):
 
 
 @kernel(inner=True)
-def can_be_listed(table, pool, moving, reach):
+def can_be_listed(store, moving, reach):
     """Whether lengths of a list are in its range."""
-    root = tree_at(table, moving.tree).node_pool
-    middle = add(matvec(moving.turn, three_of(node_at(pool, root).center)), moving.shift)
-    return dot(middle, middle) < FAR * FAR and reach < FAR and node_at(pool, root).radius < FAR
+    root = tree_at(store.table, moving.tree).node_pool
+    middle = add(matvec(moving.turn, three_of(node_at(store.pool, root).center)), moving.shift)
+    return dot(middle, middle) < FAR * FAR and reach < FAR and node_at(store.pool, root).radius < FAR
 
 
 @kernel(inner=True)
-def write_list(table, pool, at, p, moving, reach, ring, found, count):
+def write_list(store, at, p, moving, reach, ring, found, count):
     """Keep `count` pairs (k, 2), made for motions up to `ring`; none where there is no room. Whether there was."""
-    neighbors = neighbor_list_at(table, at)
-    root = node_at(pool, tree_at(table, moving.tree).node_pool)
+    neighbors = neighbor_list_at(store.table, at)
+    root = node_at(store.pool, tree_at(store.table, moving.tree).node_pool)
     middle = add(matvec(moving.turn, three_of(root.center)), moving.shift)
     neighbors.owner = p
     for k in range(4):
@@ -106,27 +106,27 @@ def write_list(table, pool, at, p, moving, reach, ring, found, count):
         return False
     neighbors.count = count
     for k in range(count):
-        entry = neighbors_at(table, at + ENTRIES + ENTRY * k)
+        entry = neighbors_at(store.table, at + ENTRIES + ENTRY * k)
         entry.f = found[k, 0]
         entry.g = found[k, 1]
     return True
 
 
 @kernel(inner=True)
-def listed_pairs(table, pool, at, p, trees, turn, shift, moving, reach, ring, stack, candidates):
+def listed_pairs(store, at, p, trees, pose, moving, reach, ring, stack, candidates):
     """What `pairs_within` finds, from the list at `at`, which is made anew where it does not reach.
 
     The pose is that of g seen from f; `moving` is a Mover (`manager/motion_bounds.py`), and
     a new list is for motions of it up to `ring`. -1 where there is no room for a list.
     """
-    fits = reaches(table, at, moved_since(table, pool, at, p, moving), reach)
-    if fits < 0 or (fits == 0 and not can_be_listed(table, pool, moving, ring + reach)):
+    fits = reaches(store.table, at, moved_since(store, at, p, moving), reach)
+    if fits < 0 or (fits == 0 and not can_be_listed(store, moving, ring + reach)):
         return -1
     if fits == 0:
-        tilt = ring / node_at(pool, tree_at(table, moving.tree).node_pool).radius
-        count = pairs_about(table, pool, trees[0], trees[1], turn, shift, reach, ring, tilt, stack, candidates)
-        if not write_list(table, pool, at, p, moving, reach, ring, candidates, count):
+        tilt = ring / node_at(store.pool, tree_at(store.table, moving.tree).node_pool).radius
+        count = pairs_about(store, trees[0], trees[1], pose, reach, ring, tilt, stack, candidates)
+        if not write_list(store, at, p, moving, reach, ring, candidates, count):
             return -1
     return still_within(
-        table, pool, trees[0], trees[1], turn, shift, reach, at + ENTRIES, neighbor_list_at(table, at).count, candidates
+        store, trees[0], trees[1], pose, reach, at + ENTRIES, neighbor_list_at(store.table, at).count, candidates
     )

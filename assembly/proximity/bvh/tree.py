@@ -20,8 +20,9 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
-from assembly._record import place_of, record_dtype, record_view, size_of
+from assembly._record import Store, place_of, record_dtype, record_view, size_of
 from assembly.geometry.vec import add, dot, matvec, matvec_t, neg, scale, sub
+from assembly.kinematics.motion import RelativePose
 
 # The header of a tree in the table.
 TREE_DTYPE = record_dtype(
@@ -184,24 +185,26 @@ def admits(pool, o, p, seen, rotation, bulk, reach, slack, tilt):
 
 
 @kernel(inner=True)
-def facing(pool, o, p, rotation, shift, slack):
+def facing(pool, o, p, pose, slack):
     """Whether leaves at o of f and at p of g, admitted, still may hold a pair when their boxes are looked at closer."""
     node = node_at(pool, o)
     node_bounds = node_at(pool, p)
-    d = sub(add(matvec(rotation, three_of(node_at(pool, p).center)), shift), three_of(node_at(pool, o).center))
+    d = sub(
+        add(matvec(pose.rotation, three_of(node_at(pool, p).center)), pose.shift), three_of(node_at(pool, o).center)
+    )
     ho = three_of(node_at(pool, o).half)
     hp = three_of(node_at(pool, p).half)
-    if beside_cone(d, three_of(node_at(pool, o).axis), node.cosine, node.sine, ho, hp, rotation, slack):
+    if beside_cone(d, three_of(node_at(pool, o).axis), node.cosine, node.sine, ho, hp, pose.rotation, slack):
         return False
-    axis = matvec(rotation, three_of(node_at(pool, p).axis))
-    return not beside_cone(d, axis, node_bounds.cosine, node_bounds.sine, ho, hp, rotation, slack)
+    axis = matvec(pose.rotation, three_of(node_at(pool, p).axis))
+    return not beside_cone(d, axis, node_bounds.cosine, node_bounds.sine, ho, hp, pose.rotation, slack)
 
 
 @kernel(inline=True)
-def node_of(table, pool, tree, e):
+def node_of(store, tree, e):
     """Where the node of element e is in the pool."""
-    tree_record = tree_at(table, tree)
-    return tree_record.node_pool + NODE * np.int64(element_at(pool, tree_record.element_pool + ELEMENT * e).node)
+    tree_record = tree_at(store.table, tree)
+    return tree_record.node_pool + NODE * np.int64(element_at(store.pool, tree_record.element_pool + ELEMENT * e).node)
 
 
 @kernel(inline=True)
@@ -215,7 +218,7 @@ def rounding(pool, root_f, root_g, shift):
 
 
 @kernel(inner=True)
-def pairs_about(table, pool, tree_f, tree_g, rotation, shift, reach, ring, tilt, stack, out):
+def pairs_about(store, tree_f, tree_g, pose, reach, ring, tilt, stack, out):
     """Elements (k, 2) that may hold an extremal pair with |gap| <= reach at this pose, or at one near it; their number.
 
     Near are poses at which no point of either body is farther than `ring` from where it is now, seen from the other,
@@ -224,25 +227,25 @@ def pairs_about(table, pool, tree_f, tree_g, rotation, shift, reach, ring, tilt,
 
     -1 where the stack (n, 2) is too short; more than `out` holds where `out` is: then what it holds are the first.
     """
-    tree = tree_at(table, tree_f)
-    tree_record = tree_at(table, tree_g)
+    tree = tree_at(store.table, tree_f)
+    tree_record = tree_at(store.table, tree_g)
     node_f = tree.node_pool
     node_g = tree_record.node_pool
     ints_f = tree.node_table
     ints_g = tree_record.node_table
-    slack = ring + rounding(pool, node_f, node_g, shift)
+    slack = ring + rounding(store.pool, node_f, node_g, pose.shift)
     reach += slack
     tilt += ROUNDING
-    bulk = magnitudes(rotation)
-    back = transposed(rotation)
+    bulk = magnitudes(pose.rotation)
+    back = transposed(pose.rotation)
     back_bulk = transposed(bulk)
-    back_shift = neg(matvec(back, shift))
+    back_shift = neg(matvec(back, pose.shift))
     room = stack.shape[0]
     count = 0
     if room < 1:
         return -1
-    seen = seen_from(pool, node_g, rotation, bulk, shift)
-    if not admits(pool, node_f, node_g, seen, rotation, bulk, reach, slack, tilt):
+    seen = seen_from(store.pool, node_g, pose.rotation, bulk, pose.shift)
+    if not admits(store.pool, node_f, node_g, seen, pose.rotation, bulk, reach, slack, tilt):
         return 0
     stack[0, 0] = 0
     stack[0, 1] = 0
@@ -253,10 +256,10 @@ def pairs_about(table, pool, tree_f, tree_g, rotation, shift, reach, ring, tilt,
         j = stack[used, 1]
         o = node_f + NODE * i
         p = node_g + NODE * j
-        child_f = node_links_at(table, ints_f + NODE_INTS * i).child
-        child_g = node_links_at(table, ints_g + NODE_INTS * j).child
+        child_f = node_links_at(store.table, ints_f + NODE_INTS * i).child
+        child_g = node_links_at(store.table, ints_g + NODE_INTS * j).child
         if child_f < 0 and child_g < 0:
-            if facing(pool, o, p, rotation, shift, slack + tilt * reach):
+            if facing(store.pool, o, p, pose, slack + tilt * reach):
                 if count < out.shape[0]:
                     out[count, 0] = -1 - child_f
                     out[count, 1] = -1 - child_g
@@ -264,17 +267,17 @@ def pairs_about(table, pool, tree_f, tree_g, rotation, shift, reach, ring, tilt,
             continue
         if used + 2 > room:
             return -1
-        if child_g < 0 or (child_f >= 0 and node_at(pool, o).radius >= node_at(pool, p).radius):
-            seen = seen_from(pool, p, rotation, bulk, shift)
+        if child_g < 0 or (child_f >= 0 and node_at(store.pool, o).radius >= node_at(store.pool, p).radius):
+            seen = seen_from(store.pool, p, pose.rotation, bulk, pose.shift)
             for k in range(2):
-                if admits(pool, node_f + NODE * (child_f + k), p, seen, rotation, bulk, reach, slack, tilt):
+                if admits(store.pool, node_f + NODE * (child_f + k), p, seen, pose.rotation, bulk, reach, slack, tilt):
                     stack[used, 0] = child_f + k
                     stack[used, 1] = j
                     used += 1
         else:
-            seen = seen_from(pool, o, back, back_bulk, back_shift)
+            seen = seen_from(store.pool, o, back, back_bulk, back_shift)
             for k in range(2):
-                if admits(pool, node_g + NODE * (child_g + k), o, seen, back, back_bulk, reach, slack, tilt):
+                if admits(store.pool, node_g + NODE * (child_g + k), o, seen, back, back_bulk, reach, slack, tilt):
                     stack[used, 0] = i
                     stack[used, 1] = child_g + k
                     used += 1
@@ -282,29 +285,31 @@ def pairs_about(table, pool, tree_f, tree_g, rotation, shift, reach, ring, tilt,
 
 
 @kernel(inner=True)
-def pairs_within(table, pool, tree_f, tree_g, rotation, shift, reach, stack, out):
+def pairs_within(store, tree_f, tree_g, pose, reach, stack, out):
     """Elements (k, 2) of two trees that may hold an extremal pair with |gap| <= reach; see `pairs_about`."""
-    return pairs_about(table, pool, tree_f, tree_g, rotation, shift, reach, 0.0, 0.0, stack, out)
+    return pairs_about(store, tree_f, tree_g, pose, reach, 0.0, 0.0, stack, out)
 
 
 @kernel(inner=True)
-def still_within(table, pool, tree_f, tree_g, rotation, shift, reach, listed, count, out):
+def still_within(store, tree_f, tree_g, pose, reach, listed, count, out):
     """Which of the elements in a list, count of them from its place `listed` in the table, `pairs_within` would find.
 
     As long as `out` holds them; their number.
     """
-    slack = rounding(pool, tree_at(table, tree_f).node_pool, tree_at(table, tree_g).node_pool, shift)
+    slack = rounding(
+        store.pool, tree_at(store.table, tree_f).node_pool, tree_at(store.table, tree_g).node_pool, pose.shift
+    )
     reach += slack
-    bulk = magnitudes(rotation)
+    bulk = magnitudes(pose.rotation)
     found = 0
     for k in range(count):
-        e = table[listed + 2 * k]
-        d = table[listed + 2 * k + 1]
-        o = node_of(table, pool, tree_f, e)
-        p = node_of(table, pool, tree_g, d)
-        seen = seen_from(pool, p, rotation, bulk, shift)
-        if admits(pool, o, p, seen, rotation, bulk, reach, slack, ROUNDING) and facing(
-            pool, o, p, rotation, shift, slack
+        e = store.table[listed + 2 * k]
+        d = store.table[listed + 2 * k + 1]
+        o = node_of(store, tree_f, e)
+        p = node_of(store, tree_g, d)
+        seen = seen_from(store.pool, p, pose.rotation, bulk, pose.shift)
+        if admits(store.pool, o, p, seen, pose.rotation, bulk, reach, slack, ROUNDING) and facing(
+            store.pool, o, p, pose, slack
         ):
             if found < out.shape[0]:
                 out[found, 0] = e
@@ -316,7 +321,7 @@ def still_within(table, pool, tree_f, tree_g, rotation, shift, reach, listed, co
 @kernel(signatures="(i8[::1], f8[::1], i8, i8, UniTuple(f8, 9), UniTuple(f8, 3), f8, i8[:, ::1], i8[:, ::1])")
 def facing_pairs(table, pool, tree_f, tree_g, rotation, shift, reach, stack, out):
     """`pairs_within` for Python."""
-    return pairs_within(table, pool, tree_f, tree_g, rotation, shift, reach, stack, out)
+    return pairs_within(Store(table, pool), tree_f, tree_g, RelativePose(rotation, shift), reach, stack, out)
 
 
 @kernel(inline=True)
@@ -329,15 +334,15 @@ def box_distance(pool, o, p, seen, rotation, bulk):
 
 
 @kernel(inner=True)
-def overlapping(table, pool, tree_f, tree_g, rotation, shift, stack, out):
+def overlapping(store, tree_f, tree_g, pose, stack, out):
     """Elements (k, 2) of two trees whose boxes meet; how many `out` holds of them."""
-    tree = tree_at(table, tree_f)
-    tree_record = tree_at(table, tree_g)
+    tree = tree_at(store.table, tree_f)
+    tree_record = tree_at(store.table, tree_g)
     node_f = tree.node_pool
     node_g = tree_record.node_pool
     ints_f = tree.node_table
     ints_g = tree_record.node_table
-    bulk = magnitudes(rotation)
+    bulk = magnitudes(pose.rotation)
     count = 0
     stack[0, 0] = 0
     stack[0, 1] = 0
@@ -348,16 +353,21 @@ def overlapping(table, pool, tree_f, tree_g, rotation, shift, stack, out):
         j = stack[used, 1]
         o = node_f + NODE * i
         p = node_g + NODE * j
-        if box_distance(pool, o, p, seen_from(pool, p, rotation, bulk, shift), rotation, bulk) > 0.0:
+        if (
+            box_distance(
+                store.pool, o, p, seen_from(store.pool, p, pose.rotation, bulk, pose.shift), pose.rotation, bulk
+            )
+            > 0.0
+        ):
             continue
-        child_f = node_links_at(table, ints_f + NODE_INTS * i).child
-        child_g = node_links_at(table, ints_g + NODE_INTS * j).child
+        child_f = node_links_at(store.table, ints_f + NODE_INTS * i).child
+        child_g = node_links_at(store.table, ints_g + NODE_INTS * j).child
         if child_f < 0 and child_g < 0:
             out[count, 0] = -1 - child_f
             out[count, 1] = -1 - child_g
             count += 1
         elif used + 2 <= stack.shape[0]:
-            down_f = child_g < 0 or (child_f >= 0 and node_at(pool, o).radius >= node_at(pool, p).radius)
+            down_f = child_g < 0 or (child_f >= 0 and node_at(store.pool, o).radius >= node_at(store.pool, p).radius)
             for k in range(2):
                 stack[used, 0] = child_f + k if down_f else i
                 stack[used, 1] = j if down_f else child_g + k
@@ -366,22 +376,22 @@ def overlapping(table, pool, tree_f, tree_g, rotation, shift, stack, out):
 
 
 @kernel(inner=True)
-def least_distance(table, pool, tree_f, tree_g, rotation, shift, upper, stack):
+def least_distance(store, tree_f, tree_g, pose, upper, stack):
     """A lower bound of the distance of two trees' elements, at most `upper`: that of their boxes.
 
     A stack (n, 2) that is too short makes what is found lower, not wrong.
     """
-    tree = tree_at(table, tree_f)
-    tree_record = tree_at(table, tree_g)
+    tree = tree_at(store.table, tree_f)
+    tree_record = tree_at(store.table, tree_g)
     node_f = tree.node_pool
     node_g = tree_record.node_pool
     ints_f = tree.node_table
     ints_g = tree_record.node_table
-    slack = rounding(pool, node_f, node_g, shift)
-    bulk = magnitudes(rotation)
-    back = transposed(rotation)
+    slack = rounding(store.pool, node_f, node_g, pose.shift)
+    bulk = magnitudes(pose.rotation)
+    back = transposed(pose.rotation)
     back_bulk = transposed(bulk)
-    back_shift = neg(matvec(back, shift))
+    back_shift = neg(matvec(back, pose.shift))
     room = stack.shape[0]
     best = (upper + slack) * (upper + slack)
     if room < 1:
@@ -395,24 +405,24 @@ def least_distance(table, pool, tree_f, tree_g, rotation, shift, upper, stack):
         j = stack[used, 1]
         o = node_f + NODE * i
         p = node_g + NODE * j
-        seen = seen_from(pool, p, rotation, bulk, shift)
-        bound = box_distance(pool, o, p, seen, rotation, bulk)
+        seen = seen_from(store.pool, p, pose.rotation, bulk, pose.shift)
+        bound = box_distance(store.pool, o, p, seen, pose.rotation, bulk)
         # What was found since the pair was put here may exclude it.
         if bound >= best:
             continue
-        child_f = node_links_at(table, ints_f + NODE_INTS * i).child
-        child_g = node_links_at(table, ints_g + NODE_INTS * j).child
+        child_f = node_links_at(store.table, ints_f + NODE_INTS * i).child
+        child_g = node_links_at(store.table, ints_g + NODE_INTS * j).child
         if (child_f < 0 and child_g < 0) or used + 2 > room:
             best = bound
             continue
-        descend_f = child_g < 0 or (child_f >= 0 and node_at(pool, o).radius >= node_at(pool, p).radius)
+        descend_f = child_g < 0 or (child_f >= 0 and node_at(store.pool, o).radius >= node_at(store.pool, p).radius)
         if descend_f:
-            one = box_distance(pool, node_f + NODE * child_f, p, seen, rotation, bulk)
-            other = box_distance(pool, node_f + NODE * (child_f + 1), p, seen, rotation, bulk)
+            one = box_distance(store.pool, node_f + NODE * child_f, p, seen, pose.rotation, bulk)
+            other = box_distance(store.pool, node_f + NODE * (child_f + 1), p, seen, pose.rotation, bulk)
         else:
-            seen = seen_from(pool, o, back, back_bulk, back_shift)
-            one = box_distance(pool, node_g + NODE * child_g, o, seen, back, back_bulk)
-            other = box_distance(pool, node_g + NODE * (child_g + 1), o, seen, back, back_bulk)
+            seen = seen_from(store.pool, o, back, back_bulk, back_shift)
+            one = box_distance(store.pool, node_g + NODE * child_g, o, seen, back, back_bulk)
+            other = box_distance(store.pool, node_g + NODE * (child_g + 1), o, seen, back, back_bulk)
         # The nearer one comes last, and is looked at first.
         near = 0 if one <= other else 1
         for k in range(2):
@@ -427,4 +437,4 @@ def least_distance(table, pool, tree_f, tree_g, rotation, shift, upper, stack):
 @kernel(signatures="(i8[::1], f8[::1], i8, i8, UniTuple(f8, 9), UniTuple(f8, 3), f8, i8[:, ::1])")
 def tree_distance(table, pool, tree_f, tree_g, rotation, shift, upper, stack):
     """`least_distance` for Python."""
-    return least_distance(table, pool, tree_f, tree_g, rotation, shift, upper, stack)
+    return least_distance(Store(table, pool), tree_f, tree_g, RelativePose(rotation, shift), upper, stack)

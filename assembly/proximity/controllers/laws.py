@@ -18,14 +18,14 @@ import math
 from collections import namedtuple
 
 from assembly._kernel import kernel
-from assembly._record import place_of, record_dtype, record_view, size_of
+from assembly._record import Store, place_of, record_dtype, record_view, size_of
 from assembly.geometry.splines.domain import into_domain
 from assembly.geometry.splines.evaluate import (
     surface_at,
     surface_point,
 )
 from assembly.geometry.vec import add, dot, matvec, matvec_t, sub
-from assembly.kinematics.motion import relative_pose, rotation
+from assembly.kinematics.motion import RelativePose, relative_pose, rotation
 from assembly.proximity.extrema.feedback import descent_step, end_of
 
 # Forms of the projections.
@@ -139,11 +139,11 @@ def largest(h, b, held_u, held_v):
 
 
 @kernel(inline=True)
-def ends(table, pool, r, u, v):
-    patch = surface_at(table, r)
+def ends(store, r, u, v):
+    patch = surface_at(store.table, r)
     return (
-        end_of(pool, patch.breaks_u, patch.spans_u, patch.closed_u, 0, 0, u),
-        end_of(pool, patch.breaks_v, patch.spans_v, patch.closed_v, 0, 0, v),
+        end_of(store.pool, patch.breaks_u, patch.spans_u, patch.closed_u, 0, 0, u),
+        end_of(store.pool, patch.breaks_v, patch.spans_v, patch.closed_v, 0, 0, v),
     )
 
 
@@ -171,21 +171,21 @@ def keep(h, held_u, held_v):
 
 
 @kernel(inner=True)
-def control_rates(table, pool, f, g, placed, x, form, law, dt):
+def control_rates(store, f, g, placed, x, form, law, dt):
     """The `ControlStep` of a `ControlLaw` at x, of a `Target`. With g < 0 that is the point `placed.shift`."""
     turn, shift = placed.turn, placed.shift
-    s = surface_point(table, pool, f, x[0], x[1])
+    s = surface_point(store.table, store.pool, f, x[0], x[1])
     t = s
     target = shift
     if g >= 0:
-        t = surface_point(table, pool, g, x[2], x[3])
+        t = surface_point(store.table, store.pool, g, x[2], x[3])
         target = add(matvec(turn, t[0]), shift)
     d = sub(s[0], target)
     square = dot(d, d)
     distance = math.sqrt(square)
     psi = (dot(d, s[1]), dot(d, s[2]))
     b = law_weights(form, s[1], s[2])
-    end_u, end_v = ends(table, pool, f, x[0], x[1])
+    end_u, end_v = ends(store, f, x[0], x[1])
     ru, rv, held_u, held_v = saturate(end_u, end_v, psi, b, s[1], s[2], form)
     h = second_form(s, d)
     power = -(psi[0] * ru + psi[1] * rv)
@@ -204,7 +204,7 @@ def control_rates(table, pool, f, g, placed, x, form, law, dt):
         dg = matvec_t(turn, d)
         chi = (-dot(dg, t[1]), -dot(dg, t[2]))
         c = law_weights(form, t[1], t[2])
-        end_u, end_v = ends(table, pool, g, x[2], x[3])
+        end_u, end_v = ends(store, g, x[2], x[3])
         rr, rs, held_r, held_s = saturate(end_u, end_v, chi, c, t[1], t[2], form)
         k = second_form(t, (-dg[0], -dg[1], -dg[2]))
         power -= chi[0] * rr + chi[1] * rs
@@ -240,25 +240,25 @@ def control_rates(table, pool, f, g, placed, x, form, law, dt):
 
 
 @kernel(inline=True)
-def moved(table, pool, f, g, x, rates, dt):
+def moved(store, f, g, x, rates, dt):
     """Parameters after an Euler step, wrapped and clamped."""
-    uf, vf, _end = into_domain(table, pool, f, x[0] + dt * rates[0], x[1] + dt * rates[1])
+    uf, vf, _end = into_domain(store, f, x[0] + dt * rates[0], x[1] + dt * rates[1])
     ug, vg = x[2], x[3]
     if g >= 0:
-        ug, vg, _end = into_domain(table, pool, g, x[2] + dt * rates[2], x[3] + dt * rates[3])
+        ug, vg, _end = into_domain(store, g, x[2] + dt * rates[2], x[3] + dt * rates[3])
     return (uf, vf, ug, vg)
 
 
 @kernel(inner=True)
-def lowering(table, pool, f, g, turn, shift, x, rates, dt, distance):
+def lowering(store, f, g, pose, x, rates, dt, distance):
     """Parameters after a step that does not lead farther apart: a whole one, or the largest of its halves."""
     y = x
     for _ in range(HALVINGS):
-        y = moved(table, pool, f, g, x, rates, dt)
-        target = shift
+        y = moved(store, f, g, x, rates, dt)
+        target = pose.shift
         if g >= 0:
-            target = add(matvec(turn, surface_point(table, pool, g, y[2], y[3])[0]), shift)
-        p = surface_point(table, pool, f, y[0], y[1])[0]
+            target = add(matvec(pose.rotation, surface_point(store.table, store.pool, g, y[2], y[3])[0]), pose.shift)
+        p = surface_point(store.table, store.pool, f, y[0], y[1])[0]
         d = sub(p, target)
         # At rest distances differ by the rounding of the points.
         rounding = 1e-14 * (math.sqrt(dot(p, p)) + math.sqrt(dot(target, target)))
@@ -270,13 +270,13 @@ def lowering(table, pool, f, g, turn, shift, x, rates, dt, distance):
 
 @kernel(inline=True)
 def relative(table, poses, k, g, point):
-    """Rotation and shift of the target seen from f at the poses of step k; of a point, its place."""
+    """The pose of the target seen from f at the poses of step k; of a point, its place."""
     k = min(k, poses.shape[0] - 1)
     turn_f = rotation(poses[k], 0)
-    turn, shift = relative_pose(poses[k], 0, turn_f, 1, rotation(poses[k], 1))
+    pose = relative_pose(poses[k], 0, turn_f, 1, rotation(poses[k], 1))
     if g < 0:
-        shift = add(matvec(turn, point), shift)
-    return turn, shift
+        return RelativePose(rotation=pose.rotation, shift=add(matvec(pose.rotation, point), pose.shift))
+    return pose
 
 
 @kernel(inline=True)
@@ -304,6 +304,7 @@ def run_control(table, pool, f, g, point, poses, x, dt, steps, form, law, tolera
     last state. Where nothing moves any more the run ends with an error of at most `tolerance`. The points meet at a
     distance of `meet`.
     """
+    store = Store(table, pool)
     law = ControlLaw(law[0], law[1], law[2], law[3])
     turn, shift = relative(table, poses, 0, g, point)
     last = out.shape[0] - 1
@@ -329,7 +330,7 @@ def run_control(table, pool, f, g, point, poses, x, dt, steps, form, law, tolera
                 before = add(matvec(turn, there), shift)
                 after = add(matvec(next_turn, there), next_shift)
             drift_f = (i * (after[0] - before[0]), i * (after[1] - before[1]), i * (after[2] - before[2]))
-        step = control_rates(table, pool, f, g, Target(turn, shift, drift_f, drift_g), x, form, law, dt)
+        step = control_rates(store, f, g, Target(turn, shift, drift_f, drift_g), x, form, law, dt)
         if not step.distance < 1e300:
             return IRREGULAR, max(k - 1, 0)
         write_row(out, min(k, last), x, step)
@@ -341,9 +342,9 @@ def run_control(table, pool, f, g, point, poses, x, dt, steps, form, law, tolera
         if k == steps:
             break
         if still and law.gain == 0.0:
-            x = lowering(table, pool, f, g, turn, shift, x, step.rates, dt, step.distance)
+            x = lowering(store, f, g, RelativePose(turn, shift), x, step.rates, dt, step.distance)
         else:
-            x = moved(table, pool, f, g, x, step.rates, dt)
+            x = moved(store, f, g, x, step.rates, dt)
         turn, shift = next_turn, next_shift
     return ON_ITS_WAY, steps
 
@@ -377,6 +378,7 @@ def attraction(table, pool, point, starts, method, form, limit, tolerance, out):
     Newton's method without saturation fails where it leaves the patch; with it, components that lead out are set to
     zero and the rest is clamped. The switching controller takes the gain that its eigenvalues allow.
     """
+    store = Store(table, pool)
     law = ControlLaw(0.0, 0.0, 0.0, 0.0)
     same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
     zero = (0.0, 0.0, 0.0)
@@ -387,9 +389,9 @@ def attraction(table, pool, point, starts, method, form, limit, tolerance, out):
         error = math.inf
         for _ in range(limit):
             if method == SWITCHING:
-                step = control_rates(table, pool, 0, -1, placed, x, form, law, 1.0)
+                step = control_rates(store, 0, -1, placed, x, form, law, 1.0)
                 error = step.error
-                y = lowering(table, pool, 0, -1, same, point, x, step.rates, 1.0, step.distance)
+                y = lowering(store, 0, -1, RelativePose(same, point), x, step.rates, 1.0, step.distance)
                 clamped = False
             else:
                 s = surface_point(table, pool, 0, x[0], x[1])
@@ -398,13 +400,13 @@ def attraction(table, pool, point, starts, method, form, limit, tolerance, out):
                 held_u = False
                 held_v = False
                 if method == NEWTON_SATURATED:
-                    end_u, end_v = ends(table, pool, 0, x[0], x[1])
+                    end_u, end_v = ends(store, 0, x[0], x[1])
                     held_u = end_u * du > 0.0
                     held_v = end_v * dv > 0.0
                     du = 0.0 if held_u else du
                     dv = 0.0 if held_v else dv
                 error = math.sqrt(free_error((dot(d, s[1]), dot(d, s[2])), s[1], s[2], held_u, held_v))
-                u, v, clamped = into_domain(table, pool, 0, x[0] + du, x[1] + dv)
+                u, v, clamped = into_domain(store, 0, x[0] + du, x[1] + dv)
                 y = (u, v, 0.0, 0.0)
             if error <= tolerance:
                 ended += 1

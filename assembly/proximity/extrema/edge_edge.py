@@ -12,6 +12,7 @@ from collections import namedtuple
 
 from assembly._kernel import kernel
 from assembly.geometry.vec import cross, dot, neg, scale, sub
+from assembly.kinematics.motion import RelativePose
 from assembly.proximity.brep.records import EDGE, VERTEX
 from assembly.proximity.extrema.face_face import BEND, CONVERGED, LEFT_PATCH, NOT_CONVERGED, SINGULAR, STAGNANT
 from assembly.proximity.extrema.feature_jets import (
@@ -133,23 +134,23 @@ def straight_frame(curve_f, curve_g, residual, normal, size, regular, isolated, 
 
 
 @kernel(inner=True)
-def solve_off_face(table, pool, kind_f, f, kind_g, g, rotation, shift, x, normal, size, turn, limit):
+def solve_off_face(store, kind_f, f, kind_g, g, pose, x, normal, size, turn, limit):
     """Newton from x = (t_f, t_g) for edges and vertices. Returns status, (t_f, t_g) and the frame."""
     same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
     origin = (0.0, 0.0, 0.0)
     if limit > 0:
         # A start carried along a step may be beyond an end, where a curve goes on and its edge does not.
         x = (
-            edge_advance(table, pool, f, x[0], 0.0) if kind_f == EDGE else x[0],
-            edge_advance(table, pool, g, x[1], 0.0) if kind_g == EDGE else x[1],
+            edge_advance(store, f, x[0], 0.0) if kind_f == EDGE else x[0],
+            edge_advance(store, g, x[1], 0.0) if kind_g == EDGE else x[1],
         )
     tolerance = 4e-14 * size
     previous = 1e300
     status = NOT_CONVERGED
     iteration = 0
     while True:
-        p, ct, ctt = other_jet(table, pool, kind_f, f, same, origin, x[0], 0.0)
-        q, cs, css = other_jet(table, pool, kind_g, g, rotation, shift, x[1], 0.0)
+        p, ct, ctt = other_jet(store, kind_f, f, RelativePose(same, origin), x[0], 0.0)
+        q, cs, css = other_jet(store, kind_g, g, pose, x[1], 0.0)
         d = sub(q, p)
         t1, bent1, bend1, speed1 = unit_tangent(ct, ctt)
         t2, bent2, bend2, speed2 = unit_tangent(cs, css)
@@ -167,8 +168,8 @@ def solve_off_face(table, pool, kind_f, f, kind_g, g, rotation, shift, x, normal
         r2 = dot(d, t2)
         if limit > 0:
             # At the end of an edge, and the distance would be less beyond it.
-            point_f = point_f or (abs(r1) > BEYOND * size and edge_held(table, pool, f, x[0], r1))
-            point_g = point_g or (abs(r2) > BEYOND * size and edge_held(table, pool, g, x[1], -r2))
+            point_f = point_f or (abs(r1) > BEYOND * size and edge_held(store, f, x[0], r1))
+            point_g = point_g or (abs(r2) > BEYOND * size and edge_held(store, g, x[1], -r2))
         while True:
             r1 = 0.0 if point_f else r1
             r2 = 0.0 if point_g else r2
@@ -183,8 +184,8 @@ def solve_off_face(table, pool, kind_f, f, kind_g, g, rotation, shift, x, normal
             s1 = i[0] * r1 - i[1] * r2
             s2 = i[2] * r1 - i[3] * r2
             # Or a step leads beyond it.
-            out_f = limit > 0 and not point_f and abs(s1) > BEYOND * size and edge_held(table, pool, f, x[0], s1)
-            out_g = limit > 0 and not point_g and abs(s2) > BEYOND * size and edge_held(table, pool, g, x[1], s2)
+            out_f = limit > 0 and not point_f and abs(s1) > BEYOND * size and edge_held(store, f, x[0], s1)
+            out_g = limit > 0 and not point_g and abs(s2) > BEYOND * size and edge_held(store, g, x[1], s2)
             if not (out_f or out_g):
                 break
             point_f = point_f or out_f
@@ -210,8 +211,8 @@ def solve_off_face(table, pool, kind_f, f, kind_g, g, rotation, shift, x, normal
         factor_f = 1.0 if reach_f <= BEND else BEND / reach_f
         factor_g = 1.0 if reach_g <= BEND else BEND / reach_g
         x = (
-            x[0] if point_f else edge_advance(table, pool, f, x[0], factor_f * s1 / speed1),
-            x[1] if point_g else edge_advance(table, pool, g, x[1], factor_g * s2 / speed2),
+            x[0] if point_f else edge_advance(store, f, x[0], factor_f * s1 / speed1),
+            x[1] if point_g else edge_advance(store, g, x[1], factor_g * s2 / speed2),
         )
         iteration += 1
     _i, isolated = inverse(h, scope, RANK)

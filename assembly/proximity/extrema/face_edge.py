@@ -78,7 +78,7 @@ FaceEdgePair = namedtuple(
 
 
 @kernel(inner=True)
-def solve_on_face(table, pool, face, kind, other, rotation, shift, x, size, turn, limit):
+def solve_on_face(store, face, kind, other, pose, x, size, turn, limit):
     """Newton from x = (u, v, t, s) for a face and an edge, a vertex or a point, in the axes of the face.
 
     A point of an edge stays at t, one of a face at (t, s). With limit 0 everything is evaluated at x. Returns a
@@ -86,16 +86,16 @@ def solve_on_face(table, pool, face, kind, other, rotation, shift, x, size, turn
     """
     if limit > 0 and kind == EDGE:
         # A start carried along a step may be beyond an end, where the curve goes on and the edge does not.
-        x = (x[0], x[1], edge_advance(table, pool, other, x[2], 0.0), x[3])
+        x = (x[0], x[1], edge_advance(store, other, x[2], 0.0), x[3])
     tolerance = 4e-14 * size
     previous = 1e300
     status = NOT_CONVERGED
     iteration = 0
     while True:
-        own = own_frame(table, pool, face, x[0], x[1])
+        own = own_frame(store, face, x[0], x[1])
         p, n, tx, ty = own.point, own.normal, own.tangent_x, own.tangent_y
         e, a, regular = own.rates, own.shape, own.regular
-        q, ct, ctt = other_jet(table, pool, kind, other, rotation, shift, x[2], x[3])
+        q, ct, ctt = other_jet(store, kind, other, pose, x[2], x[3])
         d = sub(q, p)
         beta = dot(n, d)
         r0 = dot(tx, d)
@@ -137,7 +137,7 @@ def solve_on_face(table, pool, face, kind, other, rotation, shift, x, size, turn
         slide = False
         if not point and limit > 0 and (steep or abs(tilt) > BEYOND):
             # At the end of the edge, and the gap would be less beyond it.
-            point = edge_held(table, pool, other, x[2], -slope)
+            point = edge_held(store, other, x[2], -slope)
         if not point:
             unit = max(bound, abs(k))
             # The first row times the tangent, the second across it.
@@ -160,10 +160,10 @@ def solve_on_face(table, pool, face, kind, other, rotation, shift, x, size, turn
             slide = limit > 0 and (steep or (not fine and abs(tilt) >= LEVEL))
             if slide:
                 # The gap falls along all of this: on to where the edge bends or ends.
-                dt = edge_stride(table, pool, other)
+                dt = edge_stride(store, other)
                 dt = -dt if slope > 0.0 else dt
             # Held too where the step leads beyond the end: the slope may be that of a face not solved yet.
-            point = limit > 0 and abs(dt) * speed > BEYOND * size and edge_held(table, pool, other, x[2], dt)
+            point = limit > 0 and abs(dt) * speed > BEYOND * size and edge_held(store, other, x[2], dt)
         if point:
             unit = bound
             tilt = 0.0
@@ -203,8 +203,8 @@ def solve_on_face(table, pool, face, kind, other, rotation, shift, x, size, turn
         factor_g = 1.0 if bend_g <= BEND else BEND / bend_g
         du = factor_f * (e[0] * ax + e[1] * ay)
         dv = factor_f * e[2] * ay
-        u, v, clamped = advance(table, pool, face, x[0], x[1], du, dv, blend(factor_f * ax, tx, factor_f * ay, ty))
-        t = x[2] if point else edge_advance(table, pool, other, x[2], factor_g * dt)
+        u, v, clamped = advance(store, face, x[0], x[1], du, dv, blend(factor_f * ax, tx, factor_f * ay, ty))
+        t = x[2] if point else edge_advance(store, other, x[2], factor_g * dt)
         status = NOT_CONVERGED
         if clamped:
             status = LEFT_PATCH
@@ -271,7 +271,7 @@ def face_frame(found):
 
 
 @kernel(inner=True)
-def turned_frame(rotation, shift, found):
+def turned_frame(pose, found):
     """The frame of a pair whose face is g, in the axes of f: n, y and with them the curvatures change their signs."""
     face, c, speed, unit = found.face, found.along, found.speed, found.unit
     e, a, residual = face.rates, face.shape, found.residual
@@ -283,11 +283,11 @@ def turned_frame(rotation, shift, found):
         f = edge_side(c[0], -c[1], -found.bend, unit)
         rate = (c[0] / speed, -c[1] / speed, 0.0, 0.0)
     return FeatureFrame(
-        normal=neg(matvec(rotation, face.normal)),
-        tangent_x=matvec(rotation, face.tangent_x),
-        tangent_y=neg(matvec(rotation, face.tangent_y)),
-        point_f=add(matvec(rotation, found.point), shift),
-        point_g=add(matvec(rotation, face.point), shift),
+        normal=neg(matvec(pose.rotation, face.normal)),
+        tangent_x=matvec(pose.rotation, face.tangent_x),
+        tangent_y=neg(matvec(pose.rotation, face.tangent_y)),
+        point_f=add(matvec(pose.rotation, found.point), pose.shift),
+        point_g=add(matvec(pose.rotation, face.point), pose.shift),
         gap=found.gap,
         side_f=f,
         side_g=g,

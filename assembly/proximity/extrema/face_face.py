@@ -112,18 +112,18 @@ def shape_operator(p, q, r, s, luu, luv, lvv):
 
 
 @kernel(inline=True)
-def own_frame(table, pool, r, u, v):
+def own_frame(store, r, u, v):
     """A `SurfaceFrame` at parameters (u, v).
 
     At a pole E^-1 is zero: the point moves, its polar coordinates have no rates.
     """
-    patch = surface_at(table, r)
+    patch = surface_at(store.table, r)
     zero = (0.0, 0.0, 0.0)
     if patch.poles != 0:
-        edge, distance = nearest_pole(table, pool, r, u, v)
+        edge, distance = nearest_pole(store, r, u, v)
         if distance < CHART:
-            return pole_frame(table, pool, r, edge, u, v)
-    p, su, sv, suu, suv, svv = surface_point(table, pool, r, u, v)
+            return pole_frame(store, r, edge, u, v)
+    p, su, sv, suu, suv, svv = surface_point(store.table, store.pool, r, u, v)
     sign = float(patch.sign)
     normal = cross(su, sv)
     uu = dot(su, su)
@@ -142,17 +142,17 @@ def own_frame(table, pool, r, u, v):
 
 
 @kernel(inline=True)
-def other_frame(table, pool, r, u, v, n, x, y):
+def other_frame(store, r, u, v, n, x, y):
     """A `SeenFrame` at parameters (u, v), with another surface's n, x, y.
 
     m = n + [x y] r2 is orthogonal to S_u and S_v: T^T r2 = -(n.S_u, n.S_v), with T = [x y]^T [S_u S_v].
     """
     zero = (0.0, 0.0, 0.0)
     none = (0.0, 0.0, 0.0, 0.0)
-    if surface_at(table, r).poles != 0:
-        edge, distance = nearest_pole(table, pool, r, u, v)
+    if surface_at(store.table, r).poles != 0:
+        edge, distance = nearest_pole(store, r, u, v)
         if distance < CHART:
-            own = pole_frame(table, pool, r, edge, u, v)
+            own = pole_frame(store, r, edge, u, v)
             p, m, gx, gy, b = own.point, own.normal, own.tangent_x, own.tangent_y, own.shape
             s = dot(m, n)
             if not own.regular or abs(s) < 1e-3:
@@ -168,7 +168,7 @@ def other_frame(table, pool, r, u, v, n, x, y):
                 side * (yx * (b[0] * yx + b[1] * yy) + yy * (b[1] * yx + b[2] * yy)),
             )
             return SeenFrame(p, none, c, (dot(x, m) / s, dot(y, m) / s), True)
-    p, su, sv, suu, suv, svv = surface_point(table, pool, r, u, v)
+    p, su, sv, suu, suv, svv = surface_point(store.table, store.pool, r, u, v)
     t11 = dot(x, su)
     t12 = dot(x, sv)
     t21 = dot(y, su)
@@ -185,16 +185,16 @@ def other_frame(table, pool, r, u, v, n, x, y):
 
 
 @kernel(inline=True)
-def pair_frame(table, pool, f, g, rotation, shift, x):
+def pair_frame(store, f, g, pose, x):
     """The `PairFrame` at parameters x = (u_f, v_f, u_g, v_g), in the axes of body f."""
-    own = own_frame(table, pool, f, x[0], x[1])
+    own = own_frame(store, f, x[0], x[1])
     n, tx, ty = own.normal, own.tangent_x, own.tangent_y
     # The normal and the frame go to the axes of g, rather than six derivatives to those of f.
-    ng = matvec_t(rotation, n)
-    xg = matvec_t(rotation, tx)
-    yg = matvec_t(rotation, ty)
-    seen = other_frame(table, pool, g, x[2], x[3], ng, xg, yg)
-    pg = add(matvec(rotation, seen.point), shift)
+    ng = matvec_t(pose.rotation, n)
+    xg = matvec_t(pose.rotation, tx)
+    yg = matvec_t(pose.rotation, ty)
+    seen = other_frame(store, g, x[2], x[3], ng, xg, yg)
+    pg = add(matvec(pose.rotation, seen.point), pose.shift)
     d = sub(pg, own.point)
     return PairFrame(
         normal=n,
@@ -213,21 +213,21 @@ def pair_frame(table, pool, f, g, rotation, shift, x):
 
 
 @kernel(inline=True)
-def advance(table, pool, r, u, v, du, dv, step):
+def advance(store, r, u, v, du, dv, step):
     """Parameters moved by (du, dv), or over a pole by the tangential step (body axes); whether an end held them."""
-    if surface_at(table, r).poles != 0:
-        edge, distance = nearest_pole(table, pool, r, u, v)
-        ulo, uhi, _ = limits(table, pool, r, 0)
-        vlo, vhi, _ = limits(table, pool, r, 1)
+    if surface_at(store.table, r).poles != 0:
+        edge, distance = nearest_pole(store, r, u, v)
+        ulo, uhi, _ = limits(store, r, 0)
+        vlo, vhi, _ = limits(store, r, 1)
         turn = abs(dv) / (vhi - vlo) if edge <= 2 else abs(du) / (uhi - ulo)
         if edge <= 2:
             beyond = u + du < ulo if edge == 1 else u + du > uhi
         else:
             beyond = v + dv < vlo if edge == 4 else v + dv > vhi
         if distance < CHART or turn > TURN or beyond:
-            u, v = polar_step(table, pool, r, edge, u, v, step)
+            u, v = polar_step(store, r, edge, u, v, step)
             return u, v, False
-    return into_domain(table, pool, r, u + du, v + dv)
+    return into_domain(store, r, u + du, v + dv)
 
 
 @kernel(inline=True)
@@ -274,7 +274,7 @@ def bent_at_most(bend):
 
 
 @kernel(inline=True)
-def move_pair(table, pool, f, g, rotation, x, frame, step_f, step_g):
+def move_pair(store, f, g, rotation, x, frame, step_f, step_g):
     """Parameters after steps along the tangents of either surface; whether either was clamped; how far they were to go.
 
     The steps are in the tangent frame of f for both; `frame` is the `PairFrame` at x.
@@ -287,9 +287,9 @@ def move_pair(table, pool, f, g, rotation, x, frame, step_f, step_g):
     dv = e[2] * ay
     ds = t[0] * bx + t[1] * by
     dt = t[2] * bx + t[3] * by
-    uf, vf, clamped_f = advance(table, pool, f, x[0], x[1], du, dv, blend(ax, tx, ay, ty))
+    uf, vf, clamped_f = advance(store, f, x[0], x[1], du, dv, blend(ax, tx, ay, ty))
     move = matvec_t(rotation, blend(bx, tx, by, ty))
-    ug, vg, clamped_g = advance(table, pool, g, x[2], x[3], ds, dt, move)
+    ug, vg, clamped_g = advance(store, g, x[2], x[3], ds, dt, move)
     return (uf, vf, ug, vg), clamped_f or clamped_g, abs(du) + abs(dv) + abs(ds) + abs(dt)
 
 
@@ -339,7 +339,7 @@ def carried_along(frame, ax, ay, bx, by):
 
 
 @kernel(inner=True)
-def solve_pair(table, pool, f, g, rotation, shift, x, size, turn, close, downhill):
+def solve_pair(store, f, g, pose, x, size, turn, close, downhill):
     """Newton from x to the extremal pair: a `PairSolution`.
 
     `size` is the length against which steps are measured. A step that would turn a normal by more than `BEND` is
@@ -358,7 +358,7 @@ def solve_pair(table, pool, f, g, rotation, shift, x, size, turn, close, downhil
     stills = 0
     iteration = 0
     while True:
-        frame = pair_frame(table, pool, f, g, rotation, shift, x)
+        frame = pair_frame(store, f, g, pose, x)
         a, c, r = frame.shape_f, frame.shape_g, frame.residual
         matrix = pair_matrix(a, c, frame.gap, flat)
         isolated = matrix.isolated
@@ -398,7 +398,7 @@ def solve_pair(table, pool, f, g, rotation, shift, x, size, turn, close, downhil
         factor_g = bent_at_most(bend_g)
         step_f = (factor_f * ax, factor_f * ay)
         step_g = (factor_g * bx, factor_g * by)
-        y, clamped, way = move_pair(table, pool, f, g, rotation, x, frame, step_f, step_g)
+        y, clamped, way = move_pair(store, f, g, pose.rotation, x, frame, step_f, step_g)
         status = NOT_CONVERGED
         if clamped:
             status = LEFT_PATCH

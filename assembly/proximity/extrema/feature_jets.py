@@ -80,41 +80,41 @@ FeatureFrame = namedtuple(
 
 
 @kernel(inner=True)
-def edge_jet(table, pool, edge, t):
+def edge_jet(store, edge, t):
     """C, C_t, C_tt of an edge in body axes."""
-    edge_record = edge_at(table, edge)
-    c, d, h = curve_lanes(table, pool, edge_record.curve, t)
+    edge_record = edge_at(store.table, edge)
+    c, d, h = curve_lanes(store, edge_record.curve, t)
     p = xyz(c)
     q = xyz(d)
     w = xyz(h)
     r = edge_record.surface
     if r < 0:
         return p, q, w
-    u, v, _clamped = into_domain(table, pool, r, p[0], p[1])
-    s, su, sv, suu, suv, svv = surface_point(table, pool, r, u, v)
+    u, v, _clamped = into_domain(store, r, p[0], p[1])
+    s, su, sv, suu, suv, svv = surface_point(store.table, store.pool, r, u, v)
     bent = add(blend(q[0] * q[0], suu, 2.0 * q[0] * q[1], suv), scale(q[1] * q[1], svv))
     return s, blend(q[0], su, q[1], sv), add(bent, blend(w[0], su, w[1], sv))
 
 
 @kernel(inline=True)
-def vertex_point(table, pool, vertex):
-    o = vertex_at(table, vertex).point
-    return (pool[o], pool[o + 1], pool[o + 2])
+def vertex_point(store, vertex):
+    o = vertex_at(store.table, vertex).point
+    return (store.pool[o], store.pool[o + 1], store.pool[o + 2])
 
 
 @kernel(inline=True)
-def edge_limits(table, pool, edge):
+def edge_limits(store, edge):
     """Low and high end of t, and whether the edge has no ends."""
-    edge_record = edge_at(table, edge)
-    c = spline_curve_at(table, edge_record.curve)
+    edge_record = edge_at(store.table, edge)
+    c = spline_curve_at(store.table, edge_record.curve)
     o = c.breaks
-    return pool[o], pool[o + c.spans], edge_record.start < 0
+    return store.pool[o], store.pool[o + c.spans], edge_record.start < 0
 
 
 @kernel(inner=True)
-def edge_advance(table, pool, edge, t, dt):
+def edge_advance(store, edge, t, dt):
     """t moved by dt: wrapped on an edge without ends, else held at its end."""
-    lo, hi, endless = edge_limits(table, pool, edge)
+    lo, hi, endless = edge_limits(store, edge)
     t += dt
     if endless:
         if t < lo or t > hi:
@@ -124,18 +124,20 @@ def edge_advance(table, pool, edge, t, dt):
 
 
 @kernel(inner=True)
-def edge_held(table, pool, edge, t, dt):
+def edge_held(store, edge, t, dt):
     """Whether t is at an end and dt leads beyond it."""
-    lo, hi, endless = edge_limits(table, pool, edge)
+    lo, hi, endless = edge_limits(store, edge)
     return not endless and ((t <= lo and dt < 0.0) or (t >= hi and dt > 0.0))
 
 
 @kernel(inner=True)
-def edge_stride(table, pool, edge):
+def edge_stride(store, edge):
     """How far in t a straight part may be passed at once: one span with ends is straight all along, others in part."""
-    lo, hi, endless = edge_limits(table, pool, edge)
+    lo, hi, endless = edge_limits(store, edge)
     return (
-        hi - lo if spline_curve_at(table, edge_at(table, edge).curve).spans == 1 and not endless else 0.0625 * (hi - lo)
+        hi - lo
+        if spline_curve_at(store.table, edge_at(store.table, edge).curve).spans == 1 and not endless
+        else 0.0625 * (hi - lo)
     )
 
 
@@ -236,14 +238,18 @@ def across(a, b):
 
 
 @kernel(inner=True)
-def other_jet(table, pool, kind, other, rotation, shift, t, s):
+def other_jet(store, kind, other, pose, t, s):
     """Point, C_t, C_tt of an edge at t, or of a point (whose derivatives vanish), of a face at (t, s), moved."""
     zero = (0.0, 0.0, 0.0)
     if kind == VERTEX:
-        return add(matvec(rotation, vertex_point(table, pool, other)), shift), zero, zero
+        return add(matvec(pose.rotation, vertex_point(store, other)), pose.shift), zero, zero
     if kind == FACE_POINT:
-        return add(matvec(rotation, surface_point(table, pool, other, t, s)[0]), shift), zero, zero
-    p, ct, ctt = edge_jet(table, pool, other, t)
+        return (
+            add(matvec(pose.rotation, surface_point(store.table, store.pool, other, t, s)[0]), pose.shift),
+            zero,
+            zero,
+        )
+    p, ct, ctt = edge_jet(store, other, t)
     if kind == EDGE_POINT:
-        return add(matvec(rotation, p), shift), zero, zero
-    return add(matvec(rotation, p), shift), matvec(rotation, ct), matvec(rotation, ctt)
+        return add(matvec(pose.rotation, p), pose.shift), zero, zero
+    return add(matvec(pose.rotation, p), pose.shift), matvec(pose.rotation, ct), matvec(pose.rotation, ctt)

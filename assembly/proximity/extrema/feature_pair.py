@@ -11,6 +11,7 @@ import math
 
 from assembly._kernel import kernel
 from assembly.geometry.vec import cross, matvec, neg, sub
+from assembly.kinematics.motion import RelativePose
 from assembly.proximity.brep.records import FACE
 from assembly.proximity.extrema.edge_edge import solve_off_face
 from assembly.proximity.extrema.face_edge import face_frame, solve_on_face, turned_frame
@@ -69,26 +70,32 @@ def transposed(m):
 
 
 @kernel(inner=True)
-def newton_on_features(table, pool, kind_f, f, kind_g, g, rotation, shift, x, n, size, turn, limit):
+def newton_on_features(store, kind_f, f, kind_g, g, pose, x, n, size, turn, limit):
     """As `solve_features` for all but two faces, with the number of steps: none evaluates the pair at x."""
     if kind_f == FACE:
-        found = solve_on_face(table, pool, f, kind_g, g, rotation, shift, x, size, turn, limit)
+        found = solve_on_face(store, f, kind_g, g, pose, x, size, turn, limit)
         return found.status, found.parameters, face_frame(found)
     if kind_g == FACE:
-        back = transposed(rotation)
+        back = transposed(pose.rotation)
         found = solve_on_face(
-            table, pool, g, kind_f, f, back, neg(matvec(back, shift)), (x[2], x[3], x[0], x[1]), size, turn, limit
+            store,
+            g,
+            kind_f,
+            f,
+            RelativePose(back, neg(matvec(back, pose.shift))),
+            (x[2], x[3], x[0], x[1]),
+            size,
+            turn,
+            limit,
         )
         u, v, t, s = found.parameters
-        return found.status, (t, s, u, v), turned_frame(rotation, shift, found)
-    status, z, frame = solve_off_face(
-        table, pool, kind_f, f, kind_g, g, rotation, shift, (x[0], x[2]), n, size, turn, limit
-    )
+        return found.status, (t, s, u, v), turned_frame(pose, found)
+    status, z, frame = solve_off_face(store, kind_f, f, kind_g, g, pose, (x[0], x[2]), n, size, turn, limit)
     return status, (z[0], x[1], z[1], x[3]), frame
 
 
 @kernel(inner=True)
-def solve_features(table, pool, kind_f, f, kind_g, g, rotation, shift, x, n, size, turn):
+def solve_features(store, kind_f, f, kind_g, g, pose, x, n, size, turn):
     """Newton from x to the extremal pair of two features. Returns status, parameters and `FeatureFrame`.
 
     Parameters
@@ -119,18 +126,18 @@ def solve_features(table, pool, kind_f, f, kind_g, g, rotation, shift, x, n, siz
         Where it is (`proximity/extrema/feature_jets.py`).
     """
     if kind_f == FACE and kind_g == FACE:
-        found = solve_pair(table, pool, f, g, rotation, shift, x, size, turn, CLOSE, False)
+        found = solve_pair(store, f, g, pose, x, size, turn, CLOSE, False)
         return found.status, found.parameters, two_face_frame(found.frame, found.matrix)
-    return newton_on_features(table, pool, kind_f, f, kind_g, g, rotation, shift, x, n, size, turn, LIMIT)
+    return newton_on_features(store, kind_f, f, kind_g, g, pose, x, n, size, turn, LIMIT)
 
 
 @kernel(inner=True)
-def features_at(table, pool, kind_f, f, kind_g, g, rotation, shift, x, n, size):
+def features_at(store, kind_f, f, kind_g, g, pose, x, n, size):
     """The frame of two features at parameters x, extremal or not."""
     if kind_f == FACE and kind_g == FACE:
-        frame = pair_frame(table, pool, f, g, rotation, shift, x)
+        frame = pair_frame(store, f, g, pose, x)
         return two_face_frame(frame, pair_matrix(frame.shape_f, frame.shape_g, frame.gap, 1e-9 / size))
-    return newton_on_features(table, pool, kind_f, f, kind_g, g, rotation, shift, x, n, size, math.inf, 0)[2]
+    return newton_on_features(store, kind_f, f, kind_g, g, pose, x, n, size, math.inf, 0)[2]
 
 
 @kernel(inline=True)

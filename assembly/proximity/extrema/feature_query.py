@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
-from assembly._record import place_of, record_dtype, record_view, size_of
+from assembly._record import Store, place_of, record_dtype, record_view, size_of
 from assembly.geometry.vec import add, matvec, matvec_t
 from assembly.kinematics.motion import position, relative_pose, rotation
 from assembly.proximity.brep.records import FACE
@@ -53,9 +53,9 @@ def find_features(table, pool, kind_f, f, kind_g, g, q, x, n, size, turn, out):
     Returns the status.
     """
     turn_f = rotation(q, 0)
-    relative, shift = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
+    pose = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
     known = matvec_t(turn_f, (n[0], n[1], n[2]))
-    status, y, frame = solve_features(table, pool, kind_f, f, kind_g, g, relative, shift, x, known, size, turn)
+    status, y, frame = solve_features(Store(table, pool), kind_f, f, kind_g, g, pose, x, known, size, turn)
     origin = position(q, 0)
     pf = add(matvec(turn_f, frame.point_f), origin)
     pg = add(matvec(turn_f, frame.point_g), origin)
@@ -87,9 +87,9 @@ def feature_derivatives(table, pool, kind_f, f, kind_g, g, q, x, n, size, first,
     residual (lengths over `size`, and tilts), infinite where a feature has no tangent, and whether it is isolated.
     """
     turn_f = rotation(q, 0)
-    relative, shift = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
+    pose = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
     known = matvec_t(turn_f, (n[0], n[1], n[2]))
-    frame = features_at(table, pool, kind_f, f, kind_g, g, relative, shift, x, known, size)
+    frame = features_at(Store(table, pool), kind_f, f, kind_g, g, pose, x, known, size)
     if not frame.regular:
         return math.inf, False
     r = frame.residual
@@ -98,7 +98,7 @@ def feature_derivatives(table, pool, kind_f, f, kind_g, g, q, x, n, size, first,
     derivatives = derivatives_at(records, 0)
     gradient = np.empty((1, 12))
     row = np.empty(12)
-    feature_record(turn_f, shift, frame, records, 0)
+    feature_record(turn_f, pose.shift, frame, records, 0)
     gradient_row(records, 0, gradient, 0)
     for j in range(12):
         row[j] = gradient[0, j]

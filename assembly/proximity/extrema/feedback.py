@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
+from assembly._record import Store
 from assembly.geometry.splines.evaluate import (
     surface_at,
     surface_point,
@@ -72,19 +73,19 @@ def end_of(pool, breaks, spans, closed, pole_low, pole_high, u):
 
 
 @kernel(inline=True)
-def free_directions(table, pool, r, u, v, e, gx, gy, slack):
+def free_directions(store, r, u, v, e, gx, gy, slack):
     """Two directions (tx, ty) in which a point may descend, zero where an end of the patch takes one away; how many.
 
     e is E^-1 of `own_frame`, (gx, gy) the gradient over tangent lengths, `slack` what of it is rounding. Along an end
     the direction is that of the end: S_v at an end of u.
     """
-    patch = surface_at(table, r)
+    patch = surface_at(store.table, r)
     if e[0] == 0.0:
         # At a pole.
         return 1.0, 0.0, 0.0, 1.0, 2
     poles = patch.poles
-    end_u = end_of(pool, patch.breaks_u, patch.spans_u, patch.closed_u, poles & 1, poles & 2, u)
-    end_v = end_of(pool, patch.breaks_v, patch.spans_v, patch.closed_v, poles & 4, poles & 8, v)
+    end_u = end_of(store.pool, patch.breaks_u, patch.spans_u, patch.closed_u, poles & 1, poles & 2, u)
+    end_v = end_of(store.pool, patch.breaks_v, patch.spans_v, patch.closed_v, poles & 4, poles & 8, v)
     # S_v = (e12, e22) in the tangent frame, up to a positive factor; S_u = (1, 0).
     scale_v = 1.0 if e[2] > 0.0 else -1.0
     vx = -scale_v * e[1]
@@ -103,9 +104,9 @@ def free_directions(table, pool, r, u, v, e, gx, gy, slack):
 
 
 @kernel(inner=True)
-def end_curvature(table, pool, r, u, v, along_v, d):
+def end_curvature(store, r, u, v, along_v, d):
     """d.C'' of the curve C at the end of a patch that a point is held at, by arc length."""
-    _p, su, sv, suu, _suv, svv = surface_point(table, pool, r, u, v)
+    _p, su, sv, suu, _suv, svv = surface_point(store.table, store.pool, r, u, v)
     tangent = sv if along_v else su
     second = svv if along_v else suu
     i = 1.0 / dot(tangent, tangent)
@@ -155,30 +156,30 @@ def descent_step(p, c, q, gf, gg, mu):
 
 
 @kernel(inline=True)
-def both_frames(table, pool, f, g, turn, shift, x):
+def both_frames(store, f, g, pose, x):
     """`own_frame` of either surface, each in its own axes, and the vector d from f to g in both."""
-    own_f = own_frame(table, pool, f, x[0], x[1])
-    own_g = own_frame(table, pool, g, x[2], x[3])
-    d = sub(add(matvec(turn, own_g.point), shift), own_f.point)
-    return own_f, own_g, d, matvec_t(turn, d)
+    own_f = own_frame(store, f, x[0], x[1])
+    own_g = own_frame(store, g, x[2], x[3])
+    d = sub(add(matvec(pose.rotation, own_g.point), pose.shift), own_f.point)
+    return own_f, own_g, d, matvec_t(pose.rotation, d)
 
 
 @kernel(inner=True)
-def finish(table, pool, f, g, turn, shift, x, size, reach):
+def finish(store, f, g, pose, x, size, reach):
     """Newton's method from x: whether it came to the extremum that the descent leads to, and the `PairSolution`.
 
     That is one no farther apart than x, off by no more than `reach` on either surface; with reach = 0, where the
     surfaces meet, one where they touch or, solids, are deepest in each other.
     """
-    start = pair_frame(table, pool, f, g, turn, shift, x)
+    start = pair_frame(store, f, g, pose, x)
     most = TURN_APART if reach > 0.0 else TURN_MET
     cosine = SAME_APART if reach > 0.0 else SAME_MET
-    found = solve_pair(table, pool, f, g, turn, shift, x, size, most, 0.0, False)
+    found = solve_pair(store, f, g, pose, x, size, most, 0.0, False)
     y, frame = found.parameters, found.frame
     same = (found.status == CONVERGED or found.status == SINGULAR) and dot(start.normal, frame.normal) > cosine
     if same:
-        before = own_frame(table, pool, g, x[2], x[3]).normal
-        after = own_frame(table, pool, g, y[2], y[3]).normal
+        before = own_frame(store, g, x[2], x[3]).normal
+        after = own_frame(store, g, y[2], y[3]).normal
         same = dot(before, after) > cosine
         if reach > 0.0:
             d = sub(start.point_g, start.point_f)
@@ -188,7 +189,7 @@ def finish(table, pool, f, g, turn, shift, x, size, reach):
             same = same and abs(frame.gap) <= math.sqrt(dot(d, d)) + 1e-12 * size
             same = same and dot(moved_f, moved_f) <= limit and dot(moved_g, moved_g) <= limit
         else:
-            opposed = dot(after, matvec_t(turn, frame.normal)) < 0.0
+            opposed = dot(after, matvec_t(pose.rotation, frame.normal)) < 0.0
             same = same and (abs(frame.gap) <= 1e-9 * size or (opposed and frame.gap < 0.0))
     return same, found
 
@@ -200,7 +201,7 @@ def with_steps(found, count):
 
 
 @kernel(inner=True)
-def descend_pair(table, pool, f, g, turn, shift, x, size, limit):
+def descend_pair(store, f, g, pose, x, size, limit):
     """From any parameters x down to the nearest pair that the descent leads to, in at most `limit` steps.
 
     Returns a `PairSolution`, as `solve_pair` does. The points never move apart.
@@ -214,7 +215,7 @@ def descend_pair(table, pool, f, g, turn, shift, x, size, limit):
     mu = LEAST
     near = NEAR
     count = 0
-    own_f, own_g, d, dg = both_frames(table, pool, f, g, turn, shift, x)
+    own_f, own_g, d, dg = both_frames(store, f, g, pose, x)
     square = dot(d, d)
     while own_f.regular and own_g.regular:
         if square <= MEET * MEET * size * size:
@@ -224,8 +225,8 @@ def descend_pair(table, pool, f, g, turn, shift, x, size, limit):
         ng, xg, yg, eg, b = own_g.normal, own_g.tangent_x, own_g.tangent_y, own_g.rates, own_g.shape
         gf = (-dot(xf, d), -dot(yf, d))
         gg = (dot(xg, dg), dot(yg, dg))
-        tf = free_directions(table, pool, f, x[0], x[1], ef, gf[0], gf[1], ROUNDING * size)
-        tg = free_directions(table, pool, g, x[2], x[3], eg, gg[0], gg[1], ROUNDING * size)
+        tf = free_directions(store, f, x[0], x[1], ef, gf[0], gf[1], ROUNDING * size)
+        tg = free_directions(store, g, x[2], x[3], eg, gg[0], gg[1], ROUNDING * size)
         held = tf[4] < 2 or tg[4] < 2
         # The second derivative of |d|^2 / 2 over those directions.
         k = dot(nf, d)
@@ -233,11 +234,11 @@ def descend_pair(table, pool, f, g, turn, shift, x, size, limit):
         k = -dot(ng, dg)
         q = reduced(1.0 + k * b[0], k * b[1], 1.0 + k * b[2], tg)
         if tf[4] == 1:
-            p = (1.0 - end_curvature(table, pool, f, x[0], x[1], tf[1] != 0.0, d), 0.0, 1.0)
+            p = (1.0 - end_curvature(store, f, x[0], x[1], tf[1] != 0.0, d), 0.0, 1.0)
         if tg[4] == 1:
-            q = (1.0 + end_curvature(table, pool, g, x[2], x[3], tg[1] != 0.0, dg), 0.0, 1.0)
-        f1 = matvec_t(turn, blend(tf[0], xf, tf[1], yf))
-        f2 = matvec_t(turn, blend(tf[2], xf, tf[3], yf))
+            q = (1.0 + end_curvature(store, g, x[2], x[3], tg[1] != 0.0, dg), 0.0, 1.0)
+        f1 = matvec_t(pose.rotation, blend(tf[0], xf, tf[1], yf))
+        f2 = matvec_t(pose.rotation, blend(tf[2], xf, tf[3], yf))
         g1 = blend(tg[0], xg, tg[1], yg)
         g2 = blend(tg[2], xg, tg[3], yg)
         c = (-dot(f1, g1), -dot(f1, g2), -dot(f2, g1), -dot(f2, g2))
@@ -256,7 +257,7 @@ def descend_pair(table, pool, f, g, turn, shift, x, size, limit):
             bend = max((abs(sf[0]) + abs(sf[1])) * bend_f, (abs(sg[0]) + abs(sg[1])) * bend_g)
             if not held and bend < near and mu <= 1e-3 * first:
                 # `solve_pair` takes the rest; should it go elsewhere, the descent goes on to a nearer start.
-                same, found = finish(table, pool, f, g, turn, shift, x, size, 8.0 * step + 1e-9 * size)
+                same, found = finish(store, f, g, pose, x, size, 8.0 * step + 1e-9 * size)
                 if same:
                     return with_steps(found, count)
                 near *= 0.1
@@ -267,14 +268,10 @@ def descend_pair(table, pool, f, g, turn, shift, x, size, limit):
             ay = factor * (tf[1] * sf[0] + tf[3] * sf[1])
             bx = factor * (tg[0] * sg[0] + tg[2] * sg[1])
             by = factor * (tg[1] * sg[0] + tg[3] * sg[1])
-            uf, vf, end_f = advance(
-                table, pool, f, x[0], x[1], ef[0] * ax + ef[1] * ay, ef[2] * ay, blend(ax, xf, ay, yf)
-            )
-            ug, vg, end_g = advance(
-                table, pool, g, x[2], x[3], eg[0] * bx + eg[1] * by, eg[2] * by, blend(bx, xg, by, yg)
-            )
+            uf, vf, end_f = advance(store, f, x[0], x[1], ef[0] * ax + ef[1] * ay, ef[2] * ay, blend(ax, xf, ay, yf))
+            ug, vg, end_g = advance(store, g, x[2], x[3], eg[0] * bx + eg[1] * by, eg[2] * by, blend(bx, xg, by, yg))
             y = (uf, vf, ug, vg)
-            next_f, next_g, d_next, dg_next = both_frames(table, pool, f, g, turn, shift, y)
+            next_f, next_g, d_next, dg_next = both_frames(store, f, g, pose, y)
             now = dot(d_next, d_next)
             count += 1
             # What the slope alone would give over this step.
@@ -297,10 +294,10 @@ def descend_pair(table, pool, f, g, turn, shift, x, size, limit):
     if status == NOT_CONVERGED and square <= TOUCH * TOUCH * size * size:
         status = CROSSED
     if status == CROSSED:
-        same, found = finish(table, pool, f, g, turn, shift, x, size, 0.0)
+        same, found = finish(store, f, g, pose, x, size, 0.0)
         if same:
             return with_steps(found, count)
-    frame = pair_frame(table, pool, f, g, turn, shift, x)
+    frame = pair_frame(store, f, g, pose, x)
     return PairSolution(status, x, count, frame, pair_matrix(frame.shape_f, frame.shape_g, frame.gap, 1e-9 / size))
 
 
@@ -311,8 +308,8 @@ def find_descent(table, pool, f, g, q, x, size, limit, out):
     out: parameters (4), point of f (3), point of g (3), normal (3), gap; all in world axes. Returns the status.
     """
     turn_f = rotation(q, 0)
-    turn, shift = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
-    found = descend_pair(table, pool, f, g, turn, shift, x, size, limit)
+    pose = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
+    found = descend_pair(Store(table, pool), f, g, pose, x, size, limit)
     frame = found.frame
     origin = position(q, 0)
     out[0], out[1], out[2], out[3] = found.parameters

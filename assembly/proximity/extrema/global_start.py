@@ -22,6 +22,7 @@ from collections import namedtuple
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly._record import Store
 from assembly.geometry.splines.domain import into_domain
 from assembly.geometry.splines.evaluate import (
     CELL_SIZE,
@@ -30,7 +31,7 @@ from assembly.geometry.splines.evaluate import (
     surface_point,
 )
 from assembly.geometry.vec import add, cross, dot, matvec, matvec_t, scale, sub
-from assembly.kinematics.motion import position, relative_pose, rotation
+from assembly.kinematics.motion import RelativePose, position, relative_pose, rotation
 from assembly.proximity.extrema.face_face import (
     CONVERGED,
     LEFT_PATCH,
@@ -66,18 +67,18 @@ RankedPair = namedtuple(
 
 
 @kernel(inner=True)
-def cell_samples(table, pool, r, turn, shift, samples):
+def cell_samples(store, r, pose, samples):
     """Points and outward normals of the cells' samples, moved by a pose, (count, 6). Returns their extent."""
-    patch = surface_at(table, r)
+    patch = surface_at(store.table, r)
     lo = (math.inf, math.inf, math.inf)
     hi = (-math.inf, -math.inf, -math.inf)
     for i in range(patch.cell_count):
-        cell = cell_at(pool, patch.cells + CELL_SIZE * i)
-        p, su, sv, _uu, _uv, _vv = surface_point(table, pool, r, cell.parameters[0], cell.parameters[1])
+        cell = cell_at(store.pool, patch.cells + CELL_SIZE * i)
+        p, su, sv, _uu, _uv, _vv = surface_point(store.table, store.pool, r, cell.parameters[0], cell.parameters[1])
         normal = cross(su, sv)
         length = math.sqrt(dot(normal, normal))
-        n = matvec(turn, scale(float(patch.sign) / length if length > 0.0 else 0.0, normal))
-        p = add(matvec(turn, p), shift)
+        n = matvec(pose.rotation, scale(float(patch.sign) / length if length > 0.0 else 0.0, normal))
+        p = add(matvec(pose.rotation, p), pose.shift)
         samples[i, 0], samples[i, 1], samples[i, 2] = p
         samples[i, 3], samples[i, 4], samples[i, 5] = n
         lo = (min(lo[0], p[0]), min(lo[1], p[1]), min(lo[2], p[2]))
@@ -113,21 +114,21 @@ def best_samples(a, b, weight, nearest, score):
 
 
 @kernel(inner=True)
-def opposed(frame, rotation, table, pool, g, x):
+def opposed(frame, rotation, store, g, x):
     """Whether the outward normal of g opposes that of f."""
-    normal = own_frame(table, pool, g, x[2], x[3]).normal
+    normal = own_frame(store, g, x[2], x[3]).normal
     return dot(normal, matvec_t(rotation, frame.normal)) < 0.0
 
 
 @kernel(inner=True, allocates=True)
-def approach(table, pool, f, g, rotation, shift, x):
+def approach(store, f, g, pose, x):
     """Parameters with a smaller distance, and it, by direct search: nine points of each surface around the best."""
-    patch = surface_at(table, f)
-    other = surface_at(table, g)
-    fu = 0.03125 * (pool[patch.breaks_u + patch.spans_u] - pool[patch.breaks_u])
-    fv = 0.03125 * (pool[patch.breaks_v + patch.spans_v] - pool[patch.breaks_v])
-    gu = 0.03125 * (pool[other.breaks_u + other.spans_u] - pool[other.breaks_u])
-    gv = 0.03125 * (pool[other.breaks_v + other.spans_v] - pool[other.breaks_v])
+    patch = surface_at(store.table, f)
+    other = surface_at(store.table, g)
+    fu = 0.03125 * (store.pool[patch.breaks_u + patch.spans_u] - store.pool[patch.breaks_u])
+    fv = 0.03125 * (store.pool[patch.breaks_v + patch.spans_v] - store.pool[patch.breaks_v])
+    gu = 0.03125 * (store.pool[other.breaks_u + other.spans_u] - store.pool[other.breaks_u])
+    gv = 0.03125 * (store.pool[other.breaks_v + other.spans_v] - store.pool[other.breaks_v])
     finest = 1e-5 * fu
     points = np.empty((9, 3))
     at = np.empty((9, 2))
@@ -135,15 +136,15 @@ def approach(table, pool, f, g, rotation, shift, x):
     for _ in range(LEVELS):
         cu, cv, cs, ct = x
         for k in range(9):
-            u, v, _clamped = into_domain(table, pool, g, cs + (k % 3 - 1) * gu, ct + (k // 3 - 1) * gv)
+            u, v, _clamped = into_domain(store, g, cs + (k % 3 - 1) * gu, ct + (k // 3 - 1) * gv)
             at[k, 0] = u
             at[k, 1] = v
-            point = surface_point(table, pool, g, u, v)[0]
-            points[k, 0], points[k, 1], points[k, 2] = add(matvec(rotation, point), shift)
+            point = surface_point(store.table, store.pool, g, u, v)[0]
+            points[k, 0], points[k, 1], points[k, 2] = add(matvec(pose.rotation, point), pose.shift)
         before = best
         for k in range(9):
-            u, v, _clamped = into_domain(table, pool, f, cu + (k % 3 - 1) * fu, cv + (k // 3 - 1) * fv)
-            p = surface_point(table, pool, f, u, v)[0]
+            u, v, _clamped = into_domain(store, f, cu + (k % 3 - 1) * fu, cv + (k // 3 - 1) * fv)
+            p = surface_point(store.table, store.pool, f, u, v)[0]
             for j in range(9):
                 d = (points[j, 0] - p[0]) ** 2 + (points[j, 1] - p[1]) ** 2 + (points[j, 2] - p[2]) ** 2
                 if d < best:
@@ -172,14 +173,14 @@ def is_near(found, distance):
 
 
 @kernel(inner=True)
-def take(table, pool, g, rotation, found, best):
+def take(store, g, rotation, found, best):
     """The better one, as a `RankedPair`, of a pair that Newton's method found and the best one so far.
 
     A true extremum beats a point held at the end of a patch, and one where solids face each other beats all.
     """
     rank = 2.0
     if found.status == CONVERGED or found.status == SINGULAR:
-        rank = 0.0 if opposed(found.frame, rotation, table, pool, g, found.parameters) else 1.0
+        rank = 0.0 if opposed(found.frame, rotation, store, g, found.parameters) else 1.0
     gap = found.frame.gap
     if rank < best.rank or (rank == best.rank and abs(gap) < abs(best.gap)):
         return RankedPair(rank, gap, np.int64(found.status), found.parameters)
@@ -187,15 +188,15 @@ def take(table, pool, g, rotation, found, best):
 
 
 @kernel(inner=True)
-def next_candidate(table, pool, f, a, nearest, score, i):
+def next_candidate(store, f, a, nearest, score, i):
     """The cell with the best score, after the neighbors of cell i, which lead to the same extremum, are struck out."""
-    patch = surface_at(table, f)
-    radius = cell_at(pool, patch.cells + CELL_SIZE * i).radius
+    patch = surface_at(store.table, f)
+    radius = cell_at(store.pool, patch.cells + CELL_SIZE * i).radius
     for k in range(a.shape[0]):
         dx = a[k, 0] - a[i, 0]
         dy = a[k, 1] - a[i, 1]
         dz = a[k, 2] - a[i, 2]
-        reach = radius + cell_at(pool, patch.cells + CELL_SIZE * k).radius
+        reach = radius + cell_at(store.pool, patch.cells + CELL_SIZE * k).radius
         if dx * dx + dy * dy + dz * dz <= reach * reach:
             score[k] = math.inf
     return lowest(score)
@@ -219,16 +220,16 @@ def lowest(score):
 
 
 @kernel(inner=True, allocates=True)
-def global_start(table, pool, f, g, rotation, shift, size):
+def global_start(store, f, g, pose, size):
     """Status, parameters and gap of the best extremal pair found; where there is none, the nearest points known."""
-    patch = surface_at(table, f)
-    other = surface_at(table, g)
+    patch = surface_at(store.table, f)
+    other = surface_at(store.table, g)
     nf = patch.cell_count
     a = np.empty((nf, 6))
     b = np.empty((other.cell_count, 6))
     same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-    extent = cell_samples(table, pool, f, same, (0.0, 0.0, 0.0), a)
-    extent = min(extent, cell_samples(table, pool, g, rotation, shift, b))
+    extent = cell_samples(store, f, RelativePose(same, (0.0, 0.0, 0.0)), a)
+    extent = min(extent, cell_samples(store, g, pose, b))
     nearest = np.empty(nf, np.int64)
     score = np.empty(nf)
     best_samples(a, b, 0.0, nearest, score)
@@ -239,25 +240,25 @@ def global_start(table, pool, f, g, rotation, shift, size):
     for attempt in range(NEAREST):
         if score[i] == math.inf:
             break
-        cell_f = cell_at(pool, patch.cells + CELL_SIZE * i)
-        cell_g = cell_at(pool, other.cells + CELL_SIZE * nearest[i])
+        cell_f = cell_at(store.pool, patch.cells + CELL_SIZE * i)
+        cell_g = cell_at(store.pool, other.cells + CELL_SIZE * nearest[i])
         # Cells whose spheres are farther apart than the best pair hold no nearer one.
         if score[i] - 1.5 * (cell_f.radius + cell_g.radius) > min(abs(best.gap), upper):
             break
         start = start_in(cell_f, cell_g)
         if attempt == 0:
             best = RankedPair(3.0, math.inf, np.int64(NOT_CONVERGED), start)
-        found = solve_pair(table, pool, f, g, rotation, shift, start, size, math.inf, 0.0, False)
+        found = solve_pair(store, f, g, pose, start, size, math.inf, 0.0, False)
         limit = score[i]
         near = is_near(found, limit)
         coarse = cell_f.radius + cell_g.radius > COARSE * extent
         if near and coarse and found.status != LEFT_PATCH and found.frame.gap > 0.0:
             # Samples are far apart: an extremum that is no minimum is nearer than they are, and others nearer yet.
-            start, limit = approach(table, pool, f, g, rotation, shift, found.parameters)
+            start, limit = approach(store, f, g, pose, found.parameters)
             limit += 1e-12 * size
             near = found.frame.gap <= limit
         elif not near:
-            start, limit = approach(table, pool, f, g, rotation, shift, start)
+            start, limit = approach(store, f, g, pose, start)
             limit += 1e-12 * size
         if not near:
             if limit <= CROSSING * min(score[i], extent):
@@ -266,10 +267,10 @@ def global_start(table, pool, f, g, rotation, shift, size):
                 break
             # The minimum is no farther than the points found.
             upper = min(upper, limit)
-            found = solve_pair(table, pool, f, g, rotation, shift, start, size, math.inf, 0.0, False)
+            found = solve_pair(store, f, g, pose, start, size, math.inf, 0.0, False)
         if is_near(found, limit):
-            best = take(table, pool, g, rotation, found, best)
-        i = next_candidate(table, pool, f, a, nearest, score, i)
+            best = take(store, g, pose.rotation, found, best)
+        i = next_candidate(store, f, a, nearest, score, i)
     weight = ALIGNMENT * extent * extent
     for _ in range(3):
         # The surfaces overlap, or do not face each other; the deeper, the more the normals tell.
@@ -280,13 +281,13 @@ def global_start(table, pool, f, g, rotation, shift, size):
         for _ in range(ALIGNED):
             if score[i] == math.inf:
                 break
-            cell_f = cell_at(pool, patch.cells + CELL_SIZE * i)
-            cell_g = cell_at(pool, other.cells + CELL_SIZE * nearest[i])
+            cell_f = cell_at(store.pool, patch.cells + CELL_SIZE * i)
+            cell_g = cell_at(store.pool, other.cells + CELL_SIZE * nearest[i])
             start = start_in(cell_f, cell_g)
-            found = solve_pair(table, pool, f, g, rotation, shift, start, size, math.inf, 0.0, False)
+            found = solve_pair(store, f, g, pose, start, size, math.inf, 0.0, False)
             if found.status != NOT_CONVERGED:
-                best = take(table, pool, g, rotation, found, best)
-            i = next_candidate(table, pool, f, a, nearest, score, i)
+                best = take(store, g, pose.rotation, found, best)
+            i = next_candidate(store, f, a, nearest, score, i)
         if best.rank == 0.0:
             break
         weight *= 5.0
@@ -296,8 +297,8 @@ def global_start(table, pool, f, g, rotation, shift, size):
 @kernel(signatures="(i8[::1], f8[::1], i8, i8, i8, i8, f8[:, ::1], f8[:, ::1], i8)")
 def start_surfaces(table, pool, f, g, i, j, q, tracked, r):
     """A global start for surfaces f and g of bodies i and j of a scene, into tracked[r]. A status."""
-    turn, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
-    status, x, _gap = global_start(table, pool, f, g, turn, shift, 1.0)
+    pose = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
+    status, x, _gap = global_start(Store(table, pool), f, g, pose, 1.0)
     tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3] = x
     return status
 
@@ -308,13 +309,14 @@ def find_pair(table, pool, f, g, q, x, size, out):
 
     out: parameters (4), point of f (3), point of g (3), normal (3), gap; all in world axes. Returns the status.
     """
+    store = Store(table, pool)
     turn_f = rotation(q, 0)
-    turn, shift = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
+    pose = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
     if math.isnan(x[0]):
-        status, x, _gap = global_start(table, pool, f, g, turn, shift, size)
-        frame = pair_frame(table, pool, f, g, turn, shift, x)
+        status, x, _gap = global_start(store, f, g, pose, size)
+        frame = pair_frame(store, f, g, pose, x)
     else:
-        found = solve_pair(table, pool, f, g, turn, shift, x, size, math.inf, 0.0, False)
+        found = solve_pair(store, f, g, pose, x, size, math.inf, 0.0, False)
         status, x, frame = found.status, found.parameters, found.frame
     origin = position(q, 0)
     out[0], out[1], out[2], out[3] = x

@@ -18,6 +18,7 @@ import math
 from collections import namedtuple
 
 from assembly._kernel import kernel
+from assembly._record import Store
 from assembly.geometry.splines.evaluate import surface_at, surface_point, third_derivatives
 from assembly.geometry.vec import add, blend, cross, dot, matvec, scale, sub
 from assembly.kinematics.motion import position, relative_pose, rotation
@@ -89,9 +90,9 @@ def coordinate_lengths(table, pool, f, g, x, lengths, k):
 @kernel(signatures="(i8[::1], f8[::1], i8, i8, i8, i8, f8[:, ::1], f8[:, ::1], i8, f8)")
 def is_extremal(table, pool, f, g, i, j, q, tracked, r, tolerance):
     """Whether the coordinates in tracked[r] are those of an extremal pair, by the frame of tracked pairs."""
-    turn, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
+    pose = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
     x = (tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3])
-    frame = pair_frame(table, pool, f, g, turn, shift, x)
+    frame = pair_frame(Store(table, pool), f, g, pose, x)
     residual = frame.residual
     tilt = max(abs(residual[2]), abs(residual[3]))
     holds = frame.regular and tilt <= 1e-9 and max(abs(residual[0]), abs(residual[1])) <= tolerance
@@ -99,29 +100,30 @@ def is_extremal(table, pool, f, g, i, j, q, tracked, r, tolerance):
 
 
 @kernel(inner=True)
-def moved_along(table, pool, surface, tracked, was, r, i):
+def moved_along(store, surface, tracked, was, r, i):
     """How far the point on a surface is from where it was; its parameters are in columns i and i + 1 of row r."""
-    p = surface_point(table, pool, surface, tracked[r, i], tracked[r, i + 1])[0]
-    d = sub(p, surface_point(table, pool, surface, was[r, i], was[r, i + 1])[0])
+    p = surface_point(store.table, store.pool, surface, tracked[r, i], tracked[r, i + 1])[0]
+    d = sub(p, surface_point(store.table, store.pool, surface, was[r, i], was[r, i + 1])[0])
     return math.sqrt(dot(d, d))
 
 
 @kernel(signatures="(i8[::1], f8[::1], i8, i8, f8[:, ::1], f8[:, ::1], i8, f8)")
 def has_stayed(table, pool, f, g, tracked, was, r, most):
     """Whether neither point of pair r went farther along its surface than so much."""
-    stayed = moved_along(table, pool, f, tracked, was, r, 0) <= most
-    return 1 if stayed and moved_along(table, pool, g, tracked, was, r, 2) <= most else 0
+    store = Store(table, pool)
+    stayed = moved_along(store, f, tracked, was, r, 0) <= most
+    return 1 if stayed and moved_along(store, g, tracked, was, r, 2) <= most else 0
 
 
 @kernel(inner=True)
-def variations(table, pool, f, g, i, j, q, x, s, rates):
+def variations(store, f, g, i, j, q, x, s, rates):
     """Fill the `Variations`; returns the `PairVectors`."""
-    patch = surface_at(table, f)
+    patch = surface_at(store.table, f)
     turn_f = rotation(q, i)
     turn_g = rotation(q, j)
-    a, b, c, d_, e, h = surface_point(table, pool, f, x[0], x[1])
+    a, b, c, d_, e, h = surface_point(store.table, store.pool, f, x[0], x[1])
     pf, fu, fv, fuu, fuv, fvv = place(turn_f, a, b, c, d_, e, h)
-    a, b, c, d_, e, h = surface_point(table, pool, g, x[2], x[3])
+    a, b, c, d_, e, h = surface_point(store.table, store.pool, g, x[2], x[3])
     pg, gu, gv, guu, guv, gvv = place(turn_g, a, b, c, d_, e, h)
     d = add(sub(position(q, j), position(q, i)), sub(pg, pf))
     normal = scale(float(patch.sign), cross(fu, fv))
@@ -166,10 +168,10 @@ def variations(table, pool, f, g, i, j, q, x, s, rates):
 
 
 @kernel(inner=True)
-def free_rows(table, pool, f, g, i, j, q, x, s, work, residual, jacobian, r, e):
+def free_rows(store, f, g, i, j, q, x, s, work, residual, jacobian, r, e):
     """The gap into row r, the rows of tangency into rows e to e + 3, with their gradients."""
     rates = Variations(work[0], work[1], work[2], work[3], work[4], work[5], work[6])
-    vectors = variations(table, pool, f, g, i, j, q, x, s, rates)
+    vectors = variations(store, f, g, i, j, q, x, s, rates)
     d, n = vectors.d, vectors.n
     fu, fv, gu, gv = vectors.f_u, vectors.f_v, vectors.g_u, vectors.g_v
     beta = dot(n, d)
@@ -210,13 +212,13 @@ def add_second(y, a, a1, a2, a11, a12, a22, w, u, s1, s2, out):
 
 
 @kernel(inner=True)
-def free_hessian(table, pool, f, g, i, j, q, x, s, y, work, out):
+def free_hessian(store, f, g, i, j, q, x, s, y, work, out):
     """Second derivative (16, 16) of y . rows, overwriting out."""
     rates = Variations(work[0], work[1], work[2], work[3], work[4], work[5], work[6])
-    vectors = variations(table, pool, f, g, i, j, q, x, s, rates)
+    vectors = variations(store, f, g, i, j, q, x, s, rates)
     d, n, length = vectors.d, vectors.n, vectors.length
     fu, fv, gu, gv = vectors.f_u, vectors.f_v, vectors.g_u, vectors.g_v
-    sign = float(surface_at(table, f).sign)
+    sign = float(surface_at(store.table, f).sign)
     turn_f = rotation(q, i)
     turn_g = rotation(q, j)
     beta = dot(n, d)
@@ -254,16 +256,16 @@ def free_hessian(table, pool, f, g, i, j, q, x, s, y, work, out):
                 - turned * dot(n, column(rates.normal, l))
             )
     # Second variations of the vectors themselves, each with its coefficient.
-    a = surface_point(table, pool, f, x[0], x[1])
-    b = surface_point(table, pool, g, x[2], x[3])
+    a = surface_point(store.table, store.pool, f, x[0], x[1])
+    b = surface_point(store.table, store.pool, g, x[2], x[3])
     fuu = matvec(turn_f, a[3])
     fuv = matvec(turn_f, a[4])
     fvv = matvec(turn_f, a[5])
     guu = matvec(turn_g, b[3])
     guv = matvec(turn_g, b[4])
     gvv = matvec(turn_g, b[5])
-    a30, a21, a12, a03 = third_derivatives(table, pool, f, x[0], x[1])
-    b30, b21, b12, b03 = third_derivatives(table, pool, g, x[2], x[3])
+    a30, a21, a12, a03 = third_derivatives(store.table, store.pool, f, x[0], x[1])
+    b30, b21, b12, b03 = third_derivatives(store.table, store.pool, g, x[2], x[3])
     fuuu = matvec(turn_f, a30)
     fuuv = matvec(turn_f, a21)
     fuvv = matvec(turn_f, a12)

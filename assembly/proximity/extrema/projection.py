@@ -15,7 +15,7 @@ SLIDES = 24
 
 
 @kernel(inner=True)
-def projection_of(table, pool, g, y, s, t):
+def projection_of(store, g, y, s, t):
     """The foot on surface g of a point y, by Newton's method from (s, t): parameters, signed distance, normal.
 
     Positive outside. A step is never longer than what brings the tangent plane's foot. And whether four of them did:
@@ -25,13 +25,13 @@ def projection_of(table, pool, g, y, s, t):
     n = (0.0, 0.0, 0.0)
     settled = False
     for _ in range(4):
-        p, su, sv, suu, suv, svv = surface_point(table, pool, g, s, t)
+        p, su, sv, suu, suv, svv = surface_point(store.table, store.pool, g, s, t)
         d = sub(y, p)
         n = cross(su, sv)
         length = math.sqrt(dot(n, n))
         if not length > 0.0:
             break
-        n = scale(float(surface_at(table, g).sign) / length, n)
+        n = scale(float(surface_at(store.table, g).sign) / length, n)
         distance = dot(n, d)
         a = dot(su, su)
         b = dot(su, sv)
@@ -47,7 +47,7 @@ def projection_of(table, pool, g, y, s, t):
             h11, h12, h22 = a, b, c
             det = a * c - b * b
         s, t, _held = into_domain(
-            table, pool, g, s + (h22 * first - h12 * second) / det, t + (h11 * second - h12 * first) / det
+            store, g, s + (h22 * first - h12 * second) / det, t + (h11 * second - h12 * first) / det
         )
         if first * first / a + second * second / c < 1e-16:
             settled = bent
@@ -56,7 +56,7 @@ def projection_of(table, pool, g, y, s, t):
 
 
 @kernel(inner=True)
-def slide_down(table, pool, f, g, turn, shift, start, stride, half):
+def slide_down(store, f, g, pose, start, stride, half):
     """Parameters at which the gap is smaller than at the start: down its slope on f, the foot on g following.
 
     And whether they are beside the start, within BESIDE times half widths on f; it goes no farther. Newton's method
@@ -64,9 +64,9 @@ def slide_down(table, pool, f, g, turn, shift, start, stride, half):
     the normals; then steps are those of Barzilai and Borwein, halved where the gap grows.
     """
     u, v, s, t = start
-    p, su, sv, _uu, _uv, _vv = surface_point(table, pool, f, u, v)
-    s, t, gap, n, _settled = projection_of(table, pool, g, matvec_t(turn, sub(p, shift)), s, t)
-    slope = matvec(turn, n)
+    p, su, sv, _uu, _uv, _vv = surface_point(store.table, store.pool, f, u, v)
+    s, t, gap, n, _settled = projection_of(store, g, matvec_t(pose.rotation, sub(p, pose.shift)), s, t)
+    slope = matvec(pose.rotation, n)
     normal = cross(su, sv)
     across = scale(1.0 / max(math.sqrt(dot(normal, normal)), 1e-300), normal)
     slope = sub(slope, scale(dot(slope, across), across))
@@ -83,21 +83,21 @@ def slide_down(table, pool, f, g, turn, shift, start, stride, half):
         first = -length * dot(slope, su)
         second = -length * dot(slope, sv)
         u_new, v_new, _held = into_domain(
-            table, pool, f, u + (c * first - b * second) / det, v + (a * second - b * first) / det
+            store, f, u + (c * first - b * second) / det, v + (a * second - b * first) / det
         )
-        q, ru, rv, _uu, _uv, _vv = surface_point(table, pool, f, u_new, v_new)
-        s_new, t_new, gap_new, n, _settled = projection_of(table, pool, g, matvec_t(turn, sub(q, shift)), s, t)
+        q, ru, rv, _uu, _uv, _vv = surface_point(store.table, store.pool, f, u_new, v_new)
+        s_new, t_new, gap_new, n, _settled = projection_of(store, g, matvec_t(pose.rotation, sub(q, pose.shift)), s, t)
         if gap_new > gap:
             length *= 0.25
             continue
         normal = cross(ru, rv)
         across = scale(1.0 / max(math.sqrt(dot(normal, normal)), 1e-300), normal)
-        there = matvec(turn, n)
+        there = matvec(pose.rotation, n)
         there = sub(there, scale(dot(there, across), across))
         moved = sub(q, p)
         bent = dot(moved, sub(there, slope))
         length = min(dot(moved, moved) / bent, 4.0 * length) if bent > 0.0 else 2.0 * length
         u, v, s, t, gap, p, su, sv, slope = u_new, v_new, s_new, t_new, gap_new, q, ru, rv, there
-        if not is_within(table, pool, f, u, v, start[0], start[1], BESIDE * half[0], BESIDE * half[1]):
+        if not is_within(store, f, u, v, start[0], start[1], BESIDE * half[0], BESIDE * half[1]):
             return (u, v, s, t), False
     return (u, v, s, t), True

@@ -20,7 +20,7 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
-from assembly._record import place_of, record_dtype, record_view, size_of
+from assembly._record import Store, place_of, record_dtype, record_view, size_of
 from assembly.geometry.vec import cross, dot, matvec, scale, sub
 from assembly.kinematics.motion import quaternion_columns, relative_pose, rotation
 from assembly.proximity.extrema.face_face import pair_frame
@@ -228,8 +228,8 @@ def pair_derivatives(table, pool, f, g, q, x, size, first, hessian):
     Returns the pair's residual (lengths over `size`, and the tilt) and whether everything is regular.
     """
     turn = rotation(q, 0)
-    relative, shift = relative_pose(q, 0, turn, 1, rotation(q, 1))
-    frame = pair_frame(table, pool, f, g, relative, shift, x)
+    pose = relative_pose(q, 0, turn, 1, rotation(q, 1))
+    frame = pair_frame(Store(table, pool), f, g, pose, x)
     r = frame.residual
     error = max(abs(r[0]), abs(r[1])) / size + max(abs(r[2]), abs(r[3]))
     if not frame.regular:
@@ -239,7 +239,7 @@ def pair_derivatives(table, pool, f, g, q, x, size, first, hessian):
     derivatives = derivatives_at(records, 0)
     gradient = np.empty((1, 12))
     row = np.empty(12)
-    store_record(turn, shift, frame, matrix, records, 0)
+    store_record(turn, pose.shift, frame, matrix, records, 0)
     gradient_row(records, 0, gradient, 0)
     for j in range(12):
         row[j] = gradient[0, j]

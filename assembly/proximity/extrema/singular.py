@@ -25,39 +25,39 @@ def fold_of(h):
 
 
 @kernel(inline=True)
-def across(table, pool, r, breaks, spans, closed, x, most):
+def across(store, r, breaks, spans, closed, x, most):
     """A parameter just beyond the knot line nearest to x, or x itself where none is within `most`."""
-    o = table[r + breaks]
-    count = table[r + spans]
-    k = find_span(pool, o, count, x)
-    lo = pool[o + k]
-    hi = pool[o + k + 1]
+    o = store.table[r + breaks]
+    count = store.table[r + spans]
+    k = find_span(store.pool, o, count, x)
+    lo = store.pool[o + k]
+    hi = store.pool[o + k + 1]
     end = lo if x - lo < hi - x else hi
     if abs(x - end) > most:
         return x
-    first = pool[o]
-    last = pool[o + count]
+    first = store.pool[o]
+    last = store.pool[o + count]
     if end == lo:
         if k > 0:
-            return lo - 1e-9 * (lo - pool[o + k - 1])
-        return last - 1e-9 * (last - pool[o + count - 1]) if table[r + closed] == 1 else x
+            return lo - 1e-9 * (lo - store.pool[o + k - 1])
+        return last - 1e-9 * (last - store.pool[o + count - 1]) if store.table[r + closed] == 1 else x
     if k + 1 < count:
-        return hi + 1e-9 * (pool[o + k + 2] - hi)
-    return first + 1e-9 * (pool[o + 1] - first) if table[r + closed] == 1 else x
+        return hi + 1e-9 * (store.pool[o + k + 2] - hi)
+    return first + 1e-9 * (store.pool[o + 1] - first) if store.table[r + closed] == 1 else x
 
 
 @kernel(inner=True)
-def fold_beyond(table, pool, posed, x, half):
+def fold_beyond(store, posed, x, half):
     """The least distance from a fold of a root with the curvatures beyond knot lines within BESIDE half widths.
 
     Across them the curvature of a smooth surface may jump, as where a straight wire begins to bend.
     """
     f, g = posed.surfaces[0], posed.surfaces[1]
     y = (
-        across(table, pool, f, BREAKS_U, SPANS_U, CLOSED_U, x[0], BESIDE * half[0]),
-        across(table, pool, f, BREAKS_V, SPANS_V, CLOSED_V, x[1], BESIDE * half[1]),
-        across(table, pool, g, BREAKS_U, SPANS_U, CLOSED_U, x[2], BESIDE * half[2]),
-        across(table, pool, g, BREAKS_V, SPANS_V, CLOSED_V, x[3], BESIDE * half[3]),
+        across(store, f, BREAKS_U, SPANS_U, CLOSED_U, x[0], BESIDE * half[0]),
+        across(store, f, BREAKS_V, SPANS_V, CLOSED_V, x[1], BESIDE * half[1]),
+        across(store, g, BREAKS_U, SPANS_U, CLOSED_U, x[2], BESIDE * half[2]),
+        across(store, g, BREAKS_V, SPANS_V, CLOSED_V, x[3], BESIDE * half[3]),
     )
     least = math.inf
     for i in range(4):
@@ -70,7 +70,7 @@ def fold_beyond(table, pool, posed, x, half):
             t = y[3] if j >= 2 else x[3]
             if (i == 0 and j == 0) or (j > 0 and (s, t) == (x[2], x[3])):
                 continue
-            frame = pair_frame(table, pool, f, g, posed.turn, posed.shift, (u, v, s, t))
+            frame = pair_frame(store, f, g, posed.pose, (u, v, s, t))
             if frame.regular:
                 least = min(least, fold_of(pair_matrix(frame.shape_f, frame.shape_g, frame.gap, 1e-9).h))
     return least

@@ -98,13 +98,13 @@ def feature_cells(table, shell, k):
 
 
 @kernel(inner=True)
-def room(table, pool, shell):
+def room(store, shell):
     """How many nodes a shell's tree may need."""
-    solid = shell_at(table, shell)
+    solid = shell_at(store.table, shell)
     features = solid.faces + solid.edges + solid.vertices
     count = 1 + features + PARTS
     for k in range(features):
-        cells = feature_cells(table, shell, k).count
+        cells = feature_cells(store.table, shell, k).count
         count += cells + cells // TOGETHER + 1
     return count
 
@@ -142,32 +142,32 @@ def ball_around(nodes, i, first, last):
 
 
 @kernel(inner=True)
-def used_cell(table, pool, record, kind, c):
+def used_cell(store, record, kind, c):
     """Whether a cell is worth a look: not a face's outside of its trim."""
-    face = face_at(table, record)
+    face = face_at(store.table, record)
     if kind != FACE or face.trim < 0:
         return True
-    return pool[face.cell_flags + c] != 0.0
+    return store.pool[face.cell_flags + c] != 0.0
 
 
 @kernel(inner=True)
-def plant(table, pool, shell, turn, shift, nodes, info):
+def plant(store, shell, pose, nodes, info):
     """The nodes of the shell and of its features. Returns the number of nodes."""
     cell = cell_node_at(info, 0)
-    solid = shell_at(table, shell)
+    solid = shell_at(store.table, shell)
     features = solid.faces + solid.edges + solid.vertices
     new_node(info, 0, WHOLE, -1, -1, shell)
     cell.child = 1
     cell.children = features
     for k in range(features):
-        own = feature_cells(table, shell, k)
+        own = feature_cells(store.table, shell, k)
         kind, record, cells, at, size, ball = own.kind, own.record, own.count, own.pool, own.stride, own.ball
         i = 1 + k
         model = model_at(nodes, i)
         new_node(info, i, PART, kind, k, record)
         if kind == VERTEX:
             cell_node_at(info, i).level = CELL
-            point = add(matvec(turn, (pool[at], pool[at + 1], pool[at + 2])), shift)
+            point = add(matvec(pose.rotation, (store.pool[at], store.pool[at + 1], store.pool[at + 2])), pose.shift)
             put(nodes, i, CENTER, point)
             model.radius = 0.0
             continue
@@ -178,22 +178,30 @@ def plant(table, pool, shell, turn, shift, nodes, info):
         high_u = -math.inf
         high_v = -math.inf
         for c in range(cells):
-            if used_cell(table, pool, record, kind, c):
+            if used_cell(store, record, kind, c):
                 o = at + size * c
                 if kind == FACE:
-                    low_u = min(low_u, pool[o] - pool[o + 9])
-                    high_u = max(high_u, pool[o] + pool[o + 9])
-                    low_v = min(low_v, pool[o + 1] - pool[o + 10])
-                    high_v = max(high_v, pool[o + 1] + pool[o + 10])
+                    low_u = min(low_u, store.pool[o] - store.pool[o + 9])
+                    high_u = max(high_u, store.pool[o] + store.pool[o + 9])
+                    low_v = min(low_v, store.pool[o + 1] - store.pool[o + 10])
+                    high_v = max(high_v, store.pool[o + 1] + store.pool[o + 10])
                 else:
-                    low_u = min(low_u, pool[o])
-                    high_u = max(high_u, pool[o + 1])
+                    low_u = min(low_u, store.pool[o])
+                    high_u = max(high_u, store.pool[o + 1])
                     low_v = 0.0
                     high_v = 0.0
                 o += ball
-                r = pool[o + 3]
-                lo = (min(lo[0], pool[o] - r), min(lo[1], pool[o + 1] - r), min(lo[2], pool[o + 2] - r))
-                hi = (max(hi[0], pool[o] + r), max(hi[1], pool[o + 1] + r), max(hi[2], pool[o + 2] + r))
+                r = store.pool[o + 3]
+                lo = (
+                    min(lo[0], store.pool[o] - r),
+                    min(lo[1], store.pool[o + 1] - r),
+                    min(lo[2], store.pool[o + 2] - r),
+                )
+                hi = (
+                    max(hi[0], store.pool[o] + r),
+                    max(hi[1], store.pool[o + 1] + r),
+                    max(hi[2], store.pool[o + 2] + r),
+                )
         model.u0 = 0.5 * (low_u + high_u)
         model.v0 = 0.5 * (low_v + high_v)
         model.half_u = 0.5 * (high_u - low_u)
@@ -201,11 +209,11 @@ def plant(table, pool, shell, turn, shift, nodes, info):
         x, y, z = scale(0.5, add(lo, hi))
         reach = 0.0
         for c in range(cells):
-            if used_cell(table, pool, record, kind, c):
+            if used_cell(store, record, kind, c):
                 o = at + size * c + ball
-                d = (pool[o] - x) ** 2 + (pool[o + 1] - y) ** 2 + (pool[o + 2] - z) ** 2
-                reach = max(reach, math.sqrt(d) + pool[o + 3])
-        center = add(matvec(turn, (x, y, z)), shift)
+                d = (store.pool[o] - x) ** 2 + (store.pool[o + 1] - y) ** 2 + (store.pool[o + 2] - z) ** 2
+                reach = max(reach, math.sqrt(d) + store.pool[o + 3])
+        center = add(matvec(pose.rotation, (x, y, z)), pose.shift)
         put(nodes, i, CENTER, center)
         model.radius = reach + 4e-16 * (reach + abs(center[0]) + abs(center[1]) + abs(center[2]))
     ball_around(nodes, 0, 1, 1 + features)
@@ -213,26 +221,26 @@ def plant(table, pool, shell, turn, shift, nodes, info):
 
 
 @kernel(inner=True)
-def open_spans(table, pool, nodes, info, i, count):
+def open_spans(store, nodes, info, i, count):
     """Pieces of one span each as cells of a feature that has few spans. Returns the number of nodes."""
     cell = cell_node_at(info, i)
     model = model_at(nodes, i)
     kind = cell.kind
     record = cell.record
-    face = face_at(table, record)
+    face = face_at(store.table, record)
     cell.child = count
     low_u = model.u0 - model.half_u
     high_u = model.u0 + model.half_u
     low_v = model.v0 - model.half_v
     high_v = model.v0 + model.half_v
-    curve = spline_curve_at(table, edge_at(table, record).curve if kind == EDGE else -1)
-    r = surface_at(table, face.surface if kind == FACE else -1)
+    curve = spline_curve_at(store.table, edge_at(store.table, record).curve if kind == EDGE else -1)
+    r = surface_at(store.table, face.surface if kind == FACE else -1)
     breaks_u = curve.breaks if kind == EDGE else r.breaks_u
     spans_u = curve.spans if kind == EDGE else r.spans_u
     spans_v = 1 if kind == EDGE else r.spans_v
     for iu in range(spans_u):
-        u0 = max(pool[breaks_u + iu], low_u)
-        u1 = min(pool[breaks_u + iu + 1], high_u)
+        u0 = max(store.pool[breaks_u + iu], low_u)
+        u1 = min(store.pool[breaks_u + iu + 1], high_u)
         if not u0 < u1:
             continue
         for iv in range(spans_v):
@@ -240,8 +248,8 @@ def open_spans(table, pool, nodes, info, i, count):
             v1 = 0.0
             if kind == FACE:
                 at = r.breaks_v + iv
-                v0 = max(pool[at], low_v)
-                v1 = min(pool[at + 1], high_v)
+                v0 = max(store.pool[at], low_v)
+                v1 = min(store.pool[at + 1], high_v)
                 if not v0 < v1:
                     continue
             new_node(info, count, CELL, kind, cell.feature, record)
@@ -267,36 +275,44 @@ def span_count(table, kind, record):
 
 
 @kernel(inner=True)
-def open_feature(table, pool, shell, turn, shift, nodes, info, i, count):
+def open_feature(store, shell, pose, nodes, info, i, count):
     """Groups and cells of a feature. Returns the number of nodes."""
     cell = cell_node_at(info, i)
-    own = feature_cells(table, shell, cell.feature)
+    own = feature_cells(store.table, shell, cell.feature)
     kind, record, cells, at, size, ball = own.kind, own.record, own.count, own.pool, own.stride, own.ball
     used = 0
     for c in range(cells):
-        if used_cell(table, pool, record, kind, c):
+        if used_cell(store, record, kind, c):
             used += 1
     groups = (used + TOGETHER - 1) // TOGETHER
     first = count + groups
     j = first
     for c in range(cells):
-        if not used_cell(table, pool, record, kind, c):
+        if not used_cell(store, record, kind, c):
             continue
         o = at + size * c
         new_node(info, j, CELL, kind, cell.feature, record)
-        put(nodes, j, CENTER, add(matvec(turn, (pool[o + ball], pool[o + ball + 1], pool[o + ball + 2])), shift))
-        model_at(nodes, j).radius = pool[o + ball + 3]
+        put(
+            nodes,
+            j,
+            CENTER,
+            add(
+                matvec(pose.rotation, (store.pool[o + ball], store.pool[o + ball + 1], store.pool[o + ball + 2])),
+                pose.shift,
+            ),
+        )
+        model_at(nodes, j).radius = store.pool[o + ball + 3]
         if kind == FACE:
-            model_at(nodes, j).u0 = pool[o]
-            model_at(nodes, j).v0 = pool[o + 1]
-            model_at(nodes, j).half_u = pool[o + 9]
-            model_at(nodes, j).half_v = pool[o + 10]
-            if face_at(table, record).trim < 0:
+            model_at(nodes, j).u0 = store.pool[o]
+            model_at(nodes, j).v0 = store.pool[o + 1]
+            model_at(nodes, j).half_u = store.pool[o + 9]
+            model_at(nodes, j).half_v = store.pool[o + 10]
+            if face_at(store.table, record).trim < 0:
                 cell_node_at(info, j).side = INSIDE
         else:
-            model_at(nodes, j).u0 = 0.5 * (pool[o] + pool[o + 1])
+            model_at(nodes, j).u0 = 0.5 * (store.pool[o] + store.pool[o + 1])
             model_at(nodes, j).v0 = 0.0
-            model_at(nodes, j).half_u = 0.5 * (pool[o + 1] - pool[o])
+            model_at(nodes, j).half_u = 0.5 * (store.pool[o + 1] - store.pool[o])
             model_at(nodes, j).half_v = 0.0
             cell_node_at(info, j).side = INSIDE
         j += 1
@@ -313,7 +329,7 @@ def open_feature(table, pool, shell, turn, shift, nodes, info, i, count):
 
 
 @kernel(inner=True)
-def give_model(table, pool, turn, shift, nodes, info, i, work):
+def give_model(store, pose, nodes, info, i, work):
     """See to it that a cell has its model."""
     cell = cell_node_at(info, i)
     if cell.has_model == 1:
@@ -321,11 +337,11 @@ def give_model(table, pool, turn, shift, nodes, info, i, work):
     cell.has_model = 1
     record = cell.record
     if cell.kind == FACE:
-        face_model(table, pool, face_at(table, record).surface, turn, shift, nodes, i, work)
+        face_model(store, face_at(store.table, record).surface, pose, nodes, i, work)
     elif cell.kind == EDGE:
-        edge_model(table, pool, record, turn, shift, nodes, i, work)
+        edge_model(store, record, pose, nodes, i, work)
     else:
-        vertex_model(pool, vertex_at(table, record).point, turn, shift, nodes, i)
+        vertex_model(store.pool, vertex_at(store.table, record).point, pose, nodes, i)
 
 
 @kernel(inner=True)
@@ -361,13 +377,13 @@ def split_cell(nodes, info, i, count):
 
 
 @kernel(inner=True)
-def grow(table, pool, shell, turn, shift, nodes, info, i, count):
+def grow(store, shell, pose, nodes, info, i, count):
     """See to it that a node has children, cells yet without their models. Returns the number of nodes."""
     cell = cell_node_at(info, i)
     if cell.child >= 0 or cell.kind == VERTEX:
         return count
     if cell.level == PART:
-        if span_count(table, cell.kind, cell.record) <= SPANS:
-            return open_spans(table, pool, nodes, info, i, count)
-        return open_feature(table, pool, shell, turn, shift, nodes, info, i, count)
+        if span_count(store.table, cell.kind, cell.record) <= SPANS:
+            return open_spans(store, nodes, info, i, count)
+        return open_feature(store, shell, pose, nodes, info, i, count)
     return split_cell(nodes, info, i, count)

@@ -19,6 +19,7 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly.geometry.splines.evaluate import surface_at
 from assembly.geometry.vec import add, dot, matvec, scale, sub
+from assembly.kinematics.motion import RelativePose
 from assembly.proximity.brep.apexes import unit
 from assembly.proximity.brep.borders import feature_at, feature_kind, on_surface, other_parameter
 from assembly.proximity.brep.records import (
@@ -41,22 +42,22 @@ ROUGH = 0.1
 
 
 @kernel(inner=True)
-def middle_of(table, pool, shell):
+def middle_of(store, shell):
     """The middle of the cells of a shell's faces, and how far these reach from there."""
     lo = (math.inf, math.inf, math.inf)
     hi = (-math.inf, -math.inf, -math.inf)
     reach = 0.0
     center = (0.0, 0.0, 0.0)
     for step in range(2):
-        for k in range(shell_at(table, shell).faces):
-            own = feature_cells(table, shell, k)
+        for k in range(shell_at(store.table, shell).faces):
+            own = feature_cells(store.table, shell, k)
             kind, record, count, cells, stride, ball = own.kind, own.record, own.count, own.pool, own.stride, own.ball
             for i in range(count):
-                if not used_cell(table, pool, record, kind, i):
+                if not used_cell(store, record, kind, i):
                     continue
                 o = cells + stride * i + ball
-                c = (pool[o], pool[o + 1], pool[o + 2])
-                r = pool[o + 3]
+                c = (store.pool[o], store.pool[o + 1], store.pool[o + 2])
+                r = store.pool[o + 3]
                 if step == 0:
                     lo = (min(lo[0], c[0] - r), min(lo[1], c[1] - r), min(lo[2], c[2] - r))
                     hi = (max(hi[0], c[0] + r), max(hi[1], c[1] + r), max(hi[2], c[2] + r))
@@ -69,63 +70,63 @@ def middle_of(table, pool, shell):
 
 
 @kernel(inner=True)
-def grown(turn, shift, about, factor):
+def grown(pose, about, factor):
     """A pose with which a shell grows by a factor about a point of the axes that it is seen from."""
     larger = (
-        factor * turn[0],
-        factor * turn[1],
-        factor * turn[2],
-        factor * turn[3],
-        factor * turn[4],
-        factor * turn[5],
-        factor * turn[6],
-        factor * turn[7],
-        factor * turn[8],
+        factor * pose.rotation[0],
+        factor * pose.rotation[1],
+        factor * pose.rotation[2],
+        factor * pose.rotation[3],
+        factor * pose.rotation[4],
+        factor * pose.rotation[5],
+        factor * pose.rotation[6],
+        factor * pose.rotation[7],
+        factor * pose.rotation[8],
     )
-    return larger, add(about, scale(factor, sub(shift, about)))
+    return RelativePose(rotation=larger, shift=add(about, scale(factor, sub(pose.shift, about))))
 
 
 @kernel(inner=True)
-def leans(table, pool, shell, code, u, v, turn, n, size, ways):
+def leans(store, shell, code, u, v, turn, n, size, ways):
     """How much the normals of a shell's faces at a point of a feature lean along n, all together."""
     s = 0.0
-    for k in range(add_ways(table, pool, shell, code, u, v, turn, 1.0, size, ways, 0)):
+    for k in range(add_ways(store, shell, code, u, v, turn, 1.0, size, ways, 0)):
         s += dot(n, (ways[k, 0], ways[k, 1], ways[k, 2]))
     return s
 
 
 @kernel(inner=True)
-def face_beside(table, pool, shell, code, u, v, turn, n):
+def face_beside(store, shell, code, u, v, turn, n):
     """The face that leans most along n at a point of an edge, and the point on it; what is no edge stays as it is."""
-    solid = shell_at(table, shell)
-    if feature_kind(table, shell, code) != EDGE:
+    solid = shell_at(store.table, shell)
+    if feature_kind(store.table, shell, code) != EDGE:
         return code, u, v
     edge = solid.edge_table + EDGE_RECORD * (code - solid.faces)
-    edge_record = edge_at(table, edge)
+    edge_record = edge_at(store.table, edge)
     surface = edge_record.surface
     face = edge_record.face_a
-    on_edge = on_surface(table, pool, surface, edge_record.curve, u)
+    on_edge = on_surface(store, surface, edge_record.curve, u)
     a, b, p, m = on_edge.u, on_edge.v, on_edge.point, on_edge.normal
     if edge_record.face_b >= 0:
         other = edge_record.surface_b
-        s = other_parameter(table, pool, edge, u, p)
-        on_edge = on_surface(table, pool, other, edge_record.curve_b, s)
+        s = other_parameter(store, edge, u, p)
+        on_edge = on_surface(store, other, edge_record.curve_b, s)
         c, d, k = on_edge.u, on_edge.v, on_edge.normal
-        lean = float(surface_at(table, surface).sign) * dot(unit(matvec(turn, m)), n)
-        if float(surface_at(table, other).sign) * dot(unit(matvec(turn, k)), n) > lean:
+        lean = float(surface_at(store.table, surface).sign) * dot(unit(matvec(turn, m)), n)
+        if float(surface_at(store.table, other).sign) * dot(unit(matvec(turn, k)), n) > lean:
             return edge_record.face_b, c, d
     return face, a, b
 
 
 @kernel(inner=True)
-def pair_from(table, pool, shells, pose, codes, x, n, size):
+def pair_from(store, shells, pose, codes, x, n, size):
     """The pair of two features of shells from x, and whether it is one at which they touch with a normal near n."""
     f, g = codes
-    kind_f = feature_kind(table, shells[0], f)
-    kind_g = feature_kind(table, shells[1], g)
-    a = feature_at(table, shells[0], f)
-    b = feature_at(table, shells[1], g)
-    status, y, frame = solve_features(table, pool, kind_f, a, kind_g, b, pose[0], pose[1], x, n, size, math.inf)
+    kind_f = feature_kind(store.table, shells[0], f)
+    kind_g = feature_kind(store.table, shells[1], g)
+    a = feature_at(store.table, shells[0], f)
+    b = feature_at(store.table, shells[1], g)
+    status, y, frame = solve_features(store, kind_f, a, kind_g, b, pose, x, n, size, math.inf)
     found = (
         (status == CONVERGED or status == SINGULAR) and abs(frame.gap) <= NEARLY * size and dot(frame.normal, n) > 0.5
     )
@@ -133,7 +134,7 @@ def pair_from(table, pool, shells, pose, codes, x, n, size):
 
 
 @kernel(inner=True, allocates=True)
-def conforming_pair(table, pool, shell_f, shell_g, turn, shift, size):
+def conforming_pair(store, shell_f, shell_g, pose, size):
     """The pair at which two shells that have points in common touch along conforming faces.
 
     Made smaller, a shell within the other one's material is free as well: there normals do not oppose each other.
@@ -143,36 +144,38 @@ def conforming_pair(table, pool, shell_f, shell_g, turn, shift, size):
     same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
     ways = np.empty((WAYS, 3))
     for side in range(2):
-        center, reach = middle_of(table, pool, shell_g if side == 0 else shell_f)
+        center, reach = middle_of(store, shell_g if side == 0 else shell_f)
         if not reach > 0.0:
             continue
-        about = add(matvec(turn, center), shift) if side == 0 else center
+        about = add(matvec(pose.rotation, center), pose.shift) if side == 0 else center
         part = NEARLY * size / reach
-        other, place = grown(turn, shift, about, 1.0 - part if side == 0 else 1.0 / (1.0 - part))
-        nearest = search(table, pool, shell_f, shell_g, other, place, size, ROUGH)
+        larger = grown(pose, about, 1.0 - part if side == 0 else 1.0 / (1.0 - part))
+        nearest = search(store, shell_f, shell_g, larger, size, ROUGH)
         f, g, x = nearest.f, nearest.g, nearest.x
         if nearest.status == CROSSING or f < 0:
             continue
-        kind_f = feature_kind(table, shell_f, f)
-        kind_g = feature_kind(table, shell_g, g)
-        p = tangents(table, pool, kind_f, feature_cells(table, shell_f, f).record, same, none, x[0], x[1])[0]
-        q = tangents(table, pool, kind_g, feature_cells(table, shell_g, g).record, other, place, x[2], x[3])[0]
+        kind_f = feature_kind(store.table, shell_f, f)
+        kind_g = feature_kind(store.table, shell_g, g)
+        p = tangents(
+            store, kind_f, feature_cells(store.table, shell_f, f).record, RelativePose(same, none), x[0], x[1]
+        )[0]
+        q = tangents(store, kind_g, feature_cells(store.table, shell_g, g).record, larger, x[2], x[3])[0]
         d = sub(q, p)
         length = math.sqrt(dot(d, d))
         if not length > 0.0:
             continue
         n = scale(1.0 / length, d)
-        if not leans(table, pool, shell_f, f, x[0], x[1], same, n, size, ways) > 0.0:
+        if not leans(store, shell_f, f, x[0], x[1], same, n, size, ways) > 0.0:
             continue
-        if not leans(table, pool, shell_g, g, x[2], x[3], turn, n, size, ways) < 0.0:
+        if not leans(store, shell_g, g, x[2], x[3], pose.rotation, n, size, ways) < 0.0:
             continue
-        shells, pose = (shell_f, shell_g), (turn, shift)
-        found, y, m, gap = pair_from(table, pool, shells, pose, (f, g), x, n, size)
+        shells = (shell_f, shell_g)
+        found, y, m, gap = pair_from(store, shells, pose, (f, g), x, n, size)
         if not found:
             # Edges that lie on each other have no normal: the faces beside them do.
-            f, u, v = face_beside(table, pool, shell_f, f, x[0], x[1], same, n)
-            g, s, w = face_beside(table, pool, shell_g, g, x[2], x[3], turn, scale(-1.0, n))
-            found, y, m, gap = pair_from(table, pool, shells, pose, (f, g), (u, v, s, w), n, size)
+            f, u, v = face_beside(store, shell_f, f, x[0], x[1], same, n)
+            g, s, w = face_beside(store, shell_g, g, x[2], x[3], pose.rotation, scale(-1.0, n))
+            found, y, m, gap = pair_from(store, shells, pose, (f, g), (u, v, s, w), n, size)
         if found:
             return FoundPair(True, f, g, y, m, gap)
     return FoundPair(False, -1, -1, (0.0, 0.0, 0.0, 0.0), none, 0.0)

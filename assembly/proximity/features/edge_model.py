@@ -29,18 +29,18 @@ from assembly.proximity.features.quadratic_model import (
 
 
 @kernel(inner=True)
-def curve_remainder(table, pool, curve, t0, h, c0, c1, c2, work):
+def curve_remainder(store, curve, t0, h, c0, c1, c2, work):
     """Bounds of |x|, |y|, |z| of what the quadratic leaves of a curve over one part of a span."""
-    arc = spline_curve_at(table, curve)
-    span = find_span(pool, arc.breaks, arc.spans, t0)
+    arc = spline_curve_at(store.table, curve)
+    span = find_span(store.pool, arc.breaks, arc.spans, t0)
     at = arc.breaks + span
-    s = t0 - 0.5 * (pool[at] + pool[at + 1])
+    s = t0 - 0.5 * (store.pool[at] + store.pool[at + 1])
     n = arc.degree
     o = arc.coefficients + 4 * (n + 1) * span
     for i in range(n + 1):
-        w = pool[o + 4 * i + 3]
+        w = store.pool[o + 4 * i + 3]
         for c in range(3):
-            work[c, 0, i] = pool[o + 4 * i + c] - w * c0[c]
+            work[c, 0, i] = store.pool[o + 4 * i + c] - w * c0[c]
         work[3, 0, i] = w
     for c in range(4):
         for first in range(n):
@@ -90,15 +90,15 @@ def meets(pool, breaks, k, move, u, a):
 
 
 @kernel(inner=True)
-def wide_remainder(table, pool, r, u0, v0, a, b, s0, p, q, l, m, k, work):
+def wide_remainder(store, r, u0, v0, a, b, s0, p, q, l, m, k, work):
     """`remainder` over a box that may lie over several spans, and over seams."""
-    patch = surface_at(table, r)
+    patch = surface_at(store.table, r)
     bu = patch.breaks_u
     bv = patch.breaks_v
     nu = patch.spans_u
     nv = patch.spans_v
-    period_u = pool[bu + nu] - pool[bu]
-    period_v = pool[bv + nv] - pool[bv]
+    period_u = store.pool[bu + nu] - store.pool[bu]
+    period_v = store.pool[bv + nv] - store.pool[bv]
     around_u = 1 if patch.closed_u == 1 else 0
     around_v = 1 if patch.closed_v == 1 else 0
     if (around_u == 1 and a >= 0.5 * period_u) or (around_v == 1 and b >= 0.5 * period_v):
@@ -108,15 +108,15 @@ def wide_remainder(table, pool, r, u0, v0, a, b, s0, p, q, l, m, k, work):
     for turn_u in range(-around_u, around_u + 1):
         move_u = turn_u * period_u
         for iu in range(nu):
-            if not meets(pool, bu, iu, move_u, u0, a):
+            if not meets(store.pool, bu, iu, move_u, u0, a):
                 continue
             for turn_v in range(-around_v, around_v + 1):
                 move_v = turn_v * period_v
                 for iv in range(nv):
-                    if meets(pool, bv, iv, move_v, v0, b):
+                    if meets(store.pool, bv, iv, move_v, v0, b):
                         u = u0 - move_u
                         v = v0 - move_v
-                        e = remainder(table, pool, r, iu, iv, u, v, a, b, s0, p, q, l, m, k, none, work).rest
+                        e = remainder(store, r, iu, iv, u, v, a, b, s0, p, q, l, m, k, none, work).rest
                         most = max(most, e)
     return most
 
@@ -127,26 +127,26 @@ def length(a):
 
 
 @kernel(inner=True)
-def edge_model(table, pool, edge, turn, shift, nodes, i, work):
+def edge_model(store, edge, pose, nodes, i, work):
     """Fill in a node of an edge, whose interval stands in it already, moved by a pose."""
     model = model_at(nodes, i)
-    edge_record = edge_at(table, edge)
+    edge_record = edge_at(store.table, edge)
     t0 = model.u0
     h = model.half_u
     curve = edge_record.curve
     zero = (0.0, 0.0, 0.0)
-    c0, d, w = curve_point(table, pool, curve, t0)
+    c0, d, w = curve_point(store.table, store.pool, curve, t0)
     c1 = scale(h, d)
     c2 = scale(0.5 * h * h, w)
-    left = curve_remainder(table, pool, curve, t0, h, c0, c1, c2, work)
+    left = curve_remainder(store, curve, t0, h, c0, c1, c2, work)
     r = edge_record.surface
-    far = abs(shift[0]) + abs(shift[1]) + abs(shift[2])
+    far = abs(pose.shift[0]) + abs(pose.shift[1]) + abs(pose.shift[2])
     if r < 0:
         e = length(left) + ROUNDING * (far + abs(c0[0]) + abs(c0[1]) + abs(c0[2]))
-        place_model(turn, shift, c0, c1, zero, c2, zero, zero, e, nodes, i)
+        place_model(pose, c0, c1, zero, c2, zero, zero, e, nodes, i)
         return
-    u0, v0, _clamped = into_domain(table, pool, r, c0[0], c0[1])
-    s0, su, sv, suu, suv, svv = surface_point(table, pool, r, u0, v0)
+    u0, v0, _clamped = into_domain(store, r, c0[0], c0[1])
+    s0, su, sv, suu, suv, svv = surface_point(store.table, store.pool, r, u0, v0)
     linear = blend(c1[0], su, c1[1], sv)
     bent = add(blend(c1[0] * c1[0], suu, 2.0 * c1[0] * c1[1], suv), scale(c1[1] * c1[1], svv))
     square = add(blend(c2[0], su, c2[1], sv), scale(0.5, bent))
@@ -162,10 +162,10 @@ def edge_model(table, pool, edge, turn, shift, nodes, i, work):
         l = scale(0.5 * a * a, suu)
         m = scale(a * b, suv)
         k = scale(0.5 * b * b, svv)
-        e = wide_remainder(table, pool, r, u0, v0, a, b, s0, p, q, l, m, k, work)
+        e = wide_remainder(store, r, u0, v0, a, b, s0, p, q, l, m, k, work)
         e += left[0] * length(su) + left[1] * length(sv)
         e += 0.5 * length(suu) * more_u * (2.0 * abs(c1[0]) + more_u)
         e += 0.5 * length(svv) * more_v * (2.0 * abs(c1[1]) + more_v)
         e += length(suv) * (abs(c1[0]) * more_v + abs(c1[1]) * more_u + more_u * more_v)
         e += ROUNDING * (far + abs(s0[0]) + abs(s0[1]) + abs(s0[2]))
-    place_model(turn, shift, s0, linear, zero, square, zero, zero, e, nodes, i)
+    place_model(pose, s0, linear, zero, square, zero, zero, e, nodes, i)

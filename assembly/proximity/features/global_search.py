@@ -23,6 +23,7 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly.geometry.vec import dot, sub
+from assembly.kinematics.motion import RelativePose
 from assembly.proximity.brep.records import FACE, VERTEX, face_at
 from assembly.proximity.extrema.crossing import crossing_point
 from assembly.proximity.extrema.face_face import CONVERGED, SINGULAR, solve_pair
@@ -110,18 +111,18 @@ NearExtremum = namedtuple("NearExtremum", "status x gap curvature stretch")
 
 
 @kernel(inner=True)
-def extremum_near(table, pool, kind_f, f, kind_g, g, turn, shift, x, n, size):
+def extremum_near(store, kind_f, f, kind_g, g, pose, x, n, size):
     """Newton's method from x; its status says whether it led to an extremum."""
-    face = face_at(table, f)
-    face_record = face_at(table, g)
+    face = face_at(store.table, f)
+    face_record = face_at(store.table, g)
     if kind_f == FACE and kind_g == FACE:
-        found = solve_pair(table, pool, face.surface, face_record.surface, turn, shift, x, size, 1.5, 0.0, False)
+        found = solve_pair(store, face.surface, face_record.surface, pose, x, size, 1.5, 0.0, False)
         gap = found.frame.gap
         least, stretch = relative_curvature(found.matrix.k, found.matrix.h, gap)
         return NearExtremum(found.status, found.parameters, gap, least, stretch)
     af = face.surface if kind_f == FACE else f
     ag = face_record.surface if kind_g == FACE else g
-    status, y, frame = solve_features(table, pool, kind_f, af, kind_g, ag, turn, shift, x, n, size, 1.5)
+    status, y, frame = solve_features(store, kind_f, af, kind_g, ag, pose, x, n, size, 1.5)
     return NearExtremum(status, y, frame.gap, 0.0, 1.0)
 
 
@@ -159,19 +160,19 @@ FoundPair = namedtuple("FoundPair", "found f g x normal gap")
 
 
 @kernel(inner=True, allocates=True)
-def search(table, pool, shell_f, shell_g, turn, shift, size, rough):
+def search(store, shell_f, shell_g, pose, size, rough):
     """The nearest points of two shells, g seen from f, or any that are farther by a part of that, `rough`, at most."""
     same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
     origin = (0.0, 0.0, 0.0)
-    most_f = room(table, pool, shell_f)
-    most_g = room(table, pool, shell_g)
+    most_f = room(store, shell_f)
+    most_g = room(store, shell_g)
     a = np.empty((most_f, NODE))
     ai = np.empty((most_f, INFO), np.int64)
     b = np.empty((most_g, NODE))
     bi = np.empty((most_g, INFO), np.int64)
     work = np.empty((4, 16, 16))
-    count_f = plant(table, pool, shell_f, same, origin, a, ai)
-    count_g = plant(table, pool, shell_g, turn, shift, b, bi)
+    count_f = plant(store, shell_f, RelativePose(same, origin), a, ai)
+    count_g = plant(store, shell_g, pose, b, bi)
     keys = np.empty(WAITING)
     slots = np.empty(WAITING, np.int64)
     pairs = np.empty((WAITING, 3), np.int64)
@@ -198,7 +199,7 @@ def search(table, pool, shell_f, shell_g, turn, shift, size, rough):
     j = 0
     while cell_node_at(ai, i).level != CELL or cell_node_at(bi, j).level != CELL:
         if larger_first(a, ai, i, b, bi, j):
-            count_f = grow(table, pool, shell_f, same, origin, a, ai, i, count_f)
+            count_f = grow(store, shell_f, RelativePose(same, origin), a, ai, i, count_f)
             nearest = math.inf
             first = cell_node_at(ai, i).child
             for k in range(first, first + cell_node_at(ai, i).children):
@@ -207,7 +208,7 @@ def search(table, pool, shell_f, shell_g, turn, shift, size, rough):
                     nearest = dot(d, d)
                     i = k
         else:
-            count_g = grow(table, pool, shell_g, turn, shift, b, bi, j, count_g)
+            count_g = grow(store, shell_g, pose, b, bi, j, count_g)
             nearest = math.inf
             first = cell_node_at(bi, j).child
             for k in range(first, first + cell_node_at(bi, j).children):
@@ -251,8 +252,8 @@ def search(table, pool, shell_f, shell_g, turn, shift, size, rough):
             break
         are_cells = cell_node_at(ai, i).level == CELL and cell_node_at(bi, j).level == CELL
         if are_cells:
-            give_model(table, pool, same, origin, a, ai, i, work)
-            give_model(table, pool, turn, shift, b, bi, j, work)
+            give_model(store, RelativePose(same, origin), a, ai, i, work)
+            give_model(store, pose, b, bi, j, work)
             kind_f = cell_node_at(ai, i).kind
             kind_g = cell_node_at(bi, j).kind
             f = cell_node_at(ai, i).record
@@ -276,8 +277,8 @@ def search(table, pool, shell_f, shell_g, turn, shift, size, rough):
             start = (model_at(a, i).u0, model_at(a, i).v0, model_at(b, j).u0, model_at(b, j).v0)
             if (
                 apart < upper
-                and is_feasible(table, pool, kind_f, f, start[0], start[1])
-                and is_feasible(table, pool, kind_g, g, start[2], start[3])
+                and is_feasible(store, kind_f, f, start[0], start[1])
+                and is_feasible(store, kind_g, g, start[2], start[3])
             ):
                 upper = apart
                 best = (cell_node_at(ai, i).feature, cell_node_at(bi, j).feature)
@@ -285,18 +286,18 @@ def search(table, pool, shell_f, shell_g, turn, shift, size, rough):
                 gap = apart
             if ready != 2 and excluded(a, i, kind_f, b, j, kind_g, key > 0.0):
                 continue
-            settled, beside = is_known(table, pool, a, ai, i, b, bi, j, extrema, owners, known)
+            settled, beside = is_known(store, a, ai, i, b, bi, j, extrema, owners, known)
             if settled:
                 continue
             # Beside an extremum Newton's method would find that one again.
             if ready == 2 or (max(model_at(a, i).bend, model_at(b, j).bend) < SMOOTH and beside > FAR):
-                near = extremum_near(table, pool, kind_f, f, kind_g, g, turn, shift, start, n, size)
+                near = extremum_near(store, kind_f, f, kind_g, g, pose, start, n, size)
                 if near.status == CONVERGED or near.status == SINGULAR:
                     x, beta = near.x, near.gap
                     if (
                         abs(beta) < upper
-                        and is_feasible(table, pool, kind_f, f, x[0], x[1])
-                        and is_feasible(table, pool, kind_g, g, x[2], x[3])
+                        and is_feasible(store, kind_f, f, x[0], x[1])
+                        and is_feasible(store, kind_g, g, x[2], x[3])
                     ):
                         upper = abs(beta)
                         best = (cell_node_at(ai, i).feature, cell_node_at(bi, j).feature)
@@ -311,15 +312,11 @@ def search(table, pool, shell_f, shell_g, turn, shift, size, rough):
                         owners[known, 0] = cell_node_at(ai, i).feature
                         owners[known, 1] = cell_node_at(bi, j).feature
                         known += 1
-                        if is_known(table, pool, a, ai, i, b, bi, j, extrema[known - 1 :], owners[known - 1 :], 1)[0]:
+                        if is_known(store, a, ai, i, b, bi, j, extrema[known - 1 :], owners[known - 1 :], 1)[0]:
                             continue
             if key <= 0.0 and model_at(a, i).bend + model_at(b, j).bend < SMOOTH:
-                x, crosses = crossing_point(table, pool, kind_f, f, kind_g, g, turn, shift, start, size)
-                if (
-                    crosses
-                    and is_feasible(table, pool, kind_f, f, x[0], x[1])
-                    and is_feasible(table, pool, kind_g, g, x[2], x[3])
-                ):
+                x, crosses = crossing_point(store, kind_f, f, kind_g, g, pose, start, size)
+                if crosses and is_feasible(store, kind_f, f, x[0], x[1]) and is_feasible(store, kind_g, g, x[2], x[3]):
                     status = CROSSING
                     best = (cell_node_at(ai, i).feature, cell_node_at(bi, j).feature)
                     at = x
@@ -329,18 +326,18 @@ def search(table, pool, shell_f, shell_g, turn, shift, size, rough):
                     break
             if ready == 2:
                 continue
-            if side_of(table, pool, a, ai, i) == OUTSIDE or side_of(table, pool, b, bi, j) == OUTSIDE:
+            if side_of(store, a, ai, i) == OUTSIDE or side_of(store, b, bi, j) == OUTSIDE:
                 continue
             if max(model_at(a, i).radius, model_at(b, j).radius) < TINY * size:
                 uncut = min(uncut, key)
                 continue
         if larger_first(a, ai, i, b, bi, j):
-            count_f = grow(table, pool, shell_f, same, origin, a, ai, i, count_f)
+            count_f = grow(store, shell_f, RelativePose(same, origin), a, ai, i, count_f)
             first = cell_node_at(ai, i).child
             last = first + cell_node_at(ai, i).children
             down_f = True
         else:
-            count_g = grow(table, pool, shell_g, turn, shift, b, bi, j, count_g)
+            count_g = grow(store, shell_g, pose, b, bi, j, count_g)
             first = cell_node_at(bi, j).child
             last = first + cell_node_at(bi, j).children
             down_f = False
@@ -349,9 +346,9 @@ def search(table, pool, shell_f, shell_g, turn, shift, size, rough):
             q = j if down_f else k
             if are_cells:
                 if down_f:
-                    give_model(table, pool, same, origin, a, ai, p, work)
+                    give_model(store, RelativePose(same, origin), a, ai, p, work)
                 else:
-                    give_model(table, pool, turn, shift, b, bi, q, work)
+                    give_model(store, pose, b, bi, q, work)
                 key, m = pair_bound(a, p, b, q, n, upper)
             else:
                 key = ball_bound(a, p, b, q)

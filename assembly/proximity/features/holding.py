@@ -33,19 +33,19 @@ NOTHING, FEATURES, POINT, HELD_F, HELD_G = 0.0, 1.0, 2.0, 3.0, 4.0
 
 
 @kernel(inner=True)
-def lean_of(table, pool, shell, kind, code, t, s, n):
+def lean_of(store, shell, kind, code, t, s, n):
     """By how much a normal leans over what is beside an edge, a vertex or a point, at most; 0 for a face."""
     if kind == FACE_POINT:
-        cosine = dot(n, own_frame(table, pool, feature_at(table, shell, code), t, s).normal)
+        cosine = dot(n, own_frame(store, feature_at(store.table, shell, code), t, s).normal)
         return math.sqrt(max(1.0 - cosine * cosine, 0.0)) if cosine > 0.0 else 1.0
     if kind == EDGE or kind == EDGE_POINT:
-        lean = from_edge(table, pool, shell, code, t, n)[0]
+        lean = from_edge(store, shell, code, t, n)[0]
         if kind == EDGE:
             return lean
-        edge = edge_at(table, feature_at(table, shell, code))
-        along = on_surface(table, pool, edge.surface, edge.curve, t).tangent
+        edge = edge_at(store.table, feature_at(store.table, shell, code))
+        along = on_surface(store, edge.surface, edge.curve, t).tangent
         return max(lean, abs(dot(n, unit(along))))
-    return from_vertex(table, pool, shell, code, n)[2] if kind == VERTEX else 0.0
+    return from_vertex(store, shell, code, n)[2] if kind == VERTEX else 0.0
 
 
 @kernel(inline=True)
@@ -58,29 +58,29 @@ def held_kind(table, shell, code, held, own):
 
 
 @kernel(inner=True)
-def hold_features(table, pool, shell_f, shell_g, rotation, shift, code_f, code_g, x, n, size, turn, held):
+def hold_features(store, shell_f, shell_g, pose, code_f, code_g, x, n, size, turn, held):
     """Newton's method on two features that stay what they are: status, x, frame. Arguments as in `track_features`.
 
     Where `held` is POINT, HELD_F or HELD_G, a point of one stays where it is on it, too. LEFT_PATCH where a point
     on a face is past its boundary, one of an edge past its end, or the normal leans by more than TILT.
     """
-    kind_f = held_kind(table, shell_f, code_f, held, HELD_F)
-    kind_g = held_kind(table, shell_g, code_g, held, HELD_G)
+    kind_f = held_kind(store.table, shell_f, code_f, held, HELD_F)
+    kind_g = held_kind(store.table, shell_g, code_g, held, HELD_G)
     if kind_f == EDGE and kind_g == EDGE and dot(n, n) < 0.25:
-        n = between_edges(table, pool, shell_f, shell_g, rotation, code_f, code_g, x[0], x[2])
-    f = feature_at(table, shell_f, code_f)
-    g = feature_at(table, shell_g, code_g)
-    status, x, frame = solve_features(table, pool, kind_f, f, kind_g, g, rotation, shift, x, n, size, turn)
+        n = between_edges(store, shell_f, shell_g, pose.rotation, code_f, code_g, x[0], x[2])
+    f = feature_at(store.table, shell_f, code_f)
+    g = feature_at(store.table, shell_g, code_g)
+    status, x, frame = solve_features(store, kind_f, f, kind_g, g, pose, x, n, size, turn)
     inside = True
     if kind_f == FACE:
-        inside = is_feasible(table, pool, FACE, shell_at(table, shell_f).face_table + FACE_RECORD * code_f, x[0], x[1])
+        inside = is_feasible(store, FACE, shell_at(store.table, shell_f).face_table + FACE_RECORD * code_f, x[0], x[1])
     elif kind_g == FACE:
-        inside = is_feasible(table, pool, FACE, shell_at(table, shell_g).face_table + FACE_RECORD * code_g, x[2], x[3])
+        inside = is_feasible(store, FACE, shell_at(store.table, shell_g).face_table + FACE_RECORD * code_g, x[2], x[3])
     if status == CONVERGED and not inside:
         status = LEFT_PATCH
     if status == CONVERGED or status == SINGULAR:
         n = frame.normal
-        lean = lean_of(table, pool, shell_f, kind_f, code_f, x[0], x[1], n)
-        lean = max(lean, lean_of(table, pool, shell_g, kind_g, code_g, x[2], x[3], neg(matvec_t(rotation, n))))
+        lean = lean_of(store, shell_f, kind_f, code_f, x[0], x[1], n)
+        lean = max(lean, lean_of(store, shell_g, kind_g, code_g, x[2], x[3], neg(matvec_t(pose.rotation, n))))
         status = status if lean <= TILT else LEFT_PATCH
     return status, x, frame

@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
-from assembly._record import place_of, record_dtype, record_view, size_of
+from assembly._record import Store, place_of, record_dtype, record_view, size_of
 from assembly.geometry.vec import add, dot, matvec, matvec_t, scale, sub
-from assembly.kinematics.motion import position, relative_pose, rotation
+from assembly.kinematics.motion import RelativePose, position, relative_pose, rotation
 from assembly.proximity.brep.borders import feature_at, feature_kind
 from assembly.proximity.extrema.crossing import tangents
 from assembly.proximity.extrema.face_face import CONVERGED, SINGULAR
@@ -73,13 +73,13 @@ def write_pair(q, turn_f, x, pf, pg, n, gap, out):
 
 
 @kernel(inner=True)
-def write_features(table, pool, shell_f, shell_g, q, turn_f, turn, shift, f, g, x, n, gap, size, codes, out):
+def write_features(store, shell_f, shell_g, q, turn_f, pose, f, g, x, n, gap, size, codes, out):
     """The pair of features f and g at x into codes (2,) and out (PAIR,); n a normal near its own, or zero."""
-    kind_f = feature_kind(table, shell_f, f)
-    kind_g = feature_kind(table, shell_g, g)
-    a = feature_at(table, shell_f, f)
-    b = feature_at(table, shell_g, g)
-    status, y, frame = solve_features(table, pool, kind_f, a, kind_g, b, turn, shift, x, n, size, math.inf)
+    kind_f = feature_kind(store.table, shell_f, f)
+    kind_g = feature_kind(store.table, shell_g, g)
+    a = feature_at(store.table, shell_f, f)
+    b = feature_at(store.table, shell_g, g)
+    status, y, frame = solve_features(store, kind_f, a, kind_g, b, pose, x, n, size, math.inf)
     codes[0] = f
     codes[1] = g
     if (status == CONVERGED or status == SINGULAR) and abs(abs(frame.gap) - abs(gap)) <= 1e-12 * size:
@@ -88,8 +88,8 @@ def write_features(table, pool, shell_f, shell_g, q, turn_f, turn, shift, f, g, 
     # A crossing, or an apex where Newton's method has no tangent to go on: the points themselves.
     same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
     none = (0.0, 0.0, 0.0)
-    pf = tangents(table, pool, kind_f, feature_cells(table, shell_f, f).record, same, none, x[0], x[1])[0]
-    pg = tangents(table, pool, kind_g, feature_cells(table, shell_g, g).record, turn, shift, x[2], x[3])[0]
+    pf = tangents(store, kind_f, feature_cells(store.table, shell_f, f).record, RelativePose(same, none), x[0], x[1])[0]
+    pg = tangents(store, kind_g, feature_cells(store.table, shell_g, g).record, pose, x[2], x[3])[0]
     d = sub(pg, pf)
     length = math.sqrt(dot(d, d))
     write_pair(q, turn_f, x, pf, pg, scale(1.0 / length, d) if length > 1e-9 * size else frame.normal, length, out)
@@ -98,16 +98,17 @@ def write_features(table, pool, shell_f, shell_g, q, turn_f, turn, shift, f, g, 
 @kernel(signatures="(i8[::1], f8[::1], i8, i8, f8[:, ::1], f8, i8[::1], f8[::1])")
 def find_nearest(table, pool, shell_f, shell_g, q, size, codes, out):
     """The nearest pair at the poses q (2, 7); its features into codes (2,), the pair into out. Returns the status."""
+    store = Store(table, pool)
     answer = answer_at(out, 0)
     turn_f = rotation(q, 0)
-    turn, shift = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
-    nearest = search(table, pool, shell_f, shell_g, turn, shift, size, 0.0)
+    pose = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
+    nearest = search(store, shell_f, shell_g, pose, size, 0.0)
     status, f, g = nearest.status, nearest.f, nearest.g
     x, gap = nearest.x, nearest.gap
     none = (0.0, 0.0, 0.0)
     if status == UNPROVEN:
         # The search was over before it came to the nearest one; beside what it found there may be nearer ones.
-        beside = track_features(table, pool, shell_f, shell_g, turn, shift, f, g, x, none, size, math.inf)
+        beside = track_features(store, shell_f, shell_g, pose, f, g, x, none, size, math.inf)
         off = beside.frame.gap
         if (beside.status == CONVERGED or beside.status == SINGULAR) and nearest.lower <= abs(off) < abs(gap):
             f, g, x, gap = beside.f, beside.g, beside.x, off
@@ -115,9 +116,9 @@ def find_nearest(table, pool, shell_f, shell_g, q, size, codes, out):
             status = APART
     if status == APART and abs(gap) <= TOUCHING * size:
         # Solids whose faces are flush have points in common before a search comes to where they cross.
-        if overlap_at(table, pool, shell_f, shell_g, turn, f, g, x, size, np.empty((WAYS, 3))):
+        if overlap_at(store, shell_f, shell_g, pose.rotation, f, g, x, size, np.empty((WAYS, 3))):
             status = CROSSING
-    write_features(table, pool, shell_f, shell_g, q, turn_f, turn, shift, f, g, x, none, gap, size, codes, out)
+    write_features(store, shell_f, shell_g, q, turn_f, pose, f, g, x, none, gap, size, codes, out)
     answer.lower = nearest.lower
     answer.effort = nearest.effort
     return status
@@ -130,18 +131,19 @@ def find_deepest(table, pool, shell_f, shell_g, q, size, codes, out):
     APART where they turn out to touch, and rounding said that they cross. Where what leads out is long it is seen
     whether only conforming faces have points in common.
     """
+    store = Store(table, pool)
     turn_f = rotation(q, 0)
-    turn, shift = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
+    pose = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
     x = answer_parameters(out)
-    pair = deepest(table, pool, shell_f, shell_g, turn, shift, codes[0], codes[1], x, size)
+    pair = deepest(store, shell_f, shell_g, pose, codes[0], codes[1], x, size)
     if not pair.found or pair.gap < -NEARLY * size:
-        touching = conforming_pair(table, pool, shell_f, shell_g, turn, shift, size)
+        touching = conforming_pair(store, shell_f, shell_g, pose, size)
         if touching.found:
             pair = touching
     if not pair.found:
         return CROSSING
     write_features(
-        table, pool, shell_f, shell_g, q, turn_f, turn, shift, pair.f, pair.g, pair.x, pair.normal, pair.gap, size,
+        store, shell_f, shell_g, q, turn_f, pose, pair.f, pair.g, pair.x, pair.normal, pair.gap, size,
         codes, out,
     )  # fmt: skip
     return PENETRATING if pair.gap < 0.0 else APART
@@ -152,10 +154,10 @@ def follow_nearest(table, pool, shell_f, shell_g, q, size, codes, out):
     """The pair in codes and out carried to the poses q. Returns TRACKED, or LOST and leaves the pair."""
     answer = answer_at(out, 0)
     turn_f = rotation(q, 0)
-    turn, shift = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
+    pose = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
     n = matvec_t(turn_f, (answer.normal[0], answer.normal[1], answer.normal[2]))
     x = answer_parameters(out)
-    found = track_features(table, pool, shell_f, shell_g, turn, shift, codes[0], codes[1], x, n, size, 1.0)
+    found = track_features(Store(table, pool), shell_f, shell_g, pose, codes[0], codes[1], x, n, size, 1.0)
     status, frame = found.status, found.frame
     # An edge may have become the farthest one of its neighborhood, surfaces may cross beside their points. In a
     # continuum, of flush faces say, nothing tells.

@@ -15,6 +15,7 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly.geometry.vec import add, blend, dot, scale
+from assembly.kinematics.motion import RelativePose
 from assembly.proximity.brep.borders import feature_at
 from assembly.proximity.brep.records import face_at, shell_at
 from assembly.proximity.extrema.face_face import CONVERGED, SINGULAR
@@ -47,7 +48,7 @@ def has_one_face(table, shell):
 
 
 @kernel(inner=True)
-def walk_back(table, pool, shell_f, shell_g, turn, shift, away, f, g, x, size):
+def walk_back(store, shell_f, shell_g, pose, away, f, g, x, size):
     """The pair of g moved by `away`, followed until g is back."""
     none = (0.0, 0.0, 0.0)
     done = 0.0
@@ -57,8 +58,8 @@ def walk_back(table, pool, shell_f, shell_g, turn, shift, away, f, g, x, size):
     halved = 0
     while done < 1.0:
         part = min(done + step, 1.0)
-        place = blend(1.0, shift, 1.0 - part, away)
-        there = track_features(table, pool, shell_f, shell_g, turn, place, f, g, x, n, size, 1.0)
+        place = blend(1.0, pose.shift, 1.0 - part, away)
+        there = track_features(store, shell_f, shell_g, RelativePose(pose.rotation, place), f, g, x, n, size, 1.0)
         if there.status != CONVERGED and there.status != SINGULAR:
             if halved == HALVINGS:
                 return FoundPair(False, f, g, x, n, gap)
@@ -75,44 +76,46 @@ def walk_back(table, pool, shell_f, shell_g, turn, shift, away, f, g, x, size):
 
 
 @kernel(inner=True, allocates=True)
-def deepest(table, pool, shell_f, shell_g, turn, shift, f, g, x, size):
+def deepest(store, shell_f, shell_g, pose, f, g, x, size):
     """The pair of two shells that cross at x of features f and g."""
     none = (0.0, 0.0, 0.0)
-    if has_one_face(table, shell_f) and has_one_face(table, shell_g):
-        a = feature_at(table, shell_f, 0)
-        b = feature_at(table, shell_g, 0)
-        status, y, gap = global_start(table, pool, a, b, turn, shift, size)
+    if has_one_face(store.table, shell_f) and has_one_face(store.table, shell_g):
+        a = feature_at(store.table, shell_f, 0)
+        b = feature_at(store.table, shell_g, 0)
+        status, y, gap = global_start(store, a, b, pose, size)
         # The far side of a thin body may be nearer than where it is in the other one.
         if (status == CONVERGED or status == SINGULAR) and gap <= TOUCHING * size:
             return FoundPair(True, 0, 0, y, none, gap)
     same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
     ways = np.empty((WAYS, 3))
-    count = add_ways(table, pool, shell_f, f, x[0], x[1], same, 1.0, size, ways, 0)
-    count = add_ways(table, pool, shell_g, g, x[2], x[3], turn, -1.0, size, ways, count)
+    count = add_ways(store, shell_f, f, x[0], x[1], same, 1.0, size, ways, 0)
+    count = add_ways(store, shell_g, g, x[2], x[3], pose.rotation, -1.0, size, ways, count)
     # Out of a corner it leads between the walls.
     total = none
     for k in range(count):
         total = add(total, (ways[k, 0], ways[k, 1], ways[k, 2]))
     count = add_way(total, ways, count)
     # Flush bodies meet all along edges, also where another face leads out sooner.
-    count = add_end_ways(table, pool, shell_f, f, x[0], x[1], same, 1.0, size, ways, count)
-    count = add_end_ways(table, pool, shell_g, g, x[2], x[3], turn, -1.0, size, ways, count)
+    count = add_end_ways(store, shell_f, f, x[0], x[1], same, 1.0, size, ways, count)
+    count = add_end_ways(store, shell_g, g, x[2], x[3], pose.rotation, -1.0, size, ways, count)
     best = FoundPair(False, f, g, x, none, -math.inf)
     other = best
     for attempt in range(2):
         if attempt == 1:
             # From one body's origin to the other's, where no normal leads out.
-            count = add_way(shift if dot(shift, shift) > 1e-18 * size * size else (0.0, 0.0, 1.0), ways, 0)
+            count = add_way(
+                pose.shift if dot(pose.shift, pose.shift) > 1e-18 * size * size else (0.0, 0.0, 1.0), ways, 0
+            )
         reach = FIRST * size
         # The shortest way out, of all of them.
         for _ in range(DOUBLINGS):
             for k in range(count):
                 away = scale(reach, (ways[k, 0], ways[k, 1], ways[k, 2]))
-                place = add(shift, away)
-                out = search(table, pool, shell_f, shell_g, turn, place, size, ROUGH)
+                place = add(pose.shift, away)
+                out = search(store, shell_f, shell_g, RelativePose(pose.rotation, place), size, ROUGH)
                 if out.status == CROSSING or not out.lower > 0.0:
                     continue
-                back = walk_back(table, pool, shell_f, shell_g, turn, shift, away, out.f, out.g, out.x, size)
+                back = walk_back(store, shell_f, shell_g, pose, away, out.f, out.g, out.x, size)
                 gap = back.gap
                 if not back.found or not TOUCHING * size >= gap > best.gap:
                     continue
@@ -124,8 +127,11 @@ def deepest(table, pool, shell_f, shell_g, turn, shift, f, g, x, size):
                 if gap >= -TOUCHING * size:
                     # They touch here. If that is all, the least move parts them. Where they touch along a line or
                     # all over a face a search so near may not come to its proof: that none is found has to do.
-                    place = add(shift, scale(PARTED / reach * size, away))
-                    if search(table, pool, shell_f, shell_g, turn, place, size, ROUGH).status == CROSSING:
+                    place = add(pose.shift, scale(PARTED / reach * size, away))
+                    if (
+                        search(store, shell_f, shell_g, RelativePose(pose.rotation, place), size, ROUGH).status
+                        == CROSSING
+                    ):
                         continue
                 best = back
             if best.found:

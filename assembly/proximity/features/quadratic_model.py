@@ -100,32 +100,32 @@ Remainder = namedtuple("Remainder", "rest rest_n sss sst stt ttt beyond")
 
 
 @kernel(inner=True)
-def remainder(table, pool, r, iu, iv, u0, v0, a, b, origin, p, q, l, m, k, n, work):
+def remainder(store, r, iu, iv, u0, v0, a, b, origin, p, q, l, m, k, n, work):
     """How far a piece of the surface may be off the quadratic over a box; `work` holds 4 by 16 by 16 numbers.
 
     The piece may be one beside the middle of the box: then terms of low order remain too.
     """
-    patch = surface_at(table, r)
+    patch = surface_at(store.table, r)
     ou = patch.breaks_u + iu
     ov = patch.breaks_v + iv
-    s = u0 - 0.5 * (pool[ou] + pool[ou + 1])
-    t = v0 - 0.5 * (pool[ov] + pool[ov + 1])
+    s = u0 - 0.5 * (store.pool[ou] + store.pool[ou + 1])
+    t = v0 - 0.5 * (store.pool[ov] + store.pool[ov + 1])
     nu = patch.degree_u
     nv = patch.degree_v
     o = patch.coefficients + 4 * (nu + 1) * (nv + 1) * (iu * patch.spans_v + iv)
     # Missing powers of low degrees cost nothing.
     top = nv
-    while nu > 0 and vanish(pool, o + 4 * nu * (top + 1), 4, top + 1):
+    while nu > 0 and vanish(store.pool, o + 4 * nu * (top + 1), 4, top + 1):
         nu -= 1
-    while nv > 0 and vanish(pool, o + 4 * nv, 4 * (top + 1), nu + 1):
+    while nv > 0 and vanish(store.pool, o + 4 * nv, 4 * (top + 1), nu + 1):
         nv -= 1
     for i in range(nu + 1):
         for j in range(nv + 1):
             at = o + 4 * (i * (top + 1) + j)
-            w = pool[at + 3]
-            work[0, i, j] = pool[at] - w * origin[0]
-            work[1, i, j] = pool[at + 1] - w * origin[1]
-            work[2, i, j] = pool[at + 2] - w * origin[2]
+            w = store.pool[at + 3]
+            work[0, i, j] = store.pool[at] - w * origin[0]
+            work[1, i, j] = store.pool[at + 1] - w * origin[1]
+            work[2, i, j] = store.pool[at + 2] - w * origin[2]
             work[3, i, j] = w
     # Powers about the middle of the box, by Horner's rule repeated, then scaled by its half widths.
     for c in range(4):
@@ -215,28 +215,30 @@ def remainder(table, pool, r, iu, iv, u0, v0, a, b, origin, p, q, l, m, k, n, wo
 
 
 @kernel(inner=True)
-def face_model(table, pool, r, turn, shift, nodes, i, work):
+def face_model(store, r, pose, nodes, i, work):
     """Fill in a node of a surface, whose box stands in it already, moved by a pose."""
     model = model_at(nodes, i)
-    patch = surface_at(table, r)
+    patch = surface_at(store.table, r)
     u0 = model.u0
     v0 = model.v0
     a = model.half_u
     b = model.half_v
-    s0, su, sv, suu, suv, svv = surface_point(table, pool, r, u0, v0)
+    s0, su, sv, suu, suv, svv = surface_point(store.table, store.pool, r, u0, v0)
     p = scale(a, su)
     q = scale(b, sv)
     l = scale(0.5 * a * a, suu)
     m = scale(a * b, suv)
     k = scale(0.5 * b * b, svv)
-    iu = find_span(pool, patch.breaks_u, patch.spans_u, u0)
-    iv = find_span(pool, patch.breaks_v, patch.spans_v, v0)
+    iu = find_span(store.pool, patch.breaks_u, patch.spans_u, u0)
+    iv = find_span(store.pool, patch.breaks_v, patch.spans_v, v0)
     n = cross(p, q)
     nn = dot(n, n)
     n = scale(1.0 / math.sqrt(nn), n) if nn > 1e-20 * dot(p, p) * dot(q, q) and nn > 0.0 else (0.0, 0.0, 0.0)
-    left = remainder(table, pool, r, iu, iv, u0, v0, a, b, s0, p, q, l, m, k, n, work)
-    noise = ROUNDING * (abs(s0[0]) + abs(s0[1]) + abs(s0[2]) + abs(shift[0]) + abs(shift[1]) + abs(shift[2]))
-    place_model(turn, shift, s0, p, q, l, m, k, left.rest + noise, nodes, i)
+    left = remainder(store, r, iu, iv, u0, v0, a, b, s0, p, q, l, m, k, n, work)
+    noise = ROUNDING * (
+        abs(s0[0]) + abs(s0[1]) + abs(s0[2]) + abs(pose.shift[0]) + abs(pose.shift[1]) + abs(pose.shift[2])
+    )
+    place_model(pose, s0, p, q, l, m, k, left.rest + noise, nodes, i)
     if nn > 0.0 and model.bend < math.inf:
         model.rest_n = left.rest_n + noise
         change = curvature_change(p, q, l, m, k, n, left)
@@ -279,17 +281,17 @@ def curvature_change(p, q, l, m, k, n, left):
 
 
 @kernel(inner=True)
-def place_model(turn, shift, s0, p, q, l, m, k, e, nodes, i):
+def place_model(pose, s0, p, q, l, m, k, e, nodes, i):
     """Write a model, moved by a pose, with what follows from it."""
     model = model_at(nodes, i)
-    put(nodes, i, POINT, add(matvec(turn, s0), shift))
-    p = matvec(turn, p)
-    q = matvec(turn, q)
+    put(nodes, i, POINT, add(matvec(pose.rotation, s0), pose.shift))
+    p = matvec(pose.rotation, p)
+    q = matvec(pose.rotation, q)
     put(nodes, i, LINEAR_U, p)
     put(nodes, i, LINEAR_V, q)
-    put(nodes, i, SQUARE_U, matvec(turn, l))
-    put(nodes, i, MIXED, matvec(turn, m))
-    put(nodes, i, SQUARE_V, matvec(turn, k))
+    put(nodes, i, SQUARE_U, matvec(pose.rotation, l))
+    put(nodes, i, MIXED, matvec(pose.rotation, m))
+    put(nodes, i, SQUARE_V, matvec(pose.rotation, k))
     model.rest = e
     model.rest_n = e
     uu = dot(p, p)
@@ -395,7 +397,7 @@ def pair_bound(a, i, b, j, n, enough):
 
 
 @kernel(inner=True)
-def vertex_model(pool, at, turn, shift, nodes, i):
+def vertex_model(pool, at, pose, nodes, i):
     """Fill in a node of a vertex."""
     model = model_at(nodes, i)
     zero = (0.0, 0.0, 0.0)
@@ -404,7 +406,7 @@ def vertex_model(pool, at, turn, shift, nodes, i):
         nodes[i, k] = 0.0
     put(nodes, i, CENTER, (0.0, 0.0, 0.0))
     model.radius = math.inf
-    place_model(turn, shift, point, zero, zero, zero, zero, zero, 0.0, nodes, i)
+    place_model(pose, point, zero, zero, zero, zero, zero, 0.0, nodes, i)
     model.radius = 0.0
     model.bend = 0.0
     model.change = 0.0

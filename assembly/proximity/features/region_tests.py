@@ -53,23 +53,23 @@ FAR = 6.0
 
 
 @kernel(inner=True)
-def is_feasible(table, pool, kind, record, u, v):
+def is_feasible(store, kind, record, u, v):
     """Whether a point of a feature is one of the shell."""
-    face = face_at(table, record)
+    face = face_at(store.table, record)
     if kind != FACE or face.trim < 0:
         return True
-    return trim_side(table, pool, face.trim, u, v) >= 0
+    return trim_side(store, face.trim, u, v) >= 0
 
 
 @kernel(inner=True)
-def side_of(table, pool, nodes, info, i):
+def side_of(store, nodes, info, i):
     """Where a cell is from the trim of its face."""
     cell = cell_node_at(info, i)
     model = model_at(nodes, i)
     if cell.kind != FACE or cell.side != UNKNOWN:
         return cell.side
-    trim = face_at(table, cell.record).trim
-    s = trim_nearest(table, pool, trim, 0, trim_at(table, trim).curves, model.u0, model.v0)[0]
+    trim = face_at(store.table, cell.record).trim
+    s = trim_nearest(store, trim, 0, trim_at(store.table, trim).curves, model.u0, model.v0)[0]
     reach = math.sqrt(model.half_u**2 + model.half_v**2)
     side = INSIDE if s >= reach else (OUTSIDE if s < -1.000001 * reach else MIXED_SIDE)
     cell.side = side
@@ -160,34 +160,34 @@ def off_middle(x, middle, half, period):
 
 
 @kernel(inner=True)
-def periods(table, pool, kind, record):
+def periods(store, kind, record):
     """Periods of a feature's coordinates; 0 where there is none."""
-    edge = edge_at(table, record)
+    edge = edge_at(store.table, record)
     if kind == FACE:
-        r = surface_at(table, face_at(table, record).surface)
+        r = surface_at(store.table, face_at(store.table, record).surface)
         bu = r.breaks_u
         bv = r.breaks_v
-        u = pool[bu + r.spans_u] - pool[bu] if r.closed_u == 1 else 0.0
-        v = pool[bv + r.spans_v] - pool[bv] if r.closed_v == 1 else 0.0
+        u = store.pool[bu + r.spans_u] - store.pool[bu] if r.closed_u == 1 else 0.0
+        v = store.pool[bv + r.spans_v] - store.pool[bv] if r.closed_v == 1 else 0.0
         return u, v
     if kind == EDGE and edge.start < 0:
-        c = spline_curve_at(table, edge.curve)
+        c = spline_curve_at(store.table, edge.curve)
         o = c.breaks
-        return pool[o + c.spans] - pool[o], 0.0
+        return store.pool[o + c.spans] - store.pool[o], 0.0
     return 0.0, 0.0
 
 
 @kernel(inner=True)
-def from_middles(table, pool, a, ai, i, b, bi, j, x):
+def from_middles(store, a, ai, i, b, bi, j, x):
     """The most half widths that coordinates x are from the middles of two cells."""
     model = model_at(a, i)
     model_record = model_at(b, j)
     cell = cell_node_at(ai, i)
     cell_node = cell_node_at(bi, j)
-    pu, pv = periods(table, pool, cell.kind, cell.record)
+    pu, pv = periods(store, cell.kind, cell.record)
     s = off_middle(x[0], model.u0, model.half_u, pu)
     s = max(s, off_middle(x[1], model.v0, model.half_v, pv))
-    pu, pv = periods(table, pool, cell_node.kind, cell_node.record)
+    pu, pv = periods(store, cell_node.kind, cell_node.record)
     s = max(s, off_middle(x[2], model_record.u0, model_record.half_u, pu))
     return max(s, off_middle(x[3], model_record.v0, model_record.half_v, pv))
 
@@ -204,7 +204,7 @@ KNOWN = size_of(KNOWN_EXTREMUM)
 
 
 @kernel(inner=True)
-def is_known(table, pool, a, ai, i, b, bi, j, extrema, owners, count):
+def is_known(store, a, ai, i, b, bi, j, extrema, owners, count):
     """Whether the only extremum that two cells may hold is one that is known; half widths from the nearest one."""
     model = model_at(a, i)
     model_record = model_at(b, j)
@@ -214,7 +214,7 @@ def is_known(table, pool, a, ai, i, b, bi, j, extrema, owners, count):
         if owners[k, 0] != cell_node_at(ai, i).feature or owners[k, 1] != cell_node_at(bi, j).feature:
             continue
         extremum = known_extremum_at(extrema, k)
-        s = from_middles(table, pool, a, ai, i, b, bi, j, extremum.parameters)
+        s = from_middles(store, a, ai, i, b, bi, j, extremum.parameters)
         nearest = min(nearest, s)
         if s <= BESIDE and bend <= TRUSTED:
             return True, s

@@ -28,7 +28,7 @@ STRAIGHT, LEVEL, FAR = 1e-9, 1e-12, 1e3
 
 
 @kernel(inner=True)
-def border_ahead(table, pool, shell, code, at, move, pose, way):
+def border_ahead(store, shell, code, at, move, pose, way):
     """The edge of a face at which parameters leave it that go far beyond its border.
 
     `at` are (u, v), `move` what is added to them, `pose` how the body is turned and shifted.
@@ -37,31 +37,31 @@ def border_ahead(table, pool, shell, code, at, move, pose, way):
     -------
     code, (t, 0), and how far that is along a unit way; infinitely far where the face has no border.
     """
-    solid = shell_at(table, shell)
-    if face_at(table, solid.face_table + FACE_RECORD * code).trim < 0:
+    solid = shell_at(store.table, shell)
+    if face_at(store.table, solid.face_table + FACE_RECORD * code).trim < 0:
         return code, at, math.inf
-    code, found = nearest_edge(table, pool, shell, code, at[0] + move[0], at[1] + move[1])
+    code, found = nearest_edge(store, shell, code, at[0] + move[0], at[1] + move[1])
     edge = solid.edge_table + EDGE_RECORD * (code - solid.faces)
-    p = add(matvec(pose[0], edge_jet(table, pool, edge, found[0])[0]), pose[1])
+    p = add(matvec(pose[0], edge_jet(store, edge, found[0])[0]), pose[1])
     return code, found, dot(way, p)
 
 
 @kernel(inner=True)
-def slide_off(table, pool, shell_f, shell_g, rotation, shift, code_f, code_g, x, size):
+def slide_off(store, shell_f, shell_g, pose, code_f, code_g, x, size):
     """Two faces that are straight along each other and lean: on to the border that ends the way down.
 
     Returns whether there is such a way, the two features then, and the coordinates.
     """
-    f = feature_at(table, shell_f, code_f)
-    g = feature_at(table, shell_g, code_g)
-    frame = pair_frame(table, pool, f, g, rotation, shift, x)
+    f = feature_at(store.table, shell_f, code_f)
+    g = feature_at(store.table, shell_g, code_g)
+    frame = pair_frame(store, f, g, pose, x)
     tx, ty, e, t = frame.tangent_x, frame.tangent_y, frame.rates_f, frame.rates_g
     straight = STRAIGHT / size
     matrix = pair_matrix(frame.shape_f, frame.shape_g, frame.gap, straight)
     h = matrix.h
     if matrix.isolated or not frame.regular:
         return False, code_f, code_g, x
-    m = matvec(rotation, own_frame(table, pool, g, x[2], x[3]).normal)
+    m = matvec(pose.rotation, own_frame(store, g, x[2], x[3]).normal)
     lean = 1.0 / dot(m, frame.normal)
     wx = lean * dot(m, tx)
     wy = lean * dot(m, ty)
@@ -81,8 +81,8 @@ def slide_off(table, pool, shell_f, shell_g, rotation, shift, code_f, code_g, x,
     on_g = (t[0] * wx + t[1] * wy, t[2] * wx + t[3] * wy)
     same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
     here = (same, (0.0, 0.0, 0.0))
-    edge_f, at_f, way_f = border_ahead(table, pool, shell_f, code_f, (x[0], x[1]), on_f, here, way)
-    edge_g, at_g, way_g = border_ahead(table, pool, shell_g, code_g, (x[2], x[3]), on_g, (rotation, shift), way)
+    edge_f, at_f, way_f = border_ahead(store, shell_f, code_f, (x[0], x[1]), on_f, here, way)
+    edge_g, at_g, way_g = border_ahead(store, shell_g, code_g, (x[2], x[3]), on_g, (pose.rotation, pose.shift), way)
     if way_f <= way_g:
         return way_f < math.inf, edge_f, code_g, (at_f[0], at_f[1], x[2], x[3])
     return True, code_f, edge_g, (x[0], x[1], at_g[0], at_g[1])

@@ -11,7 +11,7 @@ import numpy as np
 
 from assembly._address import call_address
 from assembly._kernel import kernel
-from assembly._record import place_of, record_dtype, record_view, size_of
+from assembly._record import Store, place_of, record_dtype, record_view, size_of
 from assembly.geometry.vec import matvec_t
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.extrema.face_face import CONVERGED, SINGULAR
@@ -78,7 +78,7 @@ def write_tracked(x, feature_f, feature_g, n, tracked, r):
 
 
 @kernel(inner=True)
-def track_row(table, pool, shell_f, shell_g, relative, shift, start, r, patience):
+def track_row(store, shell_f, shell_g, pose, start, r, patience):
     """`track_features` from the tracked values start[r], or `hold_features`."""
     pair = tracked_at(start, r)
     code_f = np.int64(pair.feature_f)
@@ -86,11 +86,9 @@ def track_row(table, pool, shell_f, shell_g, relative, shift, start, r, patience
     x = pair_parameters(pair)
     n = (pair.normal[0], pair.normal[1], pair.normal[2])
     if pair.stays > 0.0:
-        status, x, frame = hold_features(
-            table, pool, shell_f, shell_g, relative, shift, code_f, code_g, x, n, 1.0, patience, pair.stays
-        )
+        status, x, frame = hold_features(store, shell_f, shell_g, pose, code_f, code_g, x, n, 1.0, patience, pair.stays)
         return FeatureTrack(status, code_f, code_g, x, frame, 0)
-    return track_features(table, pool, shell_f, shell_g, relative, shift, code_f, code_g, x, n, 1.0, patience)
+    return track_features(store, shell_f, shell_g, pose, code_f, code_g, x, n, 1.0, patience)
 
 
 @kernel(signatures="(i8[::1], f8[::1], i8, i8, i8, i8, f8[:, ::1], f8[:, ::1], f8, f8[:, ::1], f8[:, ::1], i8)")
@@ -101,11 +99,11 @@ def track_solids(table, pool, shell_f, shell_g, i, j, q, start, patience, record
     """
     contact = contact_record_at(records, r)
     turn = rotation(q, i)
-    relative, shift = relative_pose(q, i, turn, j, rotation(q, j))
-    found = track_row(table, pool, shell_f, shell_g, relative, shift, start, r, patience)
+    pose = relative_pose(q, i, turn, j, rotation(q, j))
+    found = track_row(Store(table, pool), shell_f, shell_g, pose, start, r, patience)
     status, frame = found.status, found.frame
     if status == CONVERGED or status == SINGULAR:
-        feature_record(turn, shift, frame, records, r)
+        feature_record(turn, pose.shift, frame, records, r)
         contact.proper = CONFORMING if conforms(frame) else (1.0 if frame.proper else 0.0)
         contact.fold = frame.fold
         write_tracked(found.x, found.f, found.g, frame.normal, tracked, r)

@@ -51,118 +51,114 @@ ACROSS = 0.3
 
 
 @kernel(inner=True)
-def lean_into(table, pool, surface, curve, t, n):
+def lean_into(store, surface, curve, t, n):
     """n.m, m the unit direction from a boundary curve into its face: material is on the left in (u, v)."""
-    on_edge = on_surface(table, pool, surface, curve, t)
+    on_edge = on_surface(store, surface, curve, t)
     along, normal = on_edge.tangent, on_edge.normal
     return dot(n, unit(cross(normal, along)))
 
 
 @kernel(inner=True)
-def from_edge(table, pool, shell, code, t, n):
+def from_edge(store, shell, code, t, n):
     """The face over which the normal leans most at a point of an edge: how much, code and (u, v) of the point on it."""
-    solid = shell_at(table, shell)
+    solid = shell_at(store.table, shell)
     edge = solid.edge_table + EDGE_RECORD * (code - solid.faces)
-    edge_record = edge_at(table, edge)
+    edge_record = edge_at(store.table, edge)
     face = edge_record.face_a
     surface = edge_record.surface
     curve = edge_record.curve
-    lean = lean_into(table, pool, surface, curve, t, n)
+    lean = lean_into(store, surface, curve, t, n)
     if edge_record.face_b >= 0:
-        on_edge = on_surface(table, pool, surface, curve, t)
+        on_edge = on_surface(store, surface, curve, t)
         p = on_edge.point
-        s = other_parameter(table, pool, edge, t, p)
-        other = lean_into(table, pool, edge_record.surface_b, edge_record.curve_b, s, n)
+        s = other_parameter(store, edge, t, p)
+        other = lean_into(store, edge_record.surface_b, edge_record.curve_b, s, n)
         if other > lean:
             lean = other
             face = edge_record.face_b
             surface = edge_record.surface_b
             curve = edge_record.curve_b
             t = s
-    on_edge = on_surface(table, pool, surface, curve, t)
+    on_edge = on_surface(store, surface, curve, t)
     u, v = on_edge.u, on_edge.v
     return lean, face, (u, v)
 
 
 @kernel(inner=True)
-def between_edges(table, pool, shell_f, shell_g, rotation, code_f, code_g, t_f, t_g):
+def between_edges(store, shell_f, shell_g, rotation, code_f, code_g, t_f, t_g):
     """The normal of two edges that leans least over their faces: it tells the outside where edges touch."""
-    solid = shell_at(table, shell_f)
-    shell_record = shell_at(table, shell_g)
-    edge_f = edge_at(table, solid.edge_table + EDGE_RECORD * (code_f - solid.faces))
-    edge_g = edge_at(table, shell_record.edge_table + EDGE_RECORD * (code_g - shell_record.faces))
-    along_f = on_surface(table, pool, edge_f.surface, edge_f.curve, t_f).tangent
-    along_g = on_surface(table, pool, edge_g.surface, edge_g.curve, t_g).tangent
+    solid = shell_at(store.table, shell_f)
+    shell_record = shell_at(store.table, shell_g)
+    edge_f = edge_at(store.table, solid.edge_table + EDGE_RECORD * (code_f - solid.faces))
+    edge_g = edge_at(store.table, shell_record.edge_table + EDGE_RECORD * (code_g - shell_record.faces))
+    along_f = on_surface(store, edge_f.surface, edge_f.curve, t_f).tangent
+    along_g = on_surface(store, edge_g.surface, edge_g.curve, t_g).tangent
     n = unit(cross(along_f, matvec(rotation, along_g)))
     m = matvec_t(rotation, n)
-    there = max(
-        from_edge(table, pool, shell_f, code_f, t_f, n)[0], from_edge(table, pool, shell_g, code_g, t_g, neg(m))[0]
-    )
-    back = max(
-        from_edge(table, pool, shell_f, code_f, t_f, neg(n))[0], from_edge(table, pool, shell_g, code_g, t_g, m)[0]
-    )
+    there = max(from_edge(store, shell_f, code_f, t_f, n)[0], from_edge(store, shell_g, code_g, t_g, neg(m))[0])
+    back = max(from_edge(store, shell_f, code_f, t_f, neg(n))[0], from_edge(store, shell_g, code_g, t_g, m)[0])
     return n if there <= back else neg(n)
 
 
 @kernel(inner=True)
-def from_vertex(table, pool, shell, code, n):
+def from_vertex(store, shell, code, n):
     """The edge along which the normal leans most at a vertex: code, (t, 0) and how much; or the vertex itself."""
-    solid = shell_at(table, shell)
+    solid = shell_at(store.table, shell)
     faces = solid.faces
     vertex = solid.vertex_table + VERTEX_RECORD * (code - faces - solid.edges)
-    vertex_record = vertex_at(table, vertex)
+    vertex_record = vertex_at(store.table, vertex)
     best = LEAN
     found = (0.0, 0.0)
     for k in range(vertex_record.edges):
         at = vertex_record.edge_list + 2 * k
-        edge = solid.edge_table + EDGE_RECORD * table[at]
-        edge_record = edge_at(table, edge)
-        t = edge_end(table, pool, edge, table[at + 1])
-        on_edge = on_surface(table, pool, edge_record.surface, edge_record.curve, t)
+        edge = solid.edge_table + EDGE_RECORD * store.table[at]
+        edge_record = edge_at(store.table, edge)
+        t = edge_end(store, edge, store.table[at + 1])
+        on_edge = on_surface(store, edge_record.surface, edge_record.curve, t)
         along = on_edge.tangent
         lean = dot(n, unit(along))
-        if table[at + 1] == 1:
+        if store.table[at + 1] == 1:
             lean = -lean
         if lean > best:
             best = lean
-            code = faces + table[at]
+            code = faces + store.table[at]
             found = (t, 0.0)
     if vertex_record.edges == 0:
-        code, found = from_apex(table, pool, shell, vertex, code, n)
+        code, found = from_apex(store, shell, vertex, code, n)
     return code, found, best
 
 
 @kernel(inner=True)
-def checked(table, pool, shell, code, a, b, held, n):
+def checked(store, shell, code, a, b, held, n):
     """The feature that takes over from one with coordinates (a, b) where n is the normal out of its body.
 
     `held` says that Newton's method was stopped at an end. Returns the code, the coordinates, and whether it changed.
     """
-    solid = shell_at(table, shell)
-    kind = feature_kind(table, shell, code)
+    solid = shell_at(store.table, shell)
+    kind = feature_kind(store.table, shell, code)
     if kind == FACE:
-        trim = face_at(table, solid.face_table + FACE_RECORD * code).trim
+        trim = face_at(store.table, solid.face_table + FACE_RECORD * code).trim
         if trim < 0:
             return code, (a, b), False
-        side = trim_side(table, pool, trim, a, b)
+        side = trim_side(store, trim, a, b)
         if side > 0 or (side == 0 and not held):
             return code, (a, b), False
-        code, found = nearest_edge(table, pool, shell, code, a, b)
+        code, found = nearest_edge(store, shell, code, a, b)
         return code, found, True
     if kind == EDGE:
         edge = solid.edge_table + EDGE_RECORD * (code - solid.faces)
-        edge_record = edge_at(table, edge)
+        edge_record = edge_at(store.table, edge)
         if edge_record.start >= 0 and held:
             vertices = solid.faces + solid.edges
-            if a <= edge_end(table, pool, edge, 0):
+            if a <= edge_end(store, edge, 0):
                 return vertices + edge_record.start, (0.0, 0.0), True
-            if a >= edge_end(table, pool, edge, 1):
+            if a >= edge_end(store, edge, 1):
                 return vertices + edge_record.end, (0.0, 0.0), True
         if held:
             return code, (a, b), False
-        lean, face, found = from_edge(table, pool, shell, code, a, n)
+        lean, face, found = from_edge(store, shell, code, a, n)
         return (face, found, True) if lean > LEAN else (code, (a, b), False)
-    other, found, _lean = from_vertex(table, pool, shell, code, n)
+    other, found, _lean = from_vertex(store, shell, code, n)
     return other, found, other != code
 
 
@@ -172,7 +168,7 @@ FeatureTrack = namedtuple("FeatureTrack", "status f g x frame switches")
 
 
 @kernel(inner=True)
-def track_features(table, pool, shell_f, shell_g, rotation, shift, code_f, code_g, x, n, size, turn):
+def track_features(store, shell_f, shell_g, pose, code_f, code_g, x, n, size, turn):
     """Newton's method on a pair of features, and switching until no other feature beside them is closer.
 
     Poses, `size` and `turn` as in `solve_pair`: g relative to f, everything in the axes of f. `n` is a normal near the
@@ -187,20 +183,18 @@ def track_features(table, pool, shell_f, shell_g, rotation, shift, code_f, code_
     switches = 0
     before = n
     while True:
-        kind_f = feature_kind(table, shell_f, code_f)
-        kind_g = feature_kind(table, shell_g, code_g)
+        kind_f = feature_kind(store.table, shell_f, code_f)
+        kind_g = feature_kind(store.table, shell_g, code_g)
         if kind_f == EDGE and kind_g == EDGE and dot(n, n) < 0.25:
-            n = between_edges(table, pool, shell_f, shell_g, rotation, code_f, code_g, x[0], x[2])
+            n = between_edges(store, shell_f, shell_g, pose.rotation, code_f, code_g, x[0], x[2])
         begun = x
         status, x, frame = solve_features(
-            table,
-            pool,
+            store,
             kind_f,
-            feature_at(table, shell_f, code_f),
+            feature_at(store.table, shell_f, code_f),
             kind_g,
-            feature_at(table, shell_g, code_g),
-            rotation,
-            shift,
+            feature_at(store.table, shell_g, code_g),
+            pose,
             x,
             n,
             size,
@@ -210,15 +204,13 @@ def track_features(table, pool, shell_f, shell_g, rotation, shift, code_f, code_
             status = NOT_CONVERGED
             break
         if status == NOT_CONVERGED and kind_f == FACE and kind_g == FACE:
-            slides, code_f, code_g, x = slide_off(
-                table, pool, shell_f, shell_g, rotation, shift, code_f, code_g, begun, size
-            )
+            slides, code_f, code_g, x = slide_off(store, shell_f, shell_g, pose, code_f, code_g, begun, size)
             if slides:
                 switches += 1
                 continue
         if status == NOT_CONVERGED:
-            tip_f = apex_near(table, pool, shell_f, code_f, x[0], x[1])
-            tip_g = apex_near(table, pool, shell_g, code_g, x[2], x[3]) if tip_f == code_f else code_g
+            tip_f = apex_near(store, shell_f, code_f, x[0], x[1])
+            tip_g = apex_near(store, shell_g, code_g, x[2], x[3]) if tip_f == code_f else code_g
             if tip_f == code_f and tip_g == code_g:
                 break
             code_f = tip_f
@@ -227,10 +219,10 @@ def track_features(table, pool, shell_f, shell_g, rotation, shift, code_f, code_
             continue
         n = frame.normal
         held = status == LEFT_PATCH
-        code_f, at_f, switched = checked(table, pool, shell_f, code_f, x[0], x[1], held, n)
+        code_f, at_f, switched = checked(store, shell_f, code_f, x[0], x[1], held, n)
         at_g = (x[2], x[3])
         if not switched:
-            code_g, at_g, switched = checked(table, pool, shell_g, code_g, x[2], x[3], held, neg(matvec_t(rotation, n)))
+            code_g, at_g, switched = checked(store, shell_g, code_g, x[2], x[3], held, neg(matvec_t(pose.rotation, n)))
         if not switched:
             break
         x = (at_f[0], at_f[1], at_g[0], at_g[1])
@@ -239,7 +231,7 @@ def track_features(table, pool, shell_f, shell_g, rotation, shift, code_f, code_
         status = NOT_CONVERGED
     if kind_f == FACE and kind_g == FACE and status != NOT_CONVERGED:
         # Of solids that touch, outward normals oppose each other; else one is inside the other.
-        normal = own_frame(table, pool, feature_at(table, shell_g, code_g), x[2], x[3]).normal
-        if dot(normal, matvec_t(rotation, n)) > 0.0:
+        normal = own_frame(store, feature_at(store.table, shell_g, code_g), x[2], x[3]).normal
+        if dot(normal, matvec_t(pose.rotation, n)) > 0.0:
             status = NOT_CONVERGED
     return FeatureTrack(status, code_f, code_g, x, frame, switches)

@@ -21,11 +21,11 @@ CORNER = 1e-6
 
 
 @kernel(inner=True)
-def trim_distance(table, pool, trim, u, v):
+def trim_distance(store, trim, u, v):
     """s, s_u (2), and the one number b of s_uu = b (I - n n^T)."""
-    trim_record = trim_at(table, trim)
-    s, k, t, _cu, _cv, nu, nv = trim_nearest(table, pool, trim, 0, trim_record.curves, u, v)
-    _c, rate, bend = curve_point(table, pool, trim_record.first + CURVE_RECORD * k, t)
+    trim_record = trim_at(store.table, trim)
+    s, k, t, _cu, _cv, nu, nv = trim_nearest(store, trim, 0, trim_record.curves, u, v)
+    _c, rate, bend = curve_point(store.table, store.pool, trim_record.first + CURVE_RECORD * k, t)
     square = rate[0] * rate[0] + rate[1] * rate[1]
     along = rate[0] * nu + rate[1] * nv
     if along * along > CORNER * CORNER * square:

@@ -13,6 +13,7 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly._record import Store
 from assembly.geometry.splines.evaluate import surface_point
 from assembly.geometry.vec import add, dot, matvec, matvec_t, scale, sub
 from assembly.proximity.brep.borders import feature_at, feature_kind
@@ -58,23 +59,23 @@ EDGE_STEPS = 8
 
 
 @kernel(inner=True)
-def point_of(table, pool, surface, shell, code, u, v):
+def point_of(store, surface, shell, code, u, v):
     """The point of a surface, or of a feature of a shell, in the axes of its body."""
     if surface >= 0:
-        return surface_point(table, pool, surface, u, v)[0]
-    kind = feature_kind(table, shell, code)
-    feature = feature_at(table, shell, code)
+        return surface_point(store.table, store.pool, surface, u, v)[0]
+    kind = feature_kind(store.table, shell, code)
+    feature = feature_at(store.table, shell, code)
     if kind == VERTEX:
-        return vertex_point(table, pool, feature)
-    return edge_jet(table, pool, feature, u)[0] if kind == EDGE else surface_point(table, pool, feature, u, v)[0]
+        return vertex_point(store, feature)
+    return edge_jet(store, feature, u)[0] if kind == EDGE else surface_point(store.table, store.pool, feature, u, v)[0]
 
 
 @kernel(inner=True)
-def point_on_edge(table, pool, edge, low, high, y):
+def point_on_edge(store, edge, low, high, y):
     """The point of a part of an edge that Newton's method takes for the nearest one to y."""
     t = 0.5 * (low + high)
     for _ in range(EDGE_STEPS):
-        p, along, bent = edge_jet(table, pool, edge, t)
+        p, along, bent = edge_jet(store, edge, t)
         d = sub(p, y)
         slope = dot(d, along)
         square = dot(along, along)
@@ -84,13 +85,13 @@ def point_on_edge(table, pool, edge, low, high, y):
         t = min(max(t + step, low), high)
         if abs(t - before) <= 1e-12 * (high - low):
             break
-    return edge_jet(table, pool, edge, t)[0]
+    return edge_jet(store, edge, t)[0]
 
 
 @kernel(inner=True)
-def nearest_point(table, pool, tree, surface, shell, y, reach, stack):
+def nearest_point(store, tree, surface, shell, y, reach, stack):
     """The nearest point of a body to y, in its axes, and whether one is within reach."""
-    tree_record = tree_at(table, tree)
+    tree_record = tree_at(store.table, tree)
     stack[0] = 0
     used = 1
     least = reach
@@ -99,31 +100,31 @@ def nearest_point(table, pool, tree, surface, shell, y, reach, stack):
     while used > 0:
         used -= 1
         i = stack[used]
-        o = node_at(pool, tree_record.node_pool + NODE * i)
+        o = node_at(store.pool, tree_record.node_pool + NODE * i)
         square = 0.0
         for k in range(3):
             off = max(abs(y[k] - o.center[k]) - o.half[k], 0.0)
             square += off * off
         if square > least * least:
             continue
-        child = node_links_at(table, tree_record.node_table + NODE_INTS * i).child
+        child = node_links_at(store.table, tree_record.node_table + NODE_INTS * i).child
         if child >= 0:
             used = with_children(stack, used, child)
             continue
         e = -1 - child
         at = tree_record.element_pool + ELEMENT * e
-        code = np.int64(element_at(pool, at).feature)
-        if surface_of(table, shell, surface, code) >= 0:
-            distance, n, found = projection_at(table, pool, tree, surface, shell, e, y)
+        code = np.int64(element_at(store.pool, at).feature)
+        if surface_of(store.table, shell, surface, code) >= 0:
+            distance, n, found = projection_at(store, tree, surface, shell, e, y)
             p = sub(y, scale(distance, n))
             if not found:
                 continue
-        elif feature_kind(table, shell, code) == EDGE:
-            element = element_at(pool, at)
+        elif feature_kind(store.table, shell, code) == EDGE:
+            element = element_at(store.pool, at)
             middle, half = element.middle[0], element.half[0]
-            p = point_on_edge(table, pool, feature_at(table, shell, code), middle - half, middle + half, y)
+            p = point_on_edge(store, feature_at(store.table, shell, code), middle - half, middle + half, y)
         else:
-            p = vertex_point(table, pool, feature_at(table, shell, code))
+            p = vertex_point(store, feature_at(store.table, shell, code))
         d = sub(p, y)
         distance = math.sqrt(dot(d, d))
         if distance <= least:
@@ -132,19 +133,19 @@ def nearest_point(table, pool, tree, surface, shell, y, reach, stack):
 
 
 @kernel(inner=True)
-def between_bodies(table, pool, posed, c, reach, stack):
+def between_bodies(store, posed, c, reach, stack):
     """The middle of the nearest points of both bodies to c, how far these are apart, and whether both are in reach."""
-    turn, shift = posed.turn, posed.shift
-    p, found_f = nearest_point(table, pool, posed.trees[0], posed.surfaces[0], posed.shells[0], c, reach, stack)
+    turn, shift = posed.pose.rotation, posed.pose.shift
+    p, found_f = nearest_point(store, posed.trees[0], posed.surfaces[0], posed.shells[0], c, reach, stack)
     at_g = matvec_t(turn, sub(c, shift))
-    q, found_g = nearest_point(table, pool, posed.trees[1], posed.surfaces[1], posed.shells[1], at_g, reach, stack)
+    q, found_g = nearest_point(store, posed.trees[1], posed.surfaces[1], posed.shells[1], at_g, reach, stack)
     q = add(matvec(turn, q), shift)
     d = sub(q, p)
     return scale(0.5, add(p, q)), math.sqrt(dot(d, d)), found_f and found_g
 
 
 @kernel(inner=True)
-def leads_to(table, pool, posed, begin, end, level, stack):
+def leads_to(store, posed, begin, end, level, stack):
     """Whether a way between the bodies leads from one point to another one, along which they are nearer than a level.
 
     It goes straight for the end, and after every stride back to where both bodies are equally far.
@@ -159,7 +160,7 @@ def leads_to(table, pool, posed, begin, end, level, stack):
         c = add(c, scale(stride / left, sub(end, c)))
         near = False
         for _centering in range(CENTERINGS):
-            c, gap, found = between_bodies(table, pool, posed, c, stride + level, stack)
+            c, gap, found = between_bodies(store, posed, c, stride + level, stack)
             if not found:
                 return False
             near = gap < level
@@ -173,21 +174,21 @@ def leads_to(table, pool, posed, begin, end, level, stack):
 
 
 @kernel(inner=True)
-def contact_points(table, pool, posed, given, tracked):
+def contact_points(store, posed, given, tracked):
     """The pair of points of a given contact, in the axes of body f of its pair of bodies."""
-    given_record = given_at(table, given)
+    given_record = given_at(store.table, given)
     pair = tracked_at(tracked, given_record.row)
     a = point_of(
-        table, pool, given_record.surface[0], given_record.shell[0], np.int64(pair.feature_f),
+        store, given_record.surface[0], given_record.shell[0], np.int64(pair.feature_f),
         pair.parameters[0], pair.parameters[1],
     )  # fmt: skip
     b = point_of(
-        table, pool, given_record.surface[1], given_record.shell[1],
+        store, given_record.surface[1], given_record.shell[1],
         np.int64(pair.feature_g), pair.parameters[2], pair.parameters[3],
     )  # fmt: skip
     if given_record.swapped == 1:
         a, b = b, a
-    return a, add(matvec(posed.turn, b), posed.shift)
+    return a, add(matvec(posed.pose.rotation, b), posed.pose.shift)
 
 
 @kernel(inline=True)
@@ -205,7 +206,7 @@ def apart(a, b):
 
 
 @kernel(inner=True, allocates=True)
-def spread(table, pool, posed, extrema, count, begin, limits, stack):
+def spread(store, posed, extrema, count, begin, limits, stack):
     """Mark the roots in the place of a contact whose points have their middle at `begin`.
 
     From root to root, the nearest first: each is tried from the nearest point that is known to be in the place. The
@@ -238,7 +239,7 @@ def spread(table, pool, posed, extrema, count, begin, limits, stack):
         tried[best] = nearest[best]
         start = (source[best, 0], source[best, 1], source[best, 2])
         end = (middles[best, 0], middles[best, 1], middles[best, 2])
-        if not leads_to(table, pool, posed, start, end, level, stack):
+        if not leads_to(store, posed, start, end, level, stack):
             continue
         extremum_at(extrema, best).place = BESIDE_CONTACT
         eligible[best] = False
@@ -252,6 +253,7 @@ def spread(table, pool, posed, extrema, count, begin, limits, stack):
 @kernel(signatures="(i8[::1], f8[::1], i8, i8, f8[:, ::1], f8[:, ::1], f8[:, ::1], i8)")
 def mark_places(table, pool, watch, p, q, tracked, extrema, count):
     """Mark the roots of pair p that are a given contact's pair, or in its place; how many contacts have one."""
+    store = Store(table, pool)
     manager = manager_at(table, watch)
     pair = pair_at(table, manager.pair_table + PAIR_RECORD * p)
     posed = posed_pair(manager, pair, q)
@@ -266,7 +268,7 @@ def mark_places(table, pool, watch, p, q, tracked, extrema, count):
         if math.isnan(tracked_at(tracked, r).parameters[0]):
             continue
         known += 1
-        a, b = contact_points(table, pool, posed, given, tracked)
+        a, b = contact_points(store, posed, given, tracked)
         for k in range(count):
             p_f, p_g = extremum_points(extrema, k)
             if max(apart(p_f, a), apart(p_g, b)) <= merge_radius:
@@ -275,5 +277,5 @@ def mark_places(table, pool, watch, p, q, tracked, extrema, count):
         # A contact that may stay open, and is by more than the least gap, excuses nothing that is nearer.
         lowest = least if given_record.opens == 1 and gap >= least else -math.inf
         limits = (gap + least, lowest)
-        spread(table, pool, posed, extrema, count, scale(0.5, add(a, b)), limits, stack)
+        spread(store, posed, extrema, count, scale(0.5, add(a, b)), limits, stack)
     return known

@@ -62,56 +62,56 @@ def cut_at(a, d, p, q, r, end, beside):
 
 
 @kernel(inner=True)
-def chord_of(table, pool, edge, t, half):
+def chord_of(store, edge, t, half):
     """The ends of a part of an edge, and how far its middle is from the middle of its chord."""
-    lo, hi, endless = edge_limits(table, pool, edge)
+    lo, hi, endless = edge_limits(store, edge)
     first = t - WIDER * half
     last = t + WIDER * half
     if not endless:
         first = max(first, lo)
         last = min(last, hi)
-    a = edge_jet(table, pool, edge, max(first, lo))[0]
-    b = edge_jet(table, pool, edge, min(last, hi))[0]
-    off = sub(edge_jet(table, pool, edge, 0.5 * (max(first, lo) + min(last, hi)))[0], scale(0.5, add(a, b)))
+    a = edge_jet(store, edge, max(first, lo))[0]
+    b = edge_jet(store, edge, min(last, hi))[0]
+    off = sub(edge_jet(store, edge, 0.5 * (max(first, lo) + min(last, hi)))[0], scale(0.5, add(a, b)))
     return a, b, math.sqrt(dot(off, off))
 
 
 @kernel(inner=True)
-def is_well_inside(table, pool, trim, u, v, du, dv):
+def is_well_inside(store, trim, u, v, du, dv):
     """Whether parameters are inside a boundary with all that is beside them."""
     return (
-        trim_side(table, pool, trim, u - du, v) > 0
-        and trim_side(table, pool, trim, u + du, v) > 0
-        and trim_side(table, pool, trim, u, v - dv) > 0
-        and trim_side(table, pool, trim, u, v + dv) > 0
+        trim_side(store, trim, u - du, v) > 0
+        and trim_side(store, trim, u + du, v) > 0
+        and trim_side(store, trim, u, v - dv) > 0
+        and trim_side(store, trim, u, v + dv) > 0
     )
 
 
 @kernel(inline=True)
-def patch_vertex_contacts(table, pool, surface, patch):
+def patch_vertex_contacts(store, surface, patch):
     """The first (u, v) of a patch and its widths, and its corners, counterclockwise in (u, v) from there."""
     u = patch.middle[0] - patch.half[0]
     v = patch.middle[1] - patch.half[1]
     wide = 2.0 * patch.half[0]
     high = 2.0 * patch.half[1]
-    p = surface_point(table, pool, surface, u, v)[0]
-    q = surface_point(table, pool, surface, u + wide, v)[0]
-    s = surface_point(table, pool, surface, u + wide, v + high)[0]
-    t = surface_point(table, pool, surface, u, v + high)[0]
+    p = surface_point(store.table, store.pool, surface, u, v)[0]
+    q = surface_point(store.table, store.pool, surface, u + wide, v)[0]
+    s = surface_point(store.table, store.pool, surface, u + wide, v + high)[0]
+    t = surface_point(store.table, store.pool, surface, u, v + high)[0]
     return (u, v, wide, high), (p, q, s, t)
 
 
 @kernel(inner=True)
-def goes_through(table, pool, tree, shell, e, a, b, margin):
+def goes_through(store, tree, shell, e, a, b, margin):
     """Whether what is within a margin of a chord goes through the face of a body at a flat patch; body axes."""
-    node = node_at(pool, node_of(table, pool, tree, e))
+    node = node_at(store.pool, node_of(store, tree, e))
     if node.cosine <= 0.0 or node.sine > FLAT:
         return False
-    patch = element_at(pool, tree_at(table, tree).element_pool + ELEMENT * e)
+    patch = element_at(store.pool, tree_at(store.table, tree).element_pool + ELEMENT * e)
     code = np.int64(patch.feature)
-    face = face_at(table, shell_at(table, shell).face_table + FACE_RECORD * code)
-    r = feature_at(table, shell, code)
-    (u, v, wide, high), (p, q, s, t) = patch_vertex_contacts(table, pool, r, patch)
+    face = face_at(store.table, shell_at(store.table, shell).face_table + FACE_RECORD * code)
+    r = feature_at(store.table, shell, code)
+    (u, v, wide, high), (p, q, s, t) = patch_vertex_contacts(store, r, patch)
     for k in range(2):
         second, third = (q, s) if k == 0 else (s, t)
         cut = cut_at(a, sub(b, a), p, second, third, 0.0, 0.0)
@@ -128,31 +128,31 @@ def goes_through(table, pool, tree, shell, e, a, b, margin):
         dv = beside * high / max(math.sqrt(dot(sub(s, q), sub(s, q))), 1e-300)
         here_u = u + (x + y if k == 0 else x) * wide
         here_v = v + (y if k == 0 else x + y) * high
-        if is_well_inside(table, pool, face.trim, here_u, here_v, du, dv):
+        if is_well_inside(store, face.trim, here_u, here_v, du, dv):
             return True
     return False
 
 
 @kernel(inner=True)
-def pierces(table, pool, posed, pair, margin, offsets):
+def pierces(store, posed, pair, margin, offsets):
     """Whether of two elements, of f and of g, one is a part of an edge that goes through the other, a patch."""
     for side in range(2):
         tree, shell = posed.trees[side], posed.shells[side]
         other, other_shell = posed.trees[1 - side], posed.shells[1 - side]
-        o = tree_at(table, tree).element_pool + ELEMENT * pair[side]
-        p = tree_at(table, other).element_pool + ELEMENT * pair[1 - side]
-        part = element_at(pool, o)
+        o = tree_at(store.table, tree).element_pool + ELEMENT * pair[side]
+        p = tree_at(store.table, other).element_pool + ELEMENT * pair[1 - side]
+        part = element_at(store.pool, o)
         code = np.int64(part.feature)
-        patch = np.int64(element_at(pool, p).feature)
-        if feature_kind(table, shell, code) != EDGE or feature_kind(table, other_shell, patch) != FACE:
+        patch = np.int64(element_at(store.pool, p).feature)
+        if feature_kind(store.table, shell, code) != EDGE or feature_kind(store.table, other_shell, patch) != FACE:
             continue
-        a, b, bent = chord_of(table, pool, feature_at(table, shell, code), part.middle[0], part.half[0])
+        a, b, bent = chord_of(store, feature_at(store.table, shell, code), part.middle[0], part.half[0])
         if side == 0:
-            a = matvec_t(posed.turn, sub(a, posed.shift))
-            b = matvec_t(posed.turn, sub(b, posed.shift))
+            a = matvec_t(posed.pose.rotation, sub(a, posed.pose.shift))
+            b = matvec_t(posed.pose.rotation, sub(b, posed.pose.shift))
         else:
-            a = add(matvec(posed.turn, a), posed.shift)
-            b = add(matvec(posed.turn, b), posed.shift)
-        if goes_through(table, pool, other, other_shell, pair[1 - side], a, b, margin + 2.0 * bent + offsets[1 - side]):
+            a = add(matvec(posed.pose.rotation, a), posed.pose.shift)
+            b = add(matvec(posed.pose.rotation, b), posed.pose.shift)
+        if goes_through(store, other, other_shell, pair[1 - side], a, b, margin + 2.0 * bent + offsets[1 - side]):
             return True
     return False

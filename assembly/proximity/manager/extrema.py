@@ -20,7 +20,7 @@ from assembly.geometry.splines.evaluate import (
     surface_point,
 )
 from assembly.geometry.vec import add, dot, matvec, matvec_t, scale, sub
-from assembly.kinematics.motion import rotation
+from assembly.kinematics.motion import RelativePose, rotation
 from assembly.proximity.brep.borders import feature_at
 from assembly.proximity.brep.records import shell_at
 from assembly.proximity.bvh.tree import three_of
@@ -86,19 +86,19 @@ DESCENTS = 40
 
 
 @kernel(inline=True)
-def between(table, pool, r, u, v, s, t):
+def between(store, r, u, v, s, t):
     """The middle of two pairs of parameters, the shorter way around."""
-    patch = surface_at(table, r)
+    patch = surface_at(store.table, r)
     a = 0.5 * (u + s)
     b = 0.5 * (v + t)
     if patch.closed_u == 1:
-        period = pool[patch.breaks_u + patch.spans_u] - pool[patch.breaks_u]
+        period = store.pool[patch.breaks_u + patch.spans_u] - store.pool[patch.breaks_u]
         if abs(u - s) > 0.5 * period:
-            a += 0.5 * period if a < pool[patch.breaks_u] + 0.5 * period else -0.5 * period
+            a += 0.5 * period if a < store.pool[patch.breaks_u] + 0.5 * period else -0.5 * period
     if patch.closed_v == 1:
-        period = pool[patch.breaks_v + patch.spans_v] - pool[patch.breaks_v]
+        period = store.pool[patch.breaks_v + patch.spans_v] - store.pool[patch.breaks_v]
         if abs(v - t) > 0.5 * period:
-            b += 0.5 * period if b < pool[patch.breaks_v] + 0.5 * period else -0.5 * period
+            b += 0.5 * period if b < store.pool[patch.breaks_v] + 0.5 * period else -0.5 * period
     return a, b
 
 
@@ -110,7 +110,7 @@ def square_to(a, b):
 
 
 @kernel(inner=True)
-def are_one(table, pool, posed, extrema, i, k, merge_radius):
+def are_one(store, posed, extrema, i, k, merge_radius):
     """Whether roots i and k are the same contact."""
     square = merge_radius * merge_radius
     one, other = extremum_at(extrema, i), extremum_at(extrema, k)
@@ -125,34 +125,34 @@ def are_one(table, pool, posed, extrema, i, k, merge_radius):
         surface = posed.surfaces[side]
         if surface < 0:
             shell = posed.shells[side]
-            if codes[side] >= shell_at(table, shell).faces:
+            if codes[side] >= shell_at(store.table, shell).faces:
                 continue
-            surface = feature_at(table, shell, np.int64(codes[side]))
-        u, v = between(table, pool, surface, x[2 * side], x[2 * side + 1], y[2 * side], y[2 * side + 1])
-        p = surface_point(table, pool, surface, u, v)[0]
+            surface = feature_at(store.table, shell, np.int64(codes[side]))
+        u, v = between(store, surface, x[2 * side], x[2 * side + 1], y[2 * side], y[2 * side + 1])
+        p = surface_point(store.table, store.pool, surface, u, v)[0]
         if side == 1:
-            p = add(matvec(posed.turn, p), posed.shift)
+            p = add(matvec(posed.pose.rotation, p), posed.pose.shift)
         if square_to(p, a) > square and square_to(p, b) > square:
             return False
     return True
 
 
 @kernel(inner=True)
-def surfaces_extremum(table, pool, posed, start, extrema, k):
+def surfaces_extremum(store, posed, start, extrema, k):
     """Newton on two surfaces from `start`, the controller where it fails; fills root k.
 
     Returns NOTHING, SADDLE or MINIMUM_FOUND.
     """
-    turn, shift = posed.turn, posed.shift
+    turn, shift = posed.pose.rotation, posed.pose.shift
     f, g = posed.surfaces[0], posed.surfaces[1]
-    found = solve_pair(table, pool, f, g, turn, shift, start, 1.0, math.inf, 0.0, True)
+    found = solve_pair(store, f, g, RelativePose(turn, shift), start, 1.0, math.inf, 0.0, True)
     if found.status == NOT_CONVERGED:
         # The controller leads down from anywhere, to a minimum of the distance.
-        found = descend_pair(table, pool, f, g, turn, shift, start, 1.0, DESCENTS)
+        found = descend_pair(store, f, g, RelativePose(turn, shift), start, 1.0, DESCENTS)
     if found.status != CONVERGED and found.status != SINGULAR:
         return NOTHING
     x, frame = found.parameters, found.frame
-    if not opposed(frame, turn, table, pool, g, x):
+    if not opposed(frame, turn, store, g, x):
         return NOTHING
     h = found.matrix.h
     det = h[0] * h[3] - h[1] * h[2]
@@ -162,7 +162,7 @@ def surfaces_extremum(table, pool, posed, start, extrema, k):
 
 
 @kernel(inner=True)
-def solids_extremum(table, pool, posed, codes, start, n, extrema, k, work, vertex_contact):
+def solids_extremum(store, posed, codes, start, n, extrema, k, work, vertex_contact):
     """Switching and Newton on the features of two solids, or Newton alone for a corner; fills root k."""
     i, j = posed.bodies
     q = posed.poses
@@ -179,7 +179,7 @@ def solids_extremum(table, pool, posed, codes, start, n, extrema, k, work, verte
         pair.normal[l] = n[l]
     status = call_address(
         posed.track_solids,
-        (table, pool, posed.shells[0], posed.shells[1], i, j, q, tracked, math.inf, records, tracked, 0),
+        (store.table, store.pool, posed.shells[0], posed.shells[1], i, j, q, tracked, math.inf, records, tracked, 0),
     )
     if status != CONVERGED and (status != SINGULAR or vertex_contact > 0.0):
         # An edge along another one, or along a face, is no corner: its ends are.
@@ -213,28 +213,28 @@ def write(extrema, k, x, code_f, code_g, n, gap, pf, pg, fold):
 
 
 @kernel(inner=True)
-def add_extremum(table, pool, posed, codes, start, n, merge_radius, extrema, count, work, vertex_contact):
+def add_extremum(store, posed, codes, start, n, merge_radius, extrema, count, work, vertex_contact):
     """Look for a root from a start and add it, as USELESS, if it is none of the known ones; a corner where it holds on
     to something.
 
     Returns how many roots there are, and NOTHING, ALIKE, SADDLE or MINIMUM_FOUND.
     """
     if posed.surfaces[0] >= 0:
-        found = surfaces_extremum(table, pool, posed, start, extrema, count)
+        found = surfaces_extremum(store, posed, start, extrema, count)
     else:
-        found = solids_extremum(table, pool, posed, codes, start, n, extrema, count, work, vertex_contact)
+        found = solids_extremum(store, posed, codes, start, n, extrema, count, work, vertex_contact)
     if found == NOTHING:
         return count, found
     for k in range(count):
         # One of far sides, or a saddle, hides no contact beside it.
         radius = min(merge_radius, SAME) if extremum_at(extrema, k).origin == USELESS else merge_radius
-        if are_one(table, pool, posed, extrema, count, k, radius):
+        if are_one(store, posed, extrema, count, k, radius):
             return count, ALIKE
     return count + 1, found
 
 
 @kernel(inner=True)
-def add_given(table, pool, posed, tracked, listed, many, merge_radius, extrema, work):
+def add_given(store, posed, tracked, listed, many, merge_radius, extrema, work):
     """Add the roots at which given contacts of the two bodies are now. Returns how many.
 
     A contact whose coordinates are unknowns of a solve may be on its way to another root than Newton's method goes to
@@ -242,22 +242,22 @@ def add_given(table, pool, posed, tracked, listed, many, merge_radius, extrema, 
     """
     count = 0
     for c in range(many):
-        given = given_at(table, listed + GIVEN_RECORD * c)
+        given = given_at(store.table, listed + GIVEN_RECORD * c)
         x = pair_parameters(tracked_at(tracked, given.row))
         if math.isnan(x[0]) or count == extrema.shape[0]:
             continue
         if given.swapped == 1:
             x = (x[2], x[3], x[0], x[1])
         before = count
-        count, found = add_extremum(table, pool, posed, (0, 0), x, (0.0, 0.0, 0.0), 0.0, extrema, count, work, 0.0)
+        count, found = add_extremum(store, posed, (0, 0), x, (0.0, 0.0, 0.0), 0.0, extrema, count, work, 0.0)
         if posed.surfaces[0] >= 0 and (found == NOTHING or (count > before and count < extrema.shape[0])):
-            frame = pair_frame(table, pool, posed.surfaces[0], posed.surfaces[1], posed.turn, posed.shift, x)
+            frame = pair_frame(store, posed.surfaces[0], posed.surfaces[1], posed.pose, x)
             if frame.regular:
                 write(extrema, count, x, 0, 0, frame.normal, frame.gap, frame.point_f, frame.point_g, 0.0)
             if found != NOTHING:
-                same = frame.regular and are_one(table, pool, posed, extrema, before, count, merge_radius)
+                same = frame.regular and are_one(store, posed, extrema, before, count, merge_radius)
                 count = count if same else before
-            elif frame.regular and opposed(frame, posed.turn, table, pool, posed.surfaces[1], x):
+            elif frame.regular and opposed(frame, posed.pose.rotation, store, posed.surfaces[1], x):
                 # At a fold Newton's method may find nothing: there the contact still is.
                 count += 1
         if count > before:

@@ -12,8 +12,9 @@ import math
 from collections import namedtuple
 
 from assembly._kernel import kernel
+from assembly._record import Store
 from assembly.geometry.vec import add, dot, matvec, matvec_t, quaternion_matrix, quaternion_product, sub
-from assembly.kinematics.motion import rotation
+from assembly.kinematics.motion import RelativePose, rotation
 from assembly.proximity.bvh.tree import node_at, three_of, tree_at
 from assembly.proximity.manager.state import (
     PAIR_MEMORY,
@@ -89,35 +90,37 @@ def turned_by(memory, o, e):
 
 
 @kernel(inline=True)
-def moved_from(point, was, turn, shift):
+def moved_from(point, was, pose):
     """How far a point of a body is from where it was, by the body's pose."""
-    d = sub(add(matvec(turn, point), shift), was)
+    d = sub(add(matvec(pose.rotation, point), pose.shift), was)
     return math.sqrt(dot(d, d))
 
 
 @kernel(inner=True)
-def reach_now(table, pool, watch, memory, p, moving):
+def reach_now(store, watch, memory, p, moving):
     """Keep where the bodies of pair p stand at this look. Returns its reach: for some moves as since the last one."""
     state = memory_header_at(memory, 0)
-    manager = manager_at(table, watch)
+    manager = manager_at(store.table, watch)
     turn, shift = moving.turn, moving.shift
-    at = memory_places(table, watch)[0] + PAIR_MEMORY * p
+    at = memory_places(store.table, watch)[0] + PAIR_MEMORY * p
     known = pair_state_at(memory, at)
-    lengths = lengths_at(pool, manager.lengths)
+    lengths = lengths_at(store.pool, manager.lengths)
     reach = known.reach
-    pair = pair_at(table, manager.pair_table + PAIR_RECORD * p)
-    extremum = tree_at(table, moving.tree).node_pool
+    pair = pair_at(store.table, manager.pair_table + PAIR_RECORD * p)
+    extremum = tree_at(store.table, moving.tree).node_pool
     if not math.isnan(known.turn[0]):
-        pace = moved_from(three_of(node_at(pool, extremum).center), three_of(known.place), turn, shift)
-        pace += 2.0 * node_at(pool, extremum).radius * turned_by(memory, at, moving.quaternion)
+        pace = moved_from(
+            three_of(node_at(store.pool, extremum).center), three_of(known.place), RelativePose(turn, shift)
+        )
+        pace += 2.0 * node_at(store.pool, extremum).radius * turned_by(memory, at, moving.quaternion)
         pace /= max(state.calls - known.called, 1.0)
         # After a step that was cut, as far as it was to go; but it goes no farther where contacts may be born.
         moves = MOVES if pair.spine_f < 0 else MOVES_OF_WIRES
-        asked = max(moves * pace, min(known.cut_short, pair_lengths_at(pool, pair.minimum).curved_bound))
+        asked = max(moves * pace, min(known.cut_short, pair_lengths_at(store.pool, pair.minimum).curved_bound))
         reach = min(max(asked, lengths.first_reach), lengths.last_reach)
     known.cut_short = 0.0
     known.called = state.calls
-    center = add(matvec(turn, three_of(node_at(pool, extremum).center)), shift)
+    center = add(matvec(turn, three_of(node_at(store.pool, extremum).center)), shift)
     for k in range(4):
         known.turn[k] = moving.quaternion[k]
     for k in range(3):
@@ -142,31 +145,32 @@ def allow_ball(memory, at, ball, allowance, sure):
 
 
 @kernel(inner=True)
-def part_used(table, pool, watch, memory, p, q):
+def part_used(store, watch, memory, p, q):
     """Which part of its allowances pair p has used at poses q; infinite before its first look. Notes its DOUBT.
 
     A ball's points went no farther than its middle and 2 r |e - e'|: a turn by an angle a about an axis moves a point
     at a distance r from it by 2 r sin(a / 2), and |e - e'| is 2 sin(a / 4).
     """
-    o = memory_places(table, watch)[0] + PAIR_MEMORY * p
+    o = memory_places(store.table, watch)[0] + PAIR_MEMORY * p
     known = pair_state_at(memory, o)
     known.doubt = 0.0
     if math.isnan(known.turn[0]):
         return math.inf
-    moving = mover(table, watch, p, q)
+    moving = mover(store.table, watch, p, q)
     turn, shift = moving.turn, moving.shift
-    extremum = tree_at(table, moving.tree).node_pool
+    extremum = tree_at(store.table, moving.tree).node_pool
     angle = turned_by(memory, o, moving.quaternion)
     moved = (
-        moved_from(three_of(node_at(pool, extremum).center), three_of(known.place), turn, shift)
-        + 2.0 * node_at(pool, extremum).radius * angle
+        moved_from(three_of(node_at(store.pool, extremum).center), three_of(known.place), RelativePose(turn, shift))
+        + 2.0 * node_at(store.pool, extremum).radius * angle
     )
     if not moved > 0.0:
         return 0.0
     part = moved / known.allowance
     if known.ball_allowance < known.allowance or 0.0 < known.sure < math.inf:
         moved = (
-            moved_from(three_of(known.ball), three_of(known.ball_place), turn, shift) + 2.0 * known.ball_radius * angle
+            moved_from(three_of(known.ball), three_of(known.ball_place), RelativePose(turn, shift))
+            + 2.0 * known.ball_radius * angle
         )
         part = max(part, moved / known.ball_allowance)
         if known.sure > 0.0:
@@ -177,13 +181,13 @@ def part_used(table, pool, watch, memory, p, q):
 
 
 @kernel(inner=True)
-def went(table, pool, watch, p, before, after):
+def went(store, watch, p, before, after):
     """How far a point of one body of pair p went at most, seen from the other one, between two poses of a scene."""
-    was, now = mover(table, watch, p, before), mover(table, watch, p, after)
-    extremum = tree_at(table, was.tree).node_pool
-    center = three_of(node_at(pool, extremum).center)
+    was, now = mover(store.table, watch, p, before), mover(store.table, watch, p, after)
+    extremum = tree_at(store.table, was.tree).node_pool
+    center = three_of(node_at(store.pool, extremum).center)
     d = sub(add(matvec(now.turn, center), now.shift), add(matvec(was.turn, center), was.shift))
-    return math.sqrt(dot(d, d)) + 2.0 * node_at(pool, extremum).radius * apart(was.quaternion, now.quaternion)
+    return math.sqrt(dot(d, d)) + 2.0 * node_at(store.pool, extremum).radius * apart(was.quaternion, now.quaternion)
 
 
 @kernel(inner=True)
@@ -198,12 +202,12 @@ def used_most(table, watch, memory):
 
 
 @kernel(inner=True)
-def largest_part(table, pool, watch, memory, q):
+def largest_part(store, watch, memory, q):
     """The pair that used the largest part of its allowances at poses q, and that part."""
-    at = memory_places(table, watch)[0]
-    for p in range(manager_at(table, watch).pairs):
-        pair_state_at(memory, at + PAIR_MEMORY * p).part = part_used(table, pool, watch, memory, p, q)
-    best = used_most(table, watch, memory)
+    at = memory_places(store.table, watch)[0]
+    for p in range(manager_at(store.table, watch).pairs):
+        pair_state_at(memory, at + PAIR_MEMORY * p).part = part_used(store, watch, memory, p, q)
+    best = used_most(store.table, watch, memory)
     return best, pair_state_at(memory, at + PAIR_MEMORY * best).part
 
 
@@ -215,11 +219,11 @@ def measure_parts(table, pool, watch, memory, first, end, q):
     """
     at = memory_places(table, watch)[0]
     for p in range(first, end):
-        pair_state_at(memory, at + PAIR_MEMORY * p).part = part_used(table, pool, watch, memory, p, q)
+        pair_state_at(memory, at + PAIR_MEMORY * p).part = part_used(Store(table, pool), watch, memory, p, q)
     return used_most(table, watch, memory)
 
 
 @kernel(signatures="(i8[::1], f8[::1], i8, i8, f8[:, ::1], f8[:, ::1], f8)")
 def went_beyond(table, pool, watch, p, before, after, most):
     """Whether a point of one body of pair p may have gone farther than `most` between two poses. By address, too."""
-    return 1 if went(table, pool, watch, p, before, after) > most else 0
+    return 1 if went(Store(table, pool), watch, p, before, after) > most else 0

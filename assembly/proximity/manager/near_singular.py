@@ -26,11 +26,11 @@ FAR = 1e300
 
 
 @kernel(inline=True)
-def toward_end(table, pool, r, du, dv):
+def toward_end(store, r, du, dv):
     """1 where rates (du, dv) of the parameters of a surface lead toward its end in the faster one, else -1."""
-    patch = surface_at(table, r)
-    du /= pool[patch.breaks_u + patch.spans_u] - pool[patch.breaks_u]
-    dv /= pool[patch.breaks_v + patch.spans_v] - pool[patch.breaks_v]
+    patch = surface_at(store.table, r)
+    du /= store.pool[patch.breaks_u + patch.spans_u] - store.pool[patch.breaks_u]
+    dv /= store.pool[patch.breaks_v + patch.spans_v] - store.pool[patch.breaks_v]
     return math.copysign(1.0, du if abs(du) >= abs(dv) else dv)
 
 
@@ -41,10 +41,10 @@ ValleyStep = namedtuple("ValleyStep", "found there bend on_f along")
 
 
 @kernel(inner=True)
-def across_near_singular(table, pool, f, g, turn, shift, x):
+def across_near_singular(store, f, g, pose, x):
     """A step from parameters x across the valley there, if there is one."""
     none = (0.0, 0.0, 0.0)
-    frame = pair_frame(table, pool, f, g, turn, shift, x)
+    frame = pair_frame(store, f, g, pose, x)
     if not frame.regular:
         return ValleyStep(False, x, FAR, False, none)
     a, c, r = frame.shape_f, frame.shape_g, frame.residual
@@ -81,17 +81,17 @@ def across_near_singular(table, pool, f, g, turn, shift, x):
     factor_g = bent_at_most(bend_g)
     step_f = (factor_f * step_f[0], factor_f * step_f[1])
     step_g = (factor_g * step_g[0], factor_g * step_g[1])
-    there, _clamped, _way = move_pair(table, pool, f, g, turn, x, frame, step_f, step_g)
+    there, _clamped, _way = move_pair(store, f, g, pose.rotation, x, frame, step_f, step_g)
     if bent_f >= bent_g:
-        sense = toward_end(table, pool, f, e[0] * w[0] + e[1] * w[1], e[2] * w[1])
+        sense = toward_end(store, f, e[0] * w[0] + e[1] * w[1], e[2] * w[1])
     else:
-        sense = toward_end(table, pool, g, t[0] * w[0] + t[1] * w[1], t[2] * w[0] + t[3] * w[1])
+        sense = toward_end(store, g, t[0] * w[0] + t[1] * w[1], t[2] * w[0] + t[3] * w[1])
     along = blend(sense * w[0], frame.tangent_x, sense * w[1], frame.tangent_y)
     return ValleyStep(True, there, max(bend_f, bend_g), bent_f >= bent_g, along)
 
 
 @kernel(inner=True)
-def into_near_singular(table, pool, f, g, turn, shift, x, half):
+def into_near_singular(store, f, g, pose, x, half):
     """The bottom of the valley that crosses a pair of patches, from their middles x: `half` are half their widths.
 
     Returns whether there is one, its parameters, whether f is the surface that is bent more across it, and its
@@ -101,9 +101,9 @@ def into_near_singular(table, pool, f, g, turn, shift, x, half):
     along = (0.0, 0.0, 0.0)
     on_f = False
     for _ in range(STEPS):
-        step = across_near_singular(table, pool, f, g, turn, shift, x)
+        step = across_near_singular(store, f, g, pose, x)
         found, there, bend, on_f, along = step.found, step.there, step.bend, step.on_f, step.along
-        if not found or not is_beside(table, pool, (f, g), there, start, half, 1.0):
+        if not found or not is_beside(store, (f, g), there, start, half, 1.0):
             return False, x, on_f, along
         x = there
         if bend <= ARRIVED:

@@ -46,21 +46,21 @@ def is_loose(extrema, k):
 
 
 @kernel(inner=True)
-def is_next_in_near_singular(table, pool, posed, codes, surfaces, x, along, extrema, count):
+def is_next_in_near_singular(store, posed, codes, surfaces, x, along, extrema, count):
     """Whether the point at x of a valley between two faces is to be held; `along` is the valley's direction there.
 
     So it is where the valley has turned far from all of the points that are known between these faces, or where these
     lie beside it rather than along it, in another valley.
     """
-    p = surface_point(table, pool, surfaces[0], x[0], x[1])[0]
+    p = surface_point(store.table, store.pool, surfaces[0], x[0], x[1])[0]
     for k in range(count):
         extremum = extremum_at(extrema, k)
         alike = extremum.code_f == codes[0] and extremum.code_g == codes[1]
         if alike and extremum.origin != USELESS and not is_loose(extrema, k):
             y = pair_parameters(extremum)
-            step = across_near_singular(table, pool, surfaces[0], surfaces[1], posed.turn, posed.shift, y)
+            step = across_near_singular(store, surfaces[0], surfaces[1], posed.pose, y)
             found, other = step.found, step.along
-            way = sub(p, surface_point(table, pool, surfaces[0], y[0], y[1])[0])
+            way = sub(p, surface_point(store.table, store.pool, surfaces[0], y[0], y[1])[0])
             square = dot(way, way)
             part = dot(way, along)
             if found and dot(along, other) > APART and 2.0 * part * part >= square - NEAR * NEAR:
@@ -69,28 +69,30 @@ def is_next_in_near_singular(table, pool, posed, codes, surfaces, x, along, extr
 
 
 @kernel(inner=True)
-def is_left_out(table, pool, posed, extrema, k):
+def is_left_out(store, posed, extrema, k):
     """Whether root k, behind all that stay, is of a continuum and next to what is held; if not, it is held."""
     extremum = extremum_at(extrema, k)
     codes = (np.int64(extremum.code_f), np.int64(extremum.code_g))
-    if extremum.origin == USELESS or not is_loose(extrema, k) or not is_of_faces(table, posed, codes[0], codes[1]):
+    if (
+        extremum.origin == USELESS
+        or not is_loose(extrema, k)
+        or not is_of_faces(store.table, posed, codes[0], codes[1])
+    ):
         return False
-    surfaces = (feature_at(table, posed.shells[0], codes[0]), feature_at(table, posed.shells[1], codes[1]))
+    surfaces = (feature_at(store.table, posed.shells[0], codes[0]), feature_at(store.table, posed.shells[1], codes[1]))
     x = pair_parameters(extremum)
-    step = across_near_singular(table, pool, surfaces[0], surfaces[1], posed.turn, posed.shift, x)
+    step = across_near_singular(store, surfaces[0], surfaces[1], posed.pose, x)
     found, on_f, along = step.found, step.on_f, step.along
     if not found:
         return False
-    if extremum.origin == NEW and not is_next_in_near_singular(
-        table, pool, posed, codes, surfaces, x, along, extrema, k
-    ):
+    if extremum.origin == NEW and not is_next_in_near_singular(store, posed, codes, surfaces, x, along, extrema, k):
         return True
     extremum.corner = HELD_F if on_f else HELD_G
     return False
 
 
 @kernel(inner=True)
-def hold_continua(table, pool, posed, extrema, count):
+def hold_continua(store, posed, extrema, count):
     """Of a continuum of roots along a valley between two faces, hold those that are listed and few of the new ones.
 
     What Newton's method finds there are as many as it has starts, and may fill the room; one that is not next to what
@@ -101,26 +103,26 @@ def hold_continua(table, pool, posed, extrema, count):
         for l in range(ROOT):
             extrema[stay, l] = extrema[k, l]
         stay += 1
-        if is_left_out(table, pool, posed, extrema, stay - 1):
+        if is_left_out(store, posed, extrema, stay - 1):
             stay -= 1
     return stay
 
 
 @kernel(inner=True)
-def is_on_face(table, pool, posed, codes, side, x):
+def is_on_face(store, posed, codes, side, x):
     """Whether the point at x of the face of one side is one of the body, within its boundary."""
-    face = shell_at(table, posed.shells[side]).face_table + FACE_RECORD * codes[side]
-    return is_feasible(table, pool, FACE, face, x[2 * side], x[2 * side + 1])
+    face = shell_at(store.table, posed.shells[side]).face_table + FACE_RECORD * codes[side]
+    return is_feasible(store, FACE, face, x[2 * side], x[2 * side + 1])
 
 
 @kernel(inner=True)
-def sunk(table, pool, posed, codes, held, x):
+def sunk(store, posed, codes, held, x):
     """Where the bottom of the valley is, between two faces, across which x is; x where there is none in the faces.
 
     `held` says of which face it holds a point, HELD_F or HELD_G.
     """
-    f = feature_at(table, posed.shells[0], codes[0])
-    g = feature_at(table, posed.shells[1], codes[1])
+    f = feature_at(store.table, posed.shells[0], codes[0])
+    g = feature_at(store.table, posed.shells[1], codes[1])
     wide = (math.inf, math.inf, math.inf, math.inf)
-    found, there, _on_f, _along = into_near_singular(table, pool, f, g, posed.turn, posed.shift, x, wide)
-    return there if found and is_on_face(table, pool, posed, codes, 0 if held == HELD_F else 1, there) else x
+    found, there, _on_f, _along = into_near_singular(store, f, g, posed.pose, x, wide)
+    return there if found and is_on_face(store, posed, codes, 0 if held == HELD_F else 1, there) else x

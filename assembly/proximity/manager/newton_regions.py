@@ -40,33 +40,33 @@ PASSED = size_of(NEWTON_WAY)
 
 
 @kernel(inline=True)
-def half_widths(table, pool, trees, pair):
+def half_widths(store, trees, pair):
     """Half the widths, in parameters, of the patches of a pair of elements."""
-    f = element_at(pool, tree_at(table, trees[0]).element_pool + ELEMENT * pair[0])
-    g = element_at(pool, tree_at(table, trees[1]).element_pool + ELEMENT * pair[1])
+    f = element_at(store.pool, tree_at(store.table, trees[0]).element_pool + ELEMENT * pair[0])
+    g = element_at(store.pool, tree_at(store.table, trees[1]).element_pool + ELEMENT * pair[1])
     return (f.half[0], f.half[1], g.half[0], g.half[1])
 
 
 @kernel(inline=True)
-def is_beside(table, pool, surfaces, x, y, half, part):
+def is_beside(store, surfaces, x, y, half, part):
     """Whether parameters x are within a part of half widths from y, on both surfaces."""
     f, g = surfaces[0], surfaces[1]
-    return is_within(table, pool, f, x[0], x[1], y[0], y[1], part * half[0], part * half[1]) and is_within(
-        table, pool, g, x[2], x[3], y[2], y[3], part * half[2], part * half[3]
+    return is_within(store, f, x[0], x[1], y[0], y[1], part * half[0], part * half[1]) and is_within(
+        store, g, x[2], x[3], y[2], y[3], part * half[2], part * half[3]
     )
 
 
 @kernel(inner=True)
-def is_known(table, pool, posed, e, d, extrema, count):
+def is_known(store, posed, e, d, extrema, count):
     """The features of elements e and d, the parameters of their middles, whether a known root is all there is.
 
     And whether one is there that is near a fold, on this side of a knot line or beyond: a second root may be beside it.
     """
-    f = element_at(pool, tree_at(table, posed.trees[0]).element_pool + ELEMENT * e)
-    g = element_at(pool, tree_at(table, posed.trees[1]).element_pool + ELEMENT * d)
+    f = element_at(store.pool, tree_at(store.table, posed.trees[0]).element_pool + ELEMENT * e)
+    g = element_at(store.pool, tree_at(store.table, posed.trees[1]).element_pool + ELEMENT * d)
     codes = (np.int64(f.feature), np.int64(g.feature))
     start = (f.middle[0], f.middle[1], g.middle[0], g.middle[1])
-    half = half_widths(table, pool, posed.trees, (e, d))
+    half = half_widths(store, posed.trees, (e, d))
     folds = False
     for k in range(count):
         extremum = extremum_at(extrema, k)
@@ -76,11 +76,11 @@ def is_known(table, pool, posed, e, d, extrema, count):
             # A point that stays where it is is no root: where the edge, or the face, is nearest may be beside it.
             continue
         x = pair_parameters(extremum)
-        if not is_beside(table, pool, posed.surfaces, x, start, half, BESIDE):
+        if not is_beside(store, posed.surfaces, x, start, half, BESIDE):
             continue
         if posed.surfaces[0] >= 0 and math.isnan(extremum.beyond):
             # Beyond a knot line curvatures may be others.
-            extremum.beyond = fold_beyond(table, pool, posed, x, half)
+            extremum.beyond = fold_beyond(store, posed, x, half)
         if is_alone(extrema, k):
             return codes, start, True, False
         folds = True
@@ -88,7 +88,7 @@ def is_known(table, pool, posed, e, d, extrema, count):
 
 
 @kernel(inner=True)
-def stays(table, pool, surfaces, turn, shift, start, half, passed, count):
+def stays(store, surfaces, pose, start, half, passed, count):
     """Whether Newton's method from `start` stays beside it, within BESIDE times half widths in (u, v) and (s, t).
 
     Returns STAYED or LEFT, or which of the `count` sequences in `passed` (n, PASSED) it goes along with; where it came
@@ -97,7 +97,7 @@ def stays(table, pool, surfaces, turn, shift, start, half, passed, count):
     f, g = surfaces[0], surfaces[1]
     x = start
     for step in range(STEPS):
-        frame = pair_frame(table, pool, f, g, turn, shift, x)
+        frame = pair_frame(store, f, g, pose, x)
         if not frame.regular:
             return STAYED, x, count
         a, c, r = frame.shape_f, frame.shape_g, frame.residual
@@ -111,13 +111,13 @@ def stays(table, pool, surfaces, turn, shift, start, half, passed, count):
         factor_g = bent_at_most(bend_g)
         step_f = (factor_f * step_f[0], factor_f * step_f[1])
         step_g = (factor_g * step_g[0], factor_g * step_g[1])
-        x, _held, _way = move_pair(table, pool, f, g, turn, x, frame, step_f, step_g)
-        if not is_beside(table, pool, surfaces, x, start, half, BESIDE):
+        x, _held, _way = move_pair(store, f, g, pose.rotation, x, frame, step_f, step_g)
+        if not is_beside(store, surfaces, x, start, half, BESIDE):
             return LEFT, x, count
         if step == 0:
             for way in range(count):
                 there = pair_parameters(newton_way_at(passed, way))
-                if is_beside(table, pool, surfaces, x, there, half, TOGETHER):
+                if is_beside(store, surfaces, x, there, half, TOGETHER):
                     return way, x, count
             if count < passed.shape[0]:
                 led = newton_way_at(passed, count)

@@ -75,12 +75,12 @@ def surface_of(table, shell, surface, code):
 
 
 @kernel(inner=True)
-def in_trim(table, pool, shell, code, u, v):
+def in_trim(store, shell, code, u, v):
     """Whether parameters are within the boundary of a face or on it; of a surface without one they always are."""
     if shell < 0:
         return True
-    trim = face_at(table, shell_at(table, shell).face_table + FACE_RECORD * code).trim
-    return trim < 0 or trim_side(table, pool, trim, u, v) >= 0
+    trim = face_at(store.table, shell_at(store.table, shell).face_table + FACE_RECORD * code).trim
+    return trim < 0 or trim_side(store, trim, u, v) >= 0
 
 
 @kernel(inline=True)
@@ -94,12 +94,12 @@ def with_children(stack, used, child):
 
 
 @kernel(inner=True, allocates=True)
-def facets_cut(table, pool, tree, surface, shell, a, d, end, beside):
+def facets_cut(store, tree, surface, shell, a, d, end, beside):
     """How many facets of a body's faces cut the segment from a to a + d, but for that part at its ends; body axes.
 
     Or are beside it, by that part of their sides. And whether the first of them leads out of the body.
     """
-    tree_record = tree_at(table, tree)
+    tree_record = tree_at(store.table, tree)
     stack = np.empty(DEPTH, np.int64)
     stack[0] = 0
     used = 1
@@ -109,57 +109,57 @@ def facets_cut(table, pool, tree, surface, shell, a, d, end, beside):
     while used > 0:
         used -= 1
         i = stack[used]
-        if not meets_box(pool, tree_record.node_pool + NODE * i, a, d):
+        if not meets_box(store.pool, tree_record.node_pool + NODE * i, a, d):
             continue
-        at = node_links_at(table, tree_record.node_table + NODE_INTS * i)
+        at = node_links_at(store.table, tree_record.node_table + NODE_INTS * i)
         child = at.child
         if child >= 0:
             used = with_children(stack, used, child)
             continue
         code = at.feature
-        r = surface_of(table, shell, surface, code)
+        r = surface_of(store.table, shell, surface, code)
         if r < 0:
             continue
         e = tree_record.element_pool + ELEMENT * (-1 - child)
-        (u, v, wide, high), (p, q, s, t) = patch_vertex_contacts(table, pool, r, element_at(pool, e))
+        (u, v, wide, high), (p, q, s, t) = patch_vertex_contacts(store, r, element_at(store.pool, e))
         for k in range(2):
             cut = cut_at(a, d, p, q if k == 0 else s, s if k == 0 else t, end, beside)
             hit, way, x, y, along = cut.hit, cut.part, cut.q, cut.r, cut.turns
             here = (u + (x + y if k == 0 else x) * wide, v + (y if k == 0 else x + y) * high)
-            if hit and in_trim(table, pool, shell, code, here[0], here[1]):
+            if hit and in_trim(store, shell, code, here[0], here[1]):
                 count += 1
                 if way < first:
                     first = way
-                    leaves = along == (surface_at(table, r).sign > 0)
+                    leaves = along == (surface_at(store.table, r).sign > 0)
     return count, leaves
 
 
 @kernel(inner=True)
-def projection_at(table, pool, tree, surface, shell, e, y):
+def projection_at(store, tree, surface, shell, e, y):
     """The signed distance of a point from its foot at a body's element e, the normal there, and whether there is one.
 
     A foot that Newton's method did not reach is none: off the foot of a point outside, the tangent plane of a bulge has
     it inside. One farther off than BESIDE may be on the far side.
     """
-    patch = element_at(pool, tree_at(table, tree).element_pool + ELEMENT * e)
+    patch = element_at(store.pool, tree_at(store.table, tree).element_pool + ELEMENT * e)
     code = np.int64(patch.feature)
-    f = surface_of(table, shell, surface, code)
+    f = surface_of(store.table, shell, surface, code)
     if f < 0:
         return 0.0, y, False
     u, v = patch.middle[0], patch.middle[1]
-    s, t, distance, n, settled = projection_of(table, pool, f, y, u, v)
+    s, t, distance, n, settled = projection_of(store, f, y, u, v)
     for _ in range(PROJECTIONS):
         if settled:
             break
-        s, t, distance, n, settled = projection_of(table, pool, f, y, s, t)
-    beside = is_within(table, pool, f, s, t, u, v, BESIDE * patch.half[0], BESIDE * patch.half[1])
-    return distance, n, settled and beside and in_trim(table, pool, shell, code, s, t)
+        s, t, distance, n, settled = projection_of(store, f, y, s, t)
+    beside = is_within(store, f, s, t, u, v, BESIDE * patch.half[0], BESIDE * patch.half[1])
+    return distance, n, settled and beside and in_trim(store, shell, code, s, t)
 
 
 @kernel(inner=True, allocates=True)
-def nearest_projection(table, pool, tree, surface, shell, y, reach):
+def nearest_projection(store, tree, surface, shell, y, reach):
     """The signed distance of a point from its nearest foot on a body; minus the reach if none is nearer than that."""
-    tree_record = tree_at(table, tree)
+    tree_record = tree_at(store.table, tree)
     stack = np.empty(DEPTH, np.int64)
     stack[0] = 0
     used = 1
@@ -167,106 +167,109 @@ def nearest_projection(table, pool, tree, surface, shell, y, reach):
     while used > 0:
         used -= 1
         i = stack[used]
-        o = node_at(pool, tree_record.node_pool + NODE * i)
+        o = node_at(store.pool, tree_record.node_pool + NODE * i)
         square = 0.0
         for k in range(3):
             off = max(abs(y[k] - o.center[k]) - o.half[k], 0.0)
             square += off * off
         if square > nearest * nearest:
             continue
-        child = node_links_at(table, tree_record.node_table + NODE_INTS * i).child
+        child = node_links_at(store.table, tree_record.node_table + NODE_INTS * i).child
         if child >= 0:
             used = with_children(stack, used, child)
             continue
-        distance, _n, some = projection_at(table, pool, tree, surface, shell, -1 - child, y)
+        distance, _n, some = projection_at(store, tree, surface, shell, -1 - child, y)
         if some and abs(distance) < abs(nearest):
             nearest = distance
     return nearest
 
 
 @kernel(inner=True)
-def is_inside_at(table, pool, tree, surface, shell, e, y, margin, offset):
+def is_inside_at(store, tree, surface, shell, e, y, margin, offset):
     """Whether a point is farther than a margin inside a body, by its foot at element e.
 
     Of a thin wall the foot may be on the far side. Then one on the near side is nearer, or, where that is past an edge,
     a facet is between; these are up to an `offset` beside their surfaces.
     """
-    distance, n, some = projection_at(table, pool, tree, surface, shell, e, y)
+    distance, n, some = projection_at(store, tree, surface, shell, e, y)
     if not (some and distance < -margin):
         return False
-    if nearest_projection(table, pool, tree, surface, shell, y, -distance) >= -margin:
+    if nearest_projection(store, tree, surface, shell, y, -distance) >= -margin:
         return False
     if -distance <= 2.0 * offset:
         return True
-    return facets_cut(table, pool, tree, surface, shell, y, scale(-distance, n), offset / -distance, 0.0)[0] == 0
+    return facets_cut(store, tree, surface, shell, y, scale(-distance, n), offset / -distance, 0.0)[0] == 0
 
 
 @kernel(inner=True)
-def is_deep(table, pool, posed, e, d, margin, offsets):
+def is_deep(store, posed, e, d, margin, offsets):
     """Whether the middle of a patch of f is farther than a margin inside g at a patch, or the other way round."""
-    turn, shift = posed.turn, posed.shift
+    turn, shift = posed.pose.rotation, posed.pose.shift
     tree_f, tree_g = posed.trees
     f, g = posed.surfaces
     shell_f, shell_g = posed.shells
-    a, some = middle(table, pool, tree_f, f, shell_f, e)
+    a, some = middle(store, tree_f, f, shell_f, e)
     a = matvec_t(turn, sub(a, shift))
-    if some and is_inside_at(table, pool, tree_g, g, shell_g, d, a, margin, offsets[1]):
+    if some and is_inside_at(store, tree_g, g, shell_g, d, a, margin, offsets[1]):
         return True
-    b, some = middle(table, pool, tree_g, g, shell_g, d)
+    b, some = middle(store, tree_g, g, shell_g, d)
     b = add(matvec(turn, b), shift)
-    return some and is_inside_at(table, pool, tree_f, f, shell_f, e, b, margin, offsets[0])
+    return some and is_inside_at(store, tree_f, f, shell_f, e, b, margin, offsets[0])
 
 
 @kernel(inner=True)
-def middle(table, pool, tree, surface, shell, e):
+def middle(store, tree, surface, shell, e):
     """The middle of a patch, in the axes of its body, and whether it is one of a face and within its boundary."""
-    patch = element_at(pool, tree_at(table, tree).element_pool + ELEMENT * e)
+    patch = element_at(store.pool, tree_at(store.table, tree).element_pool + ELEMENT * e)
     code = np.int64(patch.feature)
-    f = surface_of(table, shell, surface, code)
-    if f < 0 or not in_trim(table, pool, shell, code, patch.middle[0], patch.middle[1]):
+    f = surface_of(store.table, shell, surface, code)
+    if f < 0 or not in_trim(store, shell, code, patch.middle[0], patch.middle[1]):
         return (0.0, 0.0, 0.0), False
-    return surface_point(table, pool, f, patch.middle[0], patch.middle[1])[0], True
+    return surface_point(store.table, store.pool, f, patch.middle[0], patch.middle[1])[0], True
 
 
 @kernel(inner=True)
-def below_part(table, pool, tree, surface, shell, k, below):
+def below_part(store, tree, surface, shell, k, below):
     """A point `below` the middle of a patch in the k-th of three parts of a body's patches, and whether there is one.
 
     The parts are of different faces, if there are some: a point of a face that touches may be taken for inside.
     """
-    tree_record = tree_at(table, tree)
-    solid = shell_at(table, shell)
+    tree_record = tree_at(store.table, tree)
+    solid = shell_at(store.table, shell)
     first = tree_record.element_pool
     elements = tree_record.elements
     patches = 0
     for e in range(elements):
-        patches += int(shell < 0 or element_at(pool, first + ELEMENT * e).feature < solid.faces)
+        patches += int(shell < 0 or element_at(store.pool, first + ELEMENT * e).feature < solid.faces)
     passed = 0
     for e in range(elements):
-        if shell < 0 or element_at(pool, first + ELEMENT * e).feature < solid.faces:
+        if shell < 0 or element_at(store.pool, first + ELEMENT * e).feature < solid.faces:
             if passed >= patches * k // 3:
-                a, some = middle(table, pool, tree, surface, shell, e)
+                a, some = middle(store, tree, surface, shell, e)
                 if some:
-                    patch = element_at(pool, first + ELEMENT * e)
-                    f = surface_of(table, shell, surface, np.int64(patch.feature))
-                    _p, su, sv, _uu, _uv, _vv = surface_point(table, pool, f, patch.middle[0], patch.middle[1])
-                    return sub(a, scale(float(surface_at(table, f).sign) * below, unit(cross(su, sv)))), True
+                    patch = element_at(store.pool, first + ELEMENT * e)
+                    f = surface_of(store.table, shell, surface, np.int64(patch.feature))
+                    _p, su, sv, _uu, _uv, _vv = surface_point(
+                        store.table, store.pool, f, patch.middle[0], patch.middle[1]
+                    )
+                    return sub(a, scale(float(surface_at(store.table, f).sign) * below, unit(cross(su, sv)))), True
             passed += 1
     return (0.0, 0.0, 0.0), False
 
 
 @kernel(inner=True)
-def is_wholly_inside(table, pool, posed, side, below):
+def is_wholly_inside(store, posed, side, below):
     """Whether f (side 0) is wholly inside g, or g in f: by rays, each another way, from three points `below` it."""
-    turn, shift = posed.turn, posed.shift
+    turn, shift = posed.pose.rotation, posed.pose.shift
     tree, other = posed.trees[side], posed.trees[1 - side]
     surface, shell = posed.surfaces[side], posed.shells[side]
     # Some direction that no face is likely to lie along, and far enough.
     far = 10.0 * (
-        node_at(pool, tree_at(table, tree).node_pool).radius + node_at(pool, tree_at(table, other).node_pool).radius
+        node_at(store.pool, tree_at(store.table, tree).node_pool).radius
+        + node_at(store.pool, tree_at(store.table, other).node_pool).radius
     )
     for k in range(3):
-        a, some = below_part(table, pool, tree, surface, shell, k, below)
+        a, some = below_part(store, tree, surface, shell, k, below)
         if not some:
             return False
         ray = (0.6012 * far, 0.3517 * far, 0.7174 * far)
@@ -275,7 +278,7 @@ def is_wholly_inside(table, pool, posed, side, below):
         elif k == 2:
             ray = (0.5218 * far, -0.8125 * far, -0.2601 * far)
         a = matvec_t(turn, sub(a, shift)) if side == 0 else add(matvec(turn, a), shift)
-        cut, leaves = facets_cut(table, pool, other, posed.surfaces[1 - side], posed.shells[1 - side], a, ray, 0.0, 0.0)
+        cut, leaves = facets_cut(store, other, posed.surfaces[1 - side], posed.shells[1 - side], a, ray, 0.0, 0.0)
         # In a bore that is open at its ends a ray goes into the material.
         if cut % 2 == 0 or not leaves:
             return False
@@ -283,38 +286,37 @@ def is_wholly_inside(table, pool, posed, side, below):
 
 
 @kernel(inner=True)
-def crosses(table, pool, posed, stack, candidates, margin, offsets):
+def crosses(store, posed, stack, candidates, margin, offsets):
     """Whether two bodies are in each other by more than a margin, or wholly, whatever extrema there are.
 
     Facets of f and of g are up to `offsets` beside their surfaces.
     """
-    count = overlapping(table, pool, posed.trees[0], posed.trees[1], posed.turn, posed.shift, stack, candidates)
+    count = overlapping(store, posed.trees[0], posed.trees[1], posed.pose, stack, candidates)
     for c in range(count):
-        if is_deep(table, pool, posed, candidates[c, 0], candidates[c, 1], margin, offsets):
+        if is_deep(store, posed, candidates[c, 0], candidates[c, 1], margin, offsets):
             return True
-        if posed.surfaces[0] < 0 and pierces(table, pool, posed, (candidates[c, 0], candidates[c, 1]), margin, offsets):
+        if posed.surfaces[0] < 0 and pierces(store, posed, (candidates[c, 0], candidates[c, 1]), margin, offsets):
             return True
-    return is_wholly_inside(table, pool, posed, 0, BELOW + 2.0 * offsets[1]) or is_wholly_inside(
-        table, pool, posed, 1, BELOW + 2.0 * offsets[0]
+    return is_wholly_inside(store, posed, 0, BELOW + 2.0 * offsets[1]) or is_wholly_inside(
+        store, posed, 1, BELOW + 2.0 * offsets[0]
     )
 
 
 @kernel(inner=True)
-def is_outside(table, pool, posed, extrema, k, offsets):
+def is_outside(store, posed, extrema, k, offsets):
     """Whether root k, of a negative gap, is one of far sides: then a surface is between its points.
 
     Facets of f and of g are up to `offsets` beside their surfaces; gaps of no more are taken for true.
     """
     extremum = extremum_at(extrema, k)
     depth = -extremum.gap
-    turn, shift = posed.turn, posed.shift
+    turn, shift = posed.pose.rotation, posed.pose.shift
     a = (extremum.point_f[0], extremum.point_f[1], extremum.point_f[2])
     b = (extremum.point_g[0], extremum.point_g[1], extremum.point_g[2])
     end = offsets[0] / depth
     if (
         end < 0.5
-        and facets_cut(table, pool, posed.trees[0], posed.surfaces[0], posed.shells[0], a, sub(b, a), end, BETWEEN)[0]
-        > 0
+        and facets_cut(store, posed.trees[0], posed.surfaces[0], posed.shells[0], a, sub(b, a), end, BETWEEN)[0] > 0
     ):
         return True
     a = matvec_t(turn, sub(a, shift))
@@ -322,6 +324,5 @@ def is_outside(table, pool, posed, extrema, k, offsets):
     end = offsets[1] / depth
     return (
         end < 0.5
-        and facets_cut(table, pool, posed.trees[1], posed.surfaces[1], posed.shells[1], a, sub(b, a), end, BETWEEN)[0]
-        > 0
+        and facets_cut(store, posed.trees[1], posed.surfaces[1], posed.shells[1], a, sub(b, a), end, BETWEEN)[0] > 0
     )

@@ -11,22 +11,20 @@ from collections import namedtuple
 from assembly._kernel import kernel
 from assembly.kinematics.motion import relative_pose, rotation
 
-# turn, shift: the pose of g seen from f, a rotation matrix by rows and the origin of g [length over the scene's size].
+# pose: of g seen from f, shift in lengths over the scene's size.
 # surfaces: records of the two surfaces, -1 both where the bodies are B-rep bodies.
 # shells: records of the two B-rep bodies, -1 both where the bodies are surfaces.
 # trees: records of the trees of patches. centerlines: records of those of two round wires, -1 both of other bodies.
 # bodies: their rows in poses, (n, 7). track_solids: address of `features/solid_contact.track_solids`.
-PosedPair = namedtuple("PosedPair", "turn shift surfaces shells trees centerlines bodies poses track_solids")
+PosedPair = namedtuple("PosedPair", "pose surfaces shells trees centerlines bodies poses track_solids")
 
 
 @kernel(inline=True)
 def posed_pair(manager, pair, q):
     """The bodies of a pair of the contact manager, records of both, at the poses q."""
     i, j = pair.body_f, pair.body_g
-    turn, shift = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
     return PosedPair(
-        turn=turn,
-        shift=shift,
+        pose=relative_pose(q, i, rotation(q, i), j, rotation(q, j)),
         surfaces=(pair.surface_f, pair.surface_g),
         shells=(pair.shell_f, pair.shell_g),
         trees=(pair.tree_f, pair.tree_g),

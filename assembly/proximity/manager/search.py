@@ -32,14 +32,14 @@ SLIDES_A_LOOK = 6
 
 
 @kernel(inner=True)
-def search_candidate(table, pool, posed, e, d, merge_radius, extrema, count, work, passed, state):
+def search_candidate(store, posed, e, d, merge_radius, extrema, count, work, passed, state):
     """Look for a root of the patches e of f and d of g that is not known.
 
     Returns how many roots there are; which one is a new minimum, or -1; whether a motion may bring one forth; and the
     state: whether a root is near a fold, how many ways there are in `passed`, how many starts went down a slope.
     """
     folding, visited, slides = state
-    codes, start, inside, folds = is_known(table, pool, posed, e, d, extrema, count)
+    codes, start, inside, folds = is_known(store, posed, e, d, extrema, count)
     folding = folding or folds
     if inside:
         return count, -1, False, (folding, visited, slides)
@@ -47,8 +47,8 @@ def search_candidate(table, pool, posed, e, d, merge_radius, extrema, count, wor
     before = count
     stayed, near, half, mine = True, start, (0.0, 0.0, 0.0, 0.0), visited
     if smooth:
-        half = half_widths(table, pool, posed.trees, (e, d))
-        way, near, visited = stays(table, pool, posed.surfaces, posed.turn, posed.shift, start, half, passed, visited)
+        half = half_widths(store, posed.trees, (e, d))
+        way, near, visited = stays(store, posed.surfaces, posed.pose, start, half, passed, visited)
         stayed = way != LEFT
         if way >= 0:
             return count, -1, folding or newton_way_at(passed, way).barren == 1.0, (folding, visited, slides)
@@ -56,7 +56,7 @@ def search_candidate(table, pool, posed, e, d, merge_radius, extrema, count, wor
     if stayed or not folding:
         # Where nothing folds, it tells whether it goes to a root that is known.
         count, result = add_extremum(
-            table, pool, posed, codes, near, (0.0, 0.0, 0.0), merge_radius, extrema, count, work, 0.0
+            store, posed, codes, near, (0.0, 0.0, 0.0), merge_radius, extrema, count, work, 0.0
         )
     if count > before:
         folding = folding or not is_alone(extrema, before)
@@ -66,13 +66,11 @@ def search_candidate(table, pool, posed, e, d, merge_radius, extrema, count, wor
         if count > before:
             before += 1
         slides += 1
-        stride = element_ball(table, pool, posed.trees[0], e)[1]
-        start, stayed = slide_down(
-            table, pool, posed.surfaces[0], posed.surfaces[1], posed.turn, posed.shift, start, stride, half
-        )
+        stride = element_ball(store, posed.trees[0], e)[1]
+        start, stayed = slide_down(store, posed.surfaces[0], posed.surfaces[1], posed.pose, start, stride, half)
         if stayed and count < extrema.shape[0]:
             count, result = add_extremum(
-                table, pool, posed, codes, start, (0.0, 0.0, 0.0), merge_radius, extrema, count, work, 0.0
+                store, posed, codes, start, (0.0, 0.0, 0.0), merge_radius, extrema, count, work, 0.0
             )
     if result == ALIKE and not folding:
         # On the slopes around a root that is known.
@@ -87,7 +85,7 @@ def search_candidate(table, pool, posed, e, d, merge_radius, extrema, count, wor
 
 @kernel(inner=True)
 def search_patches(
-    table, pool, posed, moving, limits, span, offsets, merge_radius, facing, found, extrema, count, work, passed
+    store, posed, moving, limits, span, offsets, merge_radius, facing, found, extrema, count, work, passed
 ):
     """Look into `found` pairs of patches for minima that are not known: new ones where their gaps are in a span.
 
@@ -116,8 +114,7 @@ def search_patches(
             new, bears = -1, True
         else:
             count, new, bears, state = search_candidate(
-                table,
-                pool,
+                store,
                 posed,
                 candidates[c, 0],
                 candidates[c, 1],
@@ -131,12 +128,12 @@ def search_patches(
             bound = max(bound, flank)
         if bears:
             fertile = min(fertile, bound)
-            lo, hi = around(table, pool, moving.tree, candidates[c, moving.side], lo, hi)
+            lo, hi = around(store, moving.tree, candidates[c, moving.side], lo, hi)
         if new >= 0:
             gap = extremum_at(extrema, new).gap
             # The far sides of two bodies oppose each other, too.
             alien = gap > span[1] or gap < span[0]
-            alien = alien or (gap < 0.0 and is_outside(table, pool, posed, extrema, new, offsets))
+            alien = alien or (gap < 0.0 and is_outside(store, posed, extrema, new, offsets))
             extremum_at(extrema, new).origin = USELESS if alien else NEW
     d = sub(hi, lo)
     center = scale(0.5, add(lo, hi))

@@ -303,28 +303,28 @@ def write_extremum(extrema, i, tracked, r):
 
 
 @kernel(inner=True)
-def is_of_far_sides(table, pool, posed, extrema, k, offsets):
+def is_of_far_sides(store, posed, extrema, k, offsets):
     """Whether root k, with a negative gap, is of sides that are turned away from each other."""
     if posed.centerlines[0] >= 0:
-        return extremum_at(extrema, k).gap < -both_radii(table, pool, posed.centerlines)
-    return is_outside(table, pool, posed, extrema, k, offsets)
+        return extremum_at(extrema, k).gap < -both_radii(store, posed.centerlines)
+    return is_outside(store, posed, extrema, k, offsets)
 
 
 @kernel(inner=True)
-def known_extrema(table, pool, watch, memory, p, posed, offsets, tracked, extrema, work):
+def known_extrema(store, watch, memory, p, posed, offsets, tracked, extrema, work):
     """The roots that contacts of pair p have now: given ones, then listed ones.
 
     A listed contact that lost its root, or came to that of another one or to the far sides, gives up its place. Returns
     how many roots there are, and whether any was lost.
     """
-    manager = manager_at(table, watch)
-    pair = pair_at(table, manager.pair_table + PAIR_RECORD * p)
-    places = memory_places(table, watch)[1]
-    merge_radius = lengths_at(pool, manager.lengths).neglect
+    manager = manager_at(store.table, watch)
+    pair = pair_at(store.table, manager.pair_table + PAIR_RECORD * p)
+    places = memory_places(store.table, watch)[1]
+    merge_radius = lengths_at(store.pool, manager.lengths).neglect
     # A contact that is to close a gap would contradict a clearance that asks for one, where both stood for one root.
-    radius = merge_radius if pair_lengths_at(pool, pair.minimum).least == 0.0 else math.inf
+    radius = merge_radius if pair_lengths_at(store.pool, pair.minimum).least == 0.0 else math.inf
     many = pair.given_count if posed.surfaces[0] >= 0 else 0
-    count = add_given(table, pool, posed, tracked, pair.given, many, radius, extrema, work)
+    count = add_given(store, posed, tracked, pair.given, many, radius, extrema, work)
     first, last = pair.low, pair.high
     any_gone = False
     # Roots first, then corners, which give way to them.
@@ -344,25 +344,25 @@ def known_extrema(table, pool, watch, memory, p, posed, offsets, tracked, extrem
             codes = (np.int64(tracked_pair.feature_f), np.int64(tracked_pair.feature_g))
             n = three_of(tracked_pair.normal)
             if vertex_contact >= HELD_F:
-                start = sunk(table, pool, posed, codes, vertex_contact, start)
+                start = sunk(store, posed, codes, vertex_contact, start)
             count, found = add_extremum(
-                table, pool, posed, codes, start, n, merge_radius, extrema, count, work, vertex_contact
+                store, posed, codes, start, n, merge_radius, extrema, count, work, vertex_contact
             )
             lost = found != ALIKE and found != MINIMUM_FOUND
             if count > before and vertex_contact == 0.0 and extremum.gap < 0.0:
-                lost = lost or is_of_far_sides(table, pool, posed, extrema, before, offsets)
+                lost = lost or is_of_far_sides(store, posed, extrema, before, offsets)
         if count > before and not lost:
             extremum.origin = LISTED + k
             if vertex_contact >= HELD_F and extremum.gap < tracked_pair.gap - SUNK:
                 # The same contact elsewhere: who solves has to know.
-                note(table, watch, memory, HANDED_OFF, SAME_EXTREMUM, p, slot.number, extremum.gap)
+                note(store.table, watch, memory, HANDED_OFF, SAME_EXTREMUM, p, slot.number, extremum.gap)
             write_extremum(extrema, before, tracked, r)
         else:
             # A corner that went past its face is none of these.
             any_gone = any_gone or (lost and vertex_contact == 0.0)
             kind, reason = (HANDED_OFF, LOST) if lost else (MERGED, SAME_EXTREMUM)
-            note(table, watch, memory, kind, reason, p, slot.number, tracked_pair.gap)
-            release(table, watch, memory, k, tracked)
+            note(store.table, watch, memory, kind, reason, p, slot.number, tracked_pair.gap)
+            release(store.table, watch, memory, k, tracked)
     return count, any_gone
 
 
@@ -396,19 +396,19 @@ def release_given(table, watch, memory, p, extrema, count, tracked):
 
 
 @kernel(inner=True)
-def list_extrema(table, pool, watch, memory, p, extrema, count, tracked):
+def list_extrema(store, watch, memory, p, extrema, count, tracked):
     """Give places to the near roots of pair p and take them from the far ones.
 
     Returns by how much the nearest one that is not listed is farther than it has to be, its gap, and whether a place
     was wanting.
     """
     state = memory_header_at(memory, 0)
-    manager = manager_at(table, watch)
+    manager = manager_at(store.table, watch)
     wanting = False
     pair = manager.pair_table + PAIR_RECORD * p
-    at = pair_state_at(memory, memory_places(table, watch)[0] + PAIR_MEMORY * p)
-    places, reach = memory_places(table, watch)[1], at.reach
-    least = pair_lengths_at(pool, pair_at(table, pair).minimum).least
+    at = pair_state_at(memory, memory_places(store.table, watch)[0] + PAIR_MEMORY * p)
+    places, reach = memory_places(store.table, watch)[1], at.reach
+    least = pair_lengths_at(store.pool, pair_at(store.table, pair).minimum).least
     rest = math.inf
     lowest = math.inf
     for i in range(count):
@@ -416,8 +416,8 @@ def list_extrema(table, pool, watch, memory, p, extrema, count, tracked):
         if origin >= LISTED and gap_beyond(extrema, i, least) > KEEP * reach:
             k = origin - LISTED
             number = place_at(memory, places + PLACE_MEMORY * k).number
-            note(table, watch, memory, REMOVED, WENT_AWAY, p, number, extremum_at(extrema, i).gap)
-            release(table, watch, memory, k, tracked)
+            note(store.table, watch, memory, REMOVED, WENT_AWAY, p, number, extremum_at(extrema, i).gap)
+            release(store.table, watch, memory, k, tracked)
             rest = min(rest, gap_beyond(extrema, i, least))
             lowest = min(lowest, extremum_at(extrema, i).gap)
     # The nearest first, so that it is the far ones for which places may be wanting.
@@ -432,14 +432,14 @@ def list_extrema(table, pool, watch, memory, p, extrema, count, tracked):
             break
         gap = gap_beyond(extrema, best, least)
         extremum_at(extrema, best).origin = USELESS
-        k = free_place(table, watch, memory, pair) if gap <= TAKE * reach else -1
+        k = free_place(store.table, watch, memory, pair) if gap <= TAKE * reach else -1
         if k < 0:
             rest = min(rest, gap)
             lowest = min(lowest, extremum_at(extrema, best).gap)
             if gap <= TAKE * reach and not wanting:
                 wanting = True
                 if at.wanting == 0.0:
-                    note(table, watch, memory, REFUSED, NO_PLACE, p, 0.0, extremum_at(extrema, best).gap)
+                    note(store.table, watch, memory, REFUSED, NO_PLACE, p, 0.0, extremum_at(extrema, best).gap)
             continue
         o = place_at(memory, places + PLACE_MEMORY * k)
         o.pair = float(p)
@@ -448,7 +448,7 @@ def list_extrema(table, pool, watch, memory, p, extrema, count, tracked):
         o.given = 1.0 if extremum_at(extrema, best).place == BESIDE_CONTACT else 0.0
         write_extremum(extrema, best, tracked, manager.first + k)
         tracked_at(tracked, manager.first + k).allowed = -gap if -state.overlap <= gap < 0.0 else 0.0
-        note(table, watch, memory, ADDED, CAME_NEAR, p, state.born, extremum_at(extrema, best).gap)
+        note(store.table, watch, memory, ADDED, CAME_NEAR, p, state.born, extremum_at(extrema, best).gap)
     at.wanting = 1.0 if wanting else 0.0
     return rest, lowest, wanting
 

@@ -20,6 +20,7 @@ import numpy as np
 
 from assembly._address import call_address
 from assembly._kernel import kernel
+from assembly._record import Store
 from assembly.proximity.bvh.neighbor_list import LIST_INTS
 from assembly.proximity.bvh.tree import least_distance, node_at, tree_at
 from assembly.proximity.features.solid_contact import CONTACT_RECORD, TRACK, tracked_at
@@ -110,19 +111,17 @@ CROSSING = 1e-6
 
 
 @kernel(inner=True)
-def list_vertex_contacts(table, pool, watch, posed, reach, least, offsets, workspace, extrema, count, tracked):
+def list_vertex_contacts(store, watch, posed, reach, least, offsets, workspace, extrema, count, tracked):
     """Add corners over faces to the roots of a pair. Returns how many roots there are.
 
     A listed contact whose root is at one stays there.
     """
-    manager = manager_at(table, watch)
-    lengths = lengths_at(pool, manager.lengths)
+    manager = manager_at(store.table, watch)
+    lengths = lengths_at(store.pool, manager.lengths)
     span = (-lengths.first_reach, reach + least)
     merge_radius = lengths.neglect
     stack, candidates, work = workspace.stack, workspace.candidates, workspace.work
-    count = add_vertex_contacts(
-        table, pool, posed, span, offsets, merge_radius, stack, candidates, extrema, count, work
-    )
+    count = add_vertex_contacts(store, posed, span, offsets, merge_radius, stack, candidates, extrema, count, work)
     for k in range(count):
         extremum = extremum_at(extrema, k)
         place = np.int64(extremum.origin)
@@ -143,11 +142,11 @@ def nearest_fold(extrema, count, least, reach):
 
 
 @kernel(inner=True)
-def crosses_elsewhere(table, pool, watch, memory, p, posed, extrema, count, least, offsets, stack, candidates, tracked):
+def crosses_elsewhere(store, watch, memory, p, posed, extrema, count, least, offsets, stack, candidates, tracked):
     """Whether the bodies of pair p are in each other where no contact says so."""
-    manager = manager_at(table, watch)
-    pair = pair_at(table, manager.pair_table + PAIR_RECORD * p)
-    places = memory_places(table, watch)[1]
+    manager = manager_at(store.table, watch)
+    pair = pair_at(store.table, manager.pair_table + PAIR_RECORD * p)
+    places = memory_places(store.table, watch)[1]
     margin = max(CROSSING, memory_header_at(memory, 0).overlap)
     deep = False
     for k in range(count):
@@ -160,123 +159,120 @@ def crosses_elsewhere(table, pool, watch, memory, p, posed, extrema, count, leas
     for k in range(pair.low, pair.high):
         if place_at(memory, places + PLACE_MEMORY * k).pair == p:
             deep = deep or tracked_at(tracked, manager.first + k).gap < -margin
-    return not deep and crosses(table, pool, posed, stack, candidates, margin, offsets)
+    return not deep and crosses(store, posed, stack, candidates, margin, offsets)
 
 
 @kernel(inner=True)
-def search_by_patches(table, pool, watch, memory, p, posed, moving, reach, offsets, tracked, workspace, extrema):
+def search_by_patches(store, watch, memory, p, posed, moving, reach, offsets, tracked, workspace, extrema):
     """Find the roots of pair p by patches that face each other.
 
     Returns a PairSearch, whether a listed root was lost, and whether there is anything within reach.
     """
-    manager = manager_at(table, watch)
+    manager = manager_at(store.table, watch)
     stack, candidates, distances = workspace.stack, workspace.candidates, workspace.distances
-    lengths = lengths_at(pool, manager.lengths)
-    minimum = pair_at(table, manager.pair_table + PAIR_RECORD * p).minimum
-    asked = pair_lengths_at(pool, minimum)
+    lengths = lengths_at(store.pool, manager.lengths)
+    minimum = pair_at(store.table, manager.pair_table + PAIR_RECORD * p).minimum
+    asked = pair_lengths_at(store.pool, minimum)
     least, flank = asked.least, asked.curved_bound
-    at = memory_places(table, watch)[0] + PAIR_MEMORY * p
-    found, reach = candidate_pairs(table, pool, watch, memory, p, posed, moving, reach, stack, candidates)
+    at = memory_places(store.table, watch)[0] + PAIR_MEMORY * p
+    found, reach = candidate_pairs(store, watch, memory, p, posed, moving, reach, stack, candidates)
     pair_state_at(memory, at).reach = reach
-    count, any_gone = known_extrema(table, pool, watch, memory, p, posed, offsets, tracked, extrema, workspace.work)
-    enough = near_enough(table, pool, posed, least, reach, flank, candidates, found, distances)
+    count, any_gone = known_extrema(store, watch, memory, p, posed, offsets, tracked, extrema, workspace.work)
+    enough = near_enough(store, posed, least, reach, flank, candidates, found, distances)
     span = (-lengths.last_reach, reach + least)
     merge_radius = lengths.neglect
     facing = (candidates, distances)
     search = search_patches(
-        table, pool, posed, moving, (flank, enough), span, offsets, merge_radius, facing, found, extrema, count,
+        store, posed, moving, (flank, enough), span, offsets, merge_radius, facing, found, extrema, count,
         workspace.work, workspace.passed,
     )  # fmt: skip
     free = min(search.bound, reach)
     if found == 0:
         # Nothing faces the other body within reach: the boxes tell how far that is so.
         trees = posed.trees
-        free = max(
-            free, least_distance(table, pool, trees[0], trees[1], posed.turn, posed.shift, math.inf, stack) - least
-        )
+        free = max(free, least_distance(store, trees[0], trees[1], posed.pose, math.inf, stack) - least)
     return PairSearch(search.count, free, search.ball_bound, search.ball, math.inf), any_gone, found > 0
 
 
 @kernel(inner=True)
-def search_by_centerlines(table, pool, watch, memory, p, posed, moving, reach, offsets, tracked, workspace, extrema):
+def search_by_centerlines(store, watch, memory, p, posed, moving, reach, offsets, tracked, workspace, extrema):
     """The same for two round wires, by their spines."""
-    manager = manager_at(table, watch)
+    manager = manager_at(store.table, watch)
     stack, pairs, boxes = workspace.stack, workspace.pairs, workspace.boxes
-    lengths = lengths_at(pool, manager.lengths)
-    minimum = pair_at(table, manager.pair_table + PAIR_RECORD * p).minimum
-    asked = pair_lengths_at(pool, minimum)
+    lengths = lengths_at(store.pool, manager.lengths)
+    minimum = pair_at(store.table, manager.pair_table + PAIR_RECORD * p).minimum
+    asked = pair_lengths_at(store.pool, minimum)
     least, flank = asked.least, asked.curved_bound
-    radii = both_radii(table, pool, posed.centerlines) + least
+    radii = both_radii(store, posed.centerlines) + least
     ring = CENTERLINE_RINGS * lengths.first_reach
     at_list = manager.list_table + LIST_INTS * (p % manager.lists)
-    waiting = near_parts(table, pool, at_list, p, posed, moving, radii + reach, ring, stack, pairs, boxes)
+    waiting = near_parts(store, at_list, p, posed, moving, radii + reach, ring, stack, pairs, boxes)
     while waiting < 0 and reach > LEAST_ALLOWANCE:
         # Out of room: what is nearer is looked at more often.
         reach *= 0.5
-        waiting = near_parts(table, pool, at_list, p, posed, moving, radii + reach, ring, stack, pairs, boxes)
-    pair_state_at(memory, memory_places(table, watch)[0] + PAIR_MEMORY * p).reach = reach
-    count, any_gone = known_extrema(table, pool, watch, memory, p, posed, offsets, tracked, extrema, workspace.work)
+        waiting = near_parts(store, at_list, p, posed, moving, radii + reach, ring, stack, pairs, boxes)
+    pair_state_at(memory, memory_places(store.table, watch)[0] + PAIR_MEMORY * p).reach = reach
+    count, any_gone = known_extrema(store, watch, memory, p, posed, offsets, tracked, extrema, workspace.work)
     if waiting < 0:
         # There is no room for what is as near as it should not be.
         memory_header_at(memory, 0).crowded = 1.0
         return PairSearch(count, 0.0, math.inf, no_ball(), math.inf), any_gone, True
     if waiting == 0:
-        beyond = parts_beyond(table, pool, posed, radii + reach, stack, pairs) - radii
+        beyond = parts_beyond(store, posed, radii + reach, stack, pairs) - radii
         return PairSearch(count, beyond, math.inf, no_ball(), math.inf), any_gone, False
     # No tangent turns by more than a motion over this.
-    rho = min(2.0 * (radii + reach), 0.99 * node_at(pool, tree_at(table, moving.tree).node_pool).radius)
+    rho = min(2.0 * (radii + reach), 0.99 * node_at(store.pool, tree_at(store.table, moving.tree).node_pool).radius)
     search = search_centerlines(
-        table, pool, posed, moving, rho, (least, TAKE * reach, reach, flank), lengths.neglect, boxes, waiting,
+        store, posed, moving, rho, (least, TAKE * reach, reach, flank), lengths.neglect, boxes, waiting,
         workspace.marks, extrema, count, workspace.work,
     )  # fmt: skip
     return search, any_gone, True
 
 
 @kernel(inner=True)
-def update_pair(table, pool, watch, memory, p, q, tracked, workspace, extrema, asks):
+def update_pair(store, watch, memory, p, q, tracked, workspace, extrema, asks):
     """Find and list the roots of pair p; `asks` says whether it tells if the bodies cross elsewhere."""
     state = memory_header_at(memory, 0)
-    manager = manager_at(table, watch)
-    pair = pair_at(table, manager.pair_table + PAIR_RECORD * p)
-    at = memory_places(table, watch)[0] + PAIR_MEMORY * p
+    manager = manager_at(store.table, watch)
+    pair = pair_at(store.table, manager.pair_table + PAIR_RECORD * p)
+    at = memory_places(store.table, watch)[0] + PAIR_MEMORY * p
     known = pair_state_at(memory, at)
     posed = posed_pair(manager, pair, q)
     state.looks += 1.0
-    asked = pair_lengths_at(pool, pair.minimum)
+    asked = pair_lengths_at(store.pool, pair.minimum)
     least = asked.least
     offsets = (asked.offset[0], asked.offset[1])
-    moving = mover(table, watch, p, q)
-    reach = reach_now(table, pool, watch, memory, p, moving)
+    moving = mover(store.table, watch, p, q)
+    reach = reach_now(store, watch, memory, p, moving)
     wires = posed.centerlines[0] >= 0
     if wires:
         search, any_gone, found = search_by_centerlines(
-            table, pool, watch, memory, p, posed, moving, reach, offsets, tracked, workspace, extrema
+            store, watch, memory, p, posed, moving, reach, offsets, tracked, workspace, extrema
         )
     else:
         search, any_gone, found = search_by_patches(
-            table, pool, watch, memory, p, posed, moving, reach, offsets, tracked, workspace, extrema
+            store, watch, memory, p, posed, moving, reach, offsets, tracked, workspace, extrema
         )
     count, fertile, sure = search.count, search.ball_bound, search.accepted_bound
     if posed.surfaces[0] >= 0:
-        keep_slots_of_given(table, watch, memory, p, extrema, count, tracked)
+        keep_slots_of_given(store.table, watch, memory, p, extrema, count, tracked)
     elif manager.corners == 1:
         count = list_vertex_contacts(
-            table, pool, watch, posed, known.reach, least, offsets, workspace, extrema, count, tracked
+            store, watch, posed, known.reach, least, offsets, workspace, extrema, count, tracked
         )
     if posed.surfaces[0] < 0 and any_deep(extrema, count):
-        drop_flush(table, pool, watch, memory, p, posed, extrema, count, tracked)
+        drop_flush(store, watch, memory, p, posed, extrema, count, tracked)
     if manager.mark_address != 0 and least > 0.0 and pair.given_count > 0:
-        call_address(manager.mark_address, (table, pool, watch, p, q, tracked, extrema, count))
-        release_given(table, watch, memory, p, extrema, count, tracked)
-    rest, lowest, wanting = list_extrema(table, pool, watch, memory, p, extrema, count, tracked)
+        call_address(manager.mark_address, (store.table, store.pool, watch, p, q, tracked, extrema, count))
+        release_given(store.table, watch, memory, p, extrema, count, tracked)
+    rest, lowest, wanting = list_extrema(store, watch, memory, p, extrema, count, tracked)
     known.crossed = math.nan
     if wires and asks != NEVER:
         # All that is as near as this is known, and most of it is listed.
         known.crossed = 1.0 if lowest < -max(CROSSING, state.overlap) else 0.0
     elif asks == ALWAYS or (asks == WHERE_LOST and any_gone):
         crossed = crosses_elsewhere(
-            table,
-            pool,
+            store,
             watch,
             memory,
             p,
@@ -297,10 +293,10 @@ def update_pair(table, pool, watch, memory, p, q, tracked, workspace, extrema, a
         sure = max(sure, STILL * known.allowance)
     elif fertile < math.inf:
         low = nearest_fold(extrema, count, least, known.reach)
-        sure = 0.0 if low <= FLAT * lengths_at(pool, manager.lengths).first_reach else math.inf
+        sure = 0.0 if low <= FLAT * lengths_at(store.pool, manager.lengths).first_reach else math.inf
         fertile = fertile if sure == 0.0 else min(fertile, low)
     allow_ball(memory, at, search.ball, fertile, sure)
-    listed = any_listed(table, watch, memory, p)
+    listed = any_listed(store.table, watch, memory, p)
     known.state = float(TRACKING if listed else (NEAR if found else FAR))
     if wanting:
         state.crowded = 1.0
@@ -340,10 +336,10 @@ def is_due(table, watch, memory, p, tracked, how, most):
 
 
 @kernel(inner=True, allocates=True)
-def update_due(table, pool, watch, memory, q, tracked, how, first, most):
+def update_due(store, watch, memory, q, tracked, how, first, most):
     """Look at the pairs that are due, of which `first` is the first one."""
     state = memory_header_at(memory, 0)
-    manager = manager_at(table, watch)
+    manager = manager_at(store.table, watch)
     stack = np.empty((STACK, 2), np.int64)
     extrema = np.empty((EXTREMA, ROOT))
     pairs = np.empty((BOXES, 2), np.int64)
@@ -354,9 +350,9 @@ def update_due(table, pool, watch, memory, q, tracked, how, first, most):
     candidates = stack
     distances = boxes[0]
     passed = boxes
-    at = memory_places(table, watch)[0]
+    at = memory_places(store.table, watch)[0]
     for p in range(first, manager.pairs):
-        if p != first and not is_due(table, watch, memory, p, tracked, how, most):
+        if p != first and not is_due(store.table, watch, memory, p, tracked, how, most):
             continue
         if p != first and manager.clock != 0 and call_address(manager.clock, ()) > state.deadline:
             if manager.go_on_address == 0 or call_address(manager.go_on_address, ()) == ABORTED:
@@ -364,7 +360,7 @@ def update_due(table, pool, watch, memory, q, tracked, how, first, most):
                 state.deadline = -1.0
                 break
             state.deadline = call_address(manager.clock, ()) + SLICE
-        if is_by_patches(table, watch, p) and not with_patches:
+        if is_by_patches(store.table, watch, p) and not with_patches:
             with_patches = True
             candidates = np.empty((CANDIDATES, 2), np.int64)
             distances = np.empty(CANDIDATES)
@@ -382,7 +378,7 @@ def update_due(table, pool, watch, memory, q, tracked, how, first, most):
             boxes=boxes,
             marks=marks,
         )
-        update_pair(table, pool, watch, memory, p, q, tracked, workspace, extrema, asks)
+        update_pair(store, watch, memory, p, q, tracked, workspace, extrema, asks)
 
 
 @kernel(signatures="(i8[::1], f8[::1], i8, f8[::1], f8[:, ::1], f8[:, ::1], i8)")
@@ -392,16 +388,17 @@ def update(table, pool, watch, memory, q, tracked, how):
     Returns how many events that made. `tracked` has a row for every place (`proximity/features/solid_contact.py`), at
     the roots of the poses q or close by.
     """
+    store = Store(table, pool)
     state = memory_header_at(memory, 0)
     before = state.event_count
     state.calls += 1.0
     most = -1
     if how & MEASURED == 0:
-        most = largest_part(table, pool, watch, memory, q)[0]
+        most = largest_part(store, watch, memory, q)[0]
     else:
         most = used_most(table, watch, memory)
     for p in range(manager_at(table, watch).pairs):
         if is_due(table, watch, memory, p, tracked, how, most):
-            update_due(table, pool, watch, memory, q, tracked, how, p, most)
+            update_due(store, watch, memory, q, tracked, how, p, most)
             break
     return np.int64(state.event_count - before)

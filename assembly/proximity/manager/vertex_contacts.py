@@ -53,28 +53,32 @@ def is_vertex_contact(table, posed, code_f, code_g):
 
 
 @kernel(inner=True)
-def hold_extrema(table, pool, posed, extrema, count, work):
+def hold_extrema(store, posed, extrema, count, work):
     """Make corners of those roots that are at one: rows that jump from corner to corner hold none of them."""
     if count == extrema.shape[0]:
         return
     for k in range(count):
         extremum = extremum_at(extrema, k)
         codes = (np.int64(extremum.code_f), np.int64(extremum.code_g))
-        if extremum.corner > 0.0 or extremum.gap < -SLACK or not is_vertex_contact(table, posed, codes[0], codes[1]):
+        if (
+            extremum.corner > 0.0
+            or extremum.gap < -SLACK
+            or not is_vertex_contact(store.table, posed, codes[0], codes[1])
+        ):
             continue
         x, n = pair_parameters(extremum), three_of(extremum.normal)
-        found = solids_extremum(table, pool, posed, codes, x, n, extrema, count, work, FEATURES)
+        found = solids_extremum(store, posed, codes, x, n, extrema, count, work, FEATURES)
         extremum.corner = 0.0 if found == NOTHING else FEATURES
 
 
 @kernel(inner=True)
-def is_next(table, pool, posed, codes, side, start, width, extrema, count):
+def is_next(store, posed, codes, side, start, width, extrema, count):
     """Whether the middle of a part of an edge, at `start`, is to be held over the face that the other feature is.
 
     So it is where the edge is bent, and has turned far from all of its points that are known over that face.
     """
-    edge = feature_at(table, posed.shells[side], codes[side])
-    _p, along, bent = edge_jet(table, pool, edge, start[2 * side])
+    edge = feature_at(store.table, posed.shells[side], codes[side])
+    _p, along, bent = edge_jet(store, edge, start[2 * side])
     side_of = cross(along, bent)
     if width * width * dot(side_of, side_of) < STRAIGHT * STRAIGHT * dot(along, along) * dot(along, along):
         return False
@@ -82,48 +86,50 @@ def is_next(table, pool, posed, codes, side, start, width, extrema, count):
     for k in range(count):
         extremum = extremum_at(extrema, k)
         if extremum.code_f == codes[0] and extremum.code_g == codes[1]:
-            _p, other, _bent = edge_jet(table, pool, edge, extremum.parameters[2 * side])
+            _p, other, _bent = edge_jet(store, edge, extremum.parameters[2 * side])
             if dot(along, unit(other)) > NEXT:
                 return False
     return True
 
 
 @kernel(inner=True)
-def add_vertex_contact(table, pool, posed, codes, start, span, offsets, merge_radius, extrema, count, work, holds):
+def add_vertex_contact(store, posed, codes, start, span, offsets, merge_radius, extrema, count, work, holds):
     """Add the corner that holds on to two features, or to a point of an edge; how many roots there are then."""
     before = count
     extremum = extremum_at(extrema, before)
     count, _result = add_extremum(
-        table, pool, posed, codes, start, (0.0, 0.0, 0.0), merge_radius, extrema, count, work, holds
+        store, posed, codes, start, (0.0, 0.0, 0.0), merge_radius, extrema, count, work, holds
     )
     if count == before:
         return count
     gap = extremum.gap
-    of_edges = feature_kind(table, posed.shells[0], codes[0]) == feature_kind(table, posed.shells[1], codes[1]) == EDGE
+    of_edges = (
+        feature_kind(store.table, posed.shells[0], codes[0])
+        == feature_kind(store.table, posed.shells[1], codes[1])
+        == EDGE
+    )
     stays = (-SLACK if of_edges else span[0]) <= gap <= span[1]
-    if not stays or (gap < -SLACK and is_outside(table, pool, posed, extrema, before, offsets)):
+    if not stays or (gap < -SLACK and is_outside(store, posed, extrema, before, offsets)):
         return before
     extremum.origin = NEW
     return count
 
 
 @kernel(inner=True)
-def add_near_singular(table, pool, posed, codes, start, half, span, offsets, merge_radius, extrema, count, work):
+def add_near_singular(store, posed, codes, start, half, span, offsets, merge_radius, extrema, count, work):
     """Hold a point of a valley that crosses a pair of patches of two faces; how many roots there are then."""
-    surfaces = (feature_at(table, posed.shells[0], codes[0]), feature_at(table, posed.shells[1], codes[1]))
-    found, x, on_f, along = into_near_singular(
-        table, pool, surfaces[0], surfaces[1], posed.turn, posed.shift, start, half
-    )
-    if not found or not is_next_in_near_singular(table, pool, posed, codes, surfaces, x, along, extrema, count):
+    surfaces = (feature_at(store.table, posed.shells[0], codes[0]), feature_at(store.table, posed.shells[1], codes[1]))
+    found, x, on_f, along = into_near_singular(store, surfaces[0], surfaces[1], posed.pose, start, half)
+    if not found or not is_next_in_near_singular(store, posed, codes, surfaces, x, along, extrema, count):
         return count
-    if not is_on_face(table, pool, posed, codes, 0 if on_f else 1, x):
+    if not is_on_face(store, posed, codes, 0 if on_f else 1, x):
         return count
     held = HELD_F if on_f else HELD_G
-    return add_vertex_contact(table, pool, posed, codes, x, span, offsets, merge_radius, extrema, count, work, held)
+    return add_vertex_contact(store, posed, codes, x, span, offsets, merge_radius, extrema, count, work, held)
 
 
 @kernel(inner=True)
-def add_vertex_contacts(table, pool, posed, span, offsets, merge_radius, stack, candidates, extrema, count, work):
+def add_vertex_contacts(store, posed, span, offsets, merge_radius, stack, candidates, extrema, count, work):
     """Add corners with gaps in a span; how many roots there are then.
 
     A point just below a face is inside, where none is between; deeper ones may be behind a sheet, and edges that have
@@ -131,35 +137,35 @@ def add_vertex_contacts(table, pool, posed, span, offsets, merge_radius, stack, 
     that are at a corner become one.
     """
     tree_f, tree_g = posed.trees
-    count = hold_continua(table, pool, posed, extrema, count)
-    found = pairs_about(table, pool, tree_f, tree_g, posed.turn, posed.shift, span[1], 0.0, TILT, stack, candidates)
+    count = hold_continua(store, posed, extrema, count)
+    found = pairs_about(store, tree_f, tree_g, posed.pose, span[1], 0.0, TILT, stack, candidates)
     for c in range(min(found, candidates.shape[0])):
         if count == extrema.shape[0]:
             break
-        o = tree_at(table, tree_f).element_pool + ELEMENT * candidates[c, 0]
-        p = tree_at(table, tree_g).element_pool + ELEMENT * candidates[c, 1]
-        f, g = element_at(pool, o), element_at(pool, p)
+        o = tree_at(store.table, tree_f).element_pool + ELEMENT * candidates[c, 0]
+        p = tree_at(store.table, tree_g).element_pool + ELEMENT * candidates[c, 1]
+        f, g = element_at(store.pool, o), element_at(store.pool, p)
         codes = (np.int64(f.feature), np.int64(g.feature))
         start = (f.middle[0], f.middle[1], g.middle[0], g.middle[1])
-        if is_of_faces(table, posed, codes[0], codes[1]):
+        if is_of_faces(store.table, posed, codes[0], codes[1]):
             half = (f.half[0], f.half[1], g.half[0], g.half[1])
             count = add_near_singular(
-                table, pool, posed, codes, start, half, span, offsets, merge_radius, extrema, count, work
+                store, posed, codes, start, half, span, offsets, merge_radius, extrema, count, work
             )
-        if not is_vertex_contact(table, posed, codes[0], codes[1]):
+        if not is_vertex_contact(store.table, posed, codes[0], codes[1]):
             continue
         count = add_vertex_contact(
-            table, pool, posed, codes, start, span, offsets, merge_radius, extrema, count, work, FEATURES
+            store, posed, codes, start, span, offsets, merge_radius, extrema, count, work, FEATURES
         )
-        side = 0 if feature_kind(table, posed.shells[0], codes[0]) == EDGE else 1
-        other = feature_kind(table, posed.shells[1 - side], codes[1 - side])
-        is_rim = other == FACE and feature_kind(table, posed.shells[side], codes[side]) == EDGE
+        side = 0 if feature_kind(store.table, posed.shells[0], codes[0]) == EDGE else 1
+        other = feature_kind(store.table, posed.shells[1 - side], codes[1 - side])
+        is_rim = other == FACE and feature_kind(store.table, posed.shells[side], codes[side]) == EDGE
         width = f.half[0] if side == 0 else g.half[0]
         if is_rim and count < extrema.shape[0]:
-            if is_next(table, pool, posed, codes, side, start, width, extrema, count):
+            if is_next(store, posed, codes, side, start, width, extrema, count):
                 count = add_vertex_contact(
-                    table, pool, posed, codes, start, span, offsets, merge_radius, extrema, count, work, POINT
+                    store, posed, codes, start, span, offsets, merge_radius, extrema, count, work, POINT
                 )
     if 0 <= found <= candidates.shape[0]:
-        hold_extrema(table, pool, posed, extrema, count, work)
+        hold_extrema(store, posed, extrema, count, work)
     return count

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
-from assembly._record import place_of, record_dtype, record_view, size_of
+from assembly._record import Store, place_of, record_dtype, record_view, size_of
 from assembly.geometry.splines.evaluate import find_span, surface_at
 from assembly.geometry.vec import add, blend, cross, dot, scale, sub
 from assembly.proximity.bvh.tree import three_of
@@ -118,72 +118,72 @@ def in_span(pool, breaks, k, x):
 
 
 @kernel(inline=True)
-def both_radii(table, pool, centerlines):
+def both_radii(store, centerlines):
     """The radii of two wires, together."""
     return (
-        wire_at(pool, centerline_at(table, centerlines[0]).numbers).radius
-        + wire_at(pool, centerline_at(table, centerlines[1]).numbers).radius
+        wire_at(store.pool, centerline_at(store.table, centerlines[0]).numbers).radius
+        + wire_at(store.pool, centerline_at(store.table, centerlines[1]).numbers).radius
     )
 
 
 @kernel(inner=True)
-def wire_parameters(table, pool, centerline, surface, part, s, way):
+def wire_parameters(store, centerline, surface, part, s, way):
     """Parameters (u, v) of the wire's surface in a unit direction from a point of its spine, s from a part's middle.
 
     At a free end the direction may lead on: there is a half ball.
     """
-    line = centerline_at(table, centerline)
+    line = centerline_at(store.table, centerline)
     o = line.part_pool + PART * part
-    part_record = centerline_part_at(pool, o)
+    part_record = centerline_part_at(store.pool, o)
     k = np.int64(part_record.owner)
-    piece = centerline_piece_at(pool, line.piece_pool + PIECE * k)
+    piece = centerline_piece_at(store.pool, line.piece_pool + PIECE * k)
     bend, length = piece.bend, piece.length
-    _point, t, curvature = centerline_point(pool, o, s)
+    _point, t, curvature = centerline_point(store.pool, o, s)
     n = scale(1.0 / bend, curvature) if bend > 0.0 else three_of(part_record.normal)
     turn = piece.turn
     begin = blend(math.cos(turn), n, math.sin(turn), cross(t, n))
     ahead = dot(way, t)
     across = sub(way, scale(ahead, t))
-    phi = math.atan2(wire_at(pool, line.numbers).sense * dot(across, cross(t, begin)), dot(across, begin))
+    phi = math.atan2(wire_at(store.pool, line.numbers).sense * dot(across, cross(t, begin)), dot(across, begin))
     if phi < 0.0:
         phi += 4.0 * QUARTER
     along = line.along
-    wire = surface_at(table, surface)
+    wire = surface_at(store.table, surface)
     breaks_u = wire.breaks_v if along == 1 else wire.breaks_u
     breaks_v = wire.breaks_u if along == 1 else wire.breaks_v
     spans_v = wire.spans_u if along == 1 else wire.spans_v
     share = 4.0 * QUARTER / spans_v
     j = min(int(phi / share), spans_v - 1)
-    v = in_span(pool, breaks_v, j, arc_place(phi - j * share, share))
+    v = in_span(store.pool, breaks_v, j, arc_place(phi - j * share, share))
     first = 0 if line.closed == 1 else 1
     lean = math.atan2(ahead, math.sqrt(dot(across, across)))
     if first == 1 and part == 0 and s <= -part_record.half and lean < 0.0:
-        u = in_span(pool, breaks_u, 0, arc_place(QUARTER + lean, QUARTER))
+        u = in_span(store.pool, breaks_u, 0, arc_place(QUARTER + lean, QUARTER))
     elif first == 1 and part == line.parts - 1 and s >= part_record.half and lean > 0.0:
-        u = in_span(pool, breaks_u, k + 2, arc_place(lean, QUARTER))
+        u = in_span(store.pool, breaks_u, k + 2, arc_place(lean, QUARTER))
     else:
         at = part_record.place + s
         x = arc_place(bend * at, bend * length) if bend > 0.0 else 2.0 * at / length - 1.0
-        u = in_span(pool, breaks_u, first + k, x)
+        u = in_span(store.pool, breaks_u, first + k, x)
     if along == 1:
         return v, u
     return u, v
 
 
 @kernel(inner=True)
-def centerline_place(table, pool, centerline, surface, u, v):
+def centerline_place(store, centerline, surface, u, v):
     """The part of a wire's spine, and how far from its middle, where parameters of the surface are."""
-    line = centerline_at(table, centerline)
+    line = centerline_at(store.table, centerline)
     along = line.along
-    wire = surface_at(table, surface)
+    wire = surface_at(store.table, surface)
     breaks = wire.breaks_v if along == 1 else wire.breaks_u
     spans = wire.spans_v if along == 1 else wire.spans_u
     at = v if along == 1 else u
-    span = find_span(pool, breaks, spans, at)
+    span = find_span(store.pool, breaks, spans, at)
     k = min(max(span - (1 - line.closed), 0), line.pieces - 1)
-    piece = centerline_piece_at(pool, line.piece_pool + PIECE * k)
+    piece = centerline_piece_at(store.pool, line.piece_pool + PIECE * k)
     span = k + 1 - line.closed
-    low, high = pool[breaks + span], pool[breaks + span + 1]
+    low, high = store.pool[breaks + span], store.pool[breaks + span + 1]
     x = min(max(2.0 * (at - low) / (high - low) - 1.0, -1.0), 1.0)
     length = piece.length
     whole = piece.bend * length
@@ -192,7 +192,7 @@ def centerline_place(table, pool, centerline, surface, u, v):
         reach = 0.5 + 2.0 * math.atan(x * math.tan(0.25 * whole)) / whole
     count = np.int64(piece.part_count)
     part = np.int64(piece.first_part) + min(np.int64(reach * count), count - 1)
-    o = centerline_part_at(pool, line.part_pool + PART * part)
+    o = centerline_part_at(store.pool, line.part_pool + PART * part)
     if abs(x) == 1.0:
         # Ends of a piece, and half balls: exactly.
         return part, x * o.half
@@ -212,10 +212,10 @@ def point_of(table, pool, centerline, part, s, out):
 @kernel(signatures="(i8[::1], f8[::1], i8, i8, i8, f8, f8, f8, f8)")
 def parameters_of(table, pool, centerline, surface, part, s, x, y, z):
     """`wire_parameters` for Python."""
-    return wire_parameters(table, pool, centerline, surface, part, s, (x, y, z))
+    return wire_parameters(Store(table, pool), centerline, surface, part, s, (x, y, z))
 
 
 @kernel(signatures="(i8[::1], f8[::1], i8, i8, f8, f8)")
 def place_of(table, pool, centerline, surface, u, v):
     """`spine_place` for Python."""
-    return centerline_place(table, pool, centerline, surface, u, v)
+    return centerline_place(Store(table, pool), centerline, surface, u, v)

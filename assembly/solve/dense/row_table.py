@@ -13,6 +13,7 @@ from collections import namedtuple
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly._record import Store
 from assembly.constraints.program.evaluate import evaluate
 from assembly.constraints.program.objective_terms import objective
 from assembly.constraints.program.records import (
@@ -105,19 +106,19 @@ def new_point(table):
 
 
 @kernel(inner=True, allocates=True)
-def point_at(table, pool, state, free):
+def point_at(store, state, free):
     """A point of the loop at a state, a `PointFound`.
 
     Parameters of contacts that are NaN are found by a global start, pairs at folds are freed, as the loop does.
     """
-    header = header_at(table, 0)
+    header = header_at(store.table, 0)
     pairs = header.contacts
     tracks = header.tracked
     start = np.empty((tracks, TRACK))
-    point = new_point(table)
+    point = new_point(store.table)
     q, tracked, records, residual = point.q, point.tracked, point.records, point.residual
     o = header.tape_room
-    room = TapeRoom(np.empty(table[o]), np.empty(table[o + 1]), np.empty(table[o + 2]))
+    room = TapeRoom(np.empty(store.table[o]), np.empty(store.table[o + 1]), np.empty(store.table[o + 2]))
     loose = LiftedPairs(
         free,
         np.empty((pairs, 4)),
@@ -126,26 +127,26 @@ def point_at(table, pool, state, free):
         np.empty((tracks, TRACK)),
         np.empty(0),
     )
-    scaled_poses(table, pool, state, q)
+    scaled_poses(store, state, q)
     for k in range(tracks):
         for i in range(TRACK):
             tracked[k, i] = state[7 * header.bodies + TRACK * k + i]
     for k in range(pairs):
         free[k] = -1
     count = 0
-    lost = start_contacts(table, pool, q, tracked, free, loose.lengths)
+    lost = start_contacts(store, q, tracked, free, loose.lengths)
     if lost < 0:
         # Every contact counts here, also one that pushes nothing.
         active = np.ones(residual.size)
-        count = free_folds(table, pool, records, tracked, active, free, loose.lengths, -1.0, -1, False)
+        count = free_folds(store, records, tracked, active, free, loose.lengths, -1.0, -1, False)
         before = -1
         while count != before:
             for k in range(tracks):
                 for i in range(TRACK):
                     start[k, i] = tracked[k, i]
-            lost = evaluate(table, pool, start, math.inf, loose, room, point)
+            lost = evaluate(store, start, math.inf, loose, room, point)
             before = count
-            count = free_folds(table, pool, records, tracked, active, free, loose.lengths, FREE_BELOW, lost, False)
+            count = free_folds(store, records, tracked, active, free, loose.lengths, FREE_BELOW, lost, False)
     return PointFound(lost, count, point, loose, room)
 
 
@@ -159,7 +160,7 @@ def rows_at(table, pool, state, free, residual, jacobian):
     as there are folds
     """
     header = header_at(table, 0)
-    found = point_at(table, pool, state, free)
+    found = point_at(Store(table, pool), state, free)
     lost, count, point = found.lost, found.count, found.iterate
     tracked, values, packed = point.tracked, point.residual, point.jacobian
     for k in range(header.tracked):
@@ -178,30 +179,31 @@ def gradient_at(table, pool, state, free, gradient, tips):
 
     `tips` is None where no term is a dexterity. Dexterities are left out where a contact has no pair.
     """
+    store = Store(table, pool)
     header = header_at(table, 0)
-    found = point_at(table, pool, state, free)
+    found = point_at(store, state, free)
     integers, doubles = size_of_shape(table, header.rows + 4 * found.count, 6 * header.moving + 4 * found.count)
     # The blocks outlive what is carved from them: they are arguments of the kernel that carves.
-    return slopes_at(table, pool, free, found, tips, gradient, np.empty(integers, np.int64), np.empty(doubles))
+    return slopes_at(store, free, found, tips, gradient, np.empty(integers, np.int64), np.empty(doubles))
 
 
 @kernel(inner=True, allocates=True)
-def slopes_at(table, pool, free, found, tips, gradient, integers, doubles):
+def slopes_at(store, free, found, tips, gradient, integers, doubles):
     """The same at a point that `point_at` found, with what it works in."""
-    header = header_at(table, 0)
+    header = header_at(store.table, 0)
     lost, count, point, loose, room = found.lost, found.count, found.iterate, found.lifted, found.tapes
     rows = header.rows + 4 * count
     n = 6 * header.moving + 4 * count
-    shape = shape_of(table, rows, n, table[:0], integers, doubles)
-    arrange(table, free, shape, rows, n)
+    shape = shape_of(store.table, rows, n, store.table[:0], integers, doubles)
+    arrange(store.table, free, shape, rows, n)
     slopes = np.empty(n)
     curves = np.empty((n, n))
     if lost < 0:
-        value = goal(table, pool, shape, rows, loose, room, tips, point, 1, slopes, curves)
+        value = goal(store, shape, rows, loose, room, tips, point, 1, slopes, curves)
     else:
-        value = objective(table, pool, point.q, 1, room, shape.sparsity, slopes, curves)
+        value = objective(store, point.q, 1, room, shape.sparsity, slopes, curves)
     for b in range(header.bodies):
-        s = table[header.slots + b]
+        s = store.table[header.slots + b]
         for k in range(6):
             gradient[6 * b + k] = slopes[6 * s + k] if s >= 0 else 0.0
     return value

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly._record import Store
 from assembly.constraints.program.objective_terms import term_at
 from assembly.constraints.program.records import header_at
 from assembly.solve.dense.row_table import point_at
@@ -19,16 +20,17 @@ def tip_at(table, pool, term, state, free, jacobian):
 
     Returns a contact that has no pair there or -1, an outcome of `dexterity.tip_map`, and the measure.
     """
+    store = Store(table, pool)
     header = header_at(table, 0)
     term_record = term_at(table, term)
-    at = point_at(table, pool, state, free)
+    at = point_at(store, state, free)
     lost, count = at.lost, at.count
     if lost >= 0:
         return lost, DEPENDENT, 0.0
     rows = header.rows + 4 * count
     bases = np.empty((rows, 3 + header.extra), np.int64)
     place_rows(table, free, bases, np.empty(rows, np.int64))
-    tip = tip_map(table, pool, term, bases, rows, 6 * header.moving + 4 * count, at.iterate, 1)
+    tip = tip_map(store, term, bases, rows, 6 * header.moving + 4 * count, at.iterate, 1)
     found = tip.jacobian
     jacobian[:] = found
     measure = dexterity_at(table, term_record.tape).measure

@@ -25,20 +25,20 @@ STEPS_OF_ROUNDING = 8.0
 
 
 @kernel(inner=True)
-def reach_of(table, pool, q):
+def reach_of(store, q):
     """How far out the user's coordinates are, over the size."""
-    units = pool_header_at(pool, 0)
+    units = pool_header_at(store.pool, 0)
     reach = 0.0
-    for b in range(header_at(table, 0).bodies):
+    for b in range(header_at(store.table, 0).bodies):
         for k in range(3):
             reach = max(reach, abs(q[b, k] + units.reference[k] / units.scale))
     return reach
 
 
 @kernel(inner=True)
-def rounding_at(table, pool, settings, current):
+def rounding_at(store, settings, current):
     """The violation that is none: what is asked for, or what rounding of coordinates and of whole turns violates."""
-    reach = max(reach_of(table, pool, current.q), turned(table, pool, current.tracked))
+    reach = max(reach_of(store, current.q), turned(store, current.tracked))
     return max(settings_at(settings, 0).feasibility, min(ROUNDING * reach, MOST_ROUNDING))
 
 
@@ -48,8 +48,8 @@ def is_rounding(program, current, lagrangian, n, rows, y, moved, dual):
 
     Poses' rounding by the objective's curvature, and that of forces.
     """
-    table, pool, shape = program.table, program.pool, program.structure
-    reach = max(1.0, reach_of(table, pool, current.q))
+    store, shape = program.store, program.structure
+    reach = max(1.0, reach_of(store, current.q))
     most = ROUNDING * (reach * greatest_on_diagonal(lagrangian, n, shape.sparsity) + strongest(y, rows))
     return moved <= STEPS_OF_ROUNDING * ROUNDING * reach and dual <= most
 
@@ -71,10 +71,10 @@ def has_arrived(program, settings, results, current, violation, last_violation, 
     steps gain nothing more.
     """
     limits = settings_at(settings, 0)
-    table, pool = program.table, program.pool
-    if is_near_saddle(table, settings, results, violation, dual):
+    store = program.store
+    if is_near_saddle(store.table, settings, results, violation, dual):
         return True
     if not (violation <= feasible and dual <= limits.stationarity):
         return False
     gains = violation > limits.feasibility and not violation > GAIN * last_violation
-    return not gains or violation <= rounding_at(table, pool, settings, current)
+    return not gains or violation <= rounding_at(store, settings, current)

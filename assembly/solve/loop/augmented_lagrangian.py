@@ -25,6 +25,7 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly._record import Store
 from assembly.constraints.program.contact import TOUCHING
 from assembly.constraints.program.objective_terms import objective
 from assembly.constraints.program.records import (
@@ -118,17 +119,17 @@ def solve_program(table, pool, settings, state, history, tips):
     `tips` is None where no term of the objective is a dexterity.
     """
     doubles, integers = workspace_needed(table)
-    return run(table, pool, settings, state, history, tips, np.empty(doubles), np.empty(integers, np.int64))
+    return run(Store(table, pool), settings, state, history, tips, np.empty(doubles), np.empty(integers, np.int64))
 
 
 @kernel(inner=True, allocates=True)
-def run(table, pool, settings, state, history, tips, doubles, integers):
+def run(store, settings, state, history, tips, doubles, integers):
     """The same, with what it works in."""
-    header = header_at(table, 0)
+    header = header_at(store.table, 0)
     limits = settings_at(settings, 0)
     pairs = header.contacts
     m = header.rows
-    results = results_of(table, state)
+    results = results_of(store.table, state)
     # What the watch of clearances knows, and whether there is one.
     result = results_at(results, 0)
     memory = results[RESULTS:]
@@ -137,25 +138,25 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
     rows = m
     n = 6 * header.moving
     # The last pose that held is none yet.
-    workspace = carve_all(table, memory, doubles, integers)
+    workspace = carve_all(store.table, memory, doubles, integers)
     shape, lifted, room, system = workspace.structure, workspace.lifted, workspace.tapes, workspace.system
     by_row, numbers, gram, way = workspace.by_row, workspace.numbers, workspace.gram, workspace.way
     progress = restoration_at(way, 0)
     current, trial, held = workspace.here, workspace.trial, workspace.held
     y, better_y, active, forces, foreseen = by_row.y, by_row.better_y, by_row.active, by_row.forces, by_row.foreseen
     weights = (active, forces, foreseen)
-    read_state(table, pool, state, current, trial, y, better_y)
+    read_state(store, state, current, trial, y, better_y)
     one_sided, order = shape.one_sided, shape.sparsity
     free = lifted.free
     # What stays as it is for the whole solve.
-    program = Program(table, pool, shape, lifted, room)
+    program = Program(store, shape, lifted, room)
     gradient, lines, lagrangian = system.gradient, system.directions, system.hessian
 
-    feasible = rounding_at(table, pool, settings, current)
-    farthest = FAR * (1.0 + reach_of(table, pool, current.q)) if limits.strays == 1.0 else math.inf
+    feasible = rounding_at(store, settings, current)
+    farthest = FAR * (1.0 + reach_of(store, current.q)) if limits.strays == 1.0 else math.inf
     tick = limits.tick == 1.0
     # A tick goes on with the last one, if that one's time was spent.
-    begin, done, looks = begin_tick(table, settings, results, memory)
+    begin, done, looks = begin_tick(store.table, settings, results, memory)
     clock = (begin, looks)
     limit = int(limits.iterations) - done
     longest_tick = EXTRA_TIME * int(limits.iterations) - done
@@ -194,7 +195,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
     holds = False
     status, lost, folded = set_out(program, settings, state, current, by_row, n)
     if status == CONTACT_LOST:
-        value = objective(table, pool, current.q, 0, room, order, gradient, lagrangian)
+        value = objective(store, current.q, 0, room, order, gradient, lagrangian)
     count = 0
     freed = 0
     below = FREE_BELOW
@@ -212,7 +213,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
     while True:
         may_begin = watched and not tick and holds and begun < BEGINNINGS and iteration + LEFT <= limit
         if status == STALLED and may_begin:
-            begin_again(table, pool, held, lifted, current, y, better_y)
+            begin_again(store, held, lifted, current, y, better_y)
             measured = False
             begun += 1
             iteration += 1
@@ -225,32 +226,32 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         if status != RUNNING:
             break
         if iteration > 0:
-            set_deadline(table, settings, memory, begin)
-        late = is_cut(table, memory)
+            set_deadline(store.table, settings, memory, begin)
+        late = is_cut(store.table, memory)
         holds_now = False
         if watched and not changed:
-            holds_now = off_rows(table, lifted, one_sided, current, tick) <= (feasible if tick else TOUCHING)
-            late = not holds_now and may_end(table, settings, memory, clock, iteration, 1.0)
+            holds_now = off_rows(store.table, lifted, one_sided, current, tick) <= (feasible if tick else TOUCHING)
+            late = not holds_now and may_end(store.table, settings, memory, clock, iteration, 1.0)
         if watched and not changed and not late:
             how = (CAREFUL if holds_now else AS_NEEDED) | (SPARING if tick else IN_TURNS | DOUBTFUL)
             how |= MEASURED if measured else AS_NEEDED
-            changed = update_again(table, pool, memory, current, how, free, lifted.guess)
-            late = is_cut(table, memory)
+            changed = update_again(store, memory, current, how, free, lifted.guess)
+            late = is_cut(store.table, memory)
         if changed:
-            place_clearance_rows(table, memory, current, y, better_y, free, False)
+            place_clearance_rows(store.table, memory, current, y, better_y, free, False)
         weigh_rows(rows, one_sided, current.residual, y, mu, forces, active)
         if folded:
             # Nothing is known of its row yet.
             active[lost] = 1.0 / mu
         if pairs > 0:
             count = free_folds(
-                table, pool, current.records, current.tracked, active, free, lifted.lengths, below, lost, free_trims
+                store, current.records, current.tracked, active, free, lifted.lengths, below, lost, free_trims
             )
         if m + 4 * count != rows or changed:
             changed = False
             rows, n, system, lost = rearrange(program, count, rows, current, y, better_y, active)
             if iteration == 0 and lost < 0:
-                let_touch(table, current, overlap_allowed(settings))
+                let_touch(store.table, current, overlap_allowed(settings))
             gradient, lines, lagrangian = system.gradient, system.directions, system.hessian
             kept = False
             # What was hard for other rows need not be for these.
@@ -269,8 +270,8 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             status = CONTACT_LOST if folded else STALLED
         lost = np.int64(-1)
         residual = current.residual
-        violation = off_rows(table, lifted, one_sided, current, tick)
-        value = goal(table, pool, shape, rows, lifted, room, tips, current, 1, gradient, lagrangian)
+        violation = off_rows(store.table, lifted, one_sided, current, tick)
+        value = goal(store, shape, rows, lifted, room, tips, current, 1, gradient, lagrangian)
         # Rows of vectors depend on one another: their multipliers drift where nothing keeps them short.
         vectors = header.vector_trims == 1
         shortened = iteration > 0 and (alpha < 1.0 or vectors)
@@ -282,7 +283,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             shape, rows, current, shortened, vectors, touches, good, active, gradient, lines.descent, gram, y, better_y
         )
         log(history, iteration, (value, violation, dual, mu, shift, alpha, radius))
-        asked, stops = pause(table, pool, settings, results, asked, iteration, value, violation)
+        asked, stops = pause(store, settings, results, asked, iteration, value, violation)
         status = OUT_OF_TIME if stops and status == RUNNING else status
         if status != RUNNING:
             break
@@ -294,7 +295,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             # Only where the start is so: a step to such a place is not taken.
             status = STALLED
             continue
-        sunk = watched and not tick and has_sunk(table, pool, memory, residual)
+        sunk = watched and not tick and has_sunk(store, memory, residual)
         if sunk and iteration == back_at:
             # Bodies were in each other there too, and nothing had asked: that is no place to return to.
             holds, leash = False, math.inf
@@ -310,25 +311,25 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         if arrived and not retreats and not (looks_last and iteration > limit):
             # A contact that ends right here is lost and found again, however often it is looked for.
             if looks_last and iteration != looked_at:
-                changed = update_again(table, pool, memory, current, EVERYTHING, free, lifted.guess)
+                changed = update_again(store, memory, current, EVERYTHING, free, lifted.guess)
                 if changed:
                     looked_at = iteration = iteration + 1
                     continue
             # Deeper than looks reach no row tells of a crossing.
-            status = STALLED if looks_last and any_crossed(table, header.watch, memory) else SOLVED
+            status = STALLED if looks_last and any_crossed(store.table, header.watch, memory) else SOLVED
             if status == SOLVED:
                 dual = least_multipliers(shape, rows, current, active, gradient, lines.descent, gram, dual, y, better_y)
             break
         # What holds, of a tick or where nothing else is asked for; with clearances, what does not cross.
-        clear = watched and not tick and not sunk and is_clear(table, residual)
+        clear = watched and not tick and not sunk and is_clear(store.table, residual)
         lasts = not watched and (any_pose or first or iteration >= SHORT)
         if clear or (violation <= feasible and (tick or lasts)):
             holds = True
             leash *= LONGER if iteration != back_at else 1.0
             keep(current, y, rows, held)
             if watched:
-                numbers_of(table, numbers)
-        if iteration == STRAYING and limits.strays == 1.0 and not reach_of(table, pool, current.q) <= farthest:
+                numbers_of(store.table, numbers)
+        if iteration == STRAYING and limits.strays == 1.0 and not reach_of(store, current.q) <= farthest:
             status = ITERATION_LIMIT
             break
         if iteration >= limit and (not tick or violation <= feasible or iteration >= longest_tick):
@@ -348,7 +349,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             continue
         # What holds is not left for what there is hardly time to end, and ends what an earlier call began.
         part = 1.0 if violation > feasible else (0.0 if done > 0 else HALF)
-        if iteration + done > 0 and (iteration > 0 or part < 1.0) and is_spent(table, settings, begin, part):
+        if iteration + done > 0 and (iteration > 0 or part < 1.0) and is_spent(store.table, settings, begin, part):
             status = OUT_OF_TIME
             break
         if retreats:
@@ -356,7 +357,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             if leash < SHORTEST:
                 status = STALLED
                 continue
-            return_to(table, pool, held, numbers, lifted, rows, current, y, better_y, tick)
+            return_to(store, held, numbers, lifted, rows, current, y, better_y, tick)
             measured = False
             # Rows of tangency have other pairs now.
             rows = m
@@ -429,18 +430,18 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
         cut, may_go = short_share(reach, longest, turn), True
         if watched:
             most_of_it = cut
-            cut, may_go = allowed_share(table, pool, memory, current, trial, lines.step, most_of_it)
+            cut, may_go = allowed_share(store, memory, current, trial, lines.step, most_of_it)
             if tick and not may_go and asked_at != iteration:
                 # A tick looks where a step would go farther than is known to be free: at pairs that would use much.
-                if may_end(table, settings, memory, clock, iteration, HALF):
+                if may_end(store.table, settings, memory, clock, iteration, HALF):
                     status = OUT_OF_TIME
                     violation = violation if iteration > 0 else math.inf
                     break
                 asked_at = iteration
-                changed = update_again(table, pool, memory, current, AS_NEEDED | MEASURED, free, lifted.guess)
-                if changed or is_cut(table, memory):
+                changed = update_again(store, memory, current, AS_NEEDED | MEASURED, free, lifted.guess)
+                if changed or is_cut(store.table, memory):
                     continue
-                cut, may_go = allowed_share(table, pool, memory, current, trial, lines.step, most_of_it)
+                cut, may_go = allowed_share(store, memory, current, trial, lines.step, most_of_it)
         slope, steepest = cut_step(shape, current, rows, y, mu, cut, foreseen, lines)
         if restoring:
             ends = steepest <= 1e-9 * violation or longest < 1e-12
@@ -448,7 +449,7 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
             slows = iteration >= check_at and violation > 0.99 * check_violation
             if (ends or slows) and watched and iteration < limit:
                 # A contact may have come to where a given one stands, of which no clearance asks anything.
-                changed = update_again(table, pool, memory, current, EVERYTHING, free, lifted.guess)
+                changed = update_again(store, memory, current, EVERYTHING, free, lifted.guess)
                 if changed:
                     iteration += 1
                     continue
@@ -488,10 +489,10 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
                     if (
                         free[k] < 0
                         and abs(contact_record_at(current.records, k).fold) < below
-                        and is_of_surfaces(table, k)
+                        and is_of_surfaces(store.table, k)
                     ):
                         lost = np.int64(k)
-            if lost >= 0 and free[lost] < 0 and is_of_surfaces(table, lost):
+            if lost >= 0 and free[lost] < 0 and is_of_surfaces(store.table, lost):
                 # A look may put another contact in its place, time and again.
                 freed += 1
                 iteration += 1 if freed > pairs else 0
@@ -533,6 +534,6 @@ def run(table, pool, settings, state, history, tips, doubles, integers):
     result.status = float(status)
     result.count = float(min(iteration, limit) if ended != RUNNING else iteration)
     result.objective = value
-    result.violation = violation * pool_header_at(pool, 0).scale
+    result.violation = violation * pool_header_at(store.pool, 0).scale
     result.dual = dual
     return status

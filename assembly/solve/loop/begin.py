@@ -34,10 +34,10 @@ from assembly.solve.loop.workspace import results_of, unknowns
 
 
 @kernel(inline=True)
-def read_state(table, pool, state, current, trial, y, better_y):
+def read_state(store, state, current, trial, y, better_y):
     """Poses, tracked values and multipliers of a state, scaled."""
-    units = pool_header_at(pool, 0)
-    header = header_at(table, 0)
+    units = pool_header_at(store.pool, 0)
+    header = header_at(store.table, 0)
     size = units.scale
     tracks = header.tracked
     o_tracked = 7 * header.bodies
@@ -49,7 +49,7 @@ def read_state(table, pool, state, current, trial, y, better_y):
                 value = (value - units.reference[k]) / size
             current.q[b, k] = value
             trial.q[b, k] = value
-    recenter(table, pool, current.q)
+    recenter(store, current.q)
     for k in range(tracks):
         for i in range(TRACK):
             current.tracked[k, i] = state[o_tracked + TRACK * k + i]
@@ -95,14 +95,13 @@ def find_contacts(program, settings, state, current, by_row, n):
     evaluated yet where a contact has no pair to begin with, or is at a fold.
     """
     limits = settings_at(settings, 0)
-    table, pool, shape, lifted, workspace = (
-        program.table,
-        program.pool,
+    store, shape, lifted, workspace = (
+        program.store,
         program.structure,
         program.lifted,
         program.tapes,
     )
-    header = header_at(table, 0)
+    header = header_at(store.table, 0)
     free, lengths, memory = lifted.free, lifted.lengths, lifted.memory
     memory_header = memory_header_at(memory, 0)
     y, better_y, active = by_row.y, by_row.better_y, by_row.active
@@ -110,57 +109,56 @@ def find_contacts(program, settings, state, current, by_row, n):
     watched = header.watch >= 0
     came = False
     if watched:
-        place_clearance_rows(table, memory, current, y, better_y, free, True)
-    lost = start_contacts(table, pool, current.q, current.tracked, free, lengths)
+        place_clearance_rows(store.table, memory, current, y, better_y, free, True)
+    lost = start_contacts(store, current.q, current.tracked, free, lengths)
     if watched and lost < 0:
         memory_header.overlap = limits.touching
-        came = update_around(table, pool, memory, current, SPARING if tick else AS_NEEDED)
+        came = update_around(store, memory, current, SPARING if tick else AS_NEEDED)
         memory_header.overlap = 0.0
-        place_clearance_rows(table, memory, current, y, better_y, free, False)
+        place_clearance_rows(store.table, memory, current, y, better_y, free, False)
     count = free_folds(
-        table, pool, current.records, current.tracked, active, free, lengths, -1.0, -1, limits.free_trims == 1.0
+        store, current.records, current.tracked, active, free, lengths, -1.0, -1, limits.free_trims == 1.0
     )
     if lost >= 0 or count > 0:
         return lost, False
     if watched:
-        arrange(table, free, shape, header.rows, n)
-    if recalled == 0 or came or not warm_start(table, state, recalled, current):
-        lost = evaluate(table, pool, current.tracked, math.inf, lifted, workspace, current)
+        arrange(store.table, free, shape, header.rows, n)
+    if recalled == 0 or came or not warm_start(store.table, state, recalled, current):
+        lost = evaluate(store, current.tracked, math.inf, lifted, workspace, current)
         if lost < 0:
-            let_touch(table, current, overlap_allowed(settings))
+            let_touch(store.table, current, overlap_allowed(settings))
     return lost, True
 
 
 @kernel(inner=True)
 def put_together(program, current, by_row):
     """Gather scattered bodies, and begin again from there; returns the contact that has no pair, or -1."""
-    table, pool, shape, lifted, workspace = (
-        program.table,
-        program.pool,
+    store, shape, lifted, workspace = (
+        program.store,
         program.structure,
         program.lifted,
         program.tapes,
     )
-    header = header_at(table, 0)
+    header = header_at(store.table, 0)
     free, lengths, memory = lifted.free, lifted.lengths, lifted.memory
     y, better_y = by_row.y, by_row.better_y
     watched = header.watch >= 0
-    assemble(table, pool, shape.bases, header.slots, current)
+    assemble(store, shape.bases, header.slots, current)
     for k in range(header.contacts):
         current.tracked[k, 0] = math.nan
     if watched:
-        forget_clearance_rows(table, memory)
-        place_clearance_rows(table, memory, current, y, better_y, free, False)
-    start_contacts(table, pool, current.q, current.tracked, free, lengths)
+        forget_clearance_rows(store.table, memory)
+        place_clearance_rows(store.table, memory, current, y, better_y, free, False)
+    start_contacts(store, current.q, current.tracked, free, lengths)
     if watched:
-        update_around(table, pool, memory, current, AS_NEEDED)
-        place_clearance_rows(table, memory, current, y, better_y, free, False)
+        update_around(store, memory, current, AS_NEEDED)
+        place_clearance_rows(store.table, memory, current, y, better_y, free, False)
     if header.implicit == 1:
-        recenter(table, pool, current.q)
+        recenter(store, current.q)
     for r in range(header.rows):
         y[r] = 0.0
         better_y[r] = 0.0
-    return evaluate(table, pool, current.tracked, math.inf, lifted, workspace, current)
+    return evaluate(store, current.tracked, math.inf, lifted, workspace, current)
 
 
 @kernel(inline=True, allocates=True)
@@ -171,8 +169,8 @@ def set_out(program, settings, state, current, by_row, n):
     freed.
     """
     limits = settings_at(settings, 0)
-    table, shape = program.table, program.structure
-    results = results_of(table, state)
+    store, shape = program.store, program.structure
+    results = results_of(store.table, state)
     result = results_at(results, 0)
     result.culprit = -1.0
     result.held = 0.0
@@ -180,9 +178,9 @@ def set_out(program, settings, state, current, by_row, n):
     tick = limits.tick == 1.0
     lost, evaluated = find_contacts(program, settings, state, current, by_row, n)
     # A tick begins where the last one ended: there a pair that Newton's method loses is at a fold.
-    folded = lost >= 0 and evaluated and tick and is_of_surfaces(table, lost)
+    folded = lost >= 0 and evaluated and tick and is_of_surfaces(store.table, lost)
     status = CONTACT_LOST if lost >= 0 and not folded else RUNNING
-    result.scatter = 1.0 if status == RUNNING and scattered(table, current.residual, shape.one_sided) else 0.0
+    result.scatter = 1.0 if status == RUNNING and scattered(store.table, current.residual, shape.one_sided) else 0.0
     if limits.gather > 0.0 and result.scatter == 1.0:
         lost = put_together(program, current, by_row)
         folded = False
@@ -199,14 +197,13 @@ def rearrange(program, count, before, current, y, better_y, active):
 
     Returns how many rows and unknowns there are, room for these, and which contact is lost at this point, or -1.
     """
-    table, pool, shape, lifted, workspace = (
-        program.table,
-        program.pool,
+    store, shape, lifted, workspace = (
+        program.store,
         program.structure,
         program.lifted,
         program.tapes,
     )
-    header = header_at(table, 0)
+    header = header_at(store.table, 0)
     for r in range(before, y.size):
         # New rows of tangency say nothing yet: least squares leave them out.
         y[r] = 0.0
@@ -214,6 +211,6 @@ def rearrange(program, count, before, current, y, better_y, active):
         active[r] = 0.0
     rows = header.rows + 4 * count
     n = 6 * header.moving + 4 * count
-    arrange(table, lifted.free, shape, rows, n)
+    arrange(store.table, lifted.free, shape, rows, n)
     system = unknowns(n, shape.sparsity)
-    return rows, n, system, evaluate(table, pool, current.tracked, math.inf, lifted, workspace, current)
+    return rows, n, system, evaluate(store, current.tracked, math.inf, lifted, workspace, current)

@@ -107,23 +107,25 @@ def place_clearance_rows(table, memory, current, y, better_y, free, begins):
 
 
 @kernel(inner=True)
-def update_around(table, pool, memory, point, how):
+def update_around(store, memory, point, how):
     """The watch's look at a point; whether rows changed.
 
     A long one asks between two slices whether it is to go on. Where what it is for is thrown away, it ends as one that
     is cut (`solve/loop/deadline.py`), and so do those that come after it; they say that rows changed: nothing is known
     to hold.
     """
-    header = header_at(table, 0)
+    header = header_at(store.table, 0)
     state = memory_header_at(memory, 0)
     watch = header.watch
-    manager = manager_at(table, watch)
+    manager = manager_at(store.table, watch)
     asks = manager.go_on_address != 0 and manager.clock != 0
     if asks and state.deadline < 0.0:
         return True
     if asks:
         state.deadline = call_address(manager.clock, ()) + SLICE
-    changed = call_address(header.look_address, (table, pool, watch, memory, point.q, point.tracked, how)) > 0
+    changed = (
+        call_address(header.look_address, (store.table, store.pool, watch, memory, point.q, point.tracked, how)) > 0
+    )
     aborted = asks and state.deadline < 0.0
     if asks and not aborted:
         state.deadline = math.inf
@@ -131,30 +133,33 @@ def update_around(table, pool, memory, point, how):
 
 
 @kernel(inner=True)
-def update_again(table, pool, memory, point, how, free, scratch):
+def update_again(store, memory, point, how, free, scratch):
     """The watch's look at a point that is evaluated; whether rows changed.
 
     A look puts contacts on their extrema. Those whose coordinates are unknowns are on their way there: their rows have
     been evaluated where they are, and they stay. One that is as far from the extremum that it stands for as two
     contacts are from each other may be on its way to a saddle, and goes there.
     """
-    header = header_at(table, 0)
+    header = header_at(store.table, 0)
     tracked = point.tracked
     first = header.first_guard
     for r in range(first, first + header.guards):
         if free[r] >= 0:
             for i in range(TRACK):
                 scratch[r, i] = tracked[r, i]
-    changed = update_around(table, pool, memory, point, how)
-    places = memory_places(table, header.watch)[1]
-    merge_radius = lengths_at(pool, manager_at(table, header.watch).lengths).neglect
+    changed = update_around(store, memory, point, how)
+    places = memory_places(store.table, header.watch)[1]
+    merge_radius = lengths_at(store.pool, manager_at(store.table, header.watch).lengths).neglect
     for r in range(first, first + header.guards):
         place = places + PLACE_MEMORY * (r - first)
         number = np.int64(place_at(memory, place).number) if place_at(memory, place).pair >= 0.0 else 0
-        if free[r] >= 0 and number == contact_row_at(table, header.row_table + ROW * r).guard_number:
-            row = contact_row_at(table, header.row_table + ROW * r)
+        if free[r] >= 0 and number == contact_row_at(store.table, header.row_table + ROW * r).guard_number:
+            row = contact_row_at(store.table, header.row_table + ROW * r)
             f, g = row.surface_f, row.surface_g
-            if call_address(header.stayed_address, (table, pool, f, g, tracked, scratch, r, merge_radius)) == 1:
+            if (
+                call_address(header.stayed_address, (store.table, store.pool, f, g, tracked, scratch, r, merge_radius))
+                == 1
+            ):
                 for i in range(TRACK):
                     tracked[r, i] = scratch[r, i]
             else:
@@ -188,27 +193,27 @@ def go_back(table, memory, numbers):
 
 
 @kernel(inner=True)
-def measure(table, pool, memory, first, end, q):
+def measure(store, memory, first, end, q):
     """Measure what pairs from first to before `end` used of their allowances. The largest part that is known."""
-    header = header_at(table, 0)
+    header = header_at(store.table, 0)
     watch = header.watch
-    most = call_address(header.parts_address, (table, pool, watch, memory, first, end, q))
-    return pair_state_at(memory, memory_places(table, watch)[0] + PAIR_MEMORY * most).part
+    most = call_address(header.parts_address, (store.table, store.pool, watch, memory, first, end, q))
+    return pair_state_at(memory, memory_places(store.table, watch)[0] + PAIR_MEMORY * most).part
 
 
 @kernel(inner=True)
-def allowed_share(table, pool, memory, current, trial, step, share):
+def allowed_share(store, memory, current, trial, step, share):
     """How much of a step the watch allows, at most `share`, and whether it is all of that.
 
     The poses at the end of the share go into the trial point. Of what it would use of allowances there it is then known
     of which pairs more is known by another look.
     """
-    move(table, current.q, step, share, trial.q)
-    watch = header_at(table, 0).watch
-    manager = manager_at(table, watch)
-    if measure(table, pool, memory, 0, manager.pairs, trial.q) <= 1.0:
+    move(store.table, current.q, step, share, trial.q)
+    watch = header_at(store.table, 0).watch
+    manager = manager_at(store.table, watch)
+    if measure(store, memory, 0, manager.pairs, trial.q) <= 1.0:
         return share, True
-    at = memory_places(table, watch)[0]
+    at = memory_places(store.table, watch)[0]
     allowed = 1.0
     for p in range(manager.pairs):
         # Of every pair by itself: one that is nearly spent, but hardly moves, is not in the way.
@@ -217,13 +222,13 @@ def allowed_share(table, pool, memory, current, trial, step, share):
         o.cut_short = end * o.allowance
         begin = end
         if end > USED:
-            measure(table, pool, memory, p, p + 1, current.q)
+            measure(store, memory, p, p + 1, current.q)
             begin = o.part
             o.part = end
         if end > max(begin, 1.0):
             allowed = min(allowed, max(0.95 - begin, 0.05) / (end - begin))
-        flank = pool[pair_at(table, manager.pair_table + PAIR_RECORD * p).minimum + 1]
-        most = min(flank, lengths_at(pool, manager.lengths).last_reach)
+        flank = store.pool[pair_at(store.table, manager.pair_table + PAIR_RECORD * p).minimum + 1]
+        most = min(flank, lengths_at(store.pool, manager.lengths).last_reach)
         if begin <= STILL and o.reach >= min(o.cut_short, most):
             # It was looked at right here, as far as another look would.
             o.part = begin
@@ -231,21 +236,21 @@ def allowed_share(table, pool, memory, current, trial, step, share):
 
 
 @kernel(inner=True)
-def is_too_far(table, pool, memory, point):
+def is_too_far(store, memory, point):
     """Whether the poses of a point are farther than the watch allows."""
-    return measure(table, pool, memory, 0, manager_at(table, header_at(table, 0).watch).pairs, point.q) > 1.0
+    return measure(store, memory, 0, manager_at(store.table, header_at(store.table, 0).watch).pairs, point.q) > 1.0
 
 
 @kernel(inner=True)
-def ends_unseen(table, pool, memory, before, after):
+def ends_unseen(store, memory, before, after):
     """Whether a clearance's contact of solids ends along a step that goes farther than it is open.
 
     What takes its place, where features meet, is not listed yet, and was no nearer: over such a step it could pass
     through, and be found at the far side, or nowhere.
     """
-    header = header_at(table, 0)
+    header = header_at(store.table, 0)
     watch = header.watch
-    places = memory_places(table, watch)[1]
+    places = memory_places(store.table, watch)[1]
     for k in range(header.guards):
         r = header.first_guard + k
         p = np.int64(place_at(memory, places + PLACE_MEMORY * k).pair)
@@ -253,9 +258,9 @@ def ends_unseen(table, pool, memory, before, after):
             p >= 0
             and math.isnan(after.tracked[r, 0])
             and not math.isnan(before.tracked[r, 0])
-            and is_of_solids(table, r)
+            and is_of_solids(store.table, r)
         ):
             most = max(before.residual[r], SLIGHTLY)
-            if call_address(header.went_address, (table, pool, watch, p, before.q, after.q, most)) == 1:
+            if call_address(header.went_address, (store.table, store.pool, watch, p, before.q, after.q, most)) == 1:
                 return True
     return False

@@ -35,21 +35,22 @@ def is_of_surfaces(table, k):
 
 
 @kernel(inner=True)
-def free_pair(table, pool, row, k, contacts, free, lengths):
+def free_pair(store, row, k, contacts, free, lengths):
     """Make the coordinates of contact k unknowns; False where they cannot be: at a pole, and of solids.
 
     Features of solids switch, which coordinates on two fixed faces would not know.
     """
-    contact = contact_row_at(table, row)
+    contact = contact_row_at(store.table, row)
     x = (contacts[k, 0], contacts[k, 1], contacts[k, 2], contacts[k, 3])
     if contact.shell_f >= 0:
         return False
     call_address(
-        header_at(table, 0).lengths_address, (table, pool, contact.surface_f, contact.surface_g, x, lengths, k)
+        header_at(store.table, 0).lengths_address,
+        (store.table, store.pool, contact.surface_f, contact.surface_g, x, lengths, k),
     )
     for i in range(4):
         # Over the whole domain, because a parameter has a unit of its own.
-        low, high, _closed = limits(table, pool, surface_of(table, row, i // 2), i % 2)
+        low, high, _closed = limits(store, surface_of(store.table, row, i // 2), i % 2)
         if lengths[k, i] * (high - low) < POLAR:
             return False
     free[k] = 0
@@ -57,56 +58,56 @@ def free_pair(table, pool, row, k, contacts, free, lengths):
 
 
 @kernel(inner=True)
-def start_contacts(table, pool, q, contacts, free, lengths):
+def start_contacts(store, q, contacts, free, lengths):
     """Global starts for the contacts whose parameters are NaN. Returns a contact that found none, or -1.
 
     Where a pair does not exist yet (a face tilted against another), its coordinates become unknowns at once.
     """
-    header = header_at(table, 0)
+    header = header_at(store.table, 0)
     for k in range(header.contacts):
         pair = tracked_at(contacts, k)
         row = header.row_table + ROW * k
         # What a clearance has lost its watch looks for.
-        if not math.isnan(contacts[k, 0]) or row_at(table, row).body_f < 0 or is_clearance_row(table, k):
+        if not math.isnan(contacts[k, 0]) or row_at(store.table, row).body_f < 0 or is_clearance_row(store.table, k):
             continue
-        if contact_row_at(table, row).shell_f >= 0:
+        if contact_row_at(store.table, row).shell_f >= 0:
             pair.idle = 0.0
             pair.allowed = 0.0
-            if not search_row(table, pool, row, q, contacts, k, True):
+            if not search_row(store, row, q, contacts, k, True):
                 return k
             continue
-        status = start_row(table, pool, row, q, contacts, k)
+        status = start_row(store, row, q, contacts, k)
         for l in range(FEATURE_F, TRACK):
             contacts[k, l] = 0.0
         if status != CONVERGED and status != SINGULAR:
-            if not free_pair(table, pool, row, k, contacts, free, lengths):
+            if not free_pair(store, row, k, contacts, free, lengths):
                 return k
     return -1
 
 
 @kernel(inner=True)
-def free_folds(table, pool, records, contacts, active, free, lengths, below, lost, trims):
+def free_folds(store, records, contacts, active, free, lengths, below, lost, trims):
     """Mark the pairs near a fold, and the lost one, as free. Returns how many are free now.
 
     An idle one-sided row asks nothing of its pair. With `trims`, pairs whose trims count are freed as well: the second
     derivative of a trim is known in the coordinates alone.
     """
-    header = header_at(table, 0)
+    header = header_at(store.table, 0)
     count = 0
     if trims:
         for r in range(header.contacts, header.contacts + header.trims):
             row = header.row_table + ROW * r
-            k = trim_row_at(table, row).contact
-            counts = trim_row_at(table, row).form == SIGNED and not (
-                row_at(table, row).one_sided == 1 and active[r] == 0.0
+            k = trim_row_at(store.table, row).contact
+            counts = trim_row_at(store.table, row).form == SIGNED and not (
+                row_at(store.table, row).one_sided == 1 and active[r] == 0.0
             )
             if free[k] < 0 and counts:
-                free_pair(table, pool, header.row_table + ROW * k, k, contacts, free, lengths)
+                free_pair(store, header.row_table + ROW * k, k, contacts, free, lengths)
     for k in range(header.contacts):
         row = header.row_table + ROW * k
-        idle = row_at(table, row).one_sided == 1 and active[k] == 0.0
+        idle = row_at(store.table, row).one_sided == 1 and active[k] == 0.0
         if free[k] < 0 and not idle and (abs(contact_record_at(records, k).fold) < below or k == lost):
-            free_pair(table, pool, row, k, contacts, free, lengths)
+            free_pair(store, row, k, contacts, free, lengths)
         if free[k] >= 0:
             free[k] = count
             count += 1
@@ -114,20 +115,20 @@ def free_folds(table, pool, records, contacts, active, free, lengths, below, los
 
 
 @kernel(inner=True)
-def free_pairs_hold(table, pool, q, contacts, free, tolerance):
+def free_pairs_hold(store, q, contacts, free, tolerance):
     """Whether every free pair is extremal by the frames of tracked pairs, which know poles.
 
     Its own rows do not tell at a pole or an apex: there a tangent vanishes, and its row with it.
     """
-    header = header_at(table, 0)
+    header = header_at(store.table, 0)
     for k in range(header.contacts):
         row = header.row_table + ROW * k
-        contact = contact_row_at(table, row)
-        fields = row_at(table, row)
+        contact = contact_row_at(store.table, row)
+        fields = row_at(store.table, row)
         if free[k] < 0:
             continue
         f, g = contact.surface_f, contact.surface_g
         i, j = fields.body_f, fields.body_g
-        if call_address(header.extremal_address, (table, pool, f, g, i, j, q, contacts, k, tolerance)) == 0:
+        if call_address(header.extremal_address, (store.table, store.pool, f, g, i, j, q, contacts, k, tolerance)) == 0:
             return False
     return True

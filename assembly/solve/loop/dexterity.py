@@ -199,27 +199,27 @@ def largest(values):
 
 
 @kernel(inner=True, allocates=True)
-def tip_map(table, pool, term, bases, rows, n, point, order):
+def tip_map(store, term, bases, rows, n, point, order):
     """The tip's Jacobian in the user's units, at a point whose rows are evaluated.
 
     What the tip needs, and so whether its motion is open, is found from order 1 on.
     """
-    term_record = term_at(table, term)
+    term_record = term_at(store.table, term)
     q, tracked, records, residual, jacobian = point.q, point.tracked, point.records, point.residual, point.jacobian
     record = term_record.tape
-    dexterity_record = dexterity_at(table, record)
+    dexterity_record = dexterity_at(store.table, record)
     o = term_record.parameters
     factors = o + FACTORS
     body = term_record.body
     k = dexterity_record.inputs
     task = dexterity_record.task
     m = task_rows(task)
-    s = slot(table, body)
-    arm = matvec(rotation(q, body), load(pool, o + ARM))
-    used = used_rows(table, rows)
+    s = slot(store.table, body)
+    arm = matvec(rotation(q, body), load(store.pool, o + ARM))
+    used = used_rows(store.table, rows)
     b = np.zeros((k, n))
     for i in range(k):
-        input_row(table, record + INPUT_LIST + INPUT * i, records, tracked, b, i)
+        input_row(store.table, record + INPUT_LIST + INPUT * i, records, tracked, b, i)
     tip = np.zeros((m, k))
     v = np.zeros((k, n))
     z = np.zeros((k, k))
@@ -241,15 +241,15 @@ def tip_map(table, pool, term, bases, rows, n, point, order):
             h[i] = 1.0
             missed = max(missed, settle(system, bases, jacobian, used, b, g, h, v[i], z[i]))
             h[i] = 0.0
-            tip_velocity(pool, o, task, arm, v[i], s, tip, i)
+            tip_velocity(store.pool, o, task, arm, v[i], s, tip, i)
             for r in range(m):
-                tip[r, i] *= pool[factors + i]
+                tip[r, i] *= store.pool[factors + i]
         unit = np.zeros((m, 1))
         for r in range(m if order > 0 else 0):
             for i in range(n):
                 g[i] = 0.0
             unit[r, 0] = 1.0
-            add_tip_force(pool, o, task, arm, unit, 0, s, g)
+            add_tip_force(store.pool, o, task, arm, unit, 0, s, g)
             unit[r, 0] = 0.0
             left = settle(system, bases, jacobian, used, b, g, h, p[r], y[r])
             if not left <= leeway * largest(g):
@@ -261,7 +261,7 @@ def tip_map(table, pool, term, bases, rows, n, point, order):
 
 
 @kernel(inner=True)
-def bend(table, pool, record, shape, lifted, workspace, point, forces, weights, inputs, rates, hessian, gradient):
+def bend(store, record, shape, lifted, workspace, point, forces, weights, inputs, rates, hessian, gradient):
     """gradient -= H v, H the second derivative of forces . rows + inputs . (values of the inputs).
 
     `weights` are no weights of rows: zeros.
@@ -270,18 +270,18 @@ def bend(table, pool, record, shape, lifted, workspace, point, forces, weights, 
     for r in range(n):
         for c in range(r, n):
             hessian[r, c] = 0.0
-    add_row_terms(table, pool, lifted, workspace, shape, point, forces, weights, hessian)
+    add_row_terms(store, lifted, workspace, shape, point, forces, weights, hessian)
     for j in range(inputs.size):
-        asked = body_coordinate_at(table, record + INPUT_LIST + INPUT * j)
+        asked = body_coordinate_at(store.table, record + INPUT_LIST + INPUT * j)
         add_coordinate_hessian(
             asked.kind,
             asked.component,
             point.records,
-            header_at(table, 0).contacts + asked.joint,
+            header_at(store.table, 0).contacts + asked.joint,
             inputs[j],
             hessian,
-            slot(table, asked.body_f),
-            slot(table, asked.body_g),
+            slot(store.table, asked.body_f),
+            slot(store.table, asked.body_g),
         )
     for r in range(n):
         for c in range(r, n):
@@ -291,32 +291,32 @@ def bend(table, pool, record, shape, lifted, workspace, point, forces, weights, 
 
 
 @kernel(inner=True, allocates=True)
-def dexterity(table, pool, term, shape, rows, lifted, workspace, point, order, gradient):
+def dexterity(store, term, shape, rows, lifted, workspace, point, order, gradient):
     """Value of the term at a point whose rows are evaluated; from order 1 on its gradient is added."""
-    term_record = term_at(table, term)
+    term_record = term_at(store.table, term)
     bases = shape.bases
     n = gradient.size
     record = term_record.tape
-    dexterity_record = dexterity_at(table, record)
+    dexterity_record = dexterity_at(store.table, record)
     o = term_record.parameters
     factors = o + FACTORS
     task = dexterity_record.task
-    weight = dexterity_weights_at(pool, o).weight
-    tip = tip_map(table, pool, term, bases, rows, n, point, order)
+    weight = dexterity_weights_at(store.pool, o).weight
+    tip = tip_map(store, term, bases, rows, n, point, order)
     jacobian, used = tip.jacobian, tip.used
     v, z, changes = tip.inputs
     p, y, loads = tip.adjoint
     if tip.outcome != DETERMINED:
         return math.inf
     slopes = np.empty(jacobian.shape)
-    value = measure_jacobian(dexterity_record.measure, pool, o + DIRECTION, jacobian, slopes)
+    value = measure_jacobian(dexterity_record.measure, store.pool, o + DIRECTION, jacobian, slopes)
     if not math.isfinite(value):
         return math.inf
     if order == 0:
         return weight * value
     body = term_record.body
-    s = slot(table, body)
-    arm = matvec(rotation(point.q, body), load(pool, o + ARM))
+    s = slot(store.table, body)
+    arm = matvec(rotation(point.q, body), load(store.pool, o + ARM))
     m, k = jacobian.shape
     # Room for one combination at a time: p, y, A p as forces on all rows.
     pull = np.empty(n)
@@ -332,7 +332,7 @@ def dexterity(table, pool, term, shape, rows, lifted, workspace, point, order, g
         for l in range(used.size):
             forces[used[l]] = 0.0
         for r in range(m):
-            w = slopes[r, i] * weight * pool[factors + i]
+            w = slopes[r, i] * weight * store.pool[factors + i]
             slopes[r, i] = w
             for c in range(n):
                 pull[c] += w * p[r, c]
@@ -340,28 +340,28 @@ def dexterity(table, pool, term, shape, rows, lifted, workspace, point, order, g
                 turn[j] += w * y[r, j]
             for l in range(used.size):
                 forces[used[l]] += w * loads[r, l]
-        bend(table, pool, record, shape, lifted, workspace, point, forces, none, turn, v[i], hessian, gradient)
+        bend(store, record, shape, lifted, workspace, point, forces, none, turn, v[i], hessian, gradient)
         if largest(changes[i]) > KEPT:
             for l in range(used.size):
                 forces[used[l]] = changes[i, l]
-            bend(table, pool, record, shape, lifted, workspace, point, forces, none, z[i], pull, hessian, gradient)
+            bend(store, record, shape, lifted, workspace, point, forces, none, z[i], pull, hessian, gradient)
         if s >= 0:
-            add_tip_bend(pool, o, task, arm, slopes, i, v[i], s, gradient)
+            add_tip_bend(store.pool, o, task, arm, slopes, i, v[i], s, gradient)
     return weight * value
 
 
 @kernel(inner=True, allocates=True)
-def add_dexterities(table, pool, shape, rows, lifted, workspace, current, order, gradient, hessian):
+def add_dexterities(store, shape, rows, lifted, workspace, current, order, gradient, hessian):
     """Values of all terms of this kind; from order 1 on gradients, and Hessians by differences of these."""
-    header = header_at(table, 0)
+    header = header_at(store.table, 0)
     value = 0.0
     n = gradient.size
     for t in range(header.terms):
         term = header.term_table + TERM * t
-        if term_at(table, term).kind != DEXTERITY:
+        if term_at(store.table, term).kind != DEXTERITY:
             continue
         slope = np.zeros(n)
-        value += dexterity(table, pool, term, shape, rows, lifted, workspace, current, order, slope)
+        value += dexterity(store, term, shape, rows, lifted, workspace, current, order, slope)
         if order == 0 or not math.isfinite(value):
             continue
         for i in range(n):
@@ -379,12 +379,12 @@ def add_dexterities(table, pool, shape, rows, lifted, workspace, current, order,
             for i in range(n):
                 other[i] = 0.0
             step[j] = STEP
-            move(table, current.q, step, 1.0, beside.q)
-            predict_pairs(table, pool, shape.bases, lifted, current, beside, step, 1.0)
+            move(store.table, current.q, step, 1.0, beside.q)
+            predict_pairs(store, shape.bases, lifted, current, beside, step, 1.0)
             step[j] = 0.0
-            if evaluate(table, pool, lifted.guess, math.inf, lifted, workspace, beside) >= 0:
+            if evaluate(store, lifted.guess, math.inf, lifted, workspace, beside) >= 0:
                 continue
-            if math.isfinite(dexterity(table, pool, term, shape, rows, lifted, workspace, beside, 1, other)):
+            if math.isfinite(dexterity(store, term, shape, rows, lifted, workspace, beside, 1, other)):
                 for i in range(n):
                     bend = 0.5 * (other[i] - slope[i]) / STEP
                     hessian[min(i, j), max(i, j)] += 2.0 * bend if i == j else bend

@@ -39,14 +39,13 @@ def find_direction(
     shift of the matrix and that of the factor the step is by, negative where there is none; the step's largest
     component and turn.
     """
-    table, pool, shape, lifted, workspace = (
-        program.table,
-        program.pool,
+    store, shape, lifted, workspace = (
+        program.store,
         program.structure,
         program.lifted,
         program.tapes,
     )
-    header = header_at(table, 0)
+    header = header_at(store.table, 0)
     active, forces, foreseen = weights
     gradient, lines, lagrangian, matrix = system.gradient, system.directions, system.hessian, system.factor
     bases, one_sided, order = shape.bases, shape.one_sided, shape.sparsity
@@ -61,7 +60,7 @@ def find_direction(
         foreseen[r] = 0.0
     if is_fresh:
         curve_rows(rows, residual, y, active, restoring, forces)
-        add_row_terms(table, pool, lifted, workspace, shape, current, forces, active, lagrangian)
+        add_row_terms(store, lifted, workspace, shape, current, forces, active, lagrangian)
         # What the inertia needs falls with the distance to the solution. Where rows alone count and depend on each
         # other there, the squares of their slopes do, too; contacts of a clearance come and go instead.
         least, off = LEAST_SHIFT, dual
@@ -72,13 +71,13 @@ def find_direction(
             return shift, shift, 0.0, 0.0
     damps = header.contacts == 0 or cuts >= OFTEN
     used, longest, turn = damped_step(
-        table, lagrangian, n, order, shift, radius, damps, matrix, descent, step, straight
+        store.table, lagrangian, n, order, shift, radius, damps, matrix, descent, step, straight
     )
     for attempt in range(FORESEEN + 1):
         if used < 0.0 or restoring:
             break
         changed = predict_active_set(
-            table, shape, rows, residual, jacobian, y, mu, step, is_fresh, active, foreseen, descent, lagrangian
+            store.table, shape, rows, residual, jacobian, y, mu, step, is_fresh, active, foreseen, descent, lagrangian
         )
         if changed == 0:
             break
@@ -87,12 +86,12 @@ def find_direction(
         if not is_fresh:
             is_fresh = True
             curve_rows(rows, residual, y, active, restoring, forces)
-            add_row_terms(table, pool, lifted, workspace, shape, current, forces, active, lagrangian)
+            add_row_terms(store, lifted, workspace, shape, current, forces, active, lagrangian)
         shift = factorize_shifted(lagrangian, n, order, max(shift, LEAST_SHIFT), matrix)
         used = shift
         if shift >= 0.0:
             used, longest, turn = damped_step(
-                table, lagrangian, n, order, shift, radius, damps, matrix, descent, step, straight
+                store.table, lagrangian, n, order, shift, radius, damps, matrix, descent, step, straight
             )
     return shift, used, longest, turn
 
@@ -140,9 +139,8 @@ def leave_saddle(program, current, trial, number, system):
 
     Of axes that are parallel and are to stand at right angles, say. `number` is how many moves there have been.
     """
-    table, pool, shape, lifted, workspace = (
-        program.table,
-        program.pool,
+    store, shape, lifted, workspace = (
+        program.store,
         program.structure,
         program.lifted,
         program.tapes,
@@ -152,7 +150,7 @@ def leave_saddle(program, current, trial, number, system):
     if not factorize_shifted(lagrangian, n, shape.sparsity, LEAST_SHIFT, matrix) > SADDLE:
         return False
     for i in range(n):
-        step[i] = KICK * math.sin(number + 1 + i) if i < 6 * header_at(table, 0).moving else 0.0
-    move(table, current.q, step, 1.0, trial.q)
-    predict_pairs(table, pool, shape.bases, lifted, current, trial, step, 1.0)
-    return evaluate(table, pool, lifted.guess, math.inf, lifted, workspace, trial) < 0
+        step[i] = KICK * math.sin(number + 1 + i) if i < 6 * header_at(store.table, 0).moving else 0.0
+    move(store.table, current.q, step, 1.0, trial.q)
+    predict_pairs(store, shape.bases, lifted, current, trial, step, 1.0)
+    return evaluate(store, lifted.guess, math.inf, lifted, workspace, trial) < 0

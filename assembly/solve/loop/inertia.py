@@ -76,18 +76,17 @@ def told_convex(results, rows, one_sided, residual, y, scratch):
 @kernel(inner=True)
 def is_convex(program, tips, current, rows, y, active, system, mu, shift):
     """Whether the matrix of the rows that push, shifted by so much, has a factor at this point."""
-    table, pool, shape, lifted, workspace = (
-        program.table,
-        program.pool,
+    store, shape, lifted, workspace = (
+        program.store,
         program.structure,
         program.lifted,
         program.tapes,
     )
     gradient, lagrangian, matrix = system.gradient, system.hessian, system.factor
-    goal(table, pool, shape, rows, lifted, workspace, tips, current, 1, gradient, lagrangian)
+    goal(store, shape, rows, lifted, workspace, tips, current, 1, gradient, lagrangian)
     for r in range(rows):
         active[r] = 0.0 if shape.one_sided[r] == 1 and y[r] >= -IDLE else 1.0 / mu
-    add_row_terms(table, pool, lifted, workspace, shape, current, y, active, lagrangian)
+    add_row_terms(store, lifted, workspace, shape, current, y, active, lagrangian)
     return factorize_shifted(lagrangian, gradient.size, shape.sparsity, shift, matrix) == shift
 
 
@@ -100,9 +99,9 @@ def test_end(program, settings, results, status, tips, current, rows, y, active,
     """
     result = results_at(results, 0)
     limits = settings_at(settings, 0)
-    table, shape = program.table, program.structure
+    store, shape = program.store, program.structure
     tick = limits.tick == 1.0
-    if not tick and (status != SOLVED or header_at(table, 0).implicit == 1):
+    if not tick and (status != SOLVED or header_at(store.table, 0).implicit == 1):
         return status
     mu = limits.penalty_floor
     if not tick:

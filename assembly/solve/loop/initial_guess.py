@@ -58,11 +58,11 @@ def scattered(table, residual, one_sided):
 
 
 @kernel(inner=True)
-def place_joint(table, pool, k, q, records):
+def place_joint(store, k, q, records):
     """The world frames of joint k."""
-    header = header_at(table, 0)
-    joint = joint_at(table, header.joint_table + JOINT_RECORD * k)
-    place_frames(pool, joint.frames, q, joint.body_f, joint.body_g, records, header.contacts + k)
+    header = header_at(store.table, 0)
+    joint = joint_at(store.table, header.joint_table + JOINT_RECORD * k)
+    place_frames(store.pool, joint.frames, q, joint.body_f, joint.body_g, records, header.contacts + k)
 
 
 @kernel(inline=True)
@@ -73,35 +73,35 @@ def is_of(table, row, joint):
 
 
 @kernel(inner=True)
-def body_rows(table, pool, first, count, joint, point):
+def body_rows(store, first, count, joint, point):
     """Evaluate rows listed in the table, of a joint or of all (-1); half the sum of squares of what does not hold."""
     q, tracked, records, residual, jacobian = point.q, point.tracked, point.records, point.residual, point.jacobian
     cost = 0.0
     for l in range(first, first + count):
-        r = table[l]
-        row = header_at(table, 0).row_table + ROW * r
-        joint_there = joint_row_at(table, row)
-        if not is_of(table, row, joint):
+        r = store.table[l]
+        row = header_at(store.table, 0).row_table + ROW * r
+        joint_there = joint_row_at(store.table, row)
+        if not is_of(store.table, row, joint):
             continue
         second = joint_there.second
-        place_joint(table, pool, joint_there.joint, q, records)
+        place_joint(store, joint_there.joint, q, records)
         if second >= 0:
-            place_joint(table, pool, coordinate_at(table, second).joint, q, records)
-        joint_row(table, pool, r, tracked, tracked, records, residual, jacobian)
-        if row_at(table, row).one_sided == 0 or residual[r] < 0.0:
+            place_joint(store, coordinate_at(store.table, second).joint, q, records)
+        joint_row(store, r, tracked, tracked, records, residual, jacobian)
+        if row_at(store.table, row).one_sided == 0 or residual[r] < 0.0:
             cost += 0.5 * residual[r] * residual[r]
     return cost
 
 
 @kernel(inner=True)
-def follow_drives(table, pool, first, count, tracked):
+def follow_drives(store, first, count, tracked):
     """Driven angles of rows listed in the table are looked for near their values again."""
     for l in range(first, first + count):
-        row = header_at(table, 0).row_table + ROW * table[l]
-        joint = joint_row_at(table, row)
-        if row_at(table, row).one_sided == 0 and joint.second < 0 and joint.angle >= 0:
+        row = header_at(store.table, 0).row_table + ROW * store.table[l]
+        joint = joint_row_at(store.table, row)
+        if row_at(store.table, row).one_sided == 0 and joint.second < 0 and joint.angle >= 0:
             o = joint.parameters
-            tracked[joint.angle, 0] = pool[o + 2] / pool[o]
+            tracked[joint.angle, 0] = store.pool[o + 2] / store.pool[o]
 
 
 @kernel(inner=True)
@@ -150,7 +150,7 @@ def normal_equations(table, bases, first, count, joint, s, point, workspace):
 
 
 @kernel(inner=True)
-def fit_body(table, pool, bases, body, first, count, joint, s, point, workspace):
+def fit_body(store, bases, body, first, count, joint, s, point, workspace):
     """Move a body until rows listed in the table, of a joint or of all (-1), are as small as they get.
 
     Returns half the sum of squares of those that do not hold.
@@ -164,11 +164,11 @@ def fit_body(table, pool, bases, body, first, count, joint, s, point, workspace)
         workspace.step,
     )
     damping = DAMPING
-    cost = body_rows(table, pool, first, count, joint, point)
+    cost = body_rows(store, first, count, joint, point)
     for _step in range(STEPS):
         if cost <= ENOUGH or damping > STUCK:
             break
-        normal_equations(table, bases, first, count, joint, s, point, workspace)
+        normal_equations(store.table, bases, first, count, joint, s, point, workspace)
         before = pose_of(q, body)
         while damping <= STUCK:
             for i in range(6):
@@ -183,14 +183,14 @@ def fit_body(table, pool, bases, body, first, count, joint, s, point, workspace)
                 for i in range(6):
                     step[i] *= cut
                 retract(q, body, (step[0], step[1], step[2]), (step[3], step[4], step[5]), q)
-                there = body_rows(table, pool, first, count, joint, point)
+                there = body_rows(store, first, count, joint, point)
                 if there < cost:
                     cost = there
                     damping = max(0.1 * damping, 1e-12)
                     break
             put_pose(q, body, before)
             damping *= 10.0
-    return body_rows(table, pool, first, count, joint, point)
+    return body_rows(store, first, count, joint, point)
 
 
 @kernel(inline=True)
@@ -205,39 +205,39 @@ def put_pose(q, body, pose):
 
 
 @kernel(inner=True, allocates=True)
-def assemble(table, pool, bases, slots, point):
+def assemble(store, bases, slots, point):
     """Move the bodies of the point one by one."""
-    header = header_at(table, 0)
+    header = header_at(store.table, 0)
     q, tracked, residual = point.q, point.tracked, point.residual
     workspace = FitRoom(np.empty((6, 6)), np.empty((6, 6)), np.full(6, 5), np.empty(6), np.empty(6), np.empty(6))
     o = header.gather_table + 1
-    for _entry in range(table[header.gather_table]):
-        body = table[o]
-        count = table[o + 1]
+    for _entry in range(store.table[header.gather_table]):
+        body = store.table[o]
+        count = store.table[o + 1]
         first = o + 2
         o = first + count
-        s = 6 * table[slots + body]
+        s = 6 * store.table[slots + body]
         start = pose_of(q, body)
-        cost = fit_body(table, pool, bases, body, first, count, -1, s, point, workspace)
-        if cost <= ENOUGH or not is_half_around(table, residual, first, count):
+        cost = fit_body(store, bases, body, first, count, -1, s, point, workspace)
+        if cost <= ENOUGH or not is_half_around(store.table, residual, first, count):
             continue
         best = pose_of(q, body)
         tried = -1
         for l in range(first, first + count):
-            joint = joint_row_at(table, header.row_table + ROW * table[l]).joint
+            joint = joint_row_at(store.table, header.row_table + ROW * store.table[l]).joint
             if cost <= ENOUGH:
                 break
             if joint == tried:
                 continue
             tried = joint
             put_pose(q, body, start)
-            follow_drives(table, pool, first, count, tracked)
-            fit_body(table, pool, bases, body, first, count, joint, s, point, workspace)
-            follow_drives(table, pool, first, count, tracked)
-            there = fit_body(table, pool, bases, body, first, count, -1, s, point, workspace)
+            follow_drives(store, first, count, tracked)
+            fit_body(store, bases, body, first, count, joint, s, point, workspace)
+            follow_drives(store, first, count, tracked)
+            there = fit_body(store, bases, body, first, count, -1, s, point, workspace)
             if there < LOWER * cost:
                 cost = there
                 best = pose_of(q, body)
         put_pose(q, body, best)
-        follow_drives(table, pool, first, count, tracked)
-        body_rows(table, pool, first, count, -1, point)
+        follow_drives(store, first, count, tracked)
+        body_rows(store, first, count, -1, point)

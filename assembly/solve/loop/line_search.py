@@ -65,14 +65,14 @@ def damped_step(table, lagrangian, n, order, shift, radius, damps, matrix, desce
 
 
 @kernel(inner=True)
-def goal(table, pool, shape, rows, lifted, workspace, tips, point, order, gradient, hessian):
+def goal(store, shape, rows, lifted, workspace, tips, point, order, gradient, hessian):
     """The objective at a point whose rows are evaluated; from order 1 on its gradient and the Hessian's upper half.
 
     `tips` is None where no term is a dexterity: then what these need is not even compiled.
     """
-    value = objective(table, pool, point.q, order, workspace, shape.sparsity, gradient, hessian)
+    value = objective(store, point.q, order, workspace, shape.sparsity, gradient, hessian)
     if tips is not None:
-        value += add_dexterities(table, pool, shape, rows, lifted, workspace, point, order, gradient, hessian)
+        value += add_dexterities(store, shape, rows, lifted, workspace, point, order, gradient, hessian)
     return value
 
 
@@ -85,14 +85,13 @@ def search(program, tips, current, trial, rows, y, base, value, restoring, leave
     says whether a contact that ends where solids are in each other may be given up, and whether bodies may go all the
     way for certain.
     """
-    table, pool, shape, lifted, workspace = (
-        program.table,
-        program.pool,
+    store, shape, lifted, workspace = (
+        program.store,
         program.structure,
         program.lifted,
         program.tapes,
     )
-    header = header_at(table, 0)
+    header = header_at(store.table, 0)
     active, forces, _foreseen = weights
     lets_go, may_go_all = leave
     gradient, descent, step, straight, lagrangian, matrix = (
@@ -118,16 +117,16 @@ def search(program, tips, current, trial, rows, y, base, value, restoring, leave
     bends = 0
     lost = -1
     while alpha * longest > 1e-9 * SHORTEST or alpha == 1.0:
-        move(table, current.q, step, alpha, trial.q)
-        predict_pairs(table, pool, bases, lifted, current, trial, step, alpha)
+        move(store.table, current.q, step, alpha, trial.q)
+        predict_pairs(store, bases, lifted, current, trial, step, alpha)
         known = may_go_all and alpha == 1.0 and bends == 0
-        if header.watch >= 0 and not known and is_too_far(table, pool, lifted.memory, trial):
+        if header.watch >= 0 and not known and is_too_far(store, lifted.memory, trial):
             # Bent, it would go farther than is known to be free.
             bends = 2
             alpha *= 0.5
             continue
-        lost = evaluate(table, pool, lifted.guess, BEND, lifted, workspace, trial)
-        if header.watch >= 0 and not lets_go and lost < 0 and ends_unseen(table, pool, lifted.memory, current, trial):
+        lost = evaluate(store, lifted.guess, BEND, lifted, workspace, trial)
+        if header.watch >= 0 and not lets_go and lost < 0 and ends_unseen(store, lifted.memory, current, trial):
             # A tick has no last look, which would tell of what it led through.
             bends = 2
             alpha *= 0.5
@@ -135,7 +134,7 @@ def search(program, tips, current, trial, rows, y, base, value, restoring, leave
         if lost < 0:
             there = merit(trial.residual, one_sided, rows, y, mu)
             if not restoring:
-                there += goal(table, pool, shape, rows, lifted, workspace, tips, trial, 0, gradient, lagrangian)
+                there += goal(store, shape, rows, lifted, workspace, tips, trial, 0, gradient, lagrangian)
             if there <= current_merit + 1e-4 * alpha * slope + noise:
                 return True, alpha, lost
             if bends < 2:
@@ -155,12 +154,17 @@ def search(program, tips, current, trial, rows, y, base, value, restoring, leave
                     step[i] = straight[i]
         # A bent step may be longer than it was.
         short = lets_go and bends % 3 == 0 and alpha <= HALVED and alpha * longest < LETS_GO
-        if lost >= 0 and short and may_go(table, lost, residual) and tracked_at(current.tracked, lost).stays >= 0.0:
+        if (
+            lost >= 0
+            and short
+            and may_go(store.table, lost, residual)
+            and tracked_at(current.tracked, lost).stays >= 0.0
+        ):
             tracked_at(current.tracked, lost).stays = MAY_GO - tracked_at(current.tracked, lost).stays
             continue
         alpha *= 0.5
         # A pair near a fold is freed; a clearance's is given up where its gap does not close.
-        if lost >= 0 and alpha * longest < 0.01 and not is_clearance_row(table, lost):
+        if lost >= 0 and alpha * longest < 0.01 and not is_clearance_row(store.table, lost):
             break
-    hold_all(table, current.tracked)
+    hold_all(store.table, current.tracked)
     return False, alpha, lost

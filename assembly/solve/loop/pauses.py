@@ -21,12 +21,12 @@ def is_large(table):
 
 
 @kernel(inline=True)
-def pause(table, pool, settings, results, asked, iteration, value, violation):
+def pause(store, settings, results, asked, iteration, value, violation):
     """The time of the last question, or of the first look at the clock [ns]; and whether the solve is to end."""
-    header = header_at(table, 0)
+    header = header_at(store.table, 0)
     result = results_at(results, 0)
     limits = settings_at(settings, 0)
-    if limits.ask_address == 0.0 or (iteration < SHORT and not is_large(table)):
+    if limits.ask_address == 0.0 or (iteration < SHORT and not is_large(store.table)):
         return asked, False
     now = call_address(header.clock_address, ()) if header.clock_address != 0 else asked + SLICE
     if asked == 0 or now - asked < SLICE:
@@ -34,7 +34,7 @@ def pause(table, pool, settings, results, asked, iteration, value, violation):
     result.count, result.objective, result.violation = (
         float(iteration),
         value,
-        violation * pool_header_at(pool, 0).scale,
+        violation * pool_header_at(store.pool, 0).scale,
     )
     ends = call_address(int(limits.ask_address), ()) != GOES_ON
     return call_address(header.clock_address, ()) if header.clock_address != 0 else now, ends

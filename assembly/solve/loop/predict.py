@@ -34,7 +34,7 @@ def longest_way(d, at, alpha, far):
 
 
 @kernel(inner=True)
-def stays_open(table, pool, bases, k, current, trial, d, alpha):
+def stays_open(store, bases, k, current, trial, d, alpha):
     """Whether row k, of a clearance, is open all along alpha d for certain; if so, what is known of it goes on.
 
     No gap changes by more than points of the two bodies go, those of each seen from where they were.
@@ -42,9 +42,9 @@ def stays_open(table, pool, bases, k, current, trial, d, alpha):
     left = contact_record_at(current.records, k).slack
     if not left > 0.0 or bases[k, 2] >= 0:
         return False
-    minimum = contact_row_at(table, header_at(table, 0).row_table + ROW * k).minimum
-    left -= longest_way(d, bases[k, 0], alpha, pool[minimum + 4])
-    left -= longest_way(d, bases[k, 1], alpha, pool[minimum + 5])
+    minimum = contact_row_at(store.table, header_at(store.table, 0).row_table + ROW * k).minimum
+    left -= longest_way(d, bases[k, 0], alpha, store.pool[minimum + 4])
+    left -= longest_way(d, bases[k, 1], alpha, store.pool[minimum + 5])
     if not left > 0.0:
         return False
     for i in range(CONTACT_RECORD):
@@ -56,14 +56,14 @@ def stays_open(table, pool, bases, k, current, trial, d, alpha):
 
 
 @kernel(inner=True)
-def predict_pairs(table, pool, bases, lifted, current, trial, d, alpha):
+def predict_pairs(store, bases, lifted, current, trial, d, alpha):
     """Contact coordinates along alpha d: by the contact velocity, or, for a free pair, by its own unknowns.
 
     Gaps follow to first order, angles start from where they are: a step turns no body by more than a radian. The guess
     goes into `loose`. Rows of clearances that stay open for certain are marked there as IDLE, and their derivatives go
     on to the trial point as they are.
     """
-    header = header_at(table, 0)
+    header = header_at(store.table, 0)
     tracked, records, jacobian = current.tracked, current.records, current.jacobian
     lengths = lifted.lengths
     out = lifted.guess
@@ -71,7 +71,7 @@ def predict_pairs(table, pool, bases, lifted, current, trial, d, alpha):
         copy_tracked(tracked, k, out)
     for k in range(header.contacts):
         row = header.row_table + ROW * k
-        if row_at(table, row).body_f < 0:
+        if row_at(store.table, row).body_f < 0:
             continue
         f = bases[k, 0]
         g = bases[k, 1]
@@ -80,7 +80,7 @@ def predict_pairs(table, pool, bases, lifted, current, trial, d, alpha):
         if u >= 0:
             for i in range(4):
                 out[k, i] += alpha * d[u + i] / lengths[k, i]
-            keep_inside(table, pool, row, k, out)
+            keep_inside(store, row, k, out)
         else:
             for j in range(4):
                 s = 0.0
@@ -92,20 +92,20 @@ def predict_pairs(table, pool, bases, lifted, current, trial, d, alpha):
                 s *= alpha
                 for i in range(4):
                     out[k, i] += derivatives_at(records, k).rates[i, j] * s
-            predict_pair(table, pool, row, k, tracked, out)
-        if is_clearance_row(table, k) and stays_open(table, pool, bases, k, current, trial, d, alpha):
+            predict_pair(store, row, k, tracked, out)
+        if is_clearance_row(store.table, k) and stays_open(store, bases, k, current, trial, d, alpha):
             tracked_at(out, k).idle = 1.0
             tracked_at(out, k).gap = max(
                 tracked_at(out, k).gap,
-                pool[contact_row_at(table, row).minimum] + contact_record_at(trial.records, k).slack,
+                store.pool[contact_row_at(store.table, row).minimum] + contact_record_at(trial.records, k).slack,
             )
 
 
 @kernel(inner=True)
-def keep_inside(table, pool, row, k, out):
+def keep_inside(store, row, k, out):
     """Coordinates that are unknowns may run over the end of a patch."""
     for side in range(2):
         i = 2 * side
         out[k, i], out[k, i + 1], _clamped = into_domain(
-            table, pool, surface_of(table, row, side), out[k, i], out[k, i + 1]
+            store, surface_of(store.table, row, side), out[k, i], out[k, i + 1]
         )

@@ -29,10 +29,10 @@ def log(history, iteration, figures):
 
 
 @kernel(inner=True)
-def scaled_poses(table, pool, state, q):
+def scaled_poses(store, state, q):
     """Poses of a state as the program has them."""
-    units = pool_header_at(pool, 0)
-    for b in range(header_at(table, 0).bodies):
+    units = pool_header_at(store.pool, 0)
+    for b in range(header_at(store.table, 0).bodies):
         for k in range(3):
             q[b, k] = (state[7 * b + k] - units.reference[k]) / units.scale
         for k in range(3, 7):
@@ -40,12 +40,12 @@ def scaled_poses(table, pool, state, q):
 
 
 @kernel(inner=True)
-def write_pose(table, pool, q, state):
+def write_pose(store, q, state):
     """Poses of the moving bodies into the state, in the user's coordinates; what did not move keeps its bits."""
-    units = pool_header_at(pool, 0)
-    header = header_at(table, 0)
+    units = pool_header_at(store.pool, 0)
+    header = header_at(store.table, 0)
     for b in range(header.bodies):
-        if table[header.slots + b] >= 0:
+        if store.table[header.slots + b] >= 0:
             for k in range(3):
                 if q[b, k] != (state[7 * b + k] - units.reference[k]) / units.scale:
                     state[7 * b + k] = q[b, k] * units.scale + units.reference[k]
@@ -89,24 +89,24 @@ def bring_back(held, rows, current, y):
 
 
 @kernel(inner=True)
-def judge(table, pool, state, lifted, workspace, shape, rows, current, trial, bound, lax):
+def judge(store, state, lifted, workspace, shape, rows, current, trial, bound, lax):
     """The pose as it is returned, rounded to the user's coordinates, evaluated afresh into `trial`.
 
     Residuals and pairs found are copied to `here`. Returns whether every row holds within the bound, and the largest
     violation, tangency counted by gaps if `lax`.
     """
     q = trial.q
-    scaled_poses(table, pool, state, q)
-    lost = evaluate(table, pool, current.tracked, BEND, lifted, workspace, trial)
+    scaled_poses(store, state, q)
+    lost = evaluate(store, current.tracked, BEND, lifted, workspace, trial)
     if lost >= 0:
         return False, math.inf
     for r in range(rows):
         current.residual[r] = trial.residual[r]
-    for k in range(header_at(table, 0).contacts):
+    for k in range(header_at(store.table, 0).contacts):
         for i in range(TRACK):
             current.tracked[k, i] = trial.tracked[k, i]
-    violation = off_rows(table, lifted, shape.one_sided, trial, lax)
-    holds = free_pairs_hold(table, pool, q, current.tracked, lifted.free, 1e-9)
+    violation = off_rows(store.table, lifted, shape.one_sided, trial, lax)
+    holds = free_pairs_hold(store, q, current.tracked, lifted.free, 1e-9)
     return holds and violation <= bound, violation
 
 

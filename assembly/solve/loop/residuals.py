@@ -306,21 +306,21 @@ def move(table, q, d, alpha, out):
 
 
 @kernel(inner=True)
-def turned(table, pool, tracked):
+def turned(store, tracked):
     """The largest product of a factor and an angle in a row."""
-    header = header_at(table, 0)
+    header = header_at(store.table, 0)
     most = 0.0
     for r in range(header.contacts, header.rows):
         row = header.row_table + ROW * r
-        joint = joint_row_at(table, row)
-        if row_at(table, row).kind != JOINT_ROW:
+        joint = joint_row_at(store.table, row)
+        if row_at(store.table, row).kind != JOINT_ROW:
             continue
         o = joint.parameters
         if joint.angle >= 0:
-            most = max(most, max(abs(pool[o + 2]), abs(pool[o] * tracked[joint.angle, 0])))
+            most = max(most, max(abs(store.pool[o + 2]), abs(store.pool[o] * tracked[joint.angle, 0])))
         second = joint.second
-        if second >= 0 and table[second + 3] >= 0:
-            most = max(most, abs(pool[o + 1] * tracked[table[second + 3], 0]))
+        if second >= 0 and store.table[second + 3] >= 0:
+            most = max(most, abs(store.pool[o + 1] * tracked[store.table[second + 3], 0]))
     return most
 
 

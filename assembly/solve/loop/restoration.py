@@ -41,14 +41,13 @@ def way_back(program, current, trial, rows, weights, mu, softness, share, enough
     `weights` is room for which rows count, and for forces. Returns the softness that the step took, and how far off the
     rows it leads: infinitely where bodies may not go so far, or a pair is lost.
     """
-    table, pool, shape, lifted, workspace = (
-        program.table,
-        program.pool,
+    store, shape, lifted, workspace = (
+        program.store,
         program.structure,
         program.lifted,
         program.tapes,
     )
-    header = header_at(table, 0)
+    header = header_at(store.table, 0)
     active, forces, _foreseen = weights
     step, lagrangian, matrix = system.directions.step, system.hessian, system.factor
     bases, one_sided = shape.bases, shape.one_sided
@@ -69,13 +68,13 @@ def way_back(program, current, trial, rows, weights, mu, softness, share, enough
         forces,
         step,
     )
-    move(table, current.q, step, share, trial.q)
-    predict_pairs(table, pool, bases, lifted, current, trial, step, share)
-    if header.watch >= 0 and is_too_far(table, pool, lifted.memory, trial):
+    move(store.table, current.q, step, share, trial.q)
+    predict_pairs(store, bases, lifted, current, trial, step, share)
+    if header.watch >= 0 and is_too_far(store, lifted.memory, trial):
         return softness, math.inf
-    if evaluate(table, pool, lifted.guess, BEND, lifted, workspace, trial) >= 0:
+    if evaluate(store, lifted.guess, BEND, lifted, workspace, trial) >= 0:
         return softness, math.inf
-    return softness, off_rows(table, lifted, one_sided, trial, tick)
+    return softness, off_rows(store.table, lifted, one_sided, trial, tick)
 
 
 @kernel(inner=True)

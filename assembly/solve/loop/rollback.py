@@ -30,32 +30,32 @@ BEGINNINGS, LEFT = 3, 20
 
 
 @kernel(inner=True)
-def has_sunk(table, pool, memory, residual):
+def has_sunk(store, memory, residual):
     """Whether bodies are deep in each other, or where no contact says so.
 
     Of solids rows lead out the way they came: corners stay on their faces.
     """
-    header = header_at(table, 0)
+    header = header_at(store.table, 0)
     for k in range(header.guards):
         r = header.first_guard + k
-        row = contact_row_at(table, header.row_table + ROW * r)
+        row = contact_row_at(store.table, header.row_table + ROW * r)
         if row.guard_number > 0 and row.shell_f < 0:
             # How far bodies may go in one step is behind the least gap, which the residual is less.
             at = row.minimum
-            if residual[r] + pool[at] < -DEEP * pool[at + 1]:
+            if residual[r] + store.pool[at] < -DEEP * store.pool[at + 1]:
                 return True
-    return any_crossed(table, header.watch, memory)
+    return any_crossed(store.table, header.watch, memory)
 
 
 @kernel(inner=True)
-def begin_again(table, pool, held, lifted, current, y, better_y):
+def begin_again(store, held, lifted, current, y, better_y):
     """Back to the pose that is held. Its contacts are found anew; no row has pushed yet."""
-    header = header_at(table, 0)
+    header = header_at(store.table, 0)
     memory, free = lifted.memory, lifted.free
     bring_back(held, header.rows, current, y)
-    forget_clearance_rows(table, memory)
-    update_around(table, pool, memory, current, AS_NEEDED)
-    place_clearance_rows(table, memory, current, y, better_y, free, False)
+    forget_clearance_rows(store.table, memory)
+    update_around(store, memory, current, AS_NEEDED)
+    place_clearance_rows(store.table, memory, current, y, better_y, free, False)
     for r in range(header.rows):
         y[r] = 0.0
         better_y[r] = 0.0

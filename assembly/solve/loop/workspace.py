@@ -33,7 +33,7 @@ System = namedtuple("System", "gradient directions hessian factor")
 # Of all unknowns: right side of the system, or scratch; the step; the step before its second-order correction.
 Directions = namedtuple("Directions", "descent step straight")
 # What stays as it is for a whole solve: table and pool, `Structure`, `LiftedPairs`, `TapeRoom`.
-Program = namedtuple("Program", "table pool structure lifted tapes")
+Program = namedtuple("Program", "store structure lifted tapes")
 # All that a solve works in. `numbers`: of the contacts that clearances had at the last feasible iterate; `gram`: room
 # for least squares; `way`: what is known of a way back (`restoration.py`).
 Workspace = namedtuple("Workspace", "here trial held by_row structure lifted numbers tapes gram way system")

@@ -14,6 +14,7 @@ import numpy as np
 
 from assembly._carve import carve
 from assembly._kernel import kernel
+from assembly._record import Store
 from assembly.constraints.program.evaluate import evaluate
 from assembly.constraints.program.records import header_at
 from assembly.constraints.program.row_terms import add_row_terms
@@ -47,26 +48,28 @@ def write_tracked(table, tracked, state):
 
 
 @kernel(inner=True, allocates=True)
-def write_curvature(table, pool, state, forces, out, tips, integers, doubles):
+def write_curvature(store, state, forces, out, tips, integers, doubles):
     """The same as `curvature_at`, with what it works in."""
-    header = header_at(table, 0)
+    header = header_at(store.table, 0)
     pairs = header.contacts
     free = np.empty(pairs, np.int64)
-    found = point_at(table, pool, state, free)
+    found = point_at(store, state, free)
     lost, count, point, loose, room = found.lost, found.count, found.iterate, found.lifted, found.tapes
     if lost >= 0:
         return -1
-    write_tracked(table, point.tracked, state)
+    write_tracked(store.table, point.tracked, state)
     rows, n = header.rows + 4 * count, 6 * header.moving + 4 * count
-    shape = shape_of(table, header.rows + 4 * pairs, 6 * header.moving + 4 * pairs, table[:0], integers, doubles)
-    arrange(table, free, shape, rows, n)
+    shape = shape_of(
+        store.table, header.rows + 4 * pairs, 6 * header.moving + 4 * pairs, store.table[:0], integers, doubles
+    )
+    arrange(store.table, free, shape, rows, n)
     jacobian = carve(out, 1 + rows + n, (rows, n))
     hessian = carve(out, 1 + rows + n + rows * n, (n, n))
     slopes = np.zeros(n)
     for i in range(out.size):
         out[i] = 0.0
-    out[0] = goal(table, pool, shape, rows, loose, room, tips, point, 1, slopes, hessian)
-    add_row_terms(table, pool, loose, room, shape, point, forces, np.zeros(rows), hessian)
+    out[0] = goal(store, shape, rows, loose, room, tips, point, 1, slopes, hessian)
+    add_row_terms(store, loose, room, shape, point, forces, np.zeros(rows), hessian)
     for r in range(rows):
         out[1 + r] = point.residual[r]
         add_row(shape.bases, point.jacobian, r, 1.0, jacobian[r])
@@ -93,7 +96,9 @@ def curvature_at(table, pool, state, forces, out, tips):
     header = header_at(table, 0)
     pairs = header.contacts
     integers, doubles = size_of_shape(table, header.rows + 4 * pairs, 6 * header.moving + 4 * pairs)
-    return write_curvature(table, pool, state, forces, out, tips, np.empty(integers, np.int64), np.empty(doubles))
+    return write_curvature(
+        Store(table, pool), state, forces, out, tips, np.empty(integers, np.int64), np.empty(doubles)
+    )
 
 
 @kernel(inline=True)
@@ -106,42 +111,42 @@ def is_at_most(values, limit):
 
 
 @kernel(inner=True, allocates=True)
-def walk_within(table, pool, state, step, share, kept, residual, tips, integers, doubles):
+def walk_within(store, state, step, share, kept, residual, tips, integers, doubles):
     """The same as `walk`, with what it works in."""
-    header = header_at(table, 0)
+    header = header_at(store.table, 0)
     pairs = header.contacts
     free = np.empty(pairs, np.int64)
-    found = point_at(table, pool, state, free)
+    found = point_at(store, state, free)
     lost, count, here, loose, room = found.lost, found.count, found.iterate, found.lifted, found.tapes
     rows, n = header.rows + 4 * count, 6 * header.moving + 4 * count
     if lost >= 0 or n != step.size:
         return math.inf
-    blocks = record_of_blocks(table)
-    shape = shape_of(table, header.rows + 4 * pairs, 6 * header.moving + 4 * pairs, blocks, integers, doubles)
-    arrange(table, free, shape, rows, n)
+    blocks = record_of_blocks(store.table)
+    shape = shape_of(store.table, header.rows + 4 * pairs, 6 * header.moving + 4 * pairs, blocks, integers, doubles)
+    arrange(store.table, free, shape, rows, n)
     for r in range(header.rows):
         if kept[r] > 0.0:
             shape.one_sided[r] = 0
-    trial = new_point(table)
+    trial = new_point(store.table)
     trial.q[:] = here.q
     system = unknowns(n, shape.sparsity)
     lagrangian, matrix = system.hessian, system.factor
     active, forces, way = np.zeros(rows), np.zeros(rows), step.copy()
     before = math.inf
     for _ in range(STEPS):
-        move(table, here.q, way, share, trial.q)
-        predict_pairs(table, pool, shape.bases, loose, here, trial, way, share)
-        if evaluate(table, pool, loose.guess, BEND, loose, room, trial) >= 0:
+        move(store.table, here.q, way, share, trial.q)
+        predict_pairs(store, shape.bases, loose, here, trial, way, share)
+        if evaluate(store, loose.guess, BEND, loose, room, trial) >= 0:
             return math.inf
         here, trial = trial, here
         share = 1.0
-        off = off_rows(table, loose, shape.one_sided, here, False)
+        off = off_rows(store.table, loose, shape.one_sided, here, False)
         if off <= EXACT or (off <= HOLDS and off > GAIN * before):
-            write_pose(table, pool, here.q, state)
-            write_tracked(table, here.tracked, state)
+            write_pose(store, here.q, state)
+            write_tracked(store.table, here.tracked, state)
             for r in range(rows):
                 residual[r] = here.residual[r]
-            return goal(table, pool, shape, rows, loose, room, tips, here, 0, way, lagrangian)
+            return goal(store, shape, rows, loose, room, tips, here, 0, way, lagrangian)
         before = off
         if not math.isfinite(off):
             break
@@ -182,25 +187,25 @@ def walk(table, pool, state, step, share, kept, residual, tips):
     pairs = header.contacts
     integers, doubles = size_of_shape(table, header.rows + 4 * pairs, 6 * header.moving + 4 * pairs)
     return walk_within(
-        table, pool, state, step, share, kept, residual, tips, np.empty(integers, np.int64), np.empty(doubles)
+        Store(table, pool), state, step, share, kept, residual, tips, np.empty(integers, np.int64), np.empty(doubles)
     )
 
 
 @kernel(inner=True, allocates=True)
-def least_within(table, pool, state, forces, active, direction, tips, integers, doubles):
+def least_within(store, state, forces, active, direction, tips, integers, doubles):
     """The same as `least_curvature`, with what it works in."""
-    header = header_at(table, 0)
-    found = point_at(table, pool, state, np.empty(header.contacts, np.int64))
+    header = header_at(store.table, 0)
+    found = point_at(store, state, np.empty(header.contacts, np.int64))
     lost, count, point, loose, room = found.lost, found.count, found.iterate, found.lifted, found.tapes
     rows, n = header.rows, 6 * header.moving
     if lost >= 0 or count > 0:
         return math.nan
-    shape = shape_of(table, rows, n, record_of_blocks(table), integers, doubles)
-    arrange(table, loose.free, shape, rows, n)
+    shape = shape_of(store.table, rows, n, record_of_blocks(store.table), integers, doubles)
+    arrange(store.table, loose.free, shape, rows, n)
     system = unknowns(n, shape.sparsity)
     gradient, lines, lagrangian, matrix = system.gradient, system.directions, system.hessian, system.factor
-    goal(table, pool, shape, rows, loose, room, tips, point, 1, gradient, lagrangian)
-    add_row_terms(table, pool, loose, room, shape, point, forces, active, lagrangian)
+    goal(store, shape, rows, loose, room, tips, point, 1, gradient, lagrangian)
+    add_row_terms(store, loose, room, shape, point, forces, active, lagrangian)
     shift = factorize_shifted(lagrangian, n, shape.sparsity, LEAST_SHIFT, matrix)
     if shift < 0.0:
         return math.nan
@@ -242,5 +247,5 @@ def least_curvature(table, pool, state, forces, active, direction, tips):
     header = header_at(table, 0)
     integers, doubles = size_of_shape(table, header.rows, 6 * header.moving)
     return least_within(
-        table, pool, state, forces, active, direction, tips, np.empty(integers, np.int64), np.empty(doubles)
+        Store(table, pool), state, forces, active, direction, tips, np.empty(integers, np.int64), np.empty(doubles)
     )

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from assembly._kernel import kernel
+from assembly._record import Store
 from assembly.constraints.model.constraint import Constraint
 from assembly.constraints.model.expression import Expression
 from assembly.constraints.model.objectives import Objective
@@ -48,14 +49,14 @@ PAIRS = np.array(np.meshgrid(ARGUMENTS, ARGUMENTS)).reshape(2, -1).T.copy()
 @kernel
 def run_compiled(table, pool, o, xs, work, ys):
     for k in range(xs.shape[0]):
-        tape.run_tape(table, pool, o, xs[k], work, ys[k])
+        tape.run_tape(Store(table, pool), o, xs[k], work, ys[k])
 
 
 def run_plain(table, pool, o, xs, work, ys):
     # What numpy warns of is what these arguments are for.
     with np.errstate(all="ignore"):
         for x, y in zip(xs, ys, strict=True):
-            tape.run_tape(table, pool, o, x, work, y)
+            tape.run_tape(Store(table, pool), o, x, work, y)
 
 
 def run(packed, x, size, compiled=True):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import assembly as asm
+from assembly._record import Store
 from assembly.geometry.splines.evaluate import SURFACE_RECORD
 from assembly.geometry.vec import matvec
 from assembly.kinematics.motion import relative_pose, rotation
@@ -27,7 +28,7 @@ def root_of(f, q_f, g, q_g, start):
     turn, shift = relative_pose(q, 0, rotation(q, 0), 1, rotation(q, 1))
     table, pool = np.asarray(table), np.asarray(pool)
     out = np.full((1, roots.ROOT), np.nan)
-    found = roots.surfaces_extremum(table, pool, posed(turn, shift, (0, SURFACE_RECORD)), tuple(start), out, 0)
+    found = roots.surfaces_extremum(Store(table, pool), posed(turn, shift, (0, SURFACE_RECORD)), tuple(start), out, 0)
     return found, out[0], rotation(q, 0)
 
 

@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import assembly as asm
+from assembly._record import Store
 from assembly.constraints.program.records import (
     CLEARANCE_ROW_NUMBER,
     CLEARANCE_ROWS,
@@ -71,13 +72,13 @@ def test_what_has_sunk():
     ):
         residual[r] = -depth * DEEP * flank
         table[row + CLEARANCE_ROW_NUMBER], table[row + SHELL_F] = number, shell
-        assert has_sunk(table, pool, memory, residual) == sunk
+        assert has_sunk(Store(table, pool), memory, residual) == sunk
     # What is nearer than it is to be is not in the other body.
     table[row + SHELL_F], table[row + CLEARANCE_ROW_NUMBER] = surfaces, 1
     pool[table[row + MINIMUM]] = 2.0 * flank
     residual[r] = -1.5 * flank
-    assert not has_sunk(table, pool, memory, residual)
+    assert not has_sunk(Store(table, pool), memory, residual)
     residual[r] = 0.0
     for told, sunk in ((np.nan, False), (0.0, False), (1.0, True)):
         memory[MEMORY_HEADER + CROSSED] = told
-        assert has_sunk(table, pool, memory, residual) == sunk
+        assert has_sunk(Store(table, pool), memory, residual) == sunk

@@ -63,16 +63,16 @@ def segment_distance(d, f, g, h, k):
 
 
 @kernel(inline=True)
-def apart(pool, o, p, turn, shift, s, t):
+def apart(pool, o, p, pose, s, t):
     """The Difference at lengths s and t along the parts at o and p."""
     pf, f, bend_f = centerline_point(pool, o, s)
     q, g, bend_g = centerline_point(pool, p, t)
     return Difference(
-        d=sub(add(matvec(turn, q), shift), pf),
+        d=sub(add(matvec(pose.rotation, q), pose.shift), pf),
         tangent_f=f,
         curvature_f=bend_f,
-        tangent_g=matvec(turn, g),
-        curvature_g=matvec(turn, bend_g),
+        tangent_g=matvec(pose.rotation, g),
+        curvature_g=matvec(pose.rotation, bend_g),
     )
 
 
@@ -141,7 +141,7 @@ def beyond_joints(pool, o, low, high, d, sign, slack, least, bend):
 
 
 @kernel(inline=True)
-def box_of(pool, o, p, turn, shift, box, open_ends, reach, rho):
+def box_of(pool, o, p, pose, box, open_ends, reach, rho):
     """What a box, Lengths, of the parts at o and p is.
 
     One that is beyond the reach is EMPTY, for longer than that. `open_ends` are where F_s, and F_t, may have any value
@@ -153,7 +153,7 @@ def box_of(pool, o, p, turn, shift, box, open_ends, reach, rho):
     """
     h = 0.5 * (box.to_f - box.from_f)
     k = 0.5 * (box.to_g - box.from_g)
-    middle = apart(pool, o, p, turn, shift, box.from_f + h, box.from_g + k)
+    middle = apart(pool, o, p, pose, box.from_f + h, box.from_g + k)
     d, f, g = middle.d, middle.tangent_f, middle.tangent_g
     bend_f, bend_g = middle.curvature_f, middle.curvature_g
     kf = centerline_part_at(pool, o).bend
@@ -200,7 +200,9 @@ def box_of(pool, o, p, turn, shift, box, open_ends, reach, rho):
         # Where the curvature jumps at the border of the box a minimum may be born, and run into it, if F is not convex
         # beyond.
         ss_low, bend_f = beyond_joints(pool, o, box.from_f, box.to_f, d, -1.0, h + k, ss_low, kf)
-        tt_low, bend_g = beyond_joints(pool, p, box.from_g, box.to_g, matvec_t(turn, d), 1.0, h + k, tt_low, kg)
+        tt_low, bend_g = beyond_joints(
+            pool, p, box.from_g, box.to_g, matvec_t(pose.rotation, d), 1.0, h + k, tt_low, kg
+        )
         if bend_f >= 0.0 or bend_g >= 0.0:
             bend_f, bend_g = max(bend_f, kf), max(bend_g, kg)
             over, least_margin = shape_of(

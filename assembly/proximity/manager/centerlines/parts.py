@@ -8,6 +8,7 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly.geometry.vec import add, dot, matvec, sub
+from assembly.kinematics.motion import RelativePose
 from assembly.proximity.bvh.neighbor_list import (
     ENTRIES,
     ENTRY,
@@ -30,44 +31,44 @@ from assembly.proximity.manager.wires import (
 
 
 @kernel(inline=True)
-def balls_apart(pool, o, p, turn, shift):
+def balls_apart(pool, o, p, pose):
     """How far the balls at o and at p are apart, negative where they meet."""
     f, g = ball_at(pool, o), ball_at(pool, p)
-    d = sub(add(matvec(turn, three_of(g.center)), shift), three_of(f.center))
+    d = sub(add(matvec(pose.rotation, three_of(g.center)), pose.shift), three_of(f.center))
     return math.sqrt(dot(d, d)) - f.radius - g.radius
 
 
 @kernel(inline=True)
-def parts_apart(pool, o, p, turn, shift):
+def parts_apart(pool, o, p, pose):
     """A lower bound of the distance of the parts at o of f and at p of g: that of their tangents in the middle."""
     part = centerline_part_at(pool, o)
     part_record = centerline_part_at(pool, p)
     h = part.half
     k = part_record.half
-    d = sub(add(matvec(turn, three_of(part_record.point)), shift), three_of(part.point))
-    least = segment_distance(d, three_of(part.tangent), matvec(turn, three_of(part_record.tangent)), h, k)
+    d = sub(add(matvec(pose.rotation, three_of(part_record.point)), pose.shift), three_of(part.point))
+    least = segment_distance(d, three_of(part.tangent), matvec(pose.rotation, three_of(part_record.tangent)), h, k)
     return least - 0.5 * (part.bend * h * h + part_record.bend * k * k) - ROUNDING
 
 
 @kernel(inline=True)
-def whole_box(table, pool, centerlines, i, j, boxes, b):
+def whole_box(store, centerlines, i, j, boxes, b):
     """Box b: the whole parts i of f and j of g, from and to their ends."""
     box = centerline_box_at(boxes, b)
-    half_f = centerline_part_at(pool, centerline_at(table, centerlines[0]).part_pool + PART * i).half
-    half_g = centerline_part_at(pool, centerline_at(table, centerlines[1]).part_pool + PART * j).half
+    half_f = centerline_part_at(store.pool, centerline_at(store.table, centerlines[0]).part_pool + PART * i).half
+    half_g = centerline_part_at(store.pool, centerline_at(store.table, centerlines[1]).part_pool + PART * j).half
     box.part_f, box.from_f, box.to_f = float(i), -half_f, half_f
     box.part_g, box.from_g, box.to_g = float(j), -half_g, half_g
 
 
 @kernel(inner=True)
-def descend(table, pool, centerlines, turn, shift, reach, stack, out):
+def descend(store, centerlines, pose, reach, stack, out):
     """Parts (k, 2) of two spines that may be within a reach of each other.
 
     Returns how many, or -1 where there is no room; and how far all others are beyond.
     """
     f, g = centerlines
-    line = centerline_at(table, f)
-    centerline = centerline_at(table, g)
+    line = centerline_at(store.table, f)
+    centerline = centerline_at(store.table, g)
     nodes_f = line.node_pool
     nodes_g = centerline.node_pool
     stack[0, 0] = 0
@@ -81,16 +82,16 @@ def descend(table, pool, centerlines, turn, shift, reach, stack, out):
         j = stack[used, 1]
         o = nodes_f + BALL * i
         p = nodes_g + BALL * j
-        apart = balls_apart(pool, o, p, turn, shift)
+        apart = balls_apart(store.pool, o, p, pose)
         if apart > reach:
             beyond = min(beyond, apart)
             continue
-        child_f = table[line.node_table + i]
-        child_g = table[centerline.node_table + j]
+        child_f = store.table[line.node_table + i]
+        child_g = store.table[centerline.node_table + j]
         if child_f < 0 and child_g < 0:
             part_f = np.int64(-1 - child_f)
             part_g = np.int64(-1 - child_g)
-            apart = parts_apart(pool, line.part_pool + PART * part_f, centerline.part_pool + PART * part_g, turn, shift)
+            apart = parts_apart(store.pool, line.part_pool + PART * part_f, centerline.part_pool + PART * part_g, pose)
             if apart > reach:
                 beyond = min(beyond, apart)
                 continue
@@ -102,7 +103,7 @@ def descend(table, pool, centerlines, turn, shift, reach, stack, out):
             continue
         if used + 2 > stack.shape[0]:
             return -1, 0.0
-        down_f = child_g < 0 or (child_f >= 0 and ball_at(pool, o).radius >= ball_at(pool, p).radius)
+        down_f = child_g < 0 or (child_f >= 0 and ball_at(store.pool, o).radius >= ball_at(store.pool, p).radius)
         for k in range(2):
             stack[used, 0] = child_f + k if down_f else i
             stack[used, 1] = j if down_f else child_g + k
@@ -111,48 +112,47 @@ def descend(table, pool, centerlines, turn, shift, reach, stack, out):
 
 
 @kernel(inner=True)
-def parts_beyond(table, pool, posed, reach, stack, out):
+def parts_beyond(store, posed, reach, stack, out):
     """How far two spines are apart at least, where no parts of them are within a reach of each other."""
-    return descend(table, pool, posed.centerlines, posed.turn, posed.shift, reach, stack, out)[1]
+    return descend(store, posed.centerlines, posed.pose, reach, stack, out)[1]
 
 
 @kernel(inner=True)
-def near_parts(table, pool, at, p, posed, moving, reach, ring, stack, out, boxes):
+def near_parts(store, at, p, posed, moving, reach, ring, stack, out, boxes):
     """Boxes of parts of two spines that are within a reach of each other; how many, or -1 where there is no room.
 
     From the list at `at`, as `patch_list.listed_pairs` has patches.
     """
-    turn, shift = posed.turn, posed.shift
+    turn, shift = posed.pose.rotation, posed.pose.shift
     centerlines = posed.centerlines
     f, g = centerlines
-    fits = reaches(table, at, moved_since(table, pool, at, p, moving), reach)
-    if fits == 0 and can_be_listed(table, pool, moving, ring + reach):
-        count, _beyond = descend(table, pool, centerlines, turn, shift, reach + ring, stack, out)
-        fits = 1 if write_list(table, pool, at, p, moving, reach, ring, out, count) else -1
+    fits = reaches(store.table, at, moved_since(store, at, p, moving), reach)
+    if fits == 0 and can_be_listed(store, moving, ring + reach):
+        count, _beyond = descend(store, centerlines, RelativePose(turn, shift), reach + ring, stack, out)
+        fits = 1 if write_list(store, at, p, moving, reach, ring, out, count) else -1
     if fits == 1:
-        many = neighbor_list_at(table, at).count
+        many = neighbor_list_at(store.table, at).count
         for k in range(many):
-            entry = neighbors_at(table, at + ENTRIES + ENTRY * k)
+            entry = neighbors_at(store.table, at + ENTRIES + ENTRY * k)
             out[k, 0] = entry.f
             out[k, 1] = entry.g
     else:
-        many, _beyond = descend(table, pool, centerlines, turn, shift, reach, stack, out)
+        many, _beyond = descend(store, centerlines, RelativePose(turn, shift), reach, stack, out)
     count = 0
     for k in range(many):
         i, j = out[k, 0], out[k, 1]
         if (
             parts_apart(
-                pool,
-                centerline_at(table, f).part_pool + PART * i,
-                centerline_at(table, g).part_pool + PART * j,
-                turn,
-                shift,
+                store.pool,
+                centerline_at(store.table, f).part_pool + PART * i,
+                centerline_at(store.table, g).part_pool + PART * j,
+                RelativePose(turn, shift),
             )
             > reach
         ):
             continue
         if count == boxes.shape[0]:
             return -1
-        whole_box(table, pool, centerlines, i, j, boxes, count)
+        whole_box(store, centerlines, i, j, boxes, count)
         count += 1
     return count if many >= 0 else -1

@@ -76,16 +76,16 @@ MEETING = 1e-12
 
 
 @kernel(inline=True)
-def open_ends(table, pool, f, g, box):
+def open_ends(store, f, g, box):
     """At which free ends of two spines a box is: f's start and end, g's start and end."""
-    line = centerline_at(table, f)
-    centerline = centerline_at(table, g)
+    line = centerline_at(store.table, f)
+    centerline = centerline_at(store.table, g)
     free_f = line.closed == 0
     free_g = centerline.closed == 0
     i = np.int64(box.part_f)
     j = np.int64(box.part_g)
-    half_f = centerline_part_at(pool, line.part_pool + PART * i).half
-    half_g = centerline_part_at(pool, centerline.part_pool + PART * j).half
+    half_f = centerline_part_at(store.pool, line.part_pool + PART * i).half
+    half_g = centerline_part_at(store.pool, centerline.part_pool + PART * j).half
     return FreeEnds(
         start_f=free_f and i == 0 and box.from_f <= -half_f,
         end_f=free_f and i == line.parts - 1 and box.to_f >= half_f,
@@ -95,20 +95,20 @@ def open_ends(table, pool, f, g, box):
 
 
 @kernel(inner=True)
-def mark_known(table, pool, posed, extrema, count, marks):
+def mark_known(store, posed, extrema, count, marks):
     """Where on the spines known roots are that are at a minimum: part and length of either; NaN for others."""
     surfaces = posed.surfaces
     f, g = posed.centerlines
     for k in range(count):
         x = pair_parameters(extremum_at(extrema, k))
-        i, s = centerline_place(table, pool, f, surfaces[0], x[0], x[1])
-        j, t = centerline_place(table, pool, g, surfaces[1], x[2], x[3])
+        i, s = centerline_place(store, f, surfaces[0], x[0], x[1])
+        j, t = centerline_place(store, g, surfaces[1], x[2], x[3])
         mark = known_place_at(marks, k)
         mark.part_f, mark.at_f = float(i), s
         mark.part_g, mark.at_g = float(j), t
-        o = centerline_at(table, f).part_pool + PART * i
-        p = centerline_at(table, g).part_pool + PART * j
-        there = apart(pool, o, p, posed.turn, posed.shift, s, t)
+        o = centerline_at(store.table, f).part_pool + PART * i
+        p = centerline_at(store.table, g).part_pool + PART * j
+        there = apart(store.pool, o, p, posed.pose, s, t)
         d = there.d
         if extremum_at(extrema, k).origin == USELESS or not abs(dot(d, there.tangent_f)) + abs(
             dot(d, there.tangent_g)
@@ -146,35 +146,33 @@ def across_both(f, g):
 
 
 @kernel(inner=True)
-def add_minimum(table, pool, posed, i, j, s, t, merge_radius, extrema, count, work):
+def add_minimum(store, posed, i, j, s, t, merge_radius, extrema, count, work):
     """Add the contact at lengths s and t along parts i and j, if it is none of the known ones. Returns how many."""
     if count == extrema.shape[0]:
         return count
     f, g = posed.centerlines
-    o = centerline_at(table, f).part_pool + PART * i
-    p = centerline_at(table, g).part_pool + PART * j
-    there = apart(pool, o, p, posed.turn, posed.shift, s, t)
+    o = centerline_at(store.table, f).part_pool + PART * i
+    p = centerline_at(store.table, g).part_pool + PART * j
+    there = apart(store.pool, o, p, posed.pose, s, t)
     d = there.d
     length = math.sqrt(dot(d, d))
     way = scale(1.0 / length, d) if length >= MEETING else across_both(there.tangent_f, there.tangent_g)
-    u_f, v_f = wire_parameters(table, pool, f, posed.surfaces[0], i, s, way)
-    u_g, v_g = wire_parameters(table, pool, g, posed.surfaces[1], j, t, matvec_t(posed.turn, scale(-1.0, way)))
+    u_f, v_f = wire_parameters(store, f, posed.surfaces[0], i, s, way)
+    u_g, v_g = wire_parameters(store, g, posed.surfaces[1], j, t, matvec_t(posed.pose.rotation, scale(-1.0, way)))
     start = (u_f, v_f, u_g, v_g)
-    gap = length - both_radii(table, pool, posed.centerlines)
+    gap = length - both_radii(store, posed.centerlines)
     before = count
     extremum = extremum_at(extrema, before)
-    count, found = add_extremum(
-        table, pool, posed, (0, 0), start, (0.0, 0.0, 0.0), merge_radius, extrema, count, work, 0.0
-    )
+    count, found = add_extremum(store, posed, (0, 0), start, (0.0, 0.0, 0.0), merge_radius, extrema, count, work, 0.0)
     if found == NOTHING or not abs(extremum.gap - gap) <= ASTRAY:
         # At a fold Newton's method may find nothing, or go elsewhere: the minimum is known without it.
-        frame = pair_frame(table, pool, posed.surfaces[0], posed.surfaces[1], posed.turn, posed.shift, start)
+        frame = pair_frame(store, posed.surfaces[0], posed.surfaces[1], posed.pose, start)
         if not frame.regular:
             return before
         write(extrema, before, start, 0, 0, frame.normal, frame.gap, frame.point_f, frame.point_g, 0.0)
         for k in range(before):
             radius = min(merge_radius, SAME) if extremum_at(extrema, k).origin == USELESS else merge_radius
-            if are_one(table, pool, posed, extrema, before, k, radius):
+            if are_one(store, posed, extrema, before, k, radius):
                 return before
         count = before + 1
     if count > before:
@@ -207,39 +205,36 @@ def halves(boxes, b):
 
 
 @kernel(inner=True)
-def add_minima(table, pool, posed, box, ends, what, merge_radius, places, extrema, count, work):
+def add_minima(store, posed, box, ends, what, merge_radius, places, extrema, count, work):
     """Add the minima that a box has. Returns how many roots there are, and whether these are all for certain."""
     f, g = posed.centerlines
     i = np.int64(box.part_f)
     j = np.int64(box.part_g)
-    o = centerline_at(table, f).part_pool + PART * i
-    p = centerline_at(table, g).part_pool + PART * j
+    o = centerline_at(store.table, f).part_pool + PART * i
+    p = centerline_at(store.table, g).part_pool + PART * j
     part = Lengths(box.from_f, box.to_f, box.from_g, box.to_g)
     certain = True
     settled = False
     if what == CONVEX:
         s, t = 0.5 * (box.from_f + box.to_f), 0.5 * (box.from_g + box.to_g)
-        found, s, t, settled = convex_minimum(pool, o, p, posed.turn, posed.shift, part, ends, s, t)
+        found, s, t, settled = convex_minimum(store.pool, o, p, posed.pose, part, ends, s, t)
         if found:
-            count = add_minimum(table, pool, posed, i, j, s, t, merge_radius, extrema, count, work)
+            count = add_minimum(store, posed, i, j, s, t, merge_radius, extrema, count, work)
     if not settled:
-        many, level, certain = near_singular_minima(pool, o, p, posed.turn, posed.shift, part, ends, places)
+        many, level, certain = near_singular_minima(store.pool, o, p, posed.pose, part, ends, places)
         if level:
             # All along it is as good: points here and there stand for it.
             merge_radius = max(
-                merge_radius, SPARSE / max(centerline_part_at(pool, o).bend, centerline_part_at(pool, p).bend)
+                merge_radius,
+                SPARSE / max(centerline_part_at(store.pool, o).bend, centerline_part_at(store.pool, p).bend),
             )
         for m in range(many):
-            count = add_minimum(
-                table, pool, posed, i, j, places[m, 0], places[m, 1], merge_radius, extrema, count, work
-            )
+            count = add_minimum(store, posed, i, j, places[m, 0], places[m, 1], merge_radius, extrema, count, work)
     return count, certain
 
 
 @kernel(inner=True)
-def search_centerlines(
-    table, pool, posed, moving, rho, lengths, merge_radius, boxes, waiting, rooms, extrema, count, work
-):
+def search_centerlines(store, posed, moving, rho, lengths, merge_radius, boxes, waiting, rooms, extrema, count, work):
     """Look for all contacts of two wires with gaps up to `near`; known ones are the first `count` roots.
 
     The `lengths` are the least gap asked for, how near is near, the reach, and the flank: how far bodies may go at a
@@ -250,14 +245,14 @@ def search_centerlines(
     """
     least, near, reach, flank = lengths
     f, g = posed.centerlines
-    line = centerline_at(table, f)
-    centerline = centerline_at(table, g)
+    line = centerline_at(store.table, f)
+    centerline = centerline_at(store.table, g)
     side = moving.side
-    radii = both_radii(table, pool, posed.centerlines) + least
-    sharpest = max(wire_at(pool, line.numbers).sharpest, wire_at(pool, centerline.numbers).sharpest)
+    radii = both_radii(store, posed.centerlines) + least
+    sharpest = max(wire_at(store.pool, line.numbers).sharpest, wire_at(store.pool, centerline.numbers).sharpest)
     known = count
     marks, places = rooms
-    mark_known(table, pool, posed, extrema, known, marks)
+    mark_known(store, posed, extrema, known, marks)
     free = reach
     fertile = math.inf
     sure = math.inf
@@ -270,8 +265,8 @@ def search_centerlines(
         o = line.part_pool + PART * np.int64(box.part_f)
         p = centerline.part_pool + PART * np.int64(box.part_g)
         part = Lengths(box.from_f, box.to_f, box.from_g, box.to_g)
-        ends = open_ends(table, pool, f, g, box)
-        low, what, margin = box_of(pool, o, p, posed.turn, posed.shift, part, ends, radii + reach, rho)
+        ends = open_ends(store, f, g, box)
+        low, what, margin = box_of(store.pool, o, p, posed.pose, part, ends, radii + reach, rho)
         low -= radii
         # A minimum that a box may hold, and nobody looks for, is as near as the box.
         hollow = what == EMPTY or what == BARREN
@@ -289,7 +284,7 @@ def search_centerlines(
             waiting += 1
             continue
         if low <= near and not hollow and not (what == CONVEX and is_marked(boxes, b, marks, known)):
-            count, certain = add_minima(table, pool, posed, box, ends, what, merge_radius, places, extrema, count, work)
+            count, certain = add_minima(store, posed, box, ends, what, merge_radius, places, extrema, count, work)
             if halve or count == extrema.shape[0] or not certain:
                 # There may be one that is not known.
                 allowed = low
@@ -302,7 +297,7 @@ def search_centerlines(
             sure = min(sure, allowed)
             allowed = flank
         fertile = min(fertile, allowed)
-        lo, hi = around_box(pool, p if side == 1 else o, box, side, lo, hi)
+        lo, hi = around_box(store.pool, p if side == 1 else o, box, side, lo, hi)
     if not fertile < math.inf:
         return PairSearch(count, free, fertile, no_ball(), sure)
     d = sub(hi, lo)
